@@ -1,0 +1,1 @@
+"""What the images tell: line extraction, triangulation, error, report."""

@@ -1,0 +1,1 @@
+"""Where the laser line is in an image."""

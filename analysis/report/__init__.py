@@ -1,0 +1,1 @@
+"""One self-contained report of a scan, HTML and PDF."""

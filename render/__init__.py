@@ -1,0 +1,1 @@
+"""What is there and what light does: scene model, exact truth, light transport, sensor."""

@@ -1,0 +1,182 @@
+"""The camera: pinhole with skew and OpenCV distortion, pixel centres at integers.
+
+    x = X/Z, y = Y/Z  ->  (x', y') = distort(x, y)  ->  u = fx x' + skew y' + cx,  v = fy y' + cy
+
+`project` runs the model forwards, `rays` inverts it (to 1e-10 px); both say where the model has no answer.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import field_validator
+
+from render.distortion import distort_points, fold_radii, undistort_points
+from render.model import Model, UnitInterval, quantity
+from render.pose import Pose
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+MAX_SIDE = 32768
+
+
+class Lens(Model):
+    """What the lens does to the amount of light; the geometry is in the camera."""
+
+    f_number: float = quantity(1.4, label="f-number", help="Focal length over entrance pupil.", gt=0, le=256)
+    transmission: UnitInterval = quantity(0.9, label="Transmission", help="Of lens and filter, at the laser.")
+    focus_distance: float | None = quantity(
+        None, unit="m", label="Focus distance", help="Empty: far away.", gt=0, le=1e6
+    )
+    vignetting: bool = quantity(True, label="Natural vignetting", help="cos^4 fall-off towards the corners.")
+
+
+class Camera(Model):
+    """A camera on the rig. Frame: x right, y down, z forward (OpenCV)."""
+
+    width: int = quantity(unit="px", label="Width", gt=0, le=MAX_SIDE)
+    height: int = quantity(unit="px", label="Height", gt=0, le=MAX_SIDE)
+    fx: float = quantity(unit="px", label="fx", help="Image distance over pixel pitch.", gt=0, le=1e7)
+    fy: float = quantity(unit="px", label="fy", gt=0, le=1e7)
+    cx: float = quantity(unit="px", label="cx", help="Centred: (width - 1) / 2.", ge=-1e6, le=1e6)
+    cy: float = quantity(unit="px", label="cy", help="Centred: (height - 1) / 2.", ge=-1e6, le=1e6)
+    skew: float = quantity(0.0, unit="px", label="Skew", ge=-1e5, le=1e5)
+    distortion: tuple[float, ...] = quantity(
+        (), label="Distortion", help="OpenCV: k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [taux tauy]]]]."
+    )
+    pixel_pitch: float = quantity(3.45e-6, unit="m", label="Pixel pitch", gt=0, le=1e-3)
+    lens: Lens = Lens()
+    T_rig_camera: Pose = Pose()
+
+    @field_validator("distortion")
+    @classmethod
+    def _known_length(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if len(value) not in DISTORTION_LENGTHS:
+            raise ValueError(f"has {len(value)} coefficients; allowed: 0, 4, 5, 8, 12 or 14")
+        return value
+
+    @classmethod
+    def from_physical(
+        cls,
+        width: int,
+        height: int,
+        pixel_pitch: float,
+        focal_length: float,
+        *,
+        f_number: float = 1.4,
+        focus_distance: float | None = None,
+        T_rig_camera: Pose = Pose(),
+        distortion: tuple[float, ...] = (),
+    ) -> Camera:
+        """Centred camera from lengths in m. A thin lens focused at s has its image at f s / (s - f), so fx grows."""
+        image_distance = focal_length
+        if focus_distance is not None:
+            if focus_distance <= focal_length:
+                raise ValueError(f"focus_distance {focus_distance} m must exceed the focal length {focal_length} m")
+            image_distance = focal_length * focus_distance / (focus_distance - focal_length)
+        return cls(
+            width=width,
+            height=height,
+            fx=image_distance / pixel_pitch,
+            fy=image_distance / pixel_pitch,
+            cx=(width - 1) / 2,
+            cy=(height - 1) / 2,
+            pixel_pitch=pixel_pitch,
+            distortion=distortion,
+            lens=Lens(f_number=f_number, focus_distance=focus_distance),
+            T_rig_camera=T_rig_camera,
+        )
+
+    @cached_property
+    def matrix(self) -> Array:
+        """(3, 3) K."""
+        return np.array([[self.fx, self.skew, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """(14,) distortion, zero padded."""
+        padded = np.zeros(14)
+        padded[: len(self.distortion)] = self.distortion
+        return padded
+
+    @property
+    def has_distortion(self) -> bool:
+        return any(c != 0.0 for c in self.distortion)
+
+    @property
+    def working_f_number(self) -> float:
+        """N (1 + m), m the magnification of the focused plane."""
+        if self.lens.focus_distance is None:
+            return self.lens.f_number
+        return self.lens.f_number * (1.0 + self.fx * self.pixel_pitch / self.lens.focus_distance)
+
+    def scaled(self, scale: float) -> Camera:
+        """The same view with `scale` times the pixels a side (pixel-centre convention kept).
+
+        The sides are rounded; fx, fy follow each side's own ratio, so that the field of view is kept exactly.
+        """
+        width, height = max(1, round(self.width * scale)), max(1, round(self.height * scale))
+        sx, sy = width / self.width, height / self.height
+        return self.model_copy(
+            update={
+                "width": width,
+                "height": height,
+                "fx": self.fx * sx,
+                "fy": self.fy * sy,
+                "skew": self.skew * sx,
+                "cx": (self.cx + 0.5) * sx - 0.5,
+                "cy": (self.cy + 0.5) * sy - 0.5,
+                "pixel_pitch": self.pixel_pitch / sx,
+            }
+        )
+
+    def project(self, points: Array) -> tuple[Array, Mask]:
+        """(..., 3) points in the camera frame -> (..., 2) pixels (u, v) and (...) valid.
+
+        Invalid: behind the camera, or beyond the radius where the distortion folds back. Pixels may lie off the image.
+        """
+        flat = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 3))
+        ahead = flat[:, 2] > 0.0
+        normalised = flat[:, :2] / np.where(ahead, flat[:, 2], 1.0)[:, None]
+        distorted, inside = distort_points(normalised, self.coefficients, self._folds())
+        pixels = np.empty_like(distorted)
+        pixels[:, 0] = self.fx * distorted[:, 0] + self.skew * distorted[:, 1] + self.cx
+        pixels[:, 1] = self.fy * distorted[:, 1] + self.cy
+        valid = ahead & inside
+        pixels[~valid] = np.nan
+        shape = np.shape(points)[:-1]
+        return pixels.reshape(*shape, 2), valid.reshape(shape)
+
+    def normalise(self, pixels: Array) -> tuple[Array, Mask]:
+        """(..., 2) pixels -> (..., 2) undistorted (X/Z, Y/Z) and (...) valid; residual below 1e-10 px where valid."""
+        flat = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        distorted = np.empty_like(flat)
+        distorted[:, 1] = (flat[:, 1] - self.cy) / self.fy
+        distorted[:, 0] = (flat[:, 0] - self.cx - self.skew * distorted[:, 1]) / self.fx
+        normalised, valid = undistort_points(
+            distorted, self.coefficients, self._folds(), 1e-10 / max(self.fx, self.fy)
+        )
+        normalised[~valid] = np.nan
+        shape = np.shape(pixels)[:-1]
+        return normalised.reshape(*shape, 2), valid.reshape(shape)
+
+    def rays(self, pixels: Array) -> tuple[Array, Mask]:
+        """(..., 2) pixels -> (..., 3) unit directions in the camera frame and (...) valid (no ray: NaN, False)."""
+        normalised, valid = self.normalise(pixels)
+        directions = np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
+        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        return directions, valid
+
+    def _folds(self) -> Array:
+        return _cached_folds(self.distortion)
+
+
+@lru_cache(maxsize=64)
+def _cached_folds(distortion: tuple[float, ...]) -> Array:
+    padded = np.zeros(14)
+    padded[: len(distortion)] = distortion
+    return fold_radii(padded)

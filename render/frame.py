@@ -1,0 +1,86 @@
+"""What a render gives: radiance per light group, and the truth that goes with it. Plain arrays, nothing computed here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+Axis = Literal["rows", "columns"]
+
+
+@dataclass(frozen=True)
+class LaserCurve:
+    """The exact line of one laser: one entry for each crossing of the lit and seen curve with a scan line's centre.
+
+    On axis "rows", `index` is the image row v and `position` the sub-pixel column u; on "columns" the other way round.
+    Sorted by index, then position. All (n,) unless said; float64.
+    """
+
+    axis: Axis
+    index: Int
+    position: Float
+    point: Float
+    """(n, 3) m, camera frame."""
+    depth_z: Float
+    depth_range: Float
+    object_id: Int
+    """Index into `scene.visible_objects`."""
+    camera_angle: Float
+    """Angle between the facet's normal and the direction to the camera, rad."""
+    laser_angle: Float
+    """Angle between the facet's normal and the direction to the laser, rad."""
+    irradiance: Float
+    """W/m^2 on the facet, at the centre of the sheet."""
+    segments: Float
+    """(m, 2, 3) m, world frame: the curve cut from the triangles that face camera and laser (before occlusion)."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Per-pixel truth at pixel centres (float64 geometry, stored float32 except position); NaN or -1 where nothing is hit."""
+
+    depth_z: Float32
+    """(h, w) m along the camera's axis."""
+    depth_range: Float32
+    """(h, w) m from the camera's centre."""
+    position: Float32
+    """(h, w, 3) m, world frame."""
+    normal: Float32
+    """(h, w, 3) unit facet normal, world frame, towards the camera."""
+    object_id: Int
+    """(h, w) index into `scene.visible_objects`, -1 for none."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One step of a scan."""
+
+    step: int
+    laser_direct: tuple[Float32, ...]
+    """For each laser (h, w) radiance at its wavelength, W/(m^2 sr), light that met one surface only."""
+    ambient: Float32 | None
+    """(h, w, 3) radiance of ambient light in the bands R, G, B, W/(m^2 sr); None: the scene has no ambient light."""
+    curves: tuple[LaserCurve, ...]
+    """For each laser."""
+    truth: Truth | None
+    plan: str
+    """What was computed, what was left out, and why; one line each."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall time by stage."""
+    counts: dict[str, float] = field(default_factory=dict)
+    """Rays, samples, lit pixels, seconds inside embree, estimated relative error."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        if self.laser_direct:
+            return (self.laser_direct[0].shape[0], self.laser_direct[0].shape[1])
+        image = self.ambient if self.ambient is not None else self.truth.depth_z if self.truth is not None else None
+        if image is None:
+            raise ValueError("an empty frame has no shape")
+        return (image.shape[0], image.shape[1])

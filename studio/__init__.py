@@ -1,0 +1,1 @@
+"""The program without its windows: project file, jobs, the scan pipeline."""
