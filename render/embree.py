@@ -1,0 +1,72 @@
+"""Embree answers "what does this ray hit"; the only file that knows embreex.
+
+Embree works in float32. The scene is shifted to its own centre first, so that coordinates are small, and callers
+recompute each hit in float64 from its triangle.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+Float32 = NDArray[np.float32]
+Int32 = NDArray[np.int32]
+
+CHUNK = 1 << 16
+"""Rays a call: long enough to hide Python's share, short enough to share work and to cancel."""
+
+
+class RayScene:
+    """A committed triangle scene. Methods release the GIL: call them in chunks from threads."""
+
+    def __init__(self, vertices: NDArray[np.float64], triangles: Int32) -> None:
+        """vertices (v, 3) float64 world m, triangles (t, 3) int32, at least one."""
+        self.centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2 if len(vertices) else np.zeros(3)
+        shifted = np.ascontiguousarray(vertices - self.centre, dtype=np.float32)
+        self.extent = float(np.abs(shifted).max()) if len(shifted) else 0.0
+        # robust traversal: no ray slips between two triangles that share an edge
+        self._scene = EmbreeScene(robust=True)
+        self._mesh = TriangleMesh(self._scene, shifted, np.ascontiguousarray(triangles, dtype=np.int32))
+        self._lock = threading.Lock()
+        self.seconds = 0.0
+        self.rays = 0
+        # commits the scene: must happen before any thread traces
+        self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+
+    def intersect(self, origins: Float32, directions: Float32, far: Float32 | None = None) -> tuple[Int32, Float32]:
+        """(n, 3) origins (scene-centred) and directions, (n,) far (changed in place) -> triangle or -1, and distance."""
+        _check(origins, directions, far)
+        with self._timed(len(origins)):
+            hit = self._scene.run(origins, directions, dists=far, output=True)
+        return hit["primID"], hit["tfar"]
+
+    def occluded(self, origins: Float32, directions: Float32, far: Float32) -> NDArray[np.bool_]:
+        """(n, 3) origins (scene-centred), directions, (n,) far (overwritten) -> (n,) something is hit before far."""
+        _check(origins, directions, far)
+        with self._timed(len(origins)):
+            hit = self._scene.run(origins, directions, dists=far, query="OCCLUDED")
+        return np.asarray(hit == 0)
+
+    @contextmanager
+    def _timed(self, rays: int) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        elapsed = time.perf_counter() - start
+        with self._lock:
+            self.seconds += elapsed
+            self.rays += rays
+
+
+def _check(origins: Float32, directions: Float32, far: Float32 | None) -> None:
+    """embreex reads out of bounds when the rows differ, so that is checked here."""
+    n = len(origins)
+    if origins.shape != (n, 3) or directions.shape != (n, 3) or (far is not None and far.shape != (n,)):
+        far_shape = None if far is None else far.shape
+        raise ValueError(f"rays: origins {origins.shape}, directions {directions.shape}, far {far_shape} do not match")
