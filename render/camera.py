@@ -142,7 +142,7 @@ class Camera(Model):
         flat = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 3))
         ahead = flat[:, 2] > 0.0
         normalised = flat[:, :2] / np.where(ahead, flat[:, 2], 1.0)[:, None]
-        distorted, inside = distort_points(normalised, self.coefficients, self._folds())
+        distorted, inside = distort_points(normalised, self.coefficients, self.fold_table)
         pixels = np.empty_like(distorted)
         pixels[:, 0] = self.fx * distorted[:, 0] + self.skew * distorted[:, 1] + self.cx
         pixels[:, 1] = self.fy * distorted[:, 1] + self.cy
@@ -158,7 +158,7 @@ class Camera(Model):
         distorted[:, 1] = (flat[:, 1] - self.cy) / self.fy
         distorted[:, 0] = (flat[:, 0] - self.cx - self.skew * distorted[:, 1]) / self.fx
         normalised, valid = undistort_points(
-            distorted, self.coefficients, self._folds(), 1e-10 / max(self.fx, self.fy)
+            distorted, self.coefficients, self.fold_table, 1e-10 / max(self.fx, self.fy)
         )
         normalised[~valid] = np.nan
         shape = np.shape(pixels)[:-1]
@@ -171,7 +171,9 @@ class Camera(Model):
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         return directions, valid
 
-    def _folds(self) -> Array:
+    @property
+    def fold_table(self) -> Array:
+        """(720,) radius, by angle, up to which the distortion is one-to-one."""
         return _cached_folds(self.distortion)
 
 

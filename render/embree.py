@@ -30,7 +30,9 @@ class RayScene:
         """vertices (v, 3) float64 world m, triangles (t, 3) int32, at least one."""
         self.centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2 if len(vertices) else np.zeros(3)
         shifted = np.ascontiguousarray(vertices - self.centre, dtype=np.float32)
-        self.extent = float(np.abs(shifted).max()) if len(shifted) else 0.0
+        extent = float(np.abs(shifted).max()) if len(shifted) else 0.0
+        # vertices, origin and traversal each round to 2^-24 of the extent; a ray from a surface starts this far off it
+        self.surface_offset = 16.0 * 2.0**-24 * extent
         # robust traversal: no ray slips between two triangles that share an edge
         self._scene = EmbreeScene(robust=True)
         self._mesh = TriangleMesh(self._scene, shifted, np.ascontiguousarray(triangles, dtype=np.int32))
