@@ -1,0 +1,132 @@
+"""What the machine must bring before anything heavy is imported: Python, its venv module, shared libraries, a font.
+
+Standard library only: `make` runs this file with the system's Python before there is an environment, and main.py asks it
+before the imports that would otherwise end in a bare ImportError, or, in VTK, in a segmentation fault.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import glob
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+
+PYTHON_NEEDED = (3, 11)
+FONT_FOLDERS = ("/usr/share/fonts", "/usr/local/share/fonts", "~/.fonts", "~/.local/share/fonts")
+OPENGL_DRIVERS = ("/usr/lib*/dri/*_dri.so", "/usr/lib/*/dri/*_dri.so", "/usr/lib*/libEGL_nvidia.so*")
+
+
+@dataclass(frozen=True)
+class Need:
+    """Something the system must have: how to find it, what it is for, and the Debian package that brings it."""
+
+    library: str
+    package: str
+    purpose: str
+
+
+LIBRARIES = (
+    Need("libgomp.so.1", "libgomp1", "geometry (open3d)"),
+    Need("libusb-1.0.so.0", "libusb-1.0-0", "geometry (open3d)"),
+    Need("libGL.so.1", "libgl1", "geometry and 3D pictures (open3d, VTK)"),
+    Need("libEGL.so.1", "libegl1", "geometry and 3D pictures (open3d, VTK)"),
+    Need("libX11.so.6", "libx11-6", "geometry and 3D pictures (open3d, VTK)"),
+    Need("libpango-1.0.so.0", "libpango-1.0-0", "the PDF report (WeasyPrint)"),
+    Need("libpangoft2-1.0.so.0", "libpangoft2-1.0-0", "the PDF report (WeasyPrint)"),
+    Need("libharfbuzz-subset.so.0", "libharfbuzz-subset0", "the PDF report (WeasyPrint)"),
+)
+DRIVER = Need("an OpenGL driver", "libgl1-mesa-dri", "3D pictures (VTK)")
+FONT = Need("a TrueType font", "fonts-dejavu-core", "the PDF report (WeasyPrint)")
+
+
+def missing_needs() -> list[Need]:
+    """What this machine lacks. Empty where the question cannot be asked this way (not Linux: wheels bring their own)."""
+    if not sys.platform.startswith("linux"):
+        return []
+    missing = [need for need in LIBRARIES if not _loads(need.library)]
+    if not any(glob.glob(pattern) for pattern in OPENGL_DRIVERS):
+        missing.append(DRIVER)
+    if not any(_has_font(os.path.expanduser(folder)) for folder in FONT_FOLDERS):
+        missing.append(FONT)
+    return missing
+
+
+def apt_command(packages: list[str]) -> str:
+    """The exact line a person types to install them."""
+    sudo = "" if os.geteuid() == 0 else "sudo "
+    return f"{sudo}apt-get update && {sudo}apt-get install -y --no-install-recommends {' '.join(packages)}"
+
+
+def message(missing: list[Need]) -> str:
+    """One sentence a need, and the command that brings them all."""
+    lines = [f"missing: {need.library}, needed for {need.purpose}" for need in missing]
+    packages = sorted({need.package for need in missing})
+    if shutil.which("apt-get"):
+        lines.append(f"install with: {apt_command(packages)}")
+    else:
+        lines.append(f"install what Debian calls: {' '.join(packages)}")
+    return "\n".join(lines)
+
+
+def missing_python_package(name: str | None) -> str:
+    """What to say when a Python package is not there: the environment was never set up, or another Python runs."""
+    return (
+        f"the Python package {name or '?'} is not installed for {sys.executable}; `make run` sets everything up "
+        "and runs; by hand: python3 -m venv .venv && .venv/bin/pip install -c .ci/constraints.txt -e ."
+    )
+
+
+def main() -> int:
+    """Check, install where that is possible without asking (root on Debian or Ubuntu), and say what is left."""
+    if sys.version_info < PYTHON_NEEDED:
+        found, wanted = ".".join(map(str, sys.version_info[:3])), ".".join(map(str, PYTHON_NEEDED))
+        print(f"Python {wanted} or newer is needed; found {found} at {sys.executable}", file=sys.stderr)
+        print(f"install it with: {apt_command(['python3.11', 'python3.11-venv'])}", file=sys.stderr)
+        return 2
+    missing = missing_needs()
+    if importlib.util.find_spec("ensurepip") is None or importlib.util.find_spec("venv") is None:
+        package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
+        missing.append(Need("Python's venv module", package, "the virtual environment"))
+    if missing and os.geteuid() == 0 and shutil.which("apt-get"):
+        packages = sorted({need.package for need in missing})
+        print(f"installing system libraries: {' '.join(packages)}", file=sys.stderr)
+        _apt_install(packages)
+        still_missing = missing_needs()
+        venv_is_here = importlib.util.find_spec("ensurepip") is not None
+        missing = still_missing + [need for need in missing if need.package.endswith("-venv") and not venv_is_here]
+    if missing:
+        print(message(missing), file=sys.stderr)
+        return 2
+    return 0
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def _has_font(folder: str) -> bool:
+    return any(name.endswith((".ttf", ".otf", ".ttc")) for _, _, names in os.walk(folder) for name in names)
+
+
+def _apt_install(packages: list[str]) -> None:
+    """Install, refreshing the package lists once if the first attempt fails."""
+    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    install = ["apt-get", "install", "-y", "-qq", "--no-install-recommends", *packages]
+    for command in (install, ["apt-get", "update", "-qq"], install):
+        done = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        if command is install and done.returncode == 0:
+            importlib.invalidate_caches()
+            return
+    print(done.stderr.strip(), file=sys.stderr)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
