@@ -1,0 +1,423 @@
+"""Direct light of a laser: each lit pixel's mean radiance under a box filter.
+
+A pixel is divided into n x n cells with one jittered camera ray each. Where the ray hits, the surface's tangent plane
+tells how the sheet's coordinate q = x / sigma(z) changes along the cell, so the Gaussian across the cell is integrated in
+closed form (a difference of error functions) instead of being sampled; visibility and albedo are sampled. Each ray also
+predicts its whole pixel; the spread of these predictions is the error estimate, and pixels that need it (edges, strong
+curvature, texture) get twice the cells a side until the image's error is below the target.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.beam import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2, fan_density, sheet_sigma
+from render.camera import Camera
+from render.distortion import distort, tilt_matrix, undistort
+from render.embree import CHUNK, RayScene
+from render.footprint import reachable_pixels
+from render.laser import LineLaser
+from render.material import reflectance_weights
+from render.pose import invert
+from render.random import uniform
+from render.texture_lookup import reflectance
+from render.threads import Cancel, Progress, map_chunks
+from render.world import World
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+
+FIRST_CELLS = 2
+MOST_CELLS = 32
+
+
+@dataclass(frozen=True)
+class DirectImage:
+    """(h, w) float32 radiance W/(m^2 sr); the estimated relative RMS error over the lit pixels; what it took."""
+
+    radiance: Float32
+    error: float
+    pixels: int
+    samples: int
+
+
+@numba.njit(nogil=True, cache=True)
+def camera_rays(
+    pixels: Int,
+    width: int,
+    cells: int,
+    seed: int,
+    intrinsics: Float,
+    k: Float,
+    folds: Float,
+    rotation: Float,
+    jittered: bool,
+    normalised: Float,
+    offsets: Float32,
+    directions: Float32,
+) -> None:
+    """One ray through a jittered point of each of cells x cells cells of (n,) pixels.
+
+    Fills normalised (n cells^2, 2) undistorted image coordinates (NaN: no ray), offsets (.., 2) of the sample from its
+    cell's centre in px, and directions (.., 3), world.
+    """
+    tilt = tilt_matrix(k[12], k[13])
+    distorted = bool(np.any(k))
+    tolerance = 1e-10 / max(intrinsics[0], intrinsics[1])
+    size = 1.0 / cells
+    for i in range(pixels.shape[0]):
+        column, row = pixels[i] % width, pixels[i] // width
+        for cell in range(cells * cells):
+            r = i * cells * cells + cell
+            du = dv = 0.0
+            if jittered:
+                du = (uniform(seed, pixels[i], cell, 2 * cells) - 0.5) * size
+                dv = (uniform(seed, pixels[i], cell, 2 * cells + 1) - 0.5) * size
+            u = column - 0.5 + (cell % cells + 0.5) * size + du
+            v = row - 0.5 + (cell // cells + 0.5) * size + dv
+            y = (v - intrinsics[3]) / intrinsics[1]
+            x = (u - intrinsics[2] - intrinsics[4] * y) / intrinsics[0]
+            ok = True
+            if distorted:
+                x, y, ok = undistort(x, y, k, tilt, folds, tolerance)
+            if not ok:
+                x = y = np.nan
+            normalised[r, 0], normalised[r, 1] = x, y
+            offsets[r, 0], offsets[r, 1] = du, dv
+            for axis in range(3):
+                d = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2]
+                directions[r, axis] = d if ok else 0.0
+
+
+@numba.njit(nogil=True, cache=True)
+def shade_sheet(
+    triangle: Int,
+    normalised: Float,
+    offsets: Float32,
+    cells: int,
+    intrinsics: Float,
+    k: Float,
+    T_world_camera: Float,
+    T_laser_world: Float,
+    laser_centre: Float,
+    beam: Float,
+    weights: Float,
+    vertices: Float,
+    triangles: Int,
+    object_id: Int,
+    uv: Float32,
+    albedo: Float,
+    textures: Float32,
+    texture_shape: Int,
+    centre: Float,
+    surface_offset: float,
+    values: Float,
+    origins: Float32,
+    directions: Float32,
+    far: Float32,
+    sample: Int,
+) -> int:
+    """Unoccluded radiance of each ray's cell and whole pixel -> values (n, 2), and the shadow rays that decide them.
+
+    Returns how many shadow rays were written; `sample` says whose each is.
+    """
+    tilt = tilt_matrix(k[12], k[13])
+    distorted = bool(np.any(k))
+    emitter, _ = sheet_sigma(0.0, beam)
+    count = 0
+    half = 0.5 / cells
+    for r in range(triangle.shape[0]):
+        values[r, 0] = values[r, 1] = 0.0
+        t = triangle[r]
+        x, y = normalised[r, 0], normalised[r, 1]
+        if t < 0 or not x == x:
+            continue
+        a, b, c = vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]
+        ab0, ab1, ab2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        ac0, ac1, ac2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+        length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+        if length == 0.0:
+            continue
+        n0, n1, n2 = n0 / length, n1 / length, n2 / length
+        o0, o1, o2 = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
+        height_camera = n0 * (o0 - a[0]) + n1 * (o1 - a[1]) + n2 * (o2 - a[2])
+        height_laser = (
+            n0 * (laser_centre[0] - a[0]) + n1 * (laser_centre[1] - a[1]) + n2 * (laser_centre[2] - a[2])
+        )
+        if not height_camera * height_laser > 0.0:
+            continue
+        side = 1.0 if height_camera > 0.0 else -1.0
+        # the ray d = R (x, y, 1) meets the facet's plane at P = o + s d
+        m = T_world_camera
+        d0, d1, d2 = (
+            m[0, 0] * x + m[0, 1] * y + m[0, 2],
+            m[1, 0] * x + m[1, 1] * y + m[1, 2],
+            m[2, 0] * x + m[2, 1] * y + m[2, 2],
+        )
+        cosine = n0 * d0 + n1 * d1 + n2 * d2
+        if cosine == 0.0:
+            continue
+        s = -height_camera / cosine
+        p0, p1, p2 = o0 + s * d0, o1 + s * d1, o2 + s * d2
+        # laser coordinates of P
+        w = T_laser_world
+        lx = w[0, 0] * p0 + w[0, 1] * p1 + w[0, 2] * p2 + w[0, 3]
+        ly = w[1, 0] * p0 + w[1, 1] * p1 + w[1, 2] * p2 + w[1, 3]
+        lz = w[2, 0] * p0 + w[2, 1] * p1 + w[2, 2] * p2 + w[2, 3]
+        if lz <= 1e-9:
+            continue
+        h = fan_density(ly / lz, beam)
+        if h == 0.0:
+            continue
+        sigma, slope = sheet_sigma(lz, beam)
+        # dP/du and dP/dv on the facet
+        xu, xv = 1.0 / intrinsics[0], -intrinsics[4] / (intrinsics[0] * intrinsics[1])
+        yu, yv = 0.0, 1.0 / intrinsics[1]
+        if distorted:
+            _, _, jxx, jxy, jyx, jyy = distort(x, y, k, tilt)
+            det = jxx * jyy - jxy * jyx
+            xu, xv, yu, yv = (
+                jyy * xu / det,
+                (jyy * xv - jxy * yv) / det,
+                -jyx * xu / det,
+                (-jyx * xv + jxx * yv) / det,
+            )
+        q = lx / sigma
+        qu = _sheet_slope(xu, yu, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+        qv = _sheet_slope(xv, yv, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+        du, dv = offsets[r, 0], offsets[r, 1]
+        cell = r % (cells * cells)
+        pixel_u, pixel_v = (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
+        in_cell = _mean_over(q - qu * du - qv * dv, qu * half, qv * half)
+        in_pixel = _mean_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
+        if in_cell == 0.0 and in_pixel == 0.0:
+            continue
+        # irradiance without the Gaussian: P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)|
+        ln0 = w[0, 0] * n0 + w[0, 1] * n1 + w[0, 2] * n2
+        ln1 = w[1, 0] * n0 + w[1, 1] * n1 + w[1, 2] * n2
+        ln2 = w[2, 0] * n0 + w[2, 1] * n1 + w[2, 2] * n2
+        power = beam[0] * h / (lz * sigma) * abs(ln0 * q * slope + ln1 * ly / lz + ln2)
+        rho = reflectance(
+            t, a, ab0, ab1, ab2, ac0, ac1, ac2, p0, p1, p2, weights, object_id, uv, albedo, textures, texture_shape
+        )
+        radiance = power * rho / math.pi
+        if radiance <= 0.0:
+            continue
+        values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
+        # the light comes from the emitting segment at z = 0, of half-width `emitter` for a focused sheet
+        shift = q * emitter
+        t0 = laser_centre[0] + w[0, 0] * shift - p0
+        t1 = laser_centre[1] + w[0, 1] * shift - p1
+        t2 = laser_centre[2] + w[0, 2] * shift - p2
+        distance = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        origins[count, 0] = p0 - centre[0] + side * n0 * surface_offset
+        origins[count, 1] = p1 - centre[1] + side * n1 * surface_offset
+        origins[count, 2] = p2 - centre[2] + side * n2 * surface_offset
+        directions[count, 0], directions[count, 1], directions[count, 2] = t0 / distance, t1 / distance, t2 / distance
+        far[count] = distance
+        sample[count] = r
+        count += 1
+    return count
+
+
+@numba.njit(nogil=True, cache=True)
+def _sheet_slope(
+    xs: float,
+    ys: float,
+    m: Float,
+    w: Float,
+    n0: float,
+    n1: float,
+    n2: float,
+    d0: float,
+    d1: float,
+    d2: float,
+    s: float,
+    cosine: float,
+    q: float,
+    sigma: float,
+    slope: float,
+) -> float:
+    """Change of q = x / sigma(z) with a pixel coordinate along which the ray's (x, y) changes by (xs, ys)."""
+    e0, e1, e2 = (
+        m[0, 0] * xs + m[0, 1] * ys,
+        m[1, 0] * xs + m[1, 1] * ys,
+        m[2, 0] * xs + m[2, 1] * ys,
+    )
+    f = (n0 * e0 + n1 * e1 + n2 * e2) / cosine
+    g0, g1, g2 = s * (e0 - f * d0), s * (e1 - f * d1), s * (e2 - f * d2)
+    dx = w[0, 0] * g0 + w[0, 1] * g1 + w[0, 2] * g2
+    dz = w[2, 0] * g0 + w[2, 1] * g1 + w[2, 2] * g2
+    return (dx - q * slope * dz) / sigma
+
+
+@numba.njit(nogil=True, cache=True)
+def _mean_gaussian(q: float, half: float) -> float:
+    """Mean of the unit Gaussian over [q - half, q + half]; 0 beyond the sheet's end."""
+    half = abs(half)
+    if abs(q) - half > SHEET_SIGMAS:
+        return 0.0
+    if half < 1e-3:
+        return math.exp(-0.5 * q * q) * INV_SQRT_2PI
+    # erfc on the positive side keeps the tail's digits
+    p = abs(q)
+    return 0.25 * (math.erfc((p - half) / SQRT2) - math.erfc((p + half) / SQRT2)) / half
+
+
+@numba.njit(nogil=True, cache=True)
+def _mean_over(q: float, half_u: float, half_v: float) -> float:
+    """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v with as many nodes as it needs."""
+    half_v = abs(half_v)
+    if half_v < 0.02:
+        return _mean_gaussian(q, half_u)
+    if half_v < 0.5:
+        offset = half_v * 0.5773502691896257
+        return 0.5 * (_mean_gaussian(q - offset, half_u) + _mean_gaussian(q + offset, half_u))
+    nodes = 2 * int(min(16.0, math.ceil(2.0 * half_v)))
+    total = 0.0
+    for i in range(nodes):
+        # two Gauss-Legendre nodes in each of nodes / 2 pieces
+        centre = (2.0 * (i // 2) + 1.0) / (nodes // 2) - 1.0
+        offset = (0.5773502691896257 if i % 2 else -0.5773502691896257) / (nodes // 2)
+        total += _mean_gaussian(q + half_v * (centre + offset), half_u)
+    return total / nodes
+
+
+@numba.njit(nogil=True, cache=True)
+def gather(
+    values: Float, occluded: NDArray[np.bool_], sample: Int, count: int, cells: int, mean: Float, error: Float
+) -> None:
+    """Sum the visible cells of each pixel -> mean (n,), and the standard error that the predictions' spread implies."""
+    for j in range(count):
+        if occluded[j]:
+            values[sample[j], 0] = values[sample[j], 1] = 0.0
+    n = cells * cells
+    for i in range(mean.shape[0]):
+        total = first = second = 0.0
+        for cell in range(n):
+            total += values[i * n + cell, 0]
+            first += values[i * n + cell, 1]
+            second += values[i * n + cell, 1] ** 2
+        mean[i] = total / n
+        # jittered sampling of an edge or a slope: the variance falls with the 3/2 power of the number of cells
+        spread = max(second / n - (first / n) ** 2, 0.0) * n / (n - 1)
+        error[i] = math.sqrt(spread) / n**0.75
+
+
+def direct_image(
+    world: World,
+    camera: Camera,
+    laser: LineLaser,
+    T_world_camera: Float,
+    T_world_laser: Float,
+    *,
+    target: float = 0.01,
+    seed: int = 0,
+    threads: int | None = None,
+    cancelled: Cancel | None = None,
+    progress: Progress | None = None,
+) -> DirectImage:
+    """Direct radiance of one laser to a target relative RMS error over the lit pixels. Raises Cancelled."""
+    pixels = reachable_pixels(world, camera, laser, T_world_camera, T_world_laser, threads)
+    image = np.zeros(camera.height * camera.width, dtype=np.float32)
+    error = np.zeros(len(pixels))
+    todo = np.arange(len(pixels))
+    samples, cells = 0, FIRST_CELLS
+    while len(todo):
+        mean, spread = np.empty(len(todo)), np.empty(len(todo))
+        task = _Task(world, camera, laser, T_world_camera, T_world_laser, pixels[todo], cells, seed, mean, spread)
+        map_chunks(task.run, len(todo), max(1, CHUNK // cells**2), threads, cancelled, progress)
+        image[pixels[todo]] = mean
+        error[todo] = spread
+        samples += len(todo) * cells**2
+        lit = image[pixels]
+        signal = float(np.sqrt(np.mean(np.square(lit[lit > 0.0], dtype=np.float64)))) if np.any(lit > 0.0) else 0.0
+        count = max(1, int(np.count_nonzero(lit)))
+        relative = math.sqrt(float(np.sum(error**2)) / count) / signal if signal > 0.0 else 0.0
+        if relative <= target or cells >= MOST_CELLS or signal == 0.0:
+            return DirectImage(image.reshape(camera.height, camera.width), relative, count, samples)
+        cells *= 2
+        # a pixel below half of its equal share cannot keep the image from its target
+        todo = np.flatnonzero(error > 0.5 * target * signal)
+    return DirectImage(image.reshape(camera.height, camera.width), 0.0, 0, samples)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """One refinement level: `run` does the pixels start..stop, each chunk with its own buffers."""
+
+    world: World
+    camera: Camera
+    laser: LineLaser
+    T_world_camera: Float
+    T_world_laser: Float
+    pixels: Int
+    cells: int
+    seed: int
+    mean: Float
+    error: Float
+
+    def run(self, start: int, stop: int) -> None:
+        world, camera, rays, n = self.world, self.camera, self.world.rays, self.cells**2
+        count = (stop - start) * n
+        intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
+        normalised, offsets = np.empty((count, 2)), np.empty((count, 2), np.float32)
+        directions = np.empty((count, 3), np.float32)
+        camera_rays(
+            self.pixels[start:stop],
+            camera.width,
+            self.cells,
+            self.seed,
+            intrinsics,
+            camera.coefficients,
+            camera.fold_table,
+            self.T_world_camera,
+            True,
+            normalised,
+            offsets,
+            directions,
+        )
+        triangle = self._hits(rays, directions)
+        values = np.empty((count, 2))
+        origins, towards = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+        far, sample = np.empty(count, np.float32), np.empty(count, np.int32)
+        shadows = shade_sheet(
+            triangle,
+            normalised,
+            offsets,
+            self.cells,
+            intrinsics,
+            camera.coefficients,
+            self.T_world_camera,
+            invert(self.T_world_laser),
+            self.T_world_laser[:3, 3].copy(),
+            self.laser.packed(),
+            np.array(reflectance_weights(self.laser.wavelength_nm)),
+            world.vertices,
+            world.triangles,
+            world.object_id,
+            world.uv,
+            world.albedo,
+            world.textures,
+            world.texture_shape,
+            rays.centre,
+            rays.surface_offset,
+            values,
+            origins,
+            towards,
+            far,
+            sample,
+        )
+        blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows])
+        gather(values, blocked, sample, shadows, self.cells, self.mean[start:stop], self.error[start:stop])
+
+    def _hits(self, rays: RayScene, directions: Float32) -> Int:
+        origin = (self.T_world_camera[:3, 3] - rays.centre).astype(np.float32)
+        return rays.intersect(np.broadcast_to(origin, directions.shape), directions)[0]

@@ -1,0 +1,186 @@
+"""Which pixels a laser can reach directly: the triangles that meet its slab, clipped to it and drawn conservatively.
+
+The slab is the sheet out to `SHEET_SIGMAS`, within the fan. Triangles that do not face both camera and laser are left out;
+occlusion is not looked at, so the set is a superset.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.beam import SHEET_SIGMAS, sheet_sigma
+from render.camera import Camera
+from render.curve import project_point
+from render.distortion import tilt_matrix
+from render.laser import LineLaser
+from render.pose import invert
+from render.threads import map_chunks
+from render.world import World
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int32]
+
+TRIANGLES_A_CHUNK = 1 << 15
+MARGIN_PX = 1
+
+
+@numba.njit(nogil=True, cache=True)
+def _clip(polygon: Float, count: int, plane: Float, out: Float) -> int:
+    """Sutherland-Hodgman: keep the part of polygon (count, 3) where plane . (p, 1) >= 0."""
+    kept = 0
+    for i in range(count):
+        j = (i + 1) % count
+        fi = plane[0] * polygon[i, 0] + plane[1] * polygon[i, 1] + plane[2] * polygon[i, 2] + plane[3]
+        fj = plane[0] * polygon[j, 0] + plane[1] * polygon[j, 1] + plane[2] * polygon[j, 2] + plane[3]
+        if fi >= 0.0:
+            out[kept] = polygon[i]
+            kept += 1
+        if (fi >= 0.0) != (fj >= 0.0):
+            t = fi / (fi - fj)
+            for axis in range(3):
+                out[kept, axis] = polygon[i, axis] + t * (polygon[j, axis] - polygon[i, axis])
+            kept += 1
+    return kept
+
+
+@numba.njit(nogil=True, cache=True)
+def mark_triangles(
+    start: int,
+    stop: int,
+    vertices: Float,
+    triangles: Int,
+    T_laser_world: Float,
+    T_camera_laser: Float,
+    camera_centre: Float,
+    laser_centre: Float,
+    beam: Float,
+    intrinsics: Float,
+    k: Float,
+    folds: Float,
+    mask: NDArray[np.uint8],
+) -> None:
+    """Set mask (h, w) wherever triangles start..stop may show direct light of the laser. Frames: T_laser_world, T_camera_laser."""
+    height, width = mask.shape
+    tilt = tilt_matrix(k[12], k[13])
+    distorted = bool(np.any(k))
+    corners, front, back = np.empty((3, 3)), np.empty((12, 3)), np.empty((12, 3))
+    planes = np.zeros((6, 4))
+    left, right = np.empty(height, dtype=np.int64), np.empty(height, dtype=np.int64)
+    p = np.empty(3)
+    for t in range(start, stop):
+        low, high, near, far = np.inf, -np.inf, np.inf, -np.inf
+        for c in range(3):
+            w = vertices[triangles[t, c]]
+            for axis in range(3):
+                m = T_laser_world[axis]
+                corners[c, axis] = m[0] * w[0] + m[1] * w[1] + m[2] * w[2] + m[3]
+            low, high = min(low, corners[c, 0]), max(high, corners[c, 0])
+            near, far = min(near, corners[c, 2]), max(far, corners[c, 2])
+        if far <= 0.0:
+            continue
+        near = max(near, 0.0)
+        sigma_near, _ = sheet_sigma(near, beam)
+        sigma_far, _ = sheet_sigma(far, beam)
+        reach = SHEET_SIGMAS * max(sigma_near, sigma_far)
+        if low > reach or high < -reach:
+            continue
+        a, b, c3 = vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]
+        nx = (b[1] - a[1]) * (c3[2] - a[2]) - (b[2] - a[2]) * (c3[1] - a[1])
+        ny = (b[2] - a[2]) * (c3[0] - a[0]) - (b[0] - a[0]) * (c3[2] - a[2])
+        nz = (b[0] - a[0]) * (c3[1] - a[1]) - (b[1] - a[1]) * (c3[0] - a[0])
+        to_camera = nx * (camera_centre[0] - a[0]) + ny * (camera_centre[1] - a[1]) + nz * (camera_centre[2] - a[2])
+        to_laser = nx * (laser_centre[0] - a[0]) + ny * (laser_centre[1] - a[1]) + nz * (laser_centre[2] - a[2])
+        if not to_camera * to_laser > 0.0:
+            continue
+        # sigma(z) is convex, so the chord over the triangle's depths bounds it
+        slope = (sigma_far - sigma_near) / (far - near) if far > near else 0.0
+        offset = max(sigma_near - slope * near, sigma_far - slope * far)
+        planes[0] = np.array([-1.0, 0.0, SHEET_SIGMAS * slope, SHEET_SIGMAS * offset])
+        planes[1] = np.array([1.0, 0.0, SHEET_SIGMAS * slope, SHEET_SIGMAS * offset])
+        planes[2] = np.array([0.0, -1.0, beam[4], 0.0])
+        planes[3] = np.array([0.0, 1.0, beam[4], 0.0])
+        planes[4] = np.array([0.0, 0.0, 1.0, -1e-9])
+        m = T_camera_laser[2]
+        planes[5] = np.array([m[0], m[1], m[2], m[3] - 1e-6])
+        front[:3] = corners
+        count = 3
+        for plane in range(6):
+            count = _clip(front, count, planes[plane], back)
+            front, back = back, front
+            if count == 0:
+                break
+        if count == 0:
+            continue
+        for i in range(count):
+            for axis in range(3):
+                m = T_camera_laser[axis]
+                p[axis] = m[0] * front[i, 0] + m[1] * front[i, 1] + m[2] * front[i, 2] + m[3]
+            back[i] = p
+        top, bottom = height, -1
+        for i in range(count):
+            e, f = back[i], back[(i + 1) % count]
+            u0, v0 = project_point(e, intrinsics, k, tilt, folds, False)
+            u1, v1 = project_point(f, intrinsics, k, tilt, folds, False)
+            steps = int(min(1e5, math.ceil(math.hypot(u1 - u0, v1 - v0)))) + 1
+            for s in range(steps + 1):
+                # equal steps in the image: the depth of an image point on a 3D line is harmonic
+                q = s / steps
+                r = q * e[2] / ((1.0 - q) * f[2] + q * e[2])
+                for axis in range(3):
+                    p[axis] = e[axis] + r * (f[axis] - e[axis])
+                u, v = project_point(p, intrinsics, k, tilt, folds, distorted)
+                if not (abs(u) < 1e6 and abs(v) < 1e6):
+                    continue
+                column = int(math.floor(u + 0.5))
+                row = int(math.floor(v + 0.5))
+                for y in range(max(row - MARGIN_PX, 0), min(row + MARGIN_PX, height - 1) + 1):
+                    if y < top or y > bottom:
+                        # widen the range of rows, clearing what it takes in
+                        if bottom < 0:
+                            top, bottom = y, y
+                            left[y], right[y] = width, -1
+                        while y < top:
+                            top -= 1
+                            left[top], right[top] = width, -1
+                        while y > bottom:
+                            bottom += 1
+                            left[bottom], right[bottom] = width, -1
+                    left[y], right[y] = min(left[y], column - MARGIN_PX), max(right[y], column + MARGIN_PX)
+        for y in range(top, bottom + 1):
+            for x in range(max(left[y], 0), min(right[y], width - 1) + 1):
+                mask[y, x] = 1
+
+
+def reachable_pixels(
+    world: World, camera: Camera, laser: LineLaser, T_world_camera: Float, T_world_laser: Float, threads: int | None = None
+) -> NDArray[np.int32]:
+    """(n,) flat pixel indices v * width + u, ascending, that may see direct light of the laser."""
+    mask = np.zeros((camera.height, camera.width), dtype=np.uint8)
+    T_laser_world, T_camera_laser = invert(T_world_laser), invert(T_world_camera) @ T_world_laser
+    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
+    camera_centre, laser_centre = T_world_camera[:3, 3].copy(), T_world_laser[:3, 3].copy()
+    beam = laser.packed()
+
+    def work(start: int, stop: int) -> None:
+        mark_triangles(
+            start,
+            stop,
+            world.vertices,
+            world.triangles,
+            T_laser_world,
+            T_camera_laser,
+            camera_centre,
+            laser_centre,
+            beam,
+            intrinsics,
+            camera.coefficients,
+            camera.fold_table,
+            mask,
+        )
+
+    map_chunks(work, len(world.triangles), TRIANGLES_A_CHUNK, threads)
+    return np.flatnonzero(mask).astype(np.int32)
