@@ -1,0 +1,284 @@
+"""Ambient light that met one surface: environment, point and rectangular lights, with shadows.
+
+Each pixel sample is a camera ray, one cosine-distributed ray to the environment and one ray to each lamp. The random numbers
+of a pixel form an additive-recurrence (Kronecker) sequence with a random start, which converges faster than independent ones.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.camera import Camera
+from render.direct import camera_rays
+from render.embree import CHUNK
+from render.lights import PointLight
+from render.random import uniform
+from render.scene import Scene
+from render.texture_lookup import reflectance
+from render.threads import Cancel, Progress, map_chunks
+from render.world import World
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+
+POINT, RECTANGLE = 0.0, 1.0
+# 1/g and 1/g^2 of the plastic number g: the R2 sequence (Roberts 2018)
+R2_X, R2_Y = 0.7548776662466927, 0.5698402909980532
+
+
+def pack_lights(scene: Scene) -> Float:
+    """(l, 20) kind, RGB, centre, half x axis, half y axis, normal, area."""
+    rows = np.zeros((len(scene.lights), 20))
+    for row, light in zip(rows, scene.lights, strict=True):
+        matrix = light.T_world_light.matrix
+        row[4:7], row[13:16] = matrix[:3, 3], matrix[:3, 2]
+        if isinstance(light, PointLight):
+            row[0], row[1:4] = POINT, light.intensity
+        else:
+            row[0], row[1:4], row[16] = RECTANGLE, light.radiance, light.width * light.height
+            row[7:10], row[10:13] = matrix[:3, 0] * light.width / 2, matrix[:3, 1] * light.height / 2
+    return rows
+
+
+@numba.njit(nogil=True, cache=True)
+def _fraction(x: float) -> float:
+    return x - math.floor(x)
+
+
+@numba.njit(nogil=True, cache=True)
+def shade_ambient(
+    pixels: Int,
+    cells: int,
+    seed: int,
+    triangle: Int,
+    normalised: Float,
+    T_world_camera: Float,
+    environment: Float,
+    lights: Float,
+    vertices: Float,
+    triangles: Int,
+    object_id: Int,
+    uv: Float32,
+    albedo: Float,
+    textures: Float32,
+    texture_shape: Int,
+    centre: Float,
+    surface_offset: float,
+    image: Float32,
+    origins: Float32,
+    directions: Float32,
+    far: Float32,
+    light_out: Float32,
+    owner: Int,
+) -> int:
+    """Add what the camera rays see of the lights themselves to image (p, 3); write the shadow rays with their worth.
+
+    Returns the number of shadow rays; light_out (.., 3) is what a clear one adds to its pixel `owner`.
+    """
+    m = T_world_camera
+    n = cells * cells
+    share = 1.0 / n
+    red, green, blue = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    rho, e = np.empty(3), np.empty(3)
+    has_environment = environment[0] + environment[1] + environment[2] > 0.0
+    o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
+    count = 0
+    for r in range(triangle.shape[0]):
+        i, cell, t = r // n, r % n, triangle[r]
+        x, y = normalised[r, 0], normalised[r, 1]
+        if not x == x:
+            continue
+        d0 = m[0, 0] * x + m[0, 1] * y + m[0, 2]
+        d1 = m[1, 0] * x + m[1, 1] * y + m[1, 2]
+        d2 = m[2, 0] * x + m[2, 1] * y + m[2, 2]
+        s = np.inf
+        n0 = n1 = n2 = p0 = p1 = p2 = 0.0
+        ab0 = ab1 = ab2 = ac0 = ac1 = ac2 = 0.0
+        if t >= 0:
+            ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
+            ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
+            ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
+            n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+            length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+            height = n0 * (o0 - a0) + n1 * (o1 - a1) + n2 * (o2 - a2)
+            length = length if height >= 0.0 else -length
+            cosine = n0 * d0 + n1 * d1 + n2 * d2
+            if cosine == 0.0:
+                continue
+            s = -height / cosine
+            n0, n1, n2 = n0 / length, n1 / length, n2 / length
+            p0, p1, p2 = o0 + s * d0, o1 + s * d1, o2 + s * d2
+        # what the camera ray sees of the lights themselves
+        seen = -1
+        nearest = s
+        for k in range(lights.shape[0]):
+            if lights[k, 0] == RECTANGLE:
+                facing = lights[k, 13] * d0 + lights[k, 14] * d1 + lights[k, 15] * d2
+                if facing < 0.0:
+                    h = lights[k, 13] * (lights[k, 4] - o0)
+                    h += lights[k, 14] * (lights[k, 5] - o1) + lights[k, 15] * (lights[k, 6] - o2)
+                    f = h / facing
+                    if 0.0 < f < nearest:
+                        q0, q1, q2 = o0 + f * d0 - lights[k, 4], o1 + f * d1 - lights[k, 5], o2 + f * d2 - lights[k, 6]
+                        hx = lights[k, 7] * q0 + lights[k, 8] * q1 + lights[k, 9] * q2
+                        hy = lights[k, 10] * q0 + lights[k, 11] * q1 + lights[k, 12] * q2
+                        xx = lights[k, 7] ** 2 + lights[k, 8] ** 2 + lights[k, 9] ** 2
+                        yy = lights[k, 10] ** 2 + lights[k, 11] ** 2 + lights[k, 12] ** 2
+                        if abs(hx) <= xx and abs(hy) <= yy:
+                            seen, nearest = k, f
+        if seen >= 0:
+            for band in range(3):
+                image[i, band] += share * lights[seen, 1 + band]
+            continue
+        if t < 0:
+            for band in range(3):
+                image[i, band] += share * environment[band]
+            continue
+        item = object_id[t]
+        if texture_shape[item, 1] == 0:
+            rho[0], rho[1], rho[2] = albedo[item, 0], albedo[item, 1], albedo[item, 2]
+        else:
+            a = vertices[triangles[t, 0]]
+            for band in range(3):
+                weights = red if band == 0 else (green if band == 1 else blue)
+                rho[band] = reflectance(
+                    t, a, ab0, ab1, ab2, ac0, ac1, ac2, p0, p1, p2, weights, object_id, uv, albedo, textures, texture_shape
+                )
+        s0 = p0 - centre[0] + n0 * surface_offset
+        s1 = p1 - centre[1] + n1 * surface_offset
+        s2 = p2 - centre[2] + n2 * surface_offset
+        if has_environment:
+            f = _fraction(uniform(seed, pixels[i], 0, 0) + cell * R2_X)
+            g = _fraction(uniform(seed, pixels[i], 0, 1) + cell * R2_Y)
+            # cosine-distributed about the normal: the radiance is then albedo times what the ray sees
+            radius, angle = math.sqrt(f), 2.0 * math.pi * g
+            v0, v1, v2 = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - f)
+            # orthonormal basis about the normal (Duff et al. 2017)
+            sign = 1.0 if n2 >= 0.0 else -1.0
+            c = -1.0 / (sign + n2)
+            b = n0 * n1 * c
+            directions[count, 0] = v0 * (1.0 + sign * n0 * n0 * c) + v1 * b + v2 * n0
+            directions[count, 1] = v0 * sign * b + v1 * (sign + n1 * n1 * c) + v2 * n1
+            directions[count, 2] = -v0 * sign * n0 - v1 * n1 + v2 * n2
+            origins[count, 0], origins[count, 1], origins[count, 2] = s0, s1, s2
+            far[count], owner[count] = 1e30, i
+            for band in range(3):
+                light_out[count, band] = share * rho[band] * environment[band]
+            count += 1
+        for k in range(lights.shape[0]):
+            t0, t1, t2 = lights[k, 4] - p0, lights[k, 5] - p1, lights[k, 6] - p2
+            area = 1.0
+            if lights[k, 0] == RECTANGLE:
+                f = 2.0 * _fraction(uniform(seed, pixels[i], k + 1, 0) + cell * R2_X) - 1.0
+                g = 2.0 * _fraction(uniform(seed, pixels[i], k + 1, 1) + cell * R2_Y) - 1.0
+                t0 += f * lights[k, 7] + g * lights[k, 10]
+                t1 += f * lights[k, 8] + g * lights[k, 11]
+                t2 += f * lights[k, 9] + g * lights[k, 12]
+            distance = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+            cosine = (n0 * t0 + n1 * t1 + n2 * t2) / distance
+            if lights[k, 0] == RECTANGLE:
+                area = -(lights[k, 13] * t0 + lights[k, 14] * t1 + lights[k, 15] * t2) / distance * lights[k, 16]
+            if cosine <= 0.0 or area <= 0.0:
+                continue
+            e[0] = share * cosine * area / (math.pi * distance * distance)
+            directions[count, 0], directions[count, 1], directions[count, 2] = t0 / distance, t1 / distance, t2 / distance
+            origins[count, 0], origins[count, 1], origins[count, 2] = s0, s1, s2
+            far[count], owner[count] = distance, i
+            for band in range(3):
+                light_out[count, band] = e[0] * rho[band] * lights[k, 1 + band]
+            count += 1
+    return count
+
+
+@numba.njit(nogil=True, cache=True)
+def add_clear(
+    light_out: Float32, occluded: NDArray[np.bool_], owner: Int, count: int, image: Float32
+) -> None:
+    """Add the worth of every clear shadow ray to its pixel."""
+    for j in range(count):
+        if not occluded[j]:
+            for band in range(3):
+                image[owner[j], band] += light_out[j, band]
+
+
+def ambient_image(
+    world: World,
+    scene: Scene,
+    camera: Camera,
+    T_world_camera: Float,
+    *,
+    samples: int = 16,
+    seed: int = 0,
+    threads: int | None = None,
+    cancelled: Cancel | None = None,
+    progress: Progress | None = None,
+) -> Float32:
+    """(h, w, 3) float32 radiance, W/(m^2 sr) in R, G, B; samples a pixel, rounded up to a square. Raises Cancelled."""
+    cells = math.ceil(math.sqrt(samples))
+    n = camera.width * camera.height
+    image = np.zeros((n, 3), np.float32)
+    lights, environment = pack_lights(scene), np.array(scene.environment.radiance)
+    shadow_rays = len(lights) + int(environment.sum() > 0.0)
+    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
+    rays = world.rays
+    origin = (T_world_camera[:3, 3] - rays.centre).astype(np.float32)
+
+    def work(start: int, stop: int) -> None:
+        pixels = np.arange(start, stop, dtype=np.int32)
+        count = (stop - start) * cells**2
+        normalised, offsets = np.empty((count, 2)), np.empty((count, 2), np.float32)
+        directions = np.empty((count, 3), np.float32)
+        camera_rays(
+            pixels,
+            camera.width,
+            cells,
+            seed,
+            intrinsics,
+            camera.coefficients,
+            camera.fold_table,
+            T_world_camera,
+            True,
+            normalised,
+            offsets,
+            directions,
+        )
+        triangle, _ = rays.intersect(np.broadcast_to(origin, directions.shape), directions)
+        most = count * shadow_rays
+        origins, towards = np.empty((most, 3), np.float32), np.empty((most, 3), np.float32)
+        far, worth, owner = np.empty(most, np.float32), np.empty((most, 3), np.float32), np.empty(most, np.int32)
+        shadows = shade_ambient(
+            pixels,
+            cells,
+            seed,
+            triangle,
+            normalised,
+            T_world_camera,
+            environment,
+            lights,
+            world.vertices,
+            world.triangles,
+            world.object_id,
+            world.uv,
+            world.albedo,
+            world.textures,
+            world.texture_shape,
+            rays.centre,
+            rays.surface_offset,
+            image[start:stop],
+            origins,
+            towards,
+            far,
+            worth,
+            owner,
+        )
+        blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows])
+        add_clear(worth, blocked, owner, shadows, image[start:stop])
+
+    map_chunks(work, n, max(1, CHUNK // cells**2), threads, cancelled, progress)
+    return image.reshape(camera.height, camera.width, 3)
