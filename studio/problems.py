@@ -1,0 +1,174 @@
+"""What pydantic found wrong with a project, told in the project's own words: field, found, allowed, nearest name."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from render.errors import InputError
+from studio.strict_json import brief
+
+MAX_LISTED = 5
+Location = tuple[int | str, ...]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing wrong at one field."""
+
+    field: str
+    what: str
+    found: str | None
+    allowed: str
+    cure: str = ""
+
+    def __str__(self) -> str:
+        return str(InputError(self.what, where=self.field, found=self.found, allowed=self.allowed, cure=self.cure))
+
+
+def input_error(error: ValidationError, model: type[BaseModel], data: Any, where: str) -> InputError:
+    """One message for everything wrong in `data`, up to five problems, the rest counted."""
+    found = problems(error, model, data)
+    if len(found) == 1:
+        only = found[0]
+        place = f"{where}: {only.field}" if only.field else where
+        return InputError(only.what, where=place, found=only.found, allowed=only.allowed, cure=only.cure)
+    listed = [f"  {problem}" for problem in found[:MAX_LISTED]]
+    if len(found) > MAX_LISTED:
+        listed.append(f"  and {len(found) - MAX_LISTED} more")
+    return InputError(f"{len(found)} problems\n" + "\n".join(listed), where=where)
+
+
+def problems(error: ValidationError, model: type[BaseModel], data: Any) -> list[Problem]:
+    """The problems in the order of the file, one a field, with the branches of unions that cannot be meant left out."""
+    entries: list[dict[str, Any]] = [dict(entry) for entry in error.errors(include_url=False)]
+    for entry in entries:
+        entry["path"], entry["union"] = _resolve(entry["loc"], data, entry["type"])
+    result: dict[str, Problem] = {}
+    for entry in _meant(entries):
+        problem = _problem(entry, model)
+        known = result.get(problem.field)
+        if known is None:
+            result[problem.field] = problem
+        elif problem.allowed and problem.allowed not in known.allowed and known.what == problem.what:
+            allowed = f"{known.allowed} or {problem.allowed}"
+            result[problem.field] = Problem(known.field, known.what, known.found, allowed, known.cure)
+    return list(result.values())
+
+
+def _resolve(location: Location, data: Any, kind: str) -> tuple[Location, tuple[int, str] | None]:
+    """The part of a location that exists in the file, and where and by which label an union's branch was entered."""
+    path: list[int | str] = []
+    branch: tuple[int, str] | None = None
+    for i, part in enumerate(location):
+        if isinstance(data, dict) and part in data:
+            data = data[part]
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        elif not (kind == "missing" and i == len(location) - 1):
+            branch = branch or (len(path), str(part))
+            continue
+        path.append(part)
+    return tuple(path), branch
+
+
+def _meant(entries: list[dict[str, Any]]) -> Iterable[dict[str, Any]]:
+    """Of every union, only the branches that the file comes nearest to."""
+    unions: dict[Location, dict[str, list[dict[str, Any]]]] = {}
+    for entry in entries:
+        if entry["union"] is not None:
+            depth, label = entry["union"]
+            unions.setdefault(entry["path"][:depth], {}).setdefault(label, []).append(entry)
+    best = {at: min(_distance(at, group) for group in branches.values()) for at, branches in unions.items()}
+    for entry in entries:
+        if entry["union"] is None:
+            yield entry
+            continue
+        depth, label = entry["union"]
+        at = entry["path"][:depth]
+        if _distance(at, unions[at][label]) == best[at]:
+            yield entry
+
+
+def _distance(at: Location, group: Sequence[dict[str, Any]]) -> tuple[bool, int]:
+    wrong_type = any(entry["path"] == at and entry["type"].endswith("_type") for entry in group)
+    return wrong_type, len(group)
+
+
+def _problem(entry: dict[str, Any], model: type[BaseModel]) -> Problem:
+    field = _dotted(entry["path"])
+    kind, found, context = entry["type"], brief(entry["input"]), entry.get("ctx", {})
+    if kind == "missing":
+        return Problem(field, "the field is missing", None, "")
+    if kind == "extra_forbidden":
+        names = _field_names(model, entry["loc"][:-1])
+        near = difflib.get_close_matches(str(entry["loc"][-1]), names, n=1, cutoff=0.5)
+        cure = f"did you mean {near[0]}?" if near else ""
+        return Problem(field, "unknown key", None, "" if near else ", ".join(names), cure)
+    if kind == "union_tag_not_found":
+        return Problem(field, "the field kind is missing", found, ", ".join(_kinds(model, entry["loc"])))
+    if kind == "union_tag_invalid":
+        expected = str(context.get("expected_tags", ""))
+        near = difflib.get_close_matches(str(context.get("tag")), [tag.strip("'") for tag in expected.split(", ")], 1)
+        place = f"{field}.kind" if field else "kind"
+        cure = f"did you mean {near[0]}?" if near else ""
+        return Problem(place, "unknown kind", brief(context.get("tag")), expected.replace("'", ""), cure)
+    if kind in ("value_error", "assertion_error"):
+        return Problem(field, str(context.get("error", entry["msg"])), None, "")
+    message = entry["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+    return Problem(field, "the value is not allowed", found, message)
+
+
+def _dotted(path: Location) -> str:
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _field_names(model: type[BaseModel], location: Location) -> list[str]:
+    return sorted({name for found in _models_at(model, location) for name in found.model_fields})
+
+
+def _kinds(model: type[BaseModel], location: Location) -> list[str]:
+    tags = [found.model_fields["kind"].annotation for found in _models_at(model, location) if "kind" in found.model_fields]
+    return sorted({str(name) for tag in tags for name in get_args(tag)})
+
+
+def _models_at(model: type[BaseModel], location: Location) -> list[type[BaseModel]]:
+    """The model classes that may stand at a location: fields, list items and union branches followed."""
+    candidates: list[Any] = [model]
+    for part in location:
+        step: list[Any] = []
+        for candidate in _alternatives(candidates):
+            if isinstance(candidate, type) and issubclass(candidate, BaseModel):
+                if part in candidate.model_fields:
+                    step.append(candidate.model_fields[str(part)].annotation)
+                elif part == candidate.__name__ or part in _tags(candidate):
+                    step.append(candidate)
+            elif isinstance(part, int) and get_origin(candidate) is tuple:
+                step.extend(item for item in get_args(candidate) if item is not Ellipsis)
+        candidates = step
+    return [item for item in _alternatives(candidates) if isinstance(item, type) and issubclass(item, BaseModel)]
+
+
+def _tags(model: type[BaseModel]) -> tuple[Any, ...]:
+    kind = model.model_fields.get("kind")
+    return get_args(kind.annotation) if kind is not None else ()
+
+
+def _alternatives(types: Iterable[Any]) -> Iterable[Any]:
+    """Unions and Annotated opened."""
+    for item in types:
+        if isinstance(item, type):
+            yield item
+        elif hasattr(item, "__metadata__"):  # Annotated
+            yield from _alternatives(get_args(item)[:1])
+        elif get_origin(item) in (tuple, Literal):
+            yield item
+        else:
+            yield from _alternatives(get_args(item))
