@@ -30,15 +30,17 @@ class Flag(IntEnum):
     """The fit left the window around the peak."""
     TOO_WIDE = 7
     """Wider than a line can be."""
+    NO_PIXELS = 8
+    """The scan line holds no usable pixel: none of the laser's colour, or none that is a number."""
 
 
 @dataclass(frozen=True)
 class Line:
     """Peaks by scan line: arrays (n, k), n image rows (axis "rows") or columns, k peaks, strongest first.
 
-    `u` is the sub-pixel position along the scan line in px (the column on axis "rows"), NaN where the flag gives a reason.
-    `sigma_u` its standard deviation, `width` the Gaussian sigma of the line, both px; `amplitude` and `background` in
-    electrons (DN / gain); `chi2` the reduced chi-square of the fit, NaN for methods without one.
+    `u` is the sub-pixel position along the scan line in px (the column on axis "rows"), NaN where the flag gives a
+    reason, `sigma_u` its standard deviation, `width` the Gaussian sigma of the line, both px; `amplitude` and
+    `background` in electrons (DN / gain); `chi2` the reduced chi-square of the fit, NaN for methods without one.
     """
 
     axis: Axis

@@ -1,0 +1,55 @@
+"""How the line is looked for: method, scan axis, detection and window. Part of the project file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from render.model import Model, quantity
+
+Method = Literal["gaussian", "centre_of_mass", "likelihood"]
+Channel = Literal["auto", "mono", "red", "green", "blue"]
+Pattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
+
+
+class ExtractionSettings(Model):
+    """Lengths are pixels along the scan line; `width` and `smoothing` are Gaussian sigmas."""
+
+    method: Method = quantity("likelihood", label="Method")
+    axis: Literal["rows", "columns"] = quantity(
+        "rows", label="Scan axis", help="Rows: one line position per image row, for a baseline along x."
+    )
+    peaks: int = quantity(1, label="Peaks", help="Strongest peaks kept on each scan line.", ge=1, le=16)
+    channel: Channel = quantity(
+        "auto", label="Laser channel", help="On colour images the mean of the other two channels is subtracted."
+    )
+    pattern: Pattern | None = quantity(
+        None, label="Bayer pattern", help="Of a raw colour image; only pixels of the laser's colour are used."
+    )
+    threshold: float = quantity(
+        5.0, label="Detection threshold", help="Matched-filter response over its noise.", ge=1, le=1000
+    )
+    width: float | None = quantity(
+        None, unit="px", label="Line width", help="Known sigma; empty: measured at each peak.", ge=0.2, le=200
+    )
+    max_width: float = quantity(20.0, unit="px", label="Widest line", help="Sigma; wider is refused.", ge=0.5, le=200)
+    smoothing: float = quantity(
+        0.0,
+        unit="px",
+        label="Smoothing",
+        help="Gaussian sigma over rows and columns before the fit. Biases curved lines; the paper used 3.",
+        ge=0,
+        le=20,
+    )
+    profile: Literal["integrated", "point"] = quantity(
+        "integrated", label="Profile", help="Gaussian integrated over each pixel, or taken at its centre."
+    )
+
+    @model_validator(mode="after")
+    def _method_takes_options(self) -> ExtractionSettings:
+        if self.method == "likelihood" and self.smoothing > 0:
+            raise ValueError(f"smoothing is {self.smoothing}; allowed for likelihood: 0 (it needs independent pixels)")
+        if self.channel == "mono" and self.pattern is not None:
+            raise ValueError("channel is mono; allowed with a Bayer pattern: red, green, blue, auto")
+        return self
