@@ -1,0 +1,195 @@
+"""The mesh of a scene object: read from its file or made from its primitive, checked, in metres, with its texture."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.errors import InputError
+from render.files import inside, sha256
+from render.material import FromMesh, Texture
+from render.mesh import Mesh
+from render.mesh_colour import merged_look, part_look
+from render.mesh_reader import EXTENSIONS, check_triangle_count, read_parts
+from render.primitives import Primitive, primitive_mesh
+from render.scene import SceneObject
+from render.shape import UNITS, MeshFile, WeldTee
+from render.texture import load_texture
+from render.weld_tee import weld_tee_mesh
+
+MAX_FILE_BYTES = 4 * 2**30
+MAX_EXTENT = 1e4
+"""m; farther from its origin a mesh keeps no micrometres in float32 rays."""
+LARGE_EXTENT = 20.0
+"""m; a larger "metre" part is taken for millimetres."""
+
+
+def load_mesh(item: SceneObject, root: Path) -> Mesh:
+    """The triangles of an object, m, in its own frame; loaded meshes are kept, so that a scan reads each file once.
+
+    root: the project folder, which every path is relative to and must stay inside.
+    Zero-area triangles are dropped with a warning. A file that changed since the project was saved gives a warning.
+    InputError: the file is absent, damaged, empty, of an unknown kind, too large, plainly not in metres though the unit
+    says so, or has NaN, wrong indices or no area; the albedo is a texture and the mesh has no UV, or the image is bad.
+    """
+    where = f"object {item.name!r}"
+    if isinstance(item.shape, MeshFile):
+        mesh = _from_file(item, item.shape, Path(root), where)
+    else:
+        mesh = _made(item.shape)
+        if item.scale != 1.0:
+            mesh = dataclasses.replace(mesh, vertices=mesh.vertices * item.scale)
+        _check_size(mesh.vertices, where)
+    albedo = item.material.albedo
+    if not isinstance(albedo, Texture):
+        return mesh
+    if mesh.uv is None:
+        raise InputError(
+            "the albedo is a texture, but the mesh has no UV",
+            where=where,
+            found=item.shape.path if isinstance(item.shape, MeshFile) else item.shape.kind,
+            cure="give the albedo as a number, or unwrap the mesh and export it with UV",
+        )
+    field = f"{where}: material.albedo.path"
+    path = inside(root, albedo.path, field)
+    state = path.stat() if path.exists() else None
+    version = None if state is None else (state.st_mtime_ns, state.st_size)
+    return dataclasses.replace(mesh, texture=_texture(path, albedo.srgb, albedo.scale, field, version))
+
+
+def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
+    """What is suspicious about the size of a loaded mesh file, in words with the cure, or None."""
+    if not isinstance(item.shape, MeshFile):
+        return None
+    extent = float(np.ptp(mesh.vertices, axis=0).max())
+    unit = item.shape.unit
+    if unit == "m" and extent > LARGE_EXTENT:
+        return f'it is {extent:.4g} m across, which looks like millimetres; set unit to "mm"'
+    if unit != "m" and extent < 2e-4:
+        return f'it is {extent * 1e6:.3g} um across with unit "{unit}", which looks like metres; set unit to "m"'
+    return None
+
+
+@lru_cache(maxsize=8)
+def _made(shape: Primitive | WeldTee) -> Mesh:
+    return weld_tee_mesh(shape) if isinstance(shape, WeldTee) else primitive_mesh(shape)
+
+
+@lru_cache(maxsize=8)
+def _texture(path: Path, srgb: bool, scale: float, field: str, version: object) -> NDArray[np.float32]:
+    """`version` changes with the file, so that an edited texture is read anew."""
+    return load_texture(path, srgb=srgb, scale=scale, where=field)
+
+
+def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str) -> Mesh:
+    path = inside(root, shape.path, f"{where}: shape.path")
+    where = f"{where}: {shape.path}"
+    cure = "put the mesh into the project folder, or correct shape.path"
+    try:
+        state = path.stat()
+    except OSError as error:
+        raise InputError("the mesh file cannot be read", where=where, found=error.strerror, cure=cure) from error
+    if not path.is_file():
+        found = "a folder" if path.is_dir() else "a device"
+        raise InputError("the mesh is not a file", where=where, found=found, cure=cure)
+    if path.suffix[1:].lower() not in EXTENSIONS:
+        allowed = ", ".join(f".{name}" for name in EXTENSIONS)
+        found = path.suffix or path.name
+        raise InputError("the mesh file's kind is not known", where=where, found=found, allowed=allowed)
+    if not 0 < state.st_size <= MAX_FILE_BYTES:
+        what = "the mesh file is empty" if state.st_size == 0 else "the mesh file is too large"
+        found = f"{state.st_size} bytes"
+        raise InputError(what, where=where, found=found, allowed=f"1 to {MAX_FILE_BYTES} bytes", cure="export it again")
+    colours = isinstance(item.material.albedo, FromMesh)
+    factor = UNITS[shape.unit] * item.scale
+    mesh = _read(path, Path(root), where, factor, colours, shape.sha256, (state.st_mtime_ns, state.st_size))
+    warning = unit_warning(mesh, item)
+    if warning and shape.unit == "m" and item.scale == 1.0:
+        cure = 'if it really is in metres, say so with unit "cm" and scale 100'
+        raise InputError("the mesh is suspiciously large", where=where, found=warning, cure=cure)
+    return mesh
+
+
+@lru_cache(maxsize=16)
+def _read(
+    path: Path, root: Path, where: str, factor: float, colours: bool, expected_sha256: str | None, version: object
+) -> Mesh:
+    """A checked mesh, its vertices multiplied by factor; `version` changes with the file."""
+    if expected_sha256 is not None and sha256(path) != expected_sha256:
+        warnings.warn(f"{where}: the file has changed since the project was saved", stacklevel=2)
+    parts = read_parts(path, root, where, colours=colours)
+    if not parts:
+        raise InputError(
+            "the mesh has no triangles",
+            where=where,
+            found="no faces (a point cloud?)",
+            cure="mesh the points first, or export the faces too",
+        )
+    counts = [len(part.triangles) for part in parts]
+    check_triangle_count(sum(counts), where)
+    vertices = np.concatenate([part.vertices for part in parts]) * factor
+    offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
+    triangles = np.concatenate([part.triangles + offset for part, offset in zip(parts, offsets, strict=True)])
+    _check_size(vertices, where)
+
+    linear = path.suffix.lower() in (".glb", ".gltf")
+    looks = [
+        part_look(part.geometry, part.triangles, colours=colours, linear_colours=linear, where=where) for part in parts
+    ]
+    look = merged_look(looks, counts, where)
+    keep = _with_area(vertices, triangles, where)
+    uv = None if look.uv is None else look.uv[keep]
+    return Mesh(
+        vertices,
+        np.ascontiguousarray(triangles[keep], dtype=np.int32),
+        None if uv is None else np.ascontiguousarray(uv, dtype=np.float32),
+        look.texture,
+        look.colour,
+        smooth_normals=any(part.smooth for part in parts),
+    )
+
+
+def _check_size(vertices: NDArray[np.float64], where: str) -> None:
+    """InputError: a vertex is not finite, or too far from the mesh's origin."""
+    bad = int((~np.isfinite(vertices).all(axis=1)).sum())
+    if bad:
+        raise InputError(
+            "the mesh has vertices that are not finite",
+            where=where,
+            found=f"NaN or infinity in {bad} of {len(vertices)} vertices",
+            cure="remove the invalid points and export it again",
+        )
+    reach = float(np.abs(vertices).max())
+    if reach > MAX_EXTENT:
+        raise InputError(
+            "the mesh is too large, or too far from its origin",
+            where=where,
+            found=f"a coordinate of {reach:.4g} m after unit and scale",
+            allowed=f"at most {MAX_EXTENT:g} m",
+            cure="correct unit and scale, or move the mesh to its origin before exporting it",
+        )
+
+
+def _with_area(vertices: NDArray[np.float64], triangles: NDArray[np.int64], where: str) -> NDArray[np.bool_]:
+    """(t,) True where a triangle has an area. InputError: at least half of them have none."""
+    keep = np.empty(len(triangles), dtype=np.bool_)
+    for start in range(0, len(triangles), 2**20):  # in pieces, to bound the memory
+        a, b, c = (vertices[triangles[start : start + 2**20, k]] for k in range(3))
+        keep[start : start + 2**20] = np.cross(b - a, c - a).any(axis=1)
+    flat = len(keep) - int(keep.sum())
+    if 2 * flat >= len(keep):
+        raise InputError(
+            "the mesh is degenerate",
+            where=where,
+            found=f"{flat} of {len(keep)} triangles without area",
+            allowed="less than half",
+            cure="export it again with more digits, or repair it",
+        )
+    if flat:
+        warnings.warn(f"{where}: {flat} of {len(keep)} triangles have no area and were left out", stacklevel=2)
+    return keep
