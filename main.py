@@ -1,13 +1,221 @@
-"""The one entry of Blazer Studio."""
+"""The one entry of Blazer Studio: no arguments opens the studio, subcommands run the same work without windows.
+
+Exit codes: 0 done, 2 bad input (one message says what to change), 3 a fault of the program, 130 interrupted.
+Only click is imported here; everything else where it is used, so that --help answers at once.
+"""
 
 from __future__ import annotations
 
-import click
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from studio.system import message, missing_needs, missing_python_package
+
+try:
+    import click
+except ModuleNotFoundError as missing:
+    sys.exit(missing_python_package(missing.name))
+
+BAD_INPUT, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 3, 130, 141
+SAMPLE = "weld_seam"
+ISSUE_HINT = "this is a fault of Blazer Studio, please report it; --debug shows where it happened"
 
 
-@click.group(invoke_without_command=True)
-def cli() -> None:
-    """Simulate line laser scanners."""
+class Commands(click.Group):
+    """Turns every way a command can end into one message and an exit code."""
+
+    def invoke(self, context: click.Context) -> Any:
+        try:
+            result = super().invoke(context)
+            sys.stdout.flush()
+            return result
+        except (click.ClickException, click.exceptions.Exit):
+            raise
+        except BaseException as error:
+            context.exit(_report_error(error, context))
+
+
+def _report_error(error: BaseException, context: click.Context) -> int:
+    """Say what happened, on standard error and, where asked for, as JSON; return the exit code."""
+    from render.errors import Cancelled, InputError
+
+    options = context.find_root().meta
+    details: dict[str, Any] = {}
+    if isinstance(error, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter complains when it closes
+        return BROKEN_PIPE
+    if isinstance(error, (KeyboardInterrupt, Cancelled, click.Abort)):
+        code, text = INTERRUPTED, "interrupted; no file was left half-written"
+    elif isinstance(error, InputError):
+        code, text = BAD_INPUT, str(error)
+        details = {name: getattr(error, name) for name in ("what", "where", "found", "allowed", "cure")}
+    elif isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith(("render", "analysis", "studio")):
+        code, text = BAD_INPUT, missing_python_package(error.name)
+    elif isinstance(error, MemoryError):
+        code, text = BAD_INPUT, "not enough memory; a smaller --scale needs less"
+    elif isinstance(error, OSError):
+        code, text = BAD_INPUT, f"{error.filename or 'the system refused'}: {error.strerror or error}"
+    else:
+        code, text = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}; {ISSUE_HINT}"
+    if options.get("debug"):
+        import traceback
+
+        traceback.print_exception(error)
+    click.echo(_printable(f"error: {text}"), err=True)
+    if options.get("as_json"):
+        from studio.console import print_json
+
+        print_json({"ok": False, "exit_code": code, "error": {"message": text, **details}})
+    return code
+
+
+def _printable(text: str) -> str:
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def _remember(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    context.find_root().meta[parameter.name or ""] = value
+    return value
+
+
+def common(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options that every command has."""
+    for option in (
+        click.option("--debug", is_flag=True, expose_value=False, callback=_remember, help="Show tracebacks."),
+        click.option("--quiet", "-q", is_flag=True, help="No progress."),
+        click.option(
+            "--json", "as_json", is_flag=True, callback=_remember, help="Print the result as one JSON object."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def working(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of the commands that compute and write."""
+    for option in (
+        click.option("--steps", type=click.IntRange(1), help="Only the first so many frames of a moving scan."),
+        click.option("--scale", type=click.FloatRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
+        click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Random seed  [default: the project's]."),
+        click.option("--threads", type=click.IntRange(1, 1024), help="Threads  [default: all processors]."),
+        click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/<name>]."),
+    ):
+        command = option(command)
+    return common(command)
+
+
+PROJECT = click.argument("project", required=False, type=click.Path(path_type=Path))
+
+
+@click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option("0.1.0", prog_name="Blazer Studio")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """Blazer Studio simulates line laser scanners: what the camera sees, what is reconstructed, and how wrong it is.
+
+    Without a command it opens the studio.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    reason = why_no_studio()
+    if reason is None:
+        from studio.qt.app import open_studio  # type: ignore[import-not-found]
+
+        context.exit(open_studio())
+    click.echo(f"The studio does not open here: {reason}. Running the sample scan without it.", err=True)
+    context.invoke(run)
+
+
+def why_no_studio() -> str | None:
+    """The reason why no window can open, or None."""
+    from importlib.util import find_spec
+
+    if find_spec("studio.qt") is None:
+        return "this version has no desktop yet"
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return "there is no display"
+    return None
+
+
+@cli.command()
+@PROJECT
+@working
+def run(project: Path | None, **options: Any) -> None:
+    """Scan a project: render, extract the line, triangulate, compare with the truth, report. Default: the sample."""
+    _require_system()
+    from studio.commands import run_project
+
+    run_project(project, **options)
+
+
+@cli.command()
+@PROJECT
+@working
+def render(project: Path | None, **options: Any) -> None:
+    """Render the frames of a project with their truth, and stop there."""
+    _require_system()
+    from studio.commands import render_project
+
+    render_project(project, **options)
+
+
+@cli.command()
+@click.argument("source", type=click.Path(path_type=Path))
+@click.option("--project", type=click.Path(path_type=Path), help="Project with camera, laser and settings.")
+@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside the source].")
+@common
+def reconstruct(source: Path, **options: Any) -> None:
+    """Points from rendered frames (a folder that `render` wrote) or from a photograph (with --project)."""
+    _require_system()
+    from studio.commands import reconstruct_source
+
+    reconstruct_source(source, **options)
+
+
+@cli.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@common
+def report(folder: Path, **options: Any) -> None:
+    """Rebuild the report of a finished scan from its folder."""
+    _require_system()
+    from studio.commands import rebuild_report
+
+    rebuild_report(folder, **options)
+
+
+@cli.command()
+@PROJECT
+@common
+def inspect(project: Path | None, **options: Any) -> None:
+    """What is in a project, whether it is sane, and what the camera will see."""
+    _require_system()
+    from studio.commands import inspect_project
+
+    inspect_project(project, **options)
+
+
+@cli.command()
+@click.argument("template", required=False)
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--force", is_flag=True, help="Overwrite files that are there.")
+@common
+def new(template: str | None, folder: Path | None, **options: Any) -> None:
+    """Start a project from a template; without a template, list them."""
+    from studio.templates import new_project
+
+    new_project(template, folder, **options)
+
+
+def _require_system() -> None:
+    """Before anything heavy is imported: name the system libraries that are missing, and the command that brings them."""
+    missing = missing_needs()
+    if missing:
+        from render.errors import InputError
+
+        raise InputError(f"the system lacks libraries\n{message(missing)}")
 
 
 if __name__ == "__main__":

@@ -135,7 +135,9 @@ def _field_names(model: type[BaseModel], location: Location) -> list[str]:
 
 
 def _kinds(model: type[BaseModel], location: Location) -> list[str]:
-    tags = [found.model_fields["kind"].annotation for found in _models_at(model, location) if "kind" in found.model_fields]
+    tags = [
+        found.model_fields["kind"].annotation for found in _models_at(model, location) if "kind" in found.model_fields
+    ]
     return sorted({str(name) for tag in tags for name in get_args(tag)})
 
 

@@ -1,0 +1,221 @@
+"""What a project will show: the line in the image, resolution, working range, width, exposure. Figures of the first frame.
+
+Everything comes from the exact curve and the direct laser light, which take a fraction of a second; "about" is a median.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.camera import Camera
+from render.checks import check_placement
+from render.frame import Frame, LaserCurve
+from render.lights import Environment
+from render.motion import NoMotion
+from render.render import render_world
+from render.settings import RenderSettings
+from render.world import build_world
+from studio.project import Project
+
+Float = NDArray[np.float64]
+
+PROBE_ERROR = 0.05
+"""Relative error of the light that is rendered to look at; ample for figures that are called about."""
+WORKING_DISTANCES = np.geomspace(0.01, 100.0, 4001)
+NARROW_PX, WIDE_PX = 0.5, 6.0
+DIM_ELECTRONS = 100.0
+STEEP = math.radians(75)
+
+
+@dataclass(frozen=True)
+class LaserView:
+    """One laser as the camera sees it. Lengths m, angles rad; None where there is nothing to measure."""
+
+    name: str
+    baseline: float
+    """Distance from the camera's centre to the laser's origin."""
+    triangulation_angle: float | None
+    """Between the rays of camera and laser, about."""
+    scan_lines: int
+    scan_lines_hit: int
+    line_length: float
+    """On the surface, where the line is unbroken."""
+    line_length_px: float
+    depth_nearest: float | None
+    depth_farthest: float | None
+    working_nearest: float | None
+    working_farthest: float | None
+    """Depths along the fan's axis that fall into the image; no farthest: no end."""
+    depth_per_px: float | None
+    along_line_per_px: float | None
+    width_px: float | None
+    """Gaussian sigma with the same height and area, about."""
+    peak_electrons: float | None
+    """Of the brightest pixel of a scan line, about."""
+    peak_electrons_most: float | None
+    saturated: float | None
+    """Share of the scan lines that are hit whose brightest pixel exceeds the full well."""
+    steepest_view: float | None
+    """Largest angle between a facet's normal and the camera or the laser."""
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What is in a project, and what it will show at step 0."""
+
+    name: str
+    objects: tuple[tuple[str, str, int], ...]
+    """Name, kind of shape, triangles."""
+    image_size: tuple[int, int]
+    frames: int
+    full_well: float
+    lasers: tuple[LaserView, ...]
+    warnings: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def inspect(project: Project, root: Path, threads: int | None = None) -> Inspection:
+    """Load the meshes below `root` and look. InputError: what rendering would refuse as well."""
+    scene = project.scene
+    world = build_world(scene, root, 0)
+    check_placement(world, scene, 0)
+    dark = scene.model_copy(update={"lights": (), "environment": Environment(), "motion": NoMotion()})
+    settings = RenderSettings(laser_error=PROBE_ERROR, truth_images=False)
+    frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, threads=threads)
+    views = tuple(_laser_view(project, frame, i) for i in range(len(scene.lasers)))
+    counts = np.bincount(world.object_id, minlength=len(scene.visible_objects))
+    return Inspection(
+        name=project.name,
+        objects=tuple(
+            (item.name, item.shape.kind, int(count)) for item, count in zip(scene.visible_objects, counts, strict=True)
+        ),
+        image_size=(scene.camera.width, scene.camera.height),
+        frames=scene.frame_count,
+        full_well=project.sensor.full_well,
+        lasers=views,
+        warnings=tuple(_warnings(project, views)),
+    )
+
+
+def _laser_view(project: Project, frame: Frame, i: int) -> LaserView:
+    scene, curve = project.scene, frame.curves[i]
+    camera, rows = scene.camera, curve.axis == "rows"
+    origin = scene.T_camera_laser(i)[:3, 3]
+    plane = scene.laser_plane(i)
+    nearest, farthest = _working_range(camera, scene.T_camera_laser(i))
+    hit = np.unique(curve.index)
+    peak, width = _brightness(project, frame, i, hit)
+    length, length_px = _lengths(curve)
+    some = len(curve.point) > 0
+    depth_px, along_px = _resolution(camera, plane, curve) if some else (None, None)
+    return LaserView(
+        name=scene.lasers[i].name,
+        baseline=float(np.linalg.norm(origin)),
+        triangulation_angle=_between_rays(curve.point, origin) if some else None,
+        scan_lines=camera.height if rows else camera.width,
+        scan_lines_hit=len(hit),
+        line_length=length,
+        line_length_px=length_px,
+        depth_nearest=float(curve.depth_z.min()) if some else None,
+        depth_farthest=float(curve.depth_z.max()) if some else None,
+        working_nearest=nearest,
+        working_farthest=farthest,
+        depth_per_px=depth_px,
+        along_line_per_px=along_px,
+        width_px=float(np.median(width)) if some else None,
+        peak_electrons=float(np.median(peak)) if some else None,
+        peak_electrons_most=float(peak.max()) if some else None,
+        saturated=float(np.mean(peak > project.sensor.full_well)) if some else None,
+        steepest_view=float(max(curve.camera_angle.max(), curve.laser_angle.max())) if some else None,
+    )
+
+
+def _between_rays(points: Float, origin: Float) -> float:
+    """Median angle at the surface between camera (at 0) and laser; (n, 3) points in the camera frame."""
+    to_laser = origin - points
+    cosine = -np.einsum("ij,ij->i", points, to_laser)
+    cosine /= np.linalg.norm(points, axis=1) * np.linalg.norm(to_laser, axis=1)
+    return float(np.median(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _brightness(project: Project, frame: Frame, i: int, hit: NDArray[np.int32]) -> tuple[Float, Float]:
+    """Electrons of the brightest pixel, and the equivalent sigma in px, of each scan line that is hit."""
+    from render.develop import laser_electrons
+
+    electrons = laser_electrons(frame, project.scene, project.sensor, i)
+    lines = (electrons if frame.curves[i].axis == "rows" else electrons.T)[hit].astype(np.float64)
+    peak = lines.max(axis=1) if len(hit) else np.zeros(0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        width = lines.sum(axis=1) / (peak * math.sqrt(2.0 * math.pi))
+    return peak, np.nan_to_num(width)
+
+
+def _lengths(curve: LaserCurve) -> tuple[float, float]:
+    """Length (m, px) of the line, summed over neighbouring scan lines where it does not jump."""
+    if len(curve.index) < 2:
+        return 0.0, 0.0
+    steps = np.linalg.norm(np.diff(curve.point, axis=0), axis=1)
+    pixels = np.hypot(np.diff(curve.index), np.diff(curve.position))
+    joined = (np.diff(curve.index) == 1) & (steps < 10.0 * np.median(steps) + 1e-12)
+    return float(steps[joined].sum()), float(pixels[joined].sum())
+
+
+def _resolution(camera: Camera, plane: Float, curve: LaserCurve) -> tuple[float | None, float | None]:
+    """Change of depth for one pixel across the line, and length on the surface from one scan line to the next, m."""
+    pixels = np.stack([curve.position, curve.index.astype(np.float64)], axis=1)
+    if curve.axis == "columns":
+        pixels = pixels[:, ::-1].copy()
+    half = np.array([0.5, 0.0] if curve.axis == "rows" else [0.0, 0.5])
+    depths = []
+    for shifted in (pixels - half, pixels + half):
+        rays, _ = camera.rays(shifted)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depths.append(-plane[3] * rays[:, 2] / (rays @ plane[:3]))
+    change = np.abs(depths[1] - depths[0])
+    steps = np.linalg.norm(np.diff(curve.point, axis=0), axis=1)[np.diff(curve.index) == 1]
+    depth = float(np.median(change[np.isfinite(change)])) if np.isfinite(change).any() else None
+    return depth, float(np.median(steps)) if len(steps) else None
+
+
+def _working_range(camera: Camera, T_camera_laser: Float) -> tuple[float | None, float | None]:
+    """Nearest and farthest depth_z of the fan's axis in the image; the farthest is None where it never leaves."""
+    points = T_camera_laser[:3, 3] + WORKING_DISTANCES[:, None] * T_camera_laser[:3, 2]
+    pixels, valid = camera.project(points)
+    with np.errstate(invalid="ignore"):
+        seen = valid & (np.abs(pixels[:, 0] - (camera.width - 1) / 2) <= camera.width / 2)
+        seen &= np.abs(pixels[:, 1] - (camera.height - 1) / 2) <= camera.height / 2
+    if not seen.any():
+        return None, None
+    inside = np.flatnonzero(seen)
+    farthest = None if inside[-1] == len(points) - 1 else float(points[inside[-1], 2])
+    return float(points[inside[0], 2]), farthest
+
+
+def _warnings(project: Project, views: tuple[LaserView, ...]) -> list[str]:
+    """What a person should know before spending time on a scan."""
+    found = []
+    if not views:
+        found.append("the rig has no laser: there is no line to extract")
+    for view in views:
+        if view.scan_lines_hit == 0:
+            found.append(f"{view.name}: no part of the line is both lit and seen")
+            continue
+        if view.saturated is not None and view.saturated > 0.01:
+            found.append(f"{view.name}: {view.saturated:.0%} of the line saturates; shorten sensor.exposure_time")
+        if view.peak_electrons is not None and view.peak_electrons < DIM_ELECTRONS:
+            found.append(f"{view.name}: the line is dim, about {view.peak_electrons:.0f} e-; lengthen the exposure")
+        if view.width_px is not None and not NARROW_PX <= view.width_px <= WIDE_PX:
+            found.append(f"{view.name}: the line's sigma is about {view.width_px:.2f} px; 0.5 to 6 px measure well")
+        if view.steepest_view is not None and view.steepest_view > STEEP:
+            found.append(
+                f"{view.name}: parts are seen or lit at {math.degrees(view.steepest_view):.0f} deg: expect bias"
+            )
+    return found

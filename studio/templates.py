@@ -1,0 +1,60 @@
+"""New projects from the ones that come with the program; nothing that is there is overwritten unasked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from render.errors import InputError
+from render.files import atomic_write
+
+DESCRIPTIONS = {
+    "weld_seam": "the founding paper's rig over a single-bevel tee joint",
+    "plane": "a tilted plane: the simplest thing with a closed form",
+    "sphere": "a sphere on a table: every slope at once",
+    "step_block": "five steps of 10 mm: depth linearity",
+    "v_groove": "a 90 degree groove: inner corners",
+    "scan": "the step block swept by a linear stage, 20 frames",
+}
+PROJECT_NAME = "project.json"
+FOLDER = Path(__file__).resolve().parent.parent / "assets" / "projects"
+
+
+@dataclass(frozen=True)
+class NewProject:
+    """Files that were written."""
+
+    project: Path
+    files: tuple[Path, ...]
+
+
+def template_folder(template: str) -> Path:
+    """The folder of a template that comes with the program. InputError: no such template."""
+    if template not in DESCRIPTIONS:
+        import difflib
+
+        near = difflib.get_close_matches(template, DESCRIPTIONS, n=1)
+        raise InputError(
+            "there is no such template",
+            found=template,
+            allowed=", ".join(DESCRIPTIONS),
+            cure=f"did you mean {near[0]}?" if near else "",
+        )
+    return FOLDER / template
+
+
+def new_project(template: str, folder: Path, *, force: bool = False) -> NewProject:
+    """Copy a template into a folder, which is made. InputError: unknown template, or files there and not `force`."""
+    source = template_folder(template)
+    pairs = [(file, folder / file.relative_to(source)) for file in sorted(source.rglob("*")) if file.is_file()]
+    there = [target for _, target in pairs if target.exists()]
+    if there and not force:
+        raise InputError(
+            "a file is there already",
+            where=str(there[0]),
+            cure="choose another folder, or overwrite it with --force",
+        )
+    for file, target in pairs:
+        with atomic_write(target) as temporary:
+            temporary.write_bytes(file.read_bytes())
+    return NewProject(project=folder / PROJECT_NAME, files=tuple(target for _, target in pairs))
