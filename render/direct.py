@@ -343,10 +343,19 @@ def direct_image(
         relative = math.sqrt(float(np.sum(error**2)) / count) / signal if signal > 0.0 else 0.0
         if relative <= target or cells >= MOST_CELLS or signal == 0.0:
             return DirectImage(image.reshape(camera.height, camera.width), relative, count, samples)
-        cells *= 2
         # a pixel below half of its equal share cannot keep the image from its target
-        todo = np.flatnonzero(error > 0.5 * target * signal)
+        rough = error > 0.5 * target * signal
+        # all rays may miss the edge of a shadow that cuts a pixel's corner: its neighbours tell
+        todo = np.flatnonzero(_with_neighbours(rough, pixels, camera.width))
+        cells *= 2
     return DirectImage(image.reshape(camera.height, camera.width), 0.0, 0, samples)
+
+
+def _with_neighbours(chosen: NDArray[np.bool_], pixels: Int, width: int) -> NDArray[np.bool_]:
+    """(n,) chosen among ascending flat pixel indices (n,) -> the chosen ones and their 8 neighbours."""
+    around = np.array([i + j * width for j in (-1, 0, 1) for i in (-1, 0, 1)])
+    wanted = np.unique(pixels[chosen][:, None] + around)
+    return np.isin(pixels, wanted, assume_unique=True)
 
 
 @dataclass(frozen=True)
