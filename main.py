@@ -20,7 +20,6 @@ except ModuleNotFoundError as missing:
     sys.exit(missing_python_package(missing.name))
 
 BAD_INPUT, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 3, 130, 141
-SAMPLE = "weld_seam"
 ISSUE_HINT = "this is a fault of Blazer Studio, please report it; --debug shows where it happened"
 
 
@@ -204,13 +203,13 @@ def inspect(project: Path | None, **options: Any) -> None:
 @common
 def new(template: str | None, folder: Path | None, **options: Any) -> None:
     """Start a project from a template; without a template, list them."""
-    from studio.templates import new_project
+    from studio.commands import start_project
 
-    new_project(template, folder, **options)
+    start_project(template, folder, **options)
 
 
 def _require_system() -> None:
-    """Before anything heavy is imported: name the system libraries that are missing, and the command that brings them."""
+    """Before heavy imports: name the system libraries that are missing, and the command that brings them."""
     missing = missing_needs()
     if missing:
         from render.errors import InputError

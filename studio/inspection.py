@@ -1,6 +1,6 @@
-"""What a project will show: the line in the image, resolution, working range, width, exposure. Figures of the first frame.
+"""What a project will show in its first frame: the line in the image, resolution, working range, width, exposure.
 
-Everything comes from the exact curve and the direct laser light, which take a fraction of a second; "about" is a median.
+All of it comes from the exact curve and the direct laser light, a fraction of a second's work; "about" is a median.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from render.camera import Camera
 from render.checks import check_placement
+from render.develop import expected_electrons
 from render.frame import Frame, LaserCurve
 from render.lights import Environment
 from render.motion import NoMotion
@@ -148,9 +149,8 @@ def _between_rays(points: Float, origin: Float) -> float:
 
 def _brightness(project: Project, frame: Frame, i: int, hit: NDArray[np.int32]) -> tuple[Float, Float]:
     """Electrons of the brightest pixel, and the equivalent sigma in px, of each scan line that is hit."""
-    from render.develop import laser_electrons
-
-    electrons = laser_electrons(frame, project.scene, project.sensor, i)
+    power = [laser.power if k == i else 0.0 for k, laser in enumerate(project.scene.lasers)]
+    electrons = expected_electrons(frame, project.scene, project.sensor, laser_power=power)
     lines = (electrons if frame.curves[i].axis == "rows" else electrons.T)[hit].astype(np.float64)
     peak = lines.max(axis=1) if len(hit) else np.zeros(0)
     with np.errstate(invalid="ignore", divide="ignore"):

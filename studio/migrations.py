@@ -19,7 +19,7 @@ CURRENT = OLDEST + len(STEPS)
 
 
 def migrate(data: Data, where: str = "") -> Data:
-    """The same project at the current version. InputError: version missing, not a number, or newer than this program."""
+    """The same project at the current version. InputError: version missing, not a number, or newer than known."""
     version = data.get("schema_version")
     place = f"{where}: schema_version" if where else "schema_version"
     understood = str(CURRENT) if CURRENT == OLDEST else f"{OLDEST} to {CURRENT}"

@@ -65,15 +65,21 @@ def _resolve(location: Location, data: Any, kind: str) -> tuple[Location, tuple[
     path: list[int | str] = []
     branch: tuple[int, str] | None = None
     for i, part in enumerate(location):
-        if isinstance(data, dict) and part in data:
-            data = data[part]
-        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
-            data = data[part]
-        elif not (kind == "missing" and i == len(location) - 1):
+        here, data = _child(data, part)
+        if not here and not (kind == "missing" and i == len(location) - 1):
             branch = branch or (len(path), str(part))
             continue
         path.append(part)
     return tuple(path), branch
+
+
+def _child(data: Any, part: int | str) -> tuple[bool, Any]:
+    """Whether a JSON value has such a part, and the part or else the value itself."""
+    if isinstance(data, dict) and part in data:
+        return True, data[part]
+    if isinstance(data, list) and isinstance(part, int) and part < len(data):
+        return True, data[part]
+    return False, data
 
 
 def _meant(entries: list[dict[str, Any]]) -> Iterable[dict[str, Any]]:
@@ -135,10 +141,7 @@ def _field_names(model: type[BaseModel], location: Location) -> list[str]:
 
 
 def _kinds(model: type[BaseModel], location: Location) -> list[str]:
-    tags = [
-        found.model_fields["kind"].annotation for found in _models_at(model, location) if "kind" in found.model_fields
-    ]
-    return sorted({str(name) for tag in tags for name in get_args(tag)})
+    return sorted({str(tag) for found in _models_at(model, location) for tag in _tags(found)})
 
 
 def _models_at(model: type[BaseModel], location: Location) -> list[type[BaseModel]]:

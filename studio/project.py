@@ -59,7 +59,7 @@ class Project(Model):
         return pretty(self.model_dump(mode="json")) + "\n"
 
     def save(self, path: Path | str) -> Self:
-        """Write the file, whole or not at all, with the digest of every mesh file there is; returns what was written."""
+        """Write the file, whole or not at all, with the digest of every mesh file; returns what was written."""
         target = Path(path)
         signed = self.with_digests(target.parent)
         with atomic_write(target) as temporary:

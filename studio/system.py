@@ -1,7 +1,7 @@
 """What the machine must bring before anything heavy is imported: Python, its venv module, shared libraries, a font.
 
-Standard library only: `make` runs this file with the system's Python before there is an environment, and main.py asks it
-before the imports that would otherwise end in a bare ImportError, or, in VTK, in a segmentation fault.
+Standard library only: `make` runs this file with the system's Python before there is an environment, and main.py asks
+it before the imports that would otherwise end in a bare ImportError, or, in VTK, in a segmentation fault.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ FONT = Need("a TrueType font", "fonts-dejavu-core", "the PDF report (WeasyPrint)
 
 
 def missing_needs() -> list[Need]:
-    """What this machine lacks. Empty where the question cannot be asked this way (not Linux: wheels bring their own)."""
+    """What this machine lacks. Empty where it cannot be asked this way (not Linux: wheels bring their own)."""
     if not sys.platform.startswith("linux"):
         return []
     missing = [need for need in LIBRARIES if not _loads(need.library)]

@@ -275,7 +275,7 @@ class TestAnyFile:
                     del place[last]
                 elif isinstance(place, dict):
                     place[data.draw(st.text(max_size=10))] = data.draw(ODD_VALUES)
-                else:
+                elif isinstance(place, list):
                     place.append(data.draw(ODD_VALUES))
             except (KeyError, IndexError, TypeError):
                 pass  # an earlier change took the place away

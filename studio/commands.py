@@ -1,0 +1,101 @@
+"""What the commands of main.py do: find the project, show progress, print the result for a person or a program."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studio.console import print_json, print_table, stage_progress
+from studio.project import Project, project_file
+from studio.templates import DESCRIPTIONS, new_project, template_folder
+
+if TYPE_CHECKING:
+    from studio.inspection import Inspection, LaserView
+
+SAMPLE = "weld_seam"
+
+
+def load_project(path: Path | None) -> tuple[Project, Path]:
+    """The project at a path (a file, or a folder with one project), or the sample; and its folder."""
+    file = project_file(path if path is not None else template_folder(SAMPLE))
+    return Project.load(file), file.parent
+
+
+def start_project(template: str | None, folder: Path | None, *, force: bool, quiet: bool, as_json: bool) -> None:
+    """`new`: copy a template, or list them."""
+    if template is None:
+        if as_json:
+            print_json({"ok": True, "templates": DESCRIPTIONS})
+        else:
+            print_table("Templates", list(DESCRIPTIONS.items()))
+        return
+    made = new_project(template, folder if folder is not None else Path(template), force=force)
+    if as_json:
+        print_json({"ok": True, "project": made.project, "files": list(made.files)})
+    elif not quiet:
+        print(f"wrote {made.project}; next: python main.py inspect {made.project}")
+
+
+def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
+    """`inspect`: tables of what is there and what will be seen."""
+    from studio.inspection import inspect
+
+    project, root = load_project(path)
+    with stage_progress(quiet or as_json) as progress:
+        progress("looking", 0.0)
+        found = inspect(project, root)
+        progress("looking", 1.0)
+    if as_json:
+        print_json({"ok": True, **found.as_dict()})
+        return
+    print_table(f"Project {found.name}", _project_rows(project, found))
+    for view in found.lasers:
+        print()
+        print_table(f"Laser {view.name}", _laser_rows(view, found.full_well))
+    for warning in found.warnings:
+        print(f"\nwarning: {warning}")
+
+
+def _project_rows(project: Project, found: Inspection) -> list[tuple[str, str]]:
+    camera, sensor, settings = project.scene.camera, project.sensor, project.extraction
+    rows = [
+        ("camera", f"{camera.width} x {camera.height} px, f {camera.fx * camera.pixel_pitch * 1e3:.2f} mm, "
+                   f"f/{camera.lens.f_number:g}, {camera.pixel_pitch * 1e6:.2f} um pixels"),
+        ("sensor", f"{sensor.colour}, {sensor.bits} bit, exposure {sensor.exposure_time * 1e3:.3g} ms, "
+                   f"full well {sensor.full_well:.0f} e-, read noise {sensor.read_noise:g} e-"),
+    ]  # fmt: skip
+    rows += [("object", f"{name}: {kind}, {count} triangles") for name, kind, count in found.objects]
+    rows.append(("frames", str(found.frames)))
+    rows.append(("extraction", f"{settings.method}, one position on each of the image's {settings.axis}"))
+    return rows
+
+
+def _laser_rows(view: LaserView, full_well: float) -> list[tuple[str, str]]:
+    def number(value: float | None, unit: float, form: str) -> str:
+        return "-" if value is None else form.format(value / unit)
+
+    degree = math.radians(1)
+    end = number(view.working_farthest, 1e-3, "{:.0f} mm") if view.working_farthest is not None else "no end"
+    return [
+        ("baseline", number(view.baseline, 1e-3, "{:.1f} mm")),
+        ("triangulation angle", number(view.triangulation_angle, degree, "about {:.1f} deg")),
+        ("working range", f"{number(view.working_nearest, 1e-3, '{:.0f}')} to {end} in depth"),
+        ("line seen", f"on {view.scan_lines_hit} of {view.scan_lines} scan lines"),
+        ("line length", f"{view.line_length_px:.0f} px, {view.line_length * 1e3:.1f} mm on the surface"),
+        (
+            "depth of the line",
+            f"{number(view.depth_nearest, 1e-3, '{:.1f}')} to {number(view.depth_farthest, 1e-3, '{:.1f}')} mm",
+        ),
+        ("depth per pixel", number(view.depth_per_px, 1e-6, "about {:.0f} um across the line")),
+        ("surface per pixel", number(view.along_line_per_px, 1e-6, "about {:.0f} um along the line")),
+        ("line width", number(view.width_px, 1, "sigma about {:.2f} px")),
+        (
+            "brightest pixels",
+            number(view.peak_electrons, 1, "about {:.0f} e-")
+            + number(view.peak_electrons_most, 1, ", at most {:.0f} e-")
+            + f" of {full_well:.0f} e-",
+        ),
+        ("saturated", number(view.saturated, 0.01, "{:.1f} % of the scan lines that are hit")),
+        ("steepest view", number(view.steepest_view, degree, "{:.1f} deg to camera or laser")),
+    ]
