@@ -1,0 +1,230 @@
+"""From radiance to digital numbers, after EMVA 1288; the last step of a frame, milliseconds, never a new render.
+
+    signal      mu    = sum over light groups of radiance x response, x the pixel's own gain (PRNU)
+    charge      e     ~ Poisson(mu + dark current x exposure)
+    read-out    e    += the pixel's own offset (DSNU) + Gaussian read noise;  e <= full well
+    numbers     DN    = round(K e + black level), clipped to 0 .. 2^bits - 1
+
+Shot noise, dark noise and read noise are new in every frame (seed and step); PRNU and DSNU belong to the sensor, so
+they have a stream of their own and are the same in every frame. Full well clips last, so a saturated pixel reads
+exactly `Image.saturation`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.errors import InputError
+from render.frame import Frame
+from render.poisson import poisson
+from render.random import normal
+from render.response import band_response, joules_per_radiance, laser_response, relative_illumination
+from render.scene import Scene
+from render.sensor import Sensor
+from render.threads import map_chunks
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
+
+PATTERN_SEED = 0x50524E55_44534E55
+ROWS = 16
+_PRNU, _DSNU = 0, 1
+_READ, _SHOT = 0, 1
+
+
+@dataclass(frozen=True)
+class Image:
+    """What the camera delivers: raw numbers (Bayer: the mosaic), and what is needed to read them as electrons."""
+
+    pixels: Pixels
+    """(h, w) DN, uint8 for 8 bits and uint16 for more, not shifted."""
+    bits: int
+    gain: float
+    """EMVA's K, DN/e-: electrons = (DN - black_level) / gain."""
+    black_level: float
+    """DN."""
+    saturation: float
+    """DN; a pixel at or above it only says "at least this much"."""
+    read_noise: float
+    """e-, standard deviation."""
+    pattern: str | None
+    """Bayer pattern of the first 2 x 2 pixels, None for mono."""
+
+
+def develop(
+    frame: Frame,
+    scene: Scene,
+    sensor: Sensor,
+    *,
+    seed: int = 0,
+    threads: int | None = None,
+    laser_power: Sequence[float] | None = None,
+    noise: bool = True,
+) -> Image:
+    """The (h, w) image that the sensor takes of a frame; the same for any number of threads.
+
+    laser_power: W for each laser in place of the scene's. noise off: the mean, without PRNU and DSNU, but saturated and
+    quantised. Raises InputError: the frame is not of this scene, or a power cannot be had from it.
+    Source: EMVA 1288 release 4, section 2 (linear model) and 4 (spatial non-uniformity).
+    """
+    exposure = _Exposure(frame, scene, sensor, laser_power, threads)
+    height, width = exposure.shape
+    top = float(2**sensor.bits - 1)
+    gain = sensor.dn_per_electron
+    pixels = np.empty((height, width), dtype=np.uint8 if sensor.bits == 8 else np.uint16)
+    chain = np.array(
+        [
+            sensor.dark_current * sensor.exposure_time,
+            sensor.prnu,
+            sensor.dsnu,
+            sensor.read_noise,
+            sensor.full_well,
+            gain,
+            sensor.black_level,
+            top,
+        ]
+    )
+
+    def rows(start: int, stop: int) -> None:
+        numbers = np.empty((stop - start, width), dtype=np.uint16)
+        _read_out(exposure.signal(start, stop), start, int(seed) % 2**63, frame.step, chain, noise, numbers)
+        pixels[start:stop] = numbers
+
+    map_chunks(rows, height, ROWS, threads)
+    saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
+    pattern = sensor.pattern if sensor.colour == "bayer" else None
+    return Image(pixels, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern)
+
+
+def expected_electrons(
+    frame: Frame,
+    scene: Scene,
+    sensor: Sensor,
+    *,
+    threads: int | None = None,
+    laser_power: Sequence[float] | None = None,
+) -> Float32:
+    """(h, w) mean electrons of light and dark current, of the ideal pixel: no PRNU, DSNU or saturation.
+
+    Raises InputError as `develop` does.
+    """
+    exposure = _Exposure(frame, scene, sensor, laser_power, threads)
+    electrons = np.empty(exposure.shape, dtype=np.float32)
+
+    def rows(start: int, stop: int) -> None:
+        electrons[start:stop] = exposure.signal(start, stop) + sensor.dark_current * sensor.exposure_time
+
+    map_chunks(rows, electrons.shape[0], ROWS, threads)
+    return electrons
+
+
+class _Exposure:
+    """A frame's light groups with the electrons that each makes per radiance."""
+
+    def __init__(
+        self,
+        frame: Frame,
+        scene: Scene,
+        sensor: Sensor,
+        laser_power: Sequence[float] | None,
+        threads: int | None,
+    ) -> None:
+        camera, lasers = scene.camera, scene.lasers
+        self.shape = (camera.height, camera.width)
+        if len(frame.laser_direct) != len(lasers):
+            found = f"{len(frame.laser_direct)} laser images"
+            raise InputError("the frame is not of this scene", where="frame", found=found, allowed=f"{len(lasers)}")
+        groups = [*frame.laser_direct, *([] if frame.ambient is None else [frame.ambient])]
+        for image in groups:
+            if image.shape[:2] != self.shape:
+                found, allowed = f"{image.shape[1]} x {image.shape[0]} px", f"{camera.width} x {camera.height} px"
+                raise InputError("the frame is not of this scene", where="frame", found=found, allowed=allowed)
+        joule = joules_per_radiance(camera, sensor)
+        scales = _power_scales(scene, laser_power)
+        self.lasers = [
+            (np.ascontiguousarray(image, dtype=np.float32), scale * joule * laser_response(sensor, laser.wavelength_nm))
+            for image, laser, scale in zip(frame.laser_direct, lasers, scales, strict=True)
+        ]
+        self.ambient = None if frame.ambient is None else np.ascontiguousarray(frame.ambient, dtype=np.float32)
+        self.bands = joule * band_response(sensor)
+        self.illumination = relative_illumination(camera, threads)
+
+    def signal(self, start: int, stop: int) -> Float:
+        """(stop - start, w) mean photo-electrons of rows start..stop."""
+        mean = np.zeros((stop - start, self.shape[1]))
+        for image, response in self.lasers:
+            _add_laser(mean, image[start:stop], response, start)
+        if self.ambient is not None:
+            _add_ambient(mean, self.ambient[start:stop], self.bands, start)
+        mean *= self.illumination[start:stop]
+        return mean
+
+
+def _power_scales(scene: Scene, laser_power: Sequence[float] | None) -> list[float]:
+    if laser_power is None:
+        return [1.0] * len(scene.lasers)
+    if len(laser_power) != len(scene.lasers):
+        found, allowed = f"{len(laser_power)} powers", f"{len(scene.lasers)}"
+        raise InputError("one power for each laser is needed", where="laser_power", found=found, allowed=allowed)
+    scales = []
+    for laser, power in zip(scene.lasers, laser_power, strict=True):
+        where = f"laser_power of {laser.name!r}"
+        if not (math.isfinite(power) and power >= 0.0):
+            raise InputError("the power is out of range", where=where, found=power, allowed="0 W or more, finite")
+        if laser.power == 0.0 and power > 0.0:
+            cure = "render the scene with the laser on"
+            raise InputError("the frame holds no light of a laser of 0 W", where=where, found=power, cure=cure)
+        scales.append(power / laser.power if laser.power > 0.0 else 1.0)
+    return scales
+
+
+@numba.njit(nogil=True, cache=True)
+def _add_laser(mean: Float, radiance: Float32, response: Float, first_row: int) -> None:
+    """Add one laser's electrons to (n, w); response (2, 2) by parity of row and column."""
+    for i in range(mean.shape[0]):
+        for j in range(mean.shape[1]):
+            if radiance[i, j] > 0.0:
+                mean[i, j] += response[(first_row + i) & 1, j & 1] * radiance[i, j]
+
+
+@numba.njit(nogil=True, cache=True)
+def _add_ambient(mean: Float, radiance: Float32, response: Float, first_row: int) -> None:
+    """Add the ambient bands' electrons to (n, w); response (2, 2, 3)."""
+    for i in range(mean.shape[0]):
+        for j in range(mean.shape[1]):
+            r = response[(first_row + i) & 1, j & 1]
+            electrons = r[0] * radiance[i, j, 0] + r[1] * radiance[i, j, 1] + r[2] * radiance[i, j, 2]
+            if electrons > 0.0:
+                mean[i, j] += electrons
+
+
+@numba.njit(nogil=True, cache=True)
+def _read_out(
+    mean: Float, first_row: int, seed: int, step: int, chain: Float, noise: bool, numbers: NDArray[np.uint16]
+) -> None:
+    """(n, w) mean photo-electrons -> (n, w) DN: the chain on top of this file, pixel by pixel."""
+    dark, prnu, dsnu, read, full_well, gain, black, top = chain
+    width = mean.shape[1]
+    for i in range(mean.shape[0]):
+        for j in range(width):
+            index = (first_row + i) * width + j
+            charge = mean[i, j]
+            if not noise:
+                charge += dark
+            else:
+                if prnu > 0.0 and charge > 0.0:
+                    charge *= max(0.0, 1.0 + prnu * normal(PATTERN_SEED, index, 0, _PRNU))
+                charge = poisson(charge + dark, seed, index, step, _SHOT)
+                if dsnu > 0.0:
+                    charge += dsnu * normal(PATTERN_SEED, index, 0, _DSNU)
+                if read > 0.0:
+                    charge += read * normal(seed, index, step, _READ)
+            number = math.floor(gain * min(charge, full_well) + black + 0.5)
+            numbers[i, j] = np.uint16(min(max(number, 0.0), top))
