@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -15,7 +16,20 @@ class Model(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, ser_json_inf_nan="constants")
 
+    def __eq__(self, other: object) -> bool:
+        """By fields alone: cached properties hold arrays, which have no truth value."""
+        if type(self) is not type(other):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy without the cached properties, which belong to the old values."""
+        copied = super().model_copy(update=update, deep=deep)
+        for name in copied.__dict__.keys() - type(self).model_fields.keys():
+            del copied.__dict__[name]
+        return copied
+
 
 def quantity(default: Any = ..., *, unit: str = "", label: str = "", help: str = "", **limits: Any) -> Any:
-    """A pydantic field that also carries what a form shows: label, SI unit ("m", "rad", "W", "s", "nm", "") and help."""
+    """A pydantic field that carries what a form shows: label, SI unit ("m", "rad", "W", "s", "nm", "") and help."""
     return Field(default, title=label or None, description=help or None, json_schema_extra={"unit": unit}, **limits)
