@@ -19,7 +19,7 @@ from render.shape import WeldTee
 Float = NDArray[np.float64]
 
 EMBEDDING = 0.02
-"""Overlap of the parts, as a fraction of the smaller of leg and thickness."""
+"""Overlap of the parts, as a fraction of the least length it has to fit in."""
 ROOT_FACE = 1 / 6
 """Least part of the upright's foot that the bevel leaves standing on the base."""
 BEVEL_REACH = 0.8
@@ -73,7 +73,7 @@ def section(shape: WeldTee) -> Section:
     bead = chord if half_arc == 0.0 else chord * half_arc / math.sin(half_arc)
     base, upright = shape.base_width / 2 - shape.leg, shape.upright_height - shape.leg
     return Section(
-        embedding=EMBEDDING * min(shape.leg, shape.thickness),
+        embedding=EMBEDDING * min(shape.leg, shape.thickness, shape.length, base, upright),
         bevel_depth=depth,
         bevel_height=height,
         bead_length=bead,

@@ -146,7 +146,7 @@ def _carried(H: Array, conic: Array) -> Array:
 
 
 def _row(K: Array, v: Array | float) -> Array:
-    return (np.asarray(v, dtype=np.float64) - K[1, 2]) / K[1, 1]
+    return np.asarray((np.asarray(v) - K[1, 2]) / K[1, 1])
 
 
 def _column(K: Array, x: Array, y: Array) -> Array:
