@@ -17,8 +17,10 @@ from studio.system import message, missing_needs, missing_python_package
 try:
     import click
 except ModuleNotFoundError as missing:
-    sys.exit(missing_python_package(missing.name))
+    print(missing_python_package(missing.name), file=sys.stderr)
+    sys.exit(2)
 
+VERSION = "0.1.0"
 BAD_INPUT, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 3, 130, 141
 ISSUE_HINT = "this is a fault of Blazer Studio, please report it; --debug shows where it happened"
 
@@ -110,7 +112,7 @@ PROJECT = click.argument("project", required=False, type=click.Path(path_type=Pa
 
 
 @click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option("0.1.0", prog_name="Blazer Studio")
+@click.version_option(VERSION, prog_name="Blazer Studio")
 @click.pass_context
 def cli(context: click.Context) -> None:
     """Blazer Studio simulates line laser scanners: what the camera sees, what is reconstructed, and how wrong it is.
