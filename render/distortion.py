@@ -28,7 +28,8 @@ def tilt_matrix(tau_x: float, tau_y: float) -> Array:
     return p @ r
 
 
-@numba.njit(nogil=True, cache=True)
+# numpy's error model: on a pole of the model the result is inf or NaN, which the fold then excludes
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def distort(x: float, y: float, k: Array, tilt: Array) -> tuple[float, float, float, float, float, float]:
     """Distorted (x', y') and the Jacobian's entries dx'/dx, dx'/dy, dy'/dx, dy'/dy."""
     r2 = x * x + y * y
@@ -117,9 +118,7 @@ def distort_points(points: Array, k: Array, folds: Array) -> tuple[Array, Mask]:
 
 
 @numba.njit(nogil=True, cache=True)
-def undistort(
-    xd: float, yd: float, k: Array, tilt: Array, folds: Array, tolerance: float
-) -> tuple[float, float, bool]:
+def undistort(xd: float, yd: float, k: Array, tilt: Array, folds: Array, tolerance: float) -> tuple[float, float, bool]:
     """Invert `distort` by Newton's method, kept inside the fold and damped so that the residual always falls."""
     x, y = xd, yd
     limit = fold_radius_at(x, y, folds)

@@ -1,0 +1,164 @@
+"""Point clouds as files: binary PLY with error and source row as attributes, and CSV with units in the header."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.error import Errors
+from analysis.triangulate import Points
+from render.errors import InputError
+from render.files import atomic_write
+from render.pose import invert, transform_points
+from render.scene import Scene
+
+Float = NDArray[np.float64]
+Column = NDArray[Any]
+Cloud = dict[str, Column]
+"""Columns of equal length; the names of `UNITS`, float64 or int32."""
+
+UNITS = {
+    "x": "m",
+    "y": "m",
+    "z": "m",
+    "sigma": "m",
+    "error_depth": "m",
+    "error_distance": "m",
+    "u": "px",
+    "v": "px",
+    "row": "",
+    "laser": "",
+    "step": "",
+}
+INTEGERS = ("row", "laser", "step")
+PLY_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
+    "double": "<f8", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2", "int32": "<i4", "uint32": "<u4",
+    "float32": "<f4", "float64": "<f8",
+}  # fmt: skip
+LONGEST_HEADER = 65536
+
+
+def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: Scene | None = None) -> Cloud:
+    """Valid points of one laser and step; errors are NaN without `errors`. "row" is the scan line.
+
+    With a scene whose objects move, x, y, z are carried back to step 0, so that the clouds of all steps fit together.
+    """
+    here = points.valid
+    xyz = points.world[here] if scene is None else at_first_step(points.world[here], scene, step)
+    count = len(xyz)
+    nan = np.full(count, np.nan)
+    return {
+        "x": xyz[:, 0].copy(),
+        "y": xyz[:, 1].copy(),
+        "z": xyz[:, 2].copy(),
+        "sigma": points.sigma[here],
+        "error_depth": nan if errors is None else errors.depth[here],
+        "error_distance": nan if errors is None else errors.distance[here],
+        "u": points.pixel[here, 0],
+        "v": points.pixel[here, 1],
+        "row": points.index[here].astype(np.int32),
+        "laser": np.full(count, laser, dtype=np.int32),
+        "step": np.full(count, step, dtype=np.int32),
+    }
+
+
+def at_first_step(world: Float, scene: Scene, step: int) -> Float:
+    """(m, 3) world points of a step, moved with the objects to where they are at step 0."""
+    motion = scene.motion
+    if motion.kind == "none" or motion.moves != "objects":
+        return world
+    return transform_points(motion.displacement(0) @ invert(motion.displacement(step)), world)
+
+
+def merge(clouds: Sequence[Cloud]) -> Cloud:
+    """One after the other; no cloud at all gives empty columns."""
+    if not clouds:
+        return {name: np.zeros(0, dtype=np.int32 if name in INTEGERS else np.float64) for name in UNITS}
+    return {name: np.concatenate([part[name] for part in clouds]) for name in clouds[0]}
+
+
+def write_ply(path: Path | str, columns: Mapping[str, Column]) -> None:
+    """Binary little-endian PLY: doubles for float64 columns, ints for int32. InputError: the file cannot be written."""
+    table = np.empty(
+        len(next(iter(columns.values()))),
+        dtype=[(name, "<i4" if column.dtype.kind == "i" else "<f8") for name, column in columns.items()],
+    )
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        "comment metre, pixel; world frame",
+        f"element vertex {len(table)}",
+    ]
+    for name, column in columns.items():
+        table[name] = column
+        header.append(f"property {'int' if column.dtype.kind == 'i' else 'double'} {name}")
+    with atomic_write(path) as temporary, open(temporary, "wb") as file:
+        file.write("\n".join([*header, "end_header", ""]).encode("ascii"))
+        file.write(table.tobytes())
+
+
+def read_ply(path: Path | str) -> Cloud:
+    """The scalar columns of a binary little-endian PLY's vertices, as float64 or int32. InputError: it is none."""
+    where = str(path)
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError("the file cannot be read", where=where, found=error.strerror or error) from error
+    end = data.find(b"end_header\n", 0, LONGEST_HEADER)
+    if not data.startswith(b"ply\n") or end < 0:
+        raise InputError("not a PLY file", where=where, allowed="a PLY header")
+    count = 0
+    fields: list[tuple[str, str]] = []
+    for text in data[:end].decode("ascii", "replace").splitlines():
+        words = text.split()
+        if words[:1] == ["format"] and words[1:2] != ["binary_little_endian"]:
+            raise InputError("the PLY format is not read", where=where, found=text, allowed="binary_little_endian")
+        if words[:1] == ["element"]:
+            if len(words) != 3 or words[1] != "vertex" or fields or not words[2].isdecimal():
+                raise InputError("an element is not read", where=where, found=text, allowed="one element, vertex")
+            count = int(words[2])
+        if words[:1] == ["property"]:
+            if len(words) != 3 or words[1] not in PLY_TYPES or words[2] in dict(fields):
+                raise InputError("a property is not read", where=where, found=text, allowed="scalars, each name once")
+            fields.append((words[2], PLY_TYPES[words[1]]))
+    dtype = np.dtype(fields)
+    body = data[end + len(b"end_header\n") :]
+    if not fields or len(body) < count * dtype.itemsize:
+        raise InputError("the PLY file is cut short", where=where, found=f"{len(body)} bytes of {count} points")
+    table = np.frombuffer(body, dtype=dtype, count=count)
+    return {name: table[name].astype(np.float64 if table[name].dtype.kind == "f" else np.int32) for name, _ in fields}
+
+
+def write_csv(path: Path | str, columns: Mapping[str, Column]) -> None:
+    """One row a point, header `x_m, ..., u_px, ..., row`; floats with all digits. InputError: cannot be written."""
+    header = [f"{name}_{UNITS[name]}" if UNITS.get(name) else name for name in columns]
+    with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+
+
+def read_csv(path: Path | str) -> Cloud:
+    """Inverse of `write_csv`. InputError: a cell is no number, or a row is short."""
+    names = {f"{name}_{unit}" if unit else name: name for name, unit in UNITS.items()}
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            header, *rows = list(csv.reader(file)) or [[]]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError("the table cannot be read", where=str(path), found=error) from error
+    cells: Cloud = {}
+    for i, title in enumerate(header):
+        name = names.get(title, title)
+        try:
+            cells[name] = np.array([row[i] for row in rows], dtype=np.int32 if name in INTEGERS else np.float64)
+        except (ValueError, IndexError, OverflowError) as error:
+            raise InputError(
+                "the table holds a cell that is no number", where=f"{path}: {title}", found=error
+            ) from error
+    return cells

@@ -1,0 +1,72 @@
+"""Signed distance from points to a mesh, in float64: positive on the camera's side of the surface it sees."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int32]
+
+
+def signed_distance(
+    points: Float, vertices: Float, triangles: Int, camera_centre: Float
+) -> tuple[Float, NDArray[np.int64]]:
+    """Distance of (m, 3) points to a mesh, (v, 3) and (t, 3), with the triangle that is nearest; m, world frame.
+
+    The sign asks what the camera sees: negative when the ray from `camera_centre` (3,) meets the surface before the
+    point. It needs neither a closed mesh nor consistent winding, and is right at edges, where the normal of the nearest
+    triangle is not (Baerentzen & Aanaes 2005). Points with NaN, or an empty mesh, give NaN and -1.
+    """
+    distance, nearest = np.full(len(points), np.nan), np.full(len(points), -1, dtype=np.int64)
+    here = np.all(np.isfinite(points), axis=1)
+    if not np.any(here) or len(triangles) == 0:
+        return distance, nearest
+    distance[here], nearest[here] = _signed_distance(points[here], vertices, triangles, camera_centre)
+    return distance, nearest
+
+
+def _signed_distance(
+    points: Float, vertices: Float, triangles: Int, camera_centre: Float
+) -> tuple[Float, NDArray[np.int64]]:
+    import open3d as o3d
+
+    # open3d computes in float32: near the origin it names the right triangles, and float64 does the rest
+    centre = np.median(points, axis=0)
+    scene = o3d.t.geometry.RaycastingScene()
+    corners = o3d.core.Tensor.from_numpy((vertices - centre).astype(np.float32))
+    scene.add_triangles(corners, o3d.core.Tensor.from_numpy(triangles.astype(np.uint32)))
+    local = o3d.core.Tensor.from_numpy((points - centre).astype(np.float32))
+    nearest = scene.compute_closest_points(local)["primitive_ids"].numpy().astype(np.int64)
+    towards = points - camera_centre
+    rays = np.concatenate([np.broadcast_to(camera_centre - centre, points.shape), towards], axis=1)
+    seen = scene.cast_rays(o3d.core.Tensor.from_numpy(rays.astype(np.float32)))["primitive_ids"].numpy()
+    distance = point_triangle_distance(points, vertices[triangles[nearest]])
+    hit = seen != o3d.t.geometry.RaycastingScene.INVALID_ID
+    a, b, c = np.moveaxis(vertices[triangles[np.where(hit, seen, 0)]], 1, 0)
+    normal = np.cross(b - a, c - a)
+    from_camera = np.einsum("ij,ij->i", a - camera_centre, normal)
+    from_point = np.einsum("ij,ij->i", a - points, normal)
+    return np.where(hit & (from_camera * from_point < 0.0), -distance, distance), nearest
+
+
+def point_triangle_distance(points: Float, corners: Float) -> Float:
+    """(m, 3) points, (m, 3, 3) corners -> (m,) distance from each point to its own triangle."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    best = np.minimum(np.minimum(_segment(points, a, b), _segment(points, b, c)), _segment(points, c, a))
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    flat = length > 0.0
+    unit = normal / np.where(flat, length, 1.0)[:, None]
+    inside = flat
+    for start, end in ((a, b), (b, c), (c, a)):
+        inside = inside & (np.einsum("ij,ij->i", np.cross(end - start, points - start), unit) >= 0.0)
+    height = np.abs(np.einsum("ij,ij->i", points - a, unit))
+    return np.where(inside, height, best)
+
+
+def _segment(points: Float, start: Float, end: Float) -> Float:
+    along = end - start
+    squared = np.einsum("ij,ij->i", along, along)
+    t = np.einsum("ij,ij->i", points - start, along) / np.where(squared > 0.0, squared, 1.0)
+    return np.asarray(np.linalg.norm(points - start - np.clip(t, 0.0, 1.0)[:, None] * along, axis=1))

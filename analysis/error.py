@@ -1,0 +1,127 @@
+"""The error of every point against exact truth: along the scan line, in depth, and off the surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.distance import signed_distance
+from analysis.line.result import Line
+from analysis.measures import Measures, measure, outliers
+from analysis.triangulate import Points
+from render.frame import LaserCurve
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """(m,) arrays in the order of the `Points`, NaN where there is nothing to compare with; measured minus true."""
+
+    truth: Index
+    """Index into the `LaserCurve` of the crossing matched to the point, -1: none on that scan line is left."""
+    position: Float
+    """px, along the scan line (u on axis "rows")."""
+    depth: Float
+    """m, `depth_z`: positive is too far from the camera."""
+    distance: Float
+    """m, off the mesh: positive is on the camera's side. Also where no truth is matched."""
+    sigma_distance: Float
+    """m, predicted from sigma_u."""
+    outlier: NDArray[np.bool_]
+    """Position wrong by more than 1 px and 5 robust sigma."""
+    u: Measures
+    """Of `position`, px."""
+    depth_z: Measures
+    """Of `depth`, m."""
+    surface: Measures
+    """Of `distance`, m."""
+    truth_rows: int
+    """Scan lines on which the camera can see the line."""
+    valid_rows: int
+    """Scan lines with at least one point."""
+    measured_rows: int
+    """Scan lines on which a point matches the truth and is no outlier."""
+    false_rows: int
+    """Scan lines with a point where there is no line to be seen."""
+
+    @property
+    def completeness(self) -> float:
+        """Measured rows over truth rows; NaN when nothing is visible."""
+        return self.measured_rows / self.truth_rows if self.truth_rows else float("nan")
+
+
+def compare(
+    points: Points, line: Line, curve: LaserCurve, vertices: Float, triangles: NDArray[np.int32], T_world_camera: Float
+) -> Errors:
+    """Errors of points against the curve of the same laser and step, and the mesh (v, 3), (t, 3) in the world frame.
+
+    ValueError: line and curve are not on the same axis.
+    """
+    if not line.axis == curve.axis == points.axis:
+        raise ValueError(f"axes differ: line {line.axis}, points {points.axis}, curve {curve.axis}")
+    along = points.pixel[:, 0 if line.axis == "rows" else 1]
+    truth = match(points.index, np.where(points.valid, along, np.nan), curve.index, curve.position)
+    matched = truth >= 0
+    position, depth = np.full(len(along), np.nan), np.full(len(along), np.nan)
+    position[matched] = along[matched] - curve.position[truth[matched]]
+    depth[matched] = points.depth_z[matched] - curve.depth_z[truth[matched]]
+    distance, nearest = signed_distance(points.world, vertices, triangles, T_world_camera[:3, 3])
+
+    per_pixel = np.abs(
+        np.einsum("ij,ij->i", points.gradient @ T_world_camera[:3, :3].T, _normals(vertices, triangles, nearest))
+    )
+    step = np.linalg.norm(points.gradient, axis=1)
+    wrong = outliers(position, 1.0)
+    where = points.index, points.rank
+    valid_rows = np.unique(points.index[points.valid])
+    truth_rows = np.unique(curve.index)
+    return Errors(
+        truth=truth,
+        position=position,
+        depth=depth,
+        distance=distance,
+        sigma_distance=per_pixel * points.sigma_pixel,
+        outlier=wrong,
+        u=measure(position, points.sigma_pixel, 1.0, *where),
+        depth_z=measure(depth, points.sigma_depth, np.abs(points.gradient[:, 2]), *where),
+        surface=measure(distance, per_pixel * points.sigma_pixel, step, *where),
+        truth_rows=len(truth_rows),
+        valid_rows=len(valid_rows),
+        measured_rows=len(np.unique(points.index[matched & ~wrong])),
+        false_rows=len(np.setdiff1d(valid_rows, truth_rows)),
+    )
+
+
+def match(index: Index, position: Float, true_index: NDArray[np.int32], true_position: Float) -> Index:
+    """One-to-one pairs on each scan line, nearest first: (m,) peaks -> (m,) index into the (n,) true crossings, or -1.
+
+    `position` NaN takes no part. `true_index` ascends.
+    """
+    found = np.full(len(index), -1, dtype=np.intp)
+    start = np.searchsorted(true_index, index, side="left")
+    count = np.searchsorted(true_index, index, side="right") - start
+    count = np.where(np.isfinite(position), count, 0)
+    # all pairs of peak and crossing that share a scan line, nearest first
+    peak = np.repeat(np.arange(len(index)), count)
+    crossing = np.repeat(start - (np.cumsum(count) - count), count) + np.arange(len(peak))
+    order = np.argsort(np.abs(position[peak] - true_position[crossing]), kind="stable")
+    taken = np.zeros(len(true_index), dtype=np.bool_)
+    for p, c in zip(peak[order].tolist(), crossing[order].tolist(), strict=True):
+        if found[p] < 0 and not taken[c]:
+            found[p], taken[c] = c, True
+    return found
+
+
+def _normals(vertices: Float, triangles: NDArray[np.int32], which: NDArray[np.int64]) -> Float:
+    """(m, 3) unit normals of triangles, NaN for -1."""
+    normals = np.full((len(which), 3), np.nan)
+    here = which >= 0
+    corners = vertices[triangles[which[here]]]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(cross, axis=1, keepdims=True)
+    normals[here] = cross / np.where(length > 0.0, length, np.nan)
+    return normals

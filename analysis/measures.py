@@ -1,0 +1,97 @@
+"""Measures of a set of errors: bias, spread, outliers, and whether the predicted sigma tells the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
+
+@dataclass(frozen=True)
+class Measures:
+    """In the unit of the errors; NaN where there is nothing to measure. Rates are fractions, 0 to 1."""
+
+    count: int
+    bias: float
+    """Mean error."""
+    median: float
+    sigma: float
+    """Standard deviation about the mean."""
+    rmse: float
+    """Root of the mean squared error: bias and sigma together."""
+    robust_sigma: float
+    """1.4826 times the median absolute deviation: sigma as it would be without outliers."""
+    p95: float
+    """95 % of the errors are smaller in size."""
+    outlier_rate: float
+    """Errors larger than `floor` and than 5 robust sigma."""
+    autocorrelation: float
+    """Between neighbouring scan lines, outliers left out: near 0 for independent rows, towards 1 after smoothing."""
+    coverage: float
+    """Within +-2 predicted sigma; 0.954 when the prediction is honest and the errors are normal."""
+
+
+EMPTY = Measures(0, *[float("nan")] * 9)
+
+
+def outliers(error: Float, floor: Float | float) -> Mask:
+    """(m,) errors -> (m,) larger than both `floor` (the error of one pixel) and 5 robust sigma. NaN is no outlier."""
+    if not np.any(np.isfinite(error)):
+        return np.zeros(len(error), dtype=np.bool_)
+    return np.asarray(np.abs(error) > np.maximum(floor, 5.0 * robust_sigma(error)))
+
+
+def robust_sigma(error: Float) -> float:
+    """1.4826 MAD of the finite errors."""
+    finite = error[np.isfinite(error)]
+    return float(MAD_TO_SIGMA * np.median(np.abs(finite - np.median(finite)))) if len(finite) else float("nan")
+
+
+def measure(
+    error: Float, sigma: Float, floor: Float | float, index: NDArray[np.intp], rank: NDArray[np.intp]
+) -> Measures:
+    """Measures of (m,) errors, NaN left out.
+
+    sigma (m,) predicted standard deviation, NaN where there is none; floor: the error of one pixel, a number or (m,);
+    index, rank (m,) scan line and peak of each error, for the autocorrelation.
+    """
+    here = np.isfinite(error)
+    if not np.any(here):
+        return EMPTY
+    e = error[here]
+    out = outliers(error, floor)[here]
+    predicted = sigma[here]
+    has_sigma = np.isfinite(predicted)
+    covered = np.abs(e[has_sigma]) <= 2.0 * predicted[has_sigma]
+    return Measures(
+        count=len(e),
+        bias=float(np.mean(e)),
+        median=float(np.median(e)),
+        sigma=float(np.std(e)),
+        rmse=float(np.sqrt(np.mean(e**2))),
+        robust_sigma=robust_sigma(e),
+        p95=float(np.percentile(np.abs(e), 95)),
+        outlier_rate=float(np.mean(out)),
+        autocorrelation=_autocorrelation(e[~out], index[here][~out], rank[here][~out]),
+        coverage=float(np.mean(covered)) if len(covered) else float("nan"),
+    )
+
+
+def _autocorrelation(error: Float, index: NDArray[np.intp], rank: NDArray[np.intp]) -> float:
+    """Correlation of errors on scan lines i and i + 1, the strongest peak of each."""
+    order = np.lexsort((rank, index))
+    lines, first = np.unique(index[order], return_index=True)
+    e = error[order][first]
+    adjacent = np.flatnonzero(np.diff(lines) == 1)
+    if len(adjacent) < 3:
+        return float("nan")
+    e = e - np.mean(e)
+    variance = float(np.mean(e**2))
+    return float(np.mean(e[adjacent] * e[adjacent + 1]) / variance) if variance > 0.0 else float("nan")
