@@ -1,7 +1,8 @@
 """Ambient light that met one surface: environment, point and rectangular lights, with shadows.
 
-Each pixel sample is a camera ray, one cosine-distributed ray to the environment and one ray to each lamp. The random numbers
-of a pixel form an additive-recurrence (Kronecker) sequence with a random start, which converges faster than independent ones.
+Each pixel sample is a camera ray, one cosine-distributed ray to the environment and one ray to each lamp. The random
+numbers of a pixel form an additive-recurrence (Kronecker) sequence with a random start, which converges faster than
+independent ones.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from render.embree import CHUNK
 from render.lights import PointLight
 from render.random import uniform
 from render.scene import Scene
-from render.texture_lookup import reflectance
+from render.surface import Surface, reflectance
 from render.threads import Cancel, Progress, map_chunks
 from render.world import World
 
@@ -52,21 +53,15 @@ def _fraction(x: float) -> float:
 
 @numba.njit(nogil=True, cache=True)
 def shade_ambient(
+    surface: Surface,
+    T_world_camera: Float,
     pixels: Int,
     cells: int,
     seed: int,
     triangle: Int,
     normalised: Float,
-    T_world_camera: Float,
     environment: Float,
     lights: Float,
-    vertices: Float,
-    triangles: Int,
-    object_id: Int,
-    uv: Float32,
-    albedo: Float,
-    textures: Float32,
-    texture_shape: Int,
     centre: Float,
     surface_offset: float,
     image: Float32,
@@ -80,18 +75,18 @@ def shade_ambient(
 
     Returns the number of shadow rays; light_out (.., 3) is what a clear one adds to its pixel `owner`.
     """
-    m = T_world_camera
+    m, vertices, triangles, albedo = T_world_camera, surface.vertices, surface.triangles, surface.albedo
     n = cells * cells
     share = 1.0 / n
     red, green, blue = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    rho, e = np.empty(3), np.empty(3)
+    rho = np.empty(3)
     has_environment = environment[0] + environment[1] + environment[2] > 0.0
     o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
     count = 0
     for r in range(triangle.shape[0]):
         i, cell, t = r // n, r % n, triangle[r]
         x, y = normalised[r, 0], normalised[r, 1]
-        if not x == x:
+        if x != x:
             continue
         d0 = m[0, 0] * x + m[0, 1] * y + m[0, 2]
         d1 = m[1, 0] * x + m[1, 1] * y + m[1, 2]
@@ -140,16 +135,13 @@ def shade_ambient(
             for band in range(3):
                 image[i, band] += share * environment[band]
             continue
-        item = object_id[t]
-        if texture_shape[item, 1] == 0:
+        item = surface.object_id[t]
+        if surface.texture_shape[item, 1] == 0:
             rho[0], rho[1], rho[2] = albedo[item, 0], albedo[item, 1], albedo[item, 2]
         else:
-            a = vertices[triangles[t, 0]]
             for band in range(3):
                 weights = red if band == 0 else (green if band == 1 else blue)
-                rho[band] = reflectance(
-                    t, a, ab0, ab1, ab2, ac0, ac1, ac2, p0, p1, p2, weights, object_id, uv, albedo, textures, texture_shape
-                )
+                rho[band] = reflectance(surface, t, p0, p1, p2, weights)
         s0 = p0 - centre[0] + n0 * surface_offset
         s1 = p1 - centre[1] + n1 * surface_offset
         s2 = p2 - centre[2] + n2 * surface_offset
@@ -186,20 +178,22 @@ def shade_ambient(
                 area = -(lights[k, 13] * t0 + lights[k, 14] * t1 + lights[k, 15] * t2) / distance * lights[k, 16]
             if cosine <= 0.0 or area <= 0.0:
                 continue
-            e[0] = share * cosine * area / (math.pi * distance * distance)
-            directions[count, 0], directions[count, 1], directions[count, 2] = t0 / distance, t1 / distance, t2 / distance
+            worth = share * cosine * area / (math.pi * distance * distance)
+            directions[count, 0], directions[count, 1], directions[count, 2] = (
+                t0 / distance,
+                t1 / distance,
+                t2 / distance,
+            )
             origins[count, 0], origins[count, 1], origins[count, 2] = s0, s1, s2
             far[count], owner[count] = distance, i
             for band in range(3):
-                light_out[count, band] = e[0] * rho[band] * lights[k, 1 + band]
+                light_out[count, band] = worth * rho[band] * lights[k, 1 + band]
             count += 1
     return count
 
 
 @numba.njit(nogil=True, cache=True)
-def add_clear(
-    light_out: Float32, occluded: NDArray[np.bool_], owner: Int, count: int, image: Float32
-) -> None:
+def add_clear(light_out: Float32, occluded: NDArray[np.bool_], owner: Int, count: int, image: Float32) -> None:
     """Add the worth of every clear shadow ray to its pixel."""
     for j in range(count):
         if not occluded[j]:
@@ -225,49 +219,28 @@ def ambient_image(
     image = np.zeros((n, 3), np.float32)
     lights, environment = pack_lights(scene), np.array(scene.environment.radiance)
     shadow_rays = len(lights) + int(environment.sum() > 0.0)
-    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
-    rays = world.rays
-    origin = (T_world_camera[:3, 3] - rays.centre).astype(np.float32)
+    view, surface, rays = camera.view(T_world_camera), world.surface, world.rays
 
     def work(start: int, stop: int) -> None:
         pixels = np.arange(start, stop, dtype=np.int32)
         count = (stop - start) * cells**2
         normalised, offsets = np.empty((count, 2)), np.empty((count, 2), np.float32)
         directions = np.empty((count, 3), np.float32)
-        camera_rays(
-            pixels,
-            camera.width,
-            cells,
-            seed,
-            intrinsics,
-            camera.coefficients,
-            camera.fold_table,
-            T_world_camera,
-            True,
-            normalised,
-            offsets,
-            directions,
-        )
-        triangle, _ = rays.intersect(np.broadcast_to(origin, directions.shape), directions)
+        camera_rays(view, pixels, cells, seed, True, normalised, offsets, directions)
+        triangle = rays.from_point(T_world_camera[:3, 3], directions)
         most = count * shadow_rays
         origins, towards = np.empty((most, 3), np.float32), np.empty((most, 3), np.float32)
         far, worth, owner = np.empty(most, np.float32), np.empty((most, 3), np.float32), np.empty(most, np.int32)
         shadows = shade_ambient(
+            surface,
+            T_world_camera,
             pixels,
             cells,
             seed,
             triangle,
             normalised,
-            T_world_camera,
             environment,
             lights,
-            world.vertices,
-            world.triangles,
-            world.object_id,
-            world.uv,
-            world.albedo,
-            world.textures,
-            world.texture_shape,
             rays.centre,
             rays.surface_offset,
             image[start:stop],

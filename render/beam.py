@@ -63,7 +63,5 @@ def irradiance_at(points: Array, normals: Array, beam: Array) -> Array:
     """(n, 3) points and unit normals in the laser frame -> (n,) irradiance, W/m^2, without occlusion."""
     out = np.empty(points.shape[0])
     for i in range(points.shape[0]):
-        out[i] = irradiance(
-            points[i, 0], points[i, 1], points[i, 2], normals[i, 0], normals[i, 1], normals[i, 2], beam
-        )
+        out[i] = irradiance(points[i, 0], points[i, 1], points[i, 2], normals[i, 0], normals[i, 1], normals[i, 2], beam)
     return out

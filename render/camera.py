@@ -16,6 +16,7 @@ from pydantic import field_validator
 from render.distortion import distort_points, fold_radii, undistort_points
 from render.model import Model, UnitInterval, quantity
 from render.pose import Pose
+from render.surface import View
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -170,6 +171,11 @@ class Camera(Model):
         directions = np.concatenate([normalised, np.ones((*normalised.shape[:-1], 1))], axis=-1)
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
         return directions, valid
+
+    def view(self, T_world_camera: Array) -> View:
+        """The camera in the world, as the kernels take it."""
+        intrinsics = np.array([self.fx, self.fy, self.cx, self.cy, self.skew])
+        return View(self.width, intrinsics, self.coefficients, self.fold_table, T_world_camera)
 
     @property
     def fold_table(self) -> Array:

@@ -16,7 +16,7 @@ CENTRE_TOLERANCE = 1e-6
 
 
 def check_placement(world: World, scene: Scene, step: int = 0) -> None:
-    """Raise InputError for a scene with nothing to see, a camera inside a solid, or a sheet through the camera's centre."""
+    """Raise InputError: nothing to see, a camera inside a solid, a sheet through the camera's centre."""
     if len(world.triangles) == 0:
         raise InputError(
             "the scene has no visible object",
@@ -72,7 +72,12 @@ def _in_view(world: World, scene: Scene, step: int) -> bool:
     camera = scene.camera
     points = transform_points(invert(scene.T_world_camera(step)), world.vertices)
     edge = np.array(
-        [[-0.5, -0.5], [camera.width - 0.5, -0.5], [-0.5, camera.height - 0.5], [camera.width - 0.5, camera.height - 0.5]]
+        [
+            [-0.5, -0.5],
+            [camera.width - 0.5, -0.5],
+            [-0.5, camera.height - 0.5],
+            [camera.width - 0.5, camera.height - 0.5],
+        ]
     )
     middle = np.array([[(camera.width - 1) / 2, -0.5], [(camera.width - 1) / 2, camera.height - 0.5]])
     sides = np.array([[-0.5, (camera.height - 1) / 2], [camera.width - 0.5, (camera.height - 1) / 2]])

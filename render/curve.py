@@ -18,6 +18,7 @@ from render.embree import CHUNK, RayScene
 from render.frame import Axis, LaserCurve
 from render.laser import LineLaser
 from render.pose import invert, transform_points
+from render.surface import View
 from render.threads import map_chunks
 from render.world import World
 
@@ -114,30 +115,30 @@ def clip_to_fan(segments: Float, T_laser_world: Float, tan_half_fan: float) -> F
 
 
 @numba.njit(nogil=True, cache=True)
-def project_point(p: Float, intrinsics: Float, k: Float, tilt: Float, folds: Float, distorted: bool) -> tuple[float, float]:
-    """Camera-frame point -> (u, v), NaN where it has no image. `intrinsics`: fx, fy, cx, cy, skew."""
+def project_point(p: Float, view: View, tilt: Float, distorted: bool) -> tuple[float, float]:
+    """Camera-frame point -> (u, v), NaN where it has no image; `tilt` is that of the view's distortion."""
     if p[2] <= NEAR:
         return np.nan, np.nan
     x, y = p[0] / p[2], p[1] / p[2]
     if distorted:
-        if np.hypot(x, y) >= fold_radius_at(x, y, folds):
+        if np.hypot(x, y) >= fold_radius_at(x, y, view.folds):
             return np.nan, np.nan
-        x, y, _, _, _, _ = distort(x, y, k, tilt)
+        x, y, _, _, _, _ = distort(x, y, view.distortion, tilt)
+    intrinsics = view.intrinsics
     return intrinsics[0] * x + intrinsics[4] * y + intrinsics[2], intrinsics[1] * y + intrinsics[3]
 
 
 @numba.njit(nogil=True, cache=True)
 def scan_line_crossings(
-    segments: Float, spans: Float, intrinsics: Float, k: Float, folds: Float, size: Int, along_rows: bool
+    segments: Float, spans: Float, view: View, height: int, along_rows: bool
 ) -> tuple[Float, Int, Int]:
     """Solve for the points of camera-frame segments (m, 2, 3) that fall on the centre of a scan line.
 
-    Returns (n, 4) position along the scan line and point, (n,) scan line, (n,) segment. `size` is (width, height).
+    Returns (n, 4) position along the scan line and point, (n,) scan line, (n,) segment.
     """
-    tilt = tilt_matrix(k[12], k[13])
-    distorted = bool(np.any(k))
-    lines = size[1] if along_rows else size[0]
-    across = size[0] if along_rows else size[1]
+    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
+    distorted = bool(np.any(view.distortion))
+    lines, across = (height, view.width) if along_rows else (view.width, height)
     capacity = 4096
     values = np.empty((capacity, 4))
     index, owner = np.empty(capacity, dtype=np.int32), np.empty(capacity, dtype=np.int32)
@@ -159,15 +160,15 @@ def scan_line_crossings(
             t1 = (near - a[2]) / step[2]
         pieces = 1
         if distorted:
-            u0, v0 = project_point(a + t0 * step, intrinsics, k, tilt, folds, False)
-            u1, v1 = project_point(a + t1 * step, intrinsics, k, tilt, folds, False)
+            u0, v0 = project_point(a + t0 * step, view, tilt, False)
+            u1, v1 = project_point(a + t1 * step, view, tilt, False)
             pieces = int(min(1e5, max(abs(u1 - u0), abs(v1 - v0)) / PIECE_PX)) + 1
-        u, v = project_point(a + t0 * step, intrinsics, k, tilt, folds, distorted)
+        u, v = project_point(a + t0 * step, view, tilt, distorted)
         line_a = v if along_rows else u
         ta = t0
         for piece in range(pieces):
             tb = t1 if piece == pieces - 1 else t0 + (t1 - t0) * (piece + 1) / pieces
-            u, v = project_point(a + tb * step, intrinsics, k, tilt, folds, distorted)
+            u, v = project_point(a + tb * step, view, tilt, distorted)
             line_b = v if along_rows else u
             low, high = min(line_a, line_b), max(line_a, line_b)
             if low <= high and high >= 0.0 and low <= lines - 1.0:
@@ -180,7 +181,7 @@ def scan_line_crossings(
                         t = p0 if f0 == 0.0 else p1 - f1 * (p1 - p0) / (f1 - f0)
                         for axis in range(3):
                             point[axis] = a[axis] + t * step[axis]
-                        u, v = project_point(point, intrinsics, k, tilt, folds, distorted)
+                        u, v = project_point(point, view, tilt, distorted)
                         f = (v if along_rows else u) - line
                         position = u if along_rows else v
                         if abs(f) < 1e-10 or abs(p1 - p0) < 1e-15:
@@ -226,10 +227,8 @@ def laser_curve(
     values, index, owner = scan_line_crossings(
         transform_points(T_camera_world, segments),
         spans,
-        np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew]),
-        camera.coefficients,
-        camera.fold_table,
-        np.array([camera.width, camera.height], dtype=np.int32),
+        camera.view(T_world_camera),
+        camera.height,
         axis == "rows",
     )
     points = transform_points(T_world_camera, values[:, 1:])
@@ -267,8 +266,10 @@ def laser_curve(
     )
 
 
-def visible(rays: RayScene, points: Float, normals: Float, towards: Float, threads: int | None = None) -> NDArray[np.bool_]:
-    """(n, 3) world points on surfaces, unit normals and vectors to a target, on the normal's side -> (n,) not occluded."""
+def visible(
+    rays: RayScene, points: Float, normals: Float, towards: Float, threads: int | None = None
+) -> NDArray[np.bool_]:
+    """(n, 3) world points on surfaces, unit normals and vectors to a target on their side -> (n,) not occluded."""
     if len(points) == 0:
         return np.zeros(0, dtype=np.bool_)
     origins = (points - rays.centre + normals * rays.surface_offset).astype(np.float32)

@@ -1,7 +1,7 @@
 """Direct light of a laser: each lit pixel's mean radiance under a box filter.
 
 A pixel is divided into n x n cells with one jittered camera ray each. Where the ray hits, the surface's tangent plane
-tells how the sheet's coordinate q = x / sigma(z) changes along the cell, so the Gaussian across the cell is integrated in
+tells how the sheet's coordinate q = x / sigma(z) changes along the cell, so the Gaussian across it is integrated in
 closed form (a difference of error functions) instead of being sampled; visibility and albedo are sampled. Each ray also
 predicts its whole pixel; the spread of these predictions is the error estimate, and pixels that need it (edges, strong
 curvature, texture) get twice the cells a side until the image's error is below the target.
@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from render.beam import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2, fan_density, sheet_sigma
 from render.camera import Camera
 from render.distortion import distort, tilt_matrix, undistort
-from render.embree import CHUNK, RayScene
+from render.embree import CHUNK
 from render.footprint import reachable_pixels
 from render.laser import LineLaser
 from render.material import reflectance_weights
 from render.pose import invert
 from render.random import uniform
-from render.texture_lookup import reflectance
+from render.surface import Surface, View, reflectance
 from render.threads import Cancel, Progress, map_chunks
 from render.world import World
 
@@ -49,14 +49,10 @@ class DirectImage:
 
 @numba.njit(nogil=True, cache=True)
 def camera_rays(
+    view: View,
     pixels: Int,
-    width: int,
     cells: int,
     seed: int,
-    intrinsics: Float,
-    k: Float,
-    folds: Float,
-    rotation: Float,
     jittered: bool,
     normalised: Float,
     offsets: Float32,
@@ -67,12 +63,13 @@ def camera_rays(
     Fills normalised (n cells^2, 2) undistorted image coordinates (NaN: no ray), offsets (.., 2) of the sample from its
     cell's centre in px, and directions (.., 3), world.
     """
+    intrinsics, k, rotation = view.intrinsics, view.distortion, view.T_world_camera
     tilt = tilt_matrix(k[12], k[13])
     distorted = bool(np.any(k))
     tolerance = 1e-10 / max(intrinsics[0], intrinsics[1])
     size = 1.0 / cells
     for i in range(pixels.shape[0]):
-        column, row = pixels[i] % width, pixels[i] // width
+        column, row = pixels[i] % view.width, pixels[i] // view.width
         for cell in range(cells * cells):
             r = i * cells * cells + cell
             du = dv = 0.0
@@ -85,7 +82,7 @@ def camera_rays(
             x = (u - intrinsics[2] - intrinsics[4] * y) / intrinsics[0]
             ok = True
             if distorted:
-                x, y, ok = undistort(x, y, k, tilt, folds, tolerance)
+                x, y, ok = undistort(x, y, k, tilt, view.folds, tolerance)
             if not ok:
                 x = y = np.nan
             normalised[r, 0], normalised[r, 1] = x, y
@@ -97,24 +94,16 @@ def camera_rays(
 
 @numba.njit(nogil=True, cache=True)
 def shade_sheet(
+    surface: Surface,
+    view: View,
     triangle: Int,
     normalised: Float,
     offsets: Float32,
     cells: int,
-    intrinsics: Float,
-    k: Float,
-    T_world_camera: Float,
     T_laser_world: Float,
     laser_centre: Float,
     beam: Float,
     weights: Float,
-    vertices: Float,
-    triangles: Int,
-    object_id: Int,
-    uv: Float32,
-    albedo: Float,
-    textures: Float32,
-    texture_shape: Int,
     centre: Float,
     surface_offset: float,
     values: Float,
@@ -127,8 +116,11 @@ def shade_sheet(
 
     Returns how many shadow rays were written; `sample` says whose each is.
     """
+    intrinsics, k, m, w = view.intrinsics, view.distortion, view.T_world_camera, T_laser_world
+    vertices, triangles = surface.vertices, surface.triangles
     tilt = tilt_matrix(k[12], k[13])
     distorted = bool(np.any(k))
+    o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
     emitter, _ = sheet_sigma(0.0, beam)
     count = 0
     half = 0.5 / cells
@@ -136,26 +128,23 @@ def shade_sheet(
         values[r, 0] = values[r, 1] = 0.0
         t = triangle[r]
         x, y = normalised[r, 0], normalised[r, 1]
-        if t < 0 or not x == x:
+        if t < 0 or x != x:
             continue
-        a, b, c = vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]
-        ab0, ab1, ab2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        ac0, ac1, ac2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
+        ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
+        ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
         n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
         length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
         if length == 0.0:
             continue
         n0, n1, n2 = n0 / length, n1 / length, n2 / length
-        o0, o1, o2 = T_world_camera[0, 3], T_world_camera[1, 3], T_world_camera[2, 3]
-        height_camera = n0 * (o0 - a[0]) + n1 * (o1 - a[1]) + n2 * (o2 - a[2])
-        height_laser = (
-            n0 * (laser_centre[0] - a[0]) + n1 * (laser_centre[1] - a[1]) + n2 * (laser_centre[2] - a[2])
-        )
+        height_camera = n0 * (o0 - a0) + n1 * (o1 - a1) + n2 * (o2 - a2)
+        height_laser = n0 * (laser_centre[0] - a0) + n1 * (laser_centre[1] - a1) + n2 * (laser_centre[2] - a2)
         if not height_camera * height_laser > 0.0:
             continue
         side = 1.0 if height_camera > 0.0 else -1.0
         # the ray d = R (x, y, 1) meets the facet's plane at P = o + s d
-        m = T_world_camera
         d0, d1, d2 = (
             m[0, 0] * x + m[0, 1] * y + m[0, 2],
             m[1, 0] * x + m[1, 1] * y + m[1, 2],
@@ -167,7 +156,6 @@ def shade_sheet(
         s = -height_camera / cosine
         p0, p1, p2 = o0 + s * d0, o1 + s * d1, o2 + s * d2
         # laser coordinates of P
-        w = T_laser_world
         lx = w[0, 0] * p0 + w[0, 1] * p1 + w[0, 2] * p2 + w[0, 3]
         ly = w[1, 0] * p0 + w[1, 1] * p1 + w[1, 2] * p2 + w[1, 3]
         lz = w[2, 0] * p0 + w[2, 1] * p1 + w[2, 2] * p2 + w[2, 3]
@@ -204,10 +192,7 @@ def shade_sheet(
         ln1 = w[1, 0] * n0 + w[1, 1] * n1 + w[1, 2] * n2
         ln2 = w[2, 0] * n0 + w[2, 1] * n1 + w[2, 2] * n2
         power = beam[0] * h / (lz * sigma) * abs(ln0 * q * slope + ln1 * ly / lz + ln2)
-        rho = reflectance(
-            t, a, ab0, ab1, ab2, ac0, ac1, ac2, p0, p1, p2, weights, object_id, uv, albedo, textures, texture_shape
-        )
-        radiance = power * rho / math.pi
+        radiance = power * reflectance(surface, t, p0, p1, p2, weights) / math.pi
         if radiance <= 0.0:
             continue
         values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
@@ -273,7 +258,7 @@ def _mean_gaussian(q: float, half: float) -> float:
 
 @numba.njit(nogil=True, cache=True)
 def _mean_over(q: float, half_u: float, half_v: float) -> float:
-    """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v with as many nodes as it needs."""
+    """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v."""
     half_v = abs(half_v)
     if half_v < 0.02:
         return _mean_gaussian(q, half_u)
@@ -374,48 +359,28 @@ class _Task:
     error: Float
 
     def run(self, start: int, stop: int) -> None:
-        world, camera, rays, n = self.world, self.camera, self.world.rays, self.cells**2
+        rays, n = self.world.rays, self.cells**2
         count = (stop - start) * n
-        intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
+        view, surface = self.camera.view(self.T_world_camera), self.world.surface
         normalised, offsets = np.empty((count, 2)), np.empty((count, 2), np.float32)
         directions = np.empty((count, 3), np.float32)
-        camera_rays(
-            self.pixels[start:stop],
-            camera.width,
-            self.cells,
-            self.seed,
-            intrinsics,
-            camera.coefficients,
-            camera.fold_table,
-            self.T_world_camera,
-            True,
-            normalised,
-            offsets,
-            directions,
-        )
-        triangle = self._hits(rays, directions)
+        pixels = self.pixels[start:stop]
+        camera_rays(view, pixels, self.cells, self.seed, True, normalised, offsets, directions)
+        triangle = rays.from_point(self.T_world_camera[:3, 3], directions)
         values = np.empty((count, 2))
         origins, towards = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
         far, sample = np.empty(count, np.float32), np.empty(count, np.int32)
         shadows = shade_sheet(
+            surface,
+            view,
             triangle,
             normalised,
             offsets,
             self.cells,
-            intrinsics,
-            camera.coefficients,
-            self.T_world_camera,
             invert(self.T_world_laser),
             self.T_world_laser[:3, 3].copy(),
             self.laser.packed(),
             np.array(reflectance_weights(self.laser.wavelength_nm)),
-            world.vertices,
-            world.triangles,
-            world.object_id,
-            world.uv,
-            world.albedo,
-            world.textures,
-            world.texture_shape,
             rays.centre,
             rays.surface_offset,
             values,
@@ -426,7 +391,3 @@ class _Task:
         )
         blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows])
         gather(values, blocked, sample, shadows, self.cells, self.mean[start:stop], self.error[start:stop])
-
-    def _hits(self, rays: RayScene, directions: Float32) -> Int:
-        origin = (self.T_world_camera[:3, 3] - rays.centre).astype(np.float32)
-        return rays.intersect(np.broadcast_to(origin, directions.shape), directions)[0]

@@ -43,11 +43,16 @@ class RayScene:
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
 
     def intersect(self, origins: Float32, directions: Float32, far: Float32 | None = None) -> tuple[Int32, Float32]:
-        """(n, 3) origins (scene-centred) and directions, (n,) far (changed in place) -> triangle or -1, and distance."""
+        """(n, 3) origins (scene-centred), directions, (n,) far (changed in place) -> triangle or -1, distance."""
         _check(origins, directions, far)
         with self._timed(len(origins)):
             hit = self._scene.run(origins, directions, dists=far, output=True)
         return hit["primID"], hit["tfar"]
+
+    def from_point(self, origin: NDArray[np.float64], directions: Float32) -> Int32:
+        """World origin (3,), (n, 3) directions -> (n,) first triangle or -1."""
+        start = (origin - self.centre).astype(np.float32)
+        return self.intersect(np.broadcast_to(start, directions.shape), directions)[0]
 
     def occluded(self, origins: Float32, directions: Float32, far: Float32) -> NDArray[np.bool_]:
         """(n, 3) origins (scene-centred), directions, (n,) far (overwritten) -> (n,) something is hit before far."""

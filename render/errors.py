@@ -11,9 +11,7 @@ class InputError(ValueError):
     found / allowed / cure: optional parts of the message.
     """
 
-    def __init__(
-        self, what: str, *, where: str = "", found: object = None, allowed: str = "", cure: str = ""
-    ) -> None:
+    def __init__(self, what: str, *, where: str = "", found: object = None, allowed: str = "", cure: str = "") -> None:
         self.what, self.where, self.found, self.allowed, self.cure = what, where, found, allowed, cure
         parts = [f"{where}: {what}" if where else what]
         if found is not None:

@@ -1,4 +1,4 @@
-"""What a render gives: radiance per light group, and the truth that goes with it. Plain arrays, nothing computed here."""
+"""What a render gives: radiance per light group, and the truth that goes with it. Plain arrays."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class LaserCurve:
 
 @dataclass(frozen=True)
 class Truth:
-    """Per-pixel truth at pixel centres (float64 geometry, stored float32 except position); NaN or -1 where nothing is hit."""
+    """Per-pixel truth at pixel centres, computed in float64; NaN or -1 where nothing is hit."""
 
     depth_z: Float32
     """(h, w) m along the camera's axis."""

@@ -66,7 +66,7 @@ def render_world(
     progress: StageProgress | None = None,
     cancelled: Cancel | None = None,
 ) -> Frame:
-    """Render a world that is already placed for `step`. `axis` is the scan axis of the exact line. Raises InputError, Cancelled."""
+    """Render a world placed for `step`; `axis` is the scan axis of the exact line. Raises InputError, Cancelled."""
     settings = settings or RenderSettings()
     camera, T_world_camera = scene.camera, scene.T_world_camera(step)
     seconds: dict[str, float] = {}
@@ -111,9 +111,7 @@ def render_world(
     truth = ambient = None
     if settings.truth_images:
         with stage("truth images") as report:
-            truth = truth_images(
-                world, camera, T_world_camera, threads=threads, cancelled=cancelled, progress=report
-            )
+            truth = truth_images(world, camera, T_world_camera, threads=threads, cancelled=cancelled, progress=report)
     if scene.lights or any(scene.environment.radiance):
         with stage("ambient light") as report:
             ambient = ambient_image(

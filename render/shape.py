@@ -62,7 +62,7 @@ class Cylinder(Model):
 
 
 class StepBlock(Model):
-    """A staircase of `steps` treads climbing along +x and +z, on a base `rise` thick; bottom at z = 0, centred in x, y."""
+    """A staircase of treads climbing along +x and +z, on a base `rise` thick; bottom at z = 0, centred in x, y."""
 
     kind: Literal["step_block"] = "step_block"
     steps: int = quantity(4, label="Steps", ge=1, le=1000)
@@ -94,8 +94,8 @@ class VGroove(Model):
 class WeldTee(Model):
     """The founding paper's single-bevel tee joint, seam along y.
 
-    Base plate with its top at z = 0; an upright plate standing on it, its face towards +x at x = 0, bevelled at its foot;
-    and a convex rippled fillet bead in the corner. UV runs along the seam (u) and along the developed cross-section (v).
+    Base plate with its top at z = 0; an upright plate standing on it, its face towards +x at x = 0, bevelled at its
+    foot; and a convex rippled fillet bead in the corner. UV runs along the seam (u) and the developed section (v).
     """
 
     kind: Literal["weld_tee"] = "weld_tee"

@@ -12,7 +12,7 @@ from render.camera import Camera
 from render.direct import camera_rays
 from render.embree import CHUNK
 from render.frame import Truth
-from render.pose import invert
+from render.surface import Surface
 from render.threads import Cancel, Progress, map_chunks
 from render.world import World
 
@@ -23,14 +23,11 @@ Int = NDArray[np.int32]
 
 @numba.njit(nogil=True, cache=True)
 def fill_truth(
+    surface: Surface,
+    T_world_camera: Float,
     start: int,
     triangle: Int,
     normalised: Float,
-    T_world_camera: Float,
-    T_camera_world: Float,
-    vertices: Float,
-    triangles: Int,
-    object_id: Int,
     depth_z: Float32,
     depth_range: Float32,
     position: Float32,
@@ -38,11 +35,11 @@ def fill_truth(
     item: Int,
 ) -> None:
     """Write the pixels start.. of the flat images (h w, ...) from their hits."""
-    m, w = T_world_camera, T_camera_world
+    m, vertices, triangles = T_world_camera, surface.vertices, surface.triangles
     for r in range(triangle.shape[0]):
         i, t = start + r, triangle[r]
         x, y = normalised[r, 0], normalised[r, 1]
-        if t < 0 or not x == x:
+        if t < 0 or x != x:
             depth_z[i] = depth_range[i] = np.nan
             item[i] = -1
             for axis in range(3):
@@ -64,7 +61,7 @@ def fill_truth(
         depth_range[i] = s * math.sqrt(x * x + y * y + 1.0)
         position[i, 0], position[i, 1], position[i, 2] = m[0, 3] + s * d0, m[1, 3] + s * d1, m[2, 3] + s * d2
         normal[i, 0], normal[i, 1], normal[i, 2] = sign * n0, sign * n1, sign * n2
-        item[i] = object_id[t]
+        item[i] = surface.object_id[t]
 
 
 def truth_images(
@@ -81,46 +78,16 @@ def truth_images(
     depth_z, depth_range = np.empty(n, np.float32), np.empty(n, np.float32)
     position, normal = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
     item = np.empty(n, np.int32)
-    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy, camera.skew])
-    rays = world.rays
-    origin = (T_world_camera[:3, 3] - rays.centre).astype(np.float32)
-    T_camera_world = invert(T_world_camera)
+    view, surface, rays = camera.view(T_world_camera), world.surface, world.rays
 
     def work(start: int, stop: int) -> None:
         count = stop - start
         normalised, offsets = np.empty((count, 2)), np.empty((count, 2), np.float32)
         directions = np.empty((count, 3), np.float32)
-        pixels = np.arange(start, stop, dtype=np.int32)
-        camera_rays(
-            pixels,
-            camera.width,
-            1,
-            0,
-            intrinsics,
-            camera.coefficients,
-            camera.fold_table,
-            T_world_camera,
-            False,
-            normalised,
-            offsets,
-            directions,
-        )
-        triangle, _ = rays.intersect(np.broadcast_to(origin, directions.shape), directions)
-        fill_truth(
-            start,
-            triangle,
-            normalised,
-            T_world_camera,
-            T_camera_world,
-            world.vertices,
-            world.triangles,
-            world.object_id,
-            depth_z,
-            depth_range,
-            position,
-            normal,
-            item,
-        )
+        camera_rays(view, np.arange(start, stop, dtype=np.int32), 1, 0, False, normalised, offsets, directions)
+        triangle = rays.from_point(T_world_camera[:3, 3], directions)
+        images = (depth_z, depth_range, position, normal, item)
+        fill_truth(surface, T_world_camera, start, triangle, normalised, *images)
 
     map_chunks(work, n, CHUNK, threads, cancelled, progress)
     shape = (camera.height, camera.width)

@@ -14,6 +14,7 @@ from render.material import FromMesh, Texture
 from render.mesh import Mesh
 from render.pose import transform_points
 from render.scene import Scene, SceneObject
+from render.surface import Surface
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -43,6 +44,13 @@ class World:
     def rays(self) -> RayScene:
         """The scene for ray queries, built at first use."""
         return RayScene(self.vertices, self.triangles)
+
+    @property
+    def surface(self) -> Surface:
+        """The arrays, as the kernels take them."""
+        return Surface(
+            self.vertices, self.triangles, self.object_id, self.uv, self.albedo, self.textures, self.texture_shape
+        )
 
     @cached_property
     def corners(self) -> Float:

@@ -49,7 +49,9 @@ def plane_mesh(normal: tuple[float, float, float], distance: float, size: float 
     return Mesh(np.array(corners), np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))
 
 
-def moved(mesh: Mesh, translation: tuple[float, float, float], rotation: tuple[float, float, float] = (0, 0, 0)) -> Mesh:
+def moved(
+    mesh: Mesh, translation: tuple[float, float, float], rotation: tuple[float, float, float] = (0, 0, 0)
+) -> Mesh:
     """The mesh in another pose."""
     matrix = Pose(translation=translation, rotation=rotation).matrix
     return Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], mesh.triangles, mesh.uv, mesh.texture)

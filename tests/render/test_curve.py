@@ -13,7 +13,9 @@ STRONG = (-0.25, 0.1, 2e-3, -1e-3, 0.02)
 def curve_of(meshes, camera=None, axis="rows", laser=None):
     scene = scene_of(camera or paper_camera(), laser or paper_laser(), objects=len(meshes))
     world = world_of(scene, *meshes)
-    return scene, laser_curve(world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0), axis)
+    return scene, laser_curve(
+        world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0), axis
+    )
 
 
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.5, 0, 0.87), (-0.5, 0.4, 0.77), (0.1, -0.8, 0.6)])
@@ -38,7 +40,9 @@ def test_the_distorted_line_lies_where_opencv_projects_its_points(axis):
     if axis == "columns":
         from render.pose import Pose
 
-        turned = paper_laser(T_rig_laser=Pose.from_matrix(Pose(rotation=(0, 0, np.pi / 2)).matrix @ turned.T_rig_laser.matrix))
+        turned = paper_laser(
+            T_rig_laser=Pose.from_matrix(Pose(rotation=(0, 0, np.pi / 2)).matrix @ turned.T_rig_laser.matrix)
+        )
     _, curve = curve_of([plane_mesh((0.3, 0.2, 0.9), 0.8)], camera, axis, turned)
     pixels = cv2.projectPoints(curve.point, np.zeros(3), np.zeros(3), camera.matrix, camera.coefficients)[0][:, 0]
     along, across = (0, 1) if axis == "rows" else (1, 0)
@@ -90,7 +94,7 @@ def test_the_fan_ends_the_line():
     import math
 
     laser = paper_laser(fan_angle=math.radians(10))
-    scene, curve = curve_of([plane_mesh((0, 0, 1), 0.9)], laser=laser)
+    _, curve = curve_of([plane_mesh((0, 0, 1), 0.9)], laser=laser)
     half_length = np.linalg.norm([0.2 - curve.point[0, 0], 0.9]) * math.tan(math.radians(5))
     assert np.abs(curve.point[:, 1]).max() == pytest.approx(half_length, abs=0.9 / 3478)
 

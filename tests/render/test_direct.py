@@ -12,7 +12,16 @@ from render.material import Lambertian
 from render.primitives import primitive_mesh
 from render.scene import SceneObject
 from render.shape import Box, Cylinder, Plane, Sphere
-from tests.render.scenes import centroids, in_laser_frame, moved, paper_camera, paper_laser, plane_mesh, scene_of, world_of
+from tests.render.scenes import (
+    centroids,
+    in_laser_frame,
+    moved,
+    paper_camera,
+    paper_laser,
+    plane_mesh,
+    scene_of,
+    world_of,
+)
 
 DEPTH_PER_PX = 1.08e-3
 """m of depth a pixel at 0.87 m (accuracy.md 2.4): 1e-3 px is 1.08 um."""

@@ -1,4 +1,4 @@
-"""The laser's direct light beside an independent renderer: Mitsuba 3 (Jakob et al.), its projector as the line laser."""
+"""The laser's direct light beside an independent renderer: Mitsuba 3 (Jakob et al.), its projector as a line laser."""
 
 import math
 
