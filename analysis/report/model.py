@@ -1,0 +1,104 @@
+"""What a report is made of: plain results, filled in by whoever ran the scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.error import Errors
+from analysis.line.result import Line
+from analysis.triangulate import Points
+from render.frame import LaserCurve
+from render.scene import Scene
+from render.sensor import Sensor
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int32]
+Tables = dict[str, dict[str, str]]
+"""Table title -> label -> value, ready to read ("Exposure time" -> "1.00 ms")."""
+
+
+@dataclass(frozen=True)
+class Extraction:
+    """One method's line in one laser's image, and what became of it."""
+
+    line: Line
+    points: Points
+    errors: Errors
+
+
+@dataclass(frozen=True)
+class LaserResult:
+    """One laser in one frame."""
+
+    curve: LaserCurve
+    """The exact line, same axis as the extractions."""
+    extractions: tuple[Extraction, ...]
+    """At least one; the first is the one that the headline speaks of, others are compared with it."""
+    image: NDArray[np.generic] | None
+    """(h, w) or (h, w, 3) digital numbers (DN) that the lines were extracted from. May be None on frames that the report
+    shall not show; the report shows one frame, chosen among those whose lasers all have an image."""
+
+
+@dataclass(frozen=True)
+class FrameResult:
+    """One step of the scan."""
+
+    step: int
+    lasers: tuple[LaserResult, ...]
+    """One for each of `scene.lasers`, in that order."""
+    plan: str = ""
+    """`Frame.plan`: what was computed, what was left out and why, one line each."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall time by stage, s, of this frame: the stages of `Frame.seconds` and those after it. Summed over the frames."""
+    counts: dict[str, float] = field(default_factory=dict)
+    """`Frame.counts`; what counts is summed over the frames, what is named "error" or "fraction" is averaged."""
+
+
+@dataclass(frozen=True)
+class ReportInput:
+    """A whole scan. Geometry is that of step 0 in the world frame; where objects move, the report moves it."""
+
+    title: str
+    scene: Scene
+    frames: tuple[FrameResult, ...]
+    """At least one, in the order of their steps."""
+    vertices: Float
+    """(v, 3) m, world frame, step 0."""
+    triangles: Int
+    """(t, 3)."""
+    object_id: Int
+    """(t,) index into `scene.visible_objects`."""
+    sensor: Sensor | None = None
+    """None for photographs."""
+    display_max: float | None = None
+    """DN shown as white; None: the largest in the image."""
+    settings: Tables = field(default_factory=dict)
+    """Tables beyond those that the report makes itself from scene and sensor: extraction settings, rendering, ..."""
+    seconds: dict[str, float] = field(default_factory=dict)
+    """Wall time of stages that belong to no frame (loading, compiling), s."""
+    seed: int | None = None
+    versions: dict[str, str] = field(default_factory=dict)
+    """Library -> version."""
+    notes: tuple[str, ...] = ()
+    """Warnings and remarks of the run, one sentence each; shown near the top."""
+    created: str = ""
+    """Date and time of the run, as it shall be printed."""
+
+    def shown_frame(self) -> FrameResult:
+        """The frame to show in detail: of those with images the one of median depth RMSE, else the first."""
+        shown = [frame for frame in self.frames if all(laser.image is not None for laser in frame.lasers)]
+        measured = [frame for frame in shown if np.isfinite(frame_rmse(frame))]
+        if measured:
+            return sorted(measured, key=frame_rmse)[len(measured) // 2]
+        return (shown or list(self.frames))[0]
+
+
+def frame_rmse(frame: FrameResult) -> float:
+    """Depth RMSE over all lasers of a frame, first method, m; NaN when nothing was measured."""
+    depth = [laser.extractions[0].errors.depth for laser in frame.lasers if laser.extractions]
+    error = np.concatenate([np.zeros(0), *depth])
+    error = error[np.isfinite(error)]
+    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")

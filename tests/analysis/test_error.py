@@ -1,0 +1,234 @@
+"""Errors against truth: matching, measures of known samples, and the signed distance to open and closed meshes."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from analysis.distance import point_triangle_distance, signed_distance
+from analysis.error import compare, match
+from analysis.line.result import Flag, Line
+from analysis.measures import measure
+from analysis.triangulate import triangulate
+from render.camera import Camera
+from render.frame import LaserCurve
+
+THETA, BASELINE, DEPTH = math.radians(13), 0.2, 0.85
+CAMERA = Camera(width=2448, height=2048, fx=3478.26, fy=3478.26, cx=1223.5, cy=1023.5)
+PLANE = np.array([math.cos(THETA), 0.0, math.sin(THETA), -BASELINE * math.cos(THETA)])
+WALL = np.array([[-1.0, -1.0, DEPTH], [1.0, -1.0, DEPTH], [1.0, 1.0, DEPTH], [-1.0, 1.0, DEPTH]])
+WALL_TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+
+
+def wall_curve(rows: np.ndarray) -> LaserCurve:
+    """The exact line on a wall at z = DEPTH that faces the camera."""
+    n = len(rows)
+    x = BASELINE - DEPTH * math.tan(THETA)
+    point = np.stack([np.full(n, x), (rows - CAMERA.cy) / CAMERA.fy * DEPTH, np.full(n, DEPTH)], axis=1)
+    u = CAMERA.fx * x / DEPTH + CAMERA.cx
+    zero = np.zeros(n)
+    return LaserCurve(
+        "rows", rows.astype(np.int32), np.full(n, u), point, point[:, 2].copy(), np.linalg.norm(point, axis=1),
+        np.zeros(n, np.int32), zero, zero, zero + 30.0, np.zeros((0, 2, 3)),
+    )  # fmt: skip
+
+
+def line_of(u: np.ndarray, sigma: float) -> Line:
+    """(n, k) positions, NaN for none -> a line."""
+    full = np.ones_like(u)
+    flag = np.where(np.isfinite(u), Flag.OK, Flag.NO_PEAK).astype(np.uint8)
+    return Line("rows", "ml", u, full * sigma, full, full, full, full, flag)
+
+
+def errors_of(line: Line, curve: LaserCurve, vertices=WALL, triangles=WALL_TRIANGLES):
+    points = triangulate(line, CAMERA, PLANE, T_rig_camera=np.eye(4), T_world_camera=np.eye(4))
+    return points, compare(points, line, curve, vertices, triangles, np.eye(4))
+
+
+def test_an_exact_line_has_no_error():
+    curve = wall_curve(np.arange(100, 1900))
+    u = np.full((2048, 1), np.nan)
+    u[100:1900, 0] = curve.position
+    _, errors = errors_of(line_of(u, 0.05), curve)
+    assert errors.truth_rows == errors.measured_rows == errors.valid_rows == errors.u.count == 1800
+    assert errors.completeness == 1.0
+    assert errors.false_rows == 0
+    assert errors.u.rmse == 0.0
+    assert errors.depth_z.rmse < 1e-14
+    assert errors.surface.rmse < 1e-14
+
+
+def test_noise_and_bias_come_out_as_they_went_in():
+    random = np.random.default_rng(3)
+    curve = wall_curve(np.arange(2048))
+    u = curve.position[:, None] + 0.02 + 0.1 * random.standard_normal((2048, 1))
+    points, errors = errors_of(line_of(u, 0.1), curve)
+    dz_du = DEPTH**2 / (BASELINE * CAMERA.fx)
+    standard_error = 0.1 / math.sqrt(2048)
+    assert abs(errors.u.bias - 0.02) < 4 * standard_error
+    assert errors.u.sigma == pytest.approx(0.1, rel=4 / math.sqrt(2 * 2048))
+    assert errors.u.robust_sigma == pytest.approx(0.1, rel=4 * 1.17 / math.sqrt(2048))
+    assert errors.depth_z.sigma == pytest.approx(errors.u.sigma * dz_du, rel=1e-3)
+    assert errors.depth_z.bias == pytest.approx(-errors.u.bias * dz_du, rel=2e-2)  # farther right is nearer
+    # the wall faces the camera: the distance off it is the depth error, towards the camera positive
+    assert np.allclose(errors.distance, -errors.depth, atol=1e-12)
+    assert np.allclose(errors.sigma_distance, points.sigma_depth, rtol=1e-9)
+    assert abs(errors.u.autocorrelation) < 4 / math.sqrt(2048)
+    assert errors.u.rmse**2 == pytest.approx(errors.u.bias**2 + errors.u.sigma**2)
+
+
+def test_coverage_tells_an_honest_sigma_from_a_boastful_one():
+    random = np.random.default_rng(5)
+    curve = wall_curve(np.arange(2048))
+    noise = 0.1 * random.standard_normal((2048, 1))
+    honest = errors_of(line_of(curve.position[:, None] + noise, 0.1), curve)[1]
+    boastful = errors_of(line_of(curve.position[:, None] + noise, 0.05), curve)[1]
+    tolerance = 4 * math.sqrt(0.954 * 0.046 / 2048)
+    for measures in (honest.u, honest.depth_z, honest.surface):
+        assert abs(measures.coverage - 0.9545) < tolerance
+    assert abs(boastful.u.coverage - 0.6827) < 4 * math.sqrt(0.68 * 0.32 / 2048)
+
+
+def test_rows_that_are_missing_false_or_wrong_are_counted_apart():
+    curve = wall_curve(np.arange(100, 200))
+    u = np.full((2048, 1), np.nan)
+    u[110:200, 0] = curve.position[0] + 0.01 * np.random.default_rng(0).standard_normal(90)  # ten rows missing
+    u[120:125, 0] += 30.0  # five wrong peaks
+    u[500:507, 0] = 900.0  # seven rows where nothing is to be seen
+    _, errors = errors_of(line_of(u, 0.01), curve)
+    assert (errors.truth_rows, errors.valid_rows, errors.measured_rows, errors.false_rows) == (100, 97, 85, 7)
+    assert errors.completeness == 0.85
+    assert errors.u.count == 90
+    assert errors.u.outlier_rate == pytest.approx(5 / 90)
+    assert errors.outlier.sum() == 5
+    assert errors.surface.count == 97
+    assert errors.u.robust_sigma < 0.02 < errors.u.sigma
+
+
+def test_each_crossing_is_matched_once_and_to_the_nearest():
+    true_index = np.array([3, 5, 5, 5, 9], dtype=np.int32)
+    true_position = np.array([10.0, 100.0, 200.0, 300.0, 50.0])
+    index = np.array([5, 5, 5, 5, 3, 4, 9])
+    position = np.array([201.0, 199.5, 90.0, np.nan, 10.5, 10.0, 1000.0])
+    # 199.5 takes 200, which leaves 300 to 201: nearer to it than 100, which 90 takes
+    assert match(index, position, true_index, true_position).tolist() == [3, 2, 1, -1, 0, -1, 4]
+
+
+def test_matching_equals_trying_every_pair_in_order_of_distance():
+    random = np.random.default_rng(11)
+    for _ in range(20):
+        true_index = np.sort(random.integers(0, 6, 12)).astype(np.int32)
+        true_position, index, position = random.random(12), random.integers(0, 6, 10), random.random(10)
+        wanted, taken = [-1] * 10, set()
+        pairs = [(abs(position[p] - true_position[c]), p, c) for p, c in itertools.product(range(10), range(12))]
+        for _, p, c in sorted(pairs):
+            if index[p] == true_index[c] and wanted[p] < 0 and c not in taken:
+                wanted[p] = c
+                taken.add(c)
+        assert match(index, position, true_index, true_position).tolist() == wanted
+
+
+def test_nothing_measured_gives_nan_and_no_warning():
+    curve = wall_curve(np.arange(100, 200))
+    with np.errstate(all="raise"):
+        points, errors = errors_of(line_of(np.full((2048, 3), np.nan), 0.1), curve)
+    assert len(points.flag) == errors.u.count == errors.valid_rows == 0
+    assert errors.completeness == 0.0
+    assert math.isnan(errors.depth_z.rmse)
+
+
+def test_nothing_visible_gives_only_false_rows():
+    u = np.full((2048, 1), np.nan)
+    u[10:20, 0] = 1200.0
+    _, errors = errors_of(line_of(u, 0.1), wall_curve(np.arange(0)), np.zeros((0, 3)), np.zeros((0, 3), np.int32))
+    assert errors.false_rows == errors.valid_rows == 10
+    assert math.isnan(errors.completeness)
+    assert errors.surface.count == errors.u.count == 0
+
+
+def test_smoothed_errors_show_in_the_autocorrelation():
+    random = np.random.default_rng(8)
+    smooth = np.convolve(random.standard_normal(4100), np.ones(5) / 5, mode="valid")
+    rows = np.arange(len(smooth))
+    found = measure(smooth, np.full(len(smooth), np.nan), 100.0, rows, np.zeros_like(rows))
+    assert found.autocorrelation == pytest.approx(0.8, abs=0.04)  # 4 of 5 samples shared
+    assert math.isnan(found.coverage)
+
+
+def box(size: float) -> tuple[np.ndarray, np.ndarray]:
+    corners = np.array(list(itertools.product((-size, size), repeat=3)))
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, np.array([t for q in quads for t in ((q[0], q[1], q[2]), (q[0], q[2], q[3]))], dtype=np.int32)
+
+
+@pytest.mark.parametrize("reversed_winding", [False, True])
+def test_distance_to_a_box_is_right_and_signed_at_faces_edges_and_corners(reversed_winding):
+    vertices, triangles = box(0.5)
+    if reversed_winding:
+        triangles = triangles[:, ::-1].copy()
+    vertices = vertices + 100.0  # far from the origin, where float32 is 8 um coarse
+    camera = np.array([103.0, 102.0, 104.0])
+    random = np.random.default_rng(2)
+    p = random.uniform(-0.6, 0.6, (4000, 3))
+    p[:, 0] = np.abs(p[:, 0])  # the sides that the camera sees
+    outside = np.maximum(np.abs(p) - 0.5, 0.0)
+    wanted = np.linalg.norm(outside, axis=1) + np.minimum(np.max(np.abs(p) - 0.5, axis=1), 0.0)
+    seen = (p[:, 1] > -0.49) & (p[:, 2] > -0.49)
+    found, nearest = signed_distance(p + 100.0, vertices, triangles, camera)
+    wrong = np.abs(found[seen] - wanted[seen])
+    # exact but where two faces are as near to float32, which may then take the other: by at most its resolution
+    assert np.max(wrong) < np.finfo(np.float32).eps
+    assert np.percentile(wrong, 99) < 1e-13
+    assert (nearest >= 0).all()
+
+
+def test_distance_off_a_tilted_sheet_keeps_its_sign_within_a_nanometre():
+    # an open mesh, a metre away, and points a nanometre off it
+    random = np.random.default_rng(6)
+    rotation = np.linalg.qr(random.standard_normal((3, 3)))[0]
+    vertices = WALL @ rotation.T + [0.3, -0.2, 0.1]
+    camera = np.array([0.3, -0.2, 0.1])
+    local = np.stack([random.uniform(-0.3, 0.3, 500), random.uniform(-0.3, 0.3, 500), np.full(500, DEPTH)], axis=1)
+    off = random.uniform(-1e-9, 1e-9, 500)
+    towards_camera = -rotation[:, 2]
+    points = local @ rotation.T + camera + off[:, None] * towards_camera
+    found, _ = signed_distance(points, vertices, WALL_TRIANGLES, camera)
+    assert np.max(np.abs(found - off)) < 1e-14
+
+
+def test_distance_to_a_triangle_is_that_of_a_fine_search():
+    random = np.random.default_rng(9)
+    corners, points = random.standard_normal((30, 3, 3)), 2 * random.standard_normal((30, 3))
+    corners[0, 2] = corners[0, 1]  # degenerate to an edge
+    corners[1, 1] = corners[1, 2] = corners[1, 0]  # and to a point
+    steps = np.linspace(0, 1, 801)
+    a, b = (grid.ravel() for grid in np.meshgrid(steps, steps))
+    weights = np.stack([a, b, 1 - a - b], axis=1)[a + b <= 1.0 + 1e-12]
+    found = point_triangle_distance(points, corners)
+    for k in range(30):
+        searched = np.min(np.linalg.norm(weights @ corners[k] - points[k], axis=1))
+        assert searched - 1e-4 < found[k] <= searched + 1e-12
+    assert found[1] == pytest.approx(np.linalg.norm(points[1] - corners[1, 0]))
+
+
+def test_points_on_a_sphere_of_facets_lie_off_it_by_at_most_the_sagitta():
+    n, radius = 128, 0.05
+    theta, phi = np.meshgrid(np.linspace(0, np.pi, n // 2 + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij")
+    unit = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    vertices = radius * unit.reshape(-1, 3)
+    i = (np.arange(n // 2)[:, None] * (n + 1) + np.arange(n)).ravel()
+    triangles = np.concatenate([np.stack([i, i + n + 1, i + n + 2], 1), np.stack([i, i + n + 2, i + 1], 1)]).astype(
+        np.int32
+    )
+    random = np.random.default_rng(4)
+    direction = random.standard_normal((2000, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    direction[:, 2] = -np.abs(direction[:, 2]) - 0.3
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    found, _ = signed_distance(radius * direction, vertices, triangles, np.array([0.0, 0.0, -1.0]))
+    sagitta = 2 * radius * (1 - math.cos(math.pi / n))
+    assert found.min() > -1e-12
+    assert found.max() < sagitta
