@@ -20,8 +20,8 @@ from analysis.line.matched_filter import (
     block_background,
     load_row,
     local_maxima,
+    noise_margin,
     respond,
-    response_noise,
 )
 from analysis.line.result import Flag
 
@@ -117,6 +117,7 @@ def detect(
     mask: Mask,
     floor: Float32,
     threshold: float,
+    step: float,
     width: float,
     max_width: float,
     seeds: Array,
@@ -124,26 +125,29 @@ def detect(
 ) -> None:
     """Scan lines (n, w) in electrons -> seeds (n, k, 6) and flags (n, k), strongest first.
 
-    floor (n, w) or (n, 1): variance of a pixel without signal. width: known sigma in px, or 0 to measure it.
+    floor (n, w) or (n, 1): variance of a pixel without signal. step: of quantisation, e-. width: known sigma in px, or 0 to measure it.
     """
     n, w = signal.shape
     wanted = seeds.shape[1]
     row, response = np.empty(w + 2 * RADIUS, np.float32), np.empty(w, np.float32)
     blocks = max(1, w // BLOCK)
-    means, level, sigma = np.empty(blocks), np.empty(blocks), np.empty(blocks)
+    means, level, margin = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     at, height = np.empty(w, np.int32), np.empty(w)
     for y in range(n):
         usable = load_row(signal[y], mask[y], row)
-        flags[y, :] = _NO_PEAK if usable else _NO_PIXELS
-        seeds[y, :, :] = np.nan
+        for k in range(wanted):
+            flags[y, k] = _NO_PEAK if usable else _NO_PIXELS
+            for j in range(SEED_COLUMNS):
+                seeds[y, k, j] = np.nan
         if not usable:
             continue
         respond(row, response)
         block_background(response, means, level)
-        response_noise(response, floor[y], w / usable, level, blocks, sigma)
-        found = local_maxima(response, level, sigma, blocks, threshold, at)
+        noise_margin(response, floor[y], w / usable, level, blocks, threshold, step, margin)
+        found = local_maxima(response, level, margin, blocks, at)
         for j in range(found):
-            height[j] = response[at[j]] - background_at(at[j], level, blocks)
+            pixel = np.int64(at[j])
+            height[j] = response[pixel] - background_at(pixel, level, blocks)
         line = row[RADIUS : RADIUS + w]
         taken = 0
         while taken < wanted:
@@ -154,8 +158,9 @@ def detect(
             if best < 0:
                 break
             seed = seeds[y, taken]
-            base = background_at(at[best], level, blocks)
-            flags[y, taken] = _measure(line, response, mask[y], at[best], base, width, max_width, seed)
+            pixel = np.int64(at[best])
+            base = background_at(pixel, level, blocks)
+            flags[y, taken] = _measure(line, response, mask[y], pixel, base, width, max_width, seed)
             claim = max(3.0 * seed[WIDTH], 3.0) + seed[PLATEAU]
             strength, reach = height[best], np.inf
             for j in range(found):

@@ -23,8 +23,7 @@ FULL_WELL = 1e4
 def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseModel:
     """Checked image (h, w) or (h, w, 3) -> NoiseModel whose black level is 0 and whose gain is that of the residuals.
 
-    Noise without light is the median absolute difference of neighbours along the scan line, blind to edges and texture
-    on less than half of the pixels. The gain is the photon transfer of the line's own fit: where shot noise rules, the
+    Noise without light is that of the differences of neighbours along the scan line, edges clipped out. The gain is the photon transfer of the line's own fit: where shot noise rules, the
     median reduced chi-square of likelihood fits is the gain over the one assumed, and four rounds settle it. What the
     Gaussian model cannot follow (speckle, a lens with tails) counts as noise, so that sigma_u stays honest.
     """
@@ -37,7 +36,7 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
     lines = scan_lines(sample, settings, numbers)
     signal, mask, _ = lines.read(0, lines.count)
     colours = 1.5 if lines.channel in COLOURS and image.ndim == 3 else 1.0  # variance of a colour difference
-    dark_variance = _difference_variance(np.where(mask & MISSING, np.nan, signal)) / colours
+    dark_variance = _difference_variance(np.where(mask & MISSING, np.nan, signal), numbers.step) / colours
     level = max(float(np.median(sample[np.isfinite(sample)])), 0.0)
     gain = _full_scale(image) / FULL_WELL
     for _ in range(ROUNDS):
@@ -59,11 +58,15 @@ def _full_scale(image: NDArray[Any]) -> float:
     return float(min(scale for scale in FULL_SCALES if scale >= highest))
 
 
-def _difference_variance(values: NDArray[np.float32]) -> float:
+def _difference_variance(values: NDArray[np.float32], step: float) -> float:
     """(n, w), NaN where not usable -> variance of a pixel, from neighbours or, on a Bayer row, next but one."""
     for lag in (1, 2):
-        steps = np.abs(values[:, lag:] - values[:, :-lag])
+        steps = np.abs(values[:, lag:] - values[:, :-lag], dtype=np.float64)
         steps = steps[np.isfinite(steps)]
         if steps.size:
-            return 0.5 * (1.4826 * float(np.median(steps))) ** 2
+            # half a step more, since the median of whole numbers may well be 0
+            sigma = 1.4826 * (float(np.median(steps)) + 0.5 * step)
+            for _ in range(3):
+                sigma = float(np.sqrt(np.mean(steps[steps <= 4.0 * sigma] ** 2)))
+            return 0.5 * sigma**2
     return 0.0

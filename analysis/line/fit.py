@@ -20,11 +20,11 @@ Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-ITERATIONS = 25
-DECREMENT = 1e-5
-"""Stop when the step is this small in squared standard deviations."""
-NARROWEST = 0.2
-"""px; below it a line falls into one pixel and its width has no trace in the data."""
+ITERATIONS = 30
+SMALL_STEP, ACCEPTED_STEP = 1e-5, 1e-3
+"""Squared standard deviations: stop at the first; out of iterations, the second will do (scoring converges linearly)."""
+NARROWEST = 0.35
+"""px; a narrower line falls into one pixel, where its width leaves no trace and drags the centre along."""
 
 _OK, _SATURATED, _AT_BORDER = int(Flag.OK), int(Flag.SATURATED), int(Flag.AT_BORDER)
 _TOO_FEW, _NOT_CONVERGED = int(Flag.TOO_FEW_PIXELS), int(Flag.NOT_CONVERGED)
@@ -50,8 +50,10 @@ def _normal(
     y: Array, floor: Array, shape: Array, n: int, p: Array, likelihood: bool, hessian: Array, score: Array
 ) -> None:
     """Fisher information (4, 4) and score (4,) for p = amplitude, centre, sigma, background."""
-    hessian[:] = 0.0
-    score[:] = 0.0
+    for j in range(4):
+        score[j] = 0.0
+        for k in range(4):
+            hessian[j, k] = 0.0
     for i in range(n):
         g = shape[0, i]
         mu = p[0] * g + p[3]
@@ -123,8 +125,8 @@ def _optimise(
     trial_shape = np.empty_like(shape)
     profile(x, n, p[1], p[2], integrated, shape)
     cost = _cost(y, floor, shape[0], n, p, likelihood)
-    damping = 1e-4
-    converged = False
+    damping, decrement, scale = 1e-4, np.inf, 1.0
+    converged = improved = False
     for _ in range(ITERATIONS):
         _normal(y, floor, shape, n, p, likelihood, hessian, score)
         if p[2] <= NARROWEST and score[2] < 0.0:
@@ -141,12 +143,15 @@ def _optimise(
                 if trial[0] > 0.0 and x[0] - 1.0 <= trial[1] <= x[n - 1] + 1.0 and trial[2] < 3.0 * (x[n - 1] - x[0]):
                     profile(x, n, trial[1], trial[2], integrated, trial_shape)
                     trial_cost = _cost(y, floor, trial_shape[0], n, trial, likelihood)
-                    small = decrement <= DECREMENT * scale
+                    small = decrement <= SMALL_STEP * scale
                     if trial_cost <= cost or small:
                         improved = True
                         converged = small and damping < 1e-2
-                        p[:] = trial
-                        shape[:] = trial_shape
+                        for j in range(4):
+                            p[j] = trial[j]
+                        for j in range(n):
+                            for m in range(3):
+                                shape[m, j] = trial_shape[m, j]
                         cost = trial_cost
                         damping = max(0.1 * damping, 1e-9)
                         break
@@ -156,7 +161,20 @@ def _optimise(
     _normal(y, floor, shape, n, p, likelihood, hessian, score)
     if p[2] <= NARROWEST and score[2] < 0.0:
         _hold_sigma(hessian, score)
-    return converged
+    return converged or (improved and decrement <= ACCEPTED_STEP * scale)
+
+
+@njit(nogil=True, cache=True)
+def _gather(
+    signal: Float32, mask: Mask, floor: Float32, middle: float, half: float, x: Array, y: Array, base: Array
+) -> int:
+    """Usable pixels within `half` of `middle` -> positions, electrons, variances; returns how many."""
+    count = 0
+    for i in range(max(0, math.ceil(middle - half)), min(signal.shape[0] - 1, math.floor(middle + half)) + 1):
+        if mask[i] == 0:
+            x[count], y[count], base[count] = i, signal[i], floor[min(i, floor.shape[0] - 1)]
+            count += 1
+    return count
 
 
 @njit(nogil=True, cache=True)
@@ -185,26 +203,22 @@ def fit_seeds(
     unit[1] = 1.0
     for row in range(n):
         for k in range(seeds.shape[1]):
-            out[row, k, :] = np.nan
+            for j in range(6):
+                out[row, k, j] = np.nan
             if flags[row, k] > _SATURATED:
                 continue
             seed = seeds[row, k]
             p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
-            half, count, converged = 0.0, 0, False
+            half, converged = 0.0, False
             for attempt in range(3):
                 # 4 sigma hold the line, the rest its background; a saturated plateau pushes the wings outwards
                 wanted = max(4.0 * p[2] + 1.5, seed[PLATEAU] + 2.5 * p[2] + 1.5)
                 wanted = math.ceil(min(wanted, seed[REACH], 6.0 * max_width))
-                if attempt > 0 and (known_width or 0.7 * half <= wanted <= 1.15 * half + 1.0):
+                if attempt > 0 and (known_width or 0.5 * half <= wanted <= 1.15 * half + 1.0):
                     break
                 half = wanted
                 middle = seed[CENTRE] if attempt == 0 else p[1]
-                count = 0
-                for i in range(max(0, math.ceil(middle - half)), min(w - 1, math.floor(middle + half)) + 1):
-                    if mask[row, i] == 0:
-                        x[count], y[count] = i, signal[row, i]
-                        base[count] = floor[row, min(i, floor.shape[1] - 1)]
-                        count += 1
+                count = _gather(signal[row], mask[row], floor[row], middle, half, x, y, base)
                 if count < 5:
                     break
                 converged = _optimise(x, y, base, count, p, likelihood, integrated, shape, hessian)

@@ -26,6 +26,9 @@ _taps /= 2.0 * _taps.sum() - _taps[0]
 T0, T1, T2, T3, T4 = (np.float32(t) for t in _taps)
 NOISE_GAIN = float(2.0 * (_taps**2).sum() - _taps[0] ** 2)
 """Variance of the response over that of a pixel."""
+SKEW_GAIN = float(2.0 * (_taps**3).sum() - _taps[0] ** 3)
+LEVEL_GAIN = 0.5 * math.pi / (7 * BLOCK)
+"""Variance of the background, a median of 7 block means, over that of a pixel."""
 
 
 @njit(nogil=True, cache=True)
@@ -110,32 +113,49 @@ def background_at(x: float, level: Array, blocks: int) -> float:
 
 
 @njit(nogil=True, cache=True)
-def response_noise(response: Float32, floor: Float32, scale: float, level: Array, blocks: int, sigma: Array) -> None:
-    """Standard deviation of the response without a line, at each block; floor (w,) or (1,). Texture counts as noise."""
+def noise_margin(
+    response: Float32, floor: Float32, scale: float, level: Array, blocks: int, threshold: float, step: float, margin: Array
+) -> None:
+    """How far above the background a response must rise at each block: threshold times its noise; floor (w,) or (1,).
+
+    Photon counts lean upwards: Cornish and Fisher's (1938) first term keeps the rate of false peaks that of a Gaussian.
+    Texture counts as noise. Noise below half a quantisation step is no longer Gaussian, but it cannot reach one `step`.
+    """
     w = response.shape[0]
+    sigma = np.empty(blocks)
     for b in range(blocks):
-        base = floor[min(b * BLOCK + BLOCK // 2, floor.shape[0] - 1)]
-        sigma[b] = math.sqrt(scale * NOISE_GAIN * (max(level[b], 0.0) + base))
+        photons = max(level[b], 0.0)
+        variance = photons + floor[min(b * BLOCK + BLOCK // 2, floor.shape[0] - 1)]
+        sigma[b] = math.sqrt(scale * (NOISE_GAIN + LEVEL_GAIN) * variance)
+        skew = SKEW_GAIN * photons / (NOISE_GAIN * variance) ** 1.5
+        margin[b] = max((threshold + skew * max(threshold * threshold - 1.0, 0.0) / 6.0) * sigma[b], step)
     spread, count = 0, 0
     for i in range(2, w, 8):
         b = min(i // BLOCK, blocks - 1)
         spread += abs(response[i] - background_at(i, level, blocks)) > 0.6745 * TEXTURE * sigma[b]
         count += 1
-    if 2 * spread <= count:
+    if 2 * spread <= count + 3.0 * math.sqrt(count):  # three sigma of a fair coin
         return
-    size = np.empty(count)
-    for j in range(count):
-        size[j] = abs(response[2 + 8 * j] - background_at(2 + 8 * j, level, blocks))
-    texture = 1.4826 * np.median(size)
+    size = np.empty(blocks)
     for b in range(blocks):
-        sigma[b] = max(sigma[b], texture)
+        total, count = 0.0, 0
+        for i in range(b * BLOCK + 1, min((b + 1) * BLOCK, w), 2):
+            total += abs(response[i] - background_at(i, level, blocks))
+            count += 1
+        value = total / max(count, 1)
+        k = b
+        while k > 0 and size[k - 1] > value:
+            size[k] = size[k - 1]
+            k -= 1
+        size[k] = value
+    texture = 1.2533 * size[blocks // 2]
+    for b in range(blocks):
+        margin[b] = max(margin[b], threshold * texture)
 
 
 @njit(nogil=True, cache=True)
-def local_maxima(
-    response: Float32, level: Array, sigma: Array, blocks: int, threshold: float, at: NDArray[np.int32]
-) -> int:
-    """Pixels where the response is a maximum and exceeds background + threshold * sigma; returns how many."""
+def local_maxima(response: Float32, level: Array, margin: Array, blocks: int, at: NDArray[np.int32]) -> int:
+    """Pixels where the response is a maximum and exceeds background + margin; returns how many."""
     w = response.shape[0]
     found = 0
     for b in range(-1, blocks):
@@ -143,7 +163,7 @@ def local_maxima(
         left, right = max(b, 0), min(b + 1, blocks - 1)
         start = 0 if b < 0 else b * BLOCK + BLOCK // 2
         stop = w if b == blocks - 1 else (b + 1) * BLOCK + BLOCK // 2
-        low, high = level[left] + threshold * sigma[left], level[right] + threshold * sigma[right]
+        low, high = level[left] + margin[left], level[right] + margin[right]
         slope = np.float32((high - low) / BLOCK)
         bound = np.float32(low)
         for i in range(start, stop):

@@ -22,12 +22,13 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None) -> 
     out = np.empty((lines.count, settings.peaks, 6))
     flags = np.empty((lines.count, settings.peaks), np.uint8)
     known = settings.width or 0.0
+    step = lines.noise.step / lines.noise.gain
 
     def work(start: int, stop: int) -> None:
         signal, mask, floor = lines.read(start, stop)
         here, flag = out[start:stop], flags[start:stop]
         seeds = np.empty((stop - start, settings.peaks, SEED_COLUMNS))
-        detect(signal, mask, floor, settings.threshold, known, settings.max_width, seeds, flag)
+        detect(signal, mask, floor, settings.threshold, step, known, settings.max_width, seeds, flag)
         if settings.method == "centre_of_mass":
             weigh_seeds(signal, mask, floor, seeds, flag, correlation, here)
         else:

@@ -28,7 +28,7 @@ class ExtractionSettings(Model):
         None, label="Bayer pattern", help="Of a raw colour image; only pixels of the laser's colour are used."
     )
     threshold: float = quantity(
-        5.0, label="Detection threshold", help="Matched-filter response over its noise.", ge=1, le=1000
+        5.2, label="Detection threshold", help="Matched-filter response over its noise.", ge=1, le=1000
     )
     width: float | None = quantity(
         None, unit="px", label="Line width", help="Known sigma; empty: measured at each peak.", ge=0.2, le=200
