@@ -53,7 +53,8 @@ class SideFiles:
         """Bytes of a side file, its name taken relative to the mesh file. InputError: absent, or outside."""
         name = name.strip()
         # As written; percent-encoded (glTF); with Windows' separator; after options ("map_Kd -s 1 1 1 wood.png").
-        for spelling in dict.fromkeys((name, unquote(name), name.replace("\\", "/"), name.split(" ")[-1])):
+        plain = name.replace("\\", "/")
+        for spelling in dict.fromkeys((name, unquote(name), plain, plain.split(" ")[-1])):
             try:
                 file = inside(self.root, str(self.folder / spelling), self.where)
                 if file.is_file():
@@ -103,6 +104,9 @@ def read_parts(path: Path, root: Path, where: str, *, colours: bool) -> list[Par
     except OSError as error:
         raise InputError("the file cannot be read", where=where, found=error.strerror or error) from error
     except Exception as error:  # a damaged file makes a reader fail in any way
+        outside = re.match(r"index (-?\d+) is out of bounds for axis 0 with size (\d+)", str(error))
+        if kind == "obj" and outside:
+            raise _no_such_vertex(int(outside[1]) + 1, where, f"1 ... {outside[2]}") from error
         raise InputError(
             f"the file cannot be read as {kind.upper()}",
             where=where,
