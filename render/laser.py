@@ -1,7 +1,7 @@
 """Line lasers: a sheet of light x = 0 that leaves the origin along z and opens along y.
 
 Through the plane at distance z the flux density is  E = P g(x; sigma(z)) h(y / z) / z  (W/m^2), with g a
-unit-area Gaussian, sigma(z) half of the sheet's 1/e^2 half-width, and h the fan profile, of unit area on |Y| <= tan(fan/2).
+unit-area Gaussian, sigma(z) half of the sheet's 1/e^2 half-width, h the fan profile, unit area on |Y| <= tan(fan/2).
 The light flows along (x sigma'/sigma, y/z, 1), which conserves energy exactly, so a surface of normal n receives
 E |n . (x sigma'/sigma, y/z, 1)| and any closed surface around the laser receives P.
 """

@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+
+from render.embree import RayScene
+from render.errors import Cancelled
+from render.primitives import primitive_mesh
+from render.shape import Sphere
+from render.threads import map_chunks
+
+
+def ball():
+    mesh = primitive_mesh(Sphere(radius=0.1, segments=64))
+    return RayScene(mesh.vertices + np.array([10.0, -20.0, 5.0]), mesh.triangles)
+
+
+def test_no_ray_slips_through_a_closed_surface():
+    scene = ball()
+    directions = np.random.default_rng(0).normal(size=(200_000, 3)).astype(np.float32)
+    hit, distance = scene.intersect(np.zeros((len(directions), 3), np.float32), directions)
+    assert (hit >= 0).all()
+    reach = distance * np.linalg.norm(directions, axis=1)
+    assert reach.min() > 0.0995 and reach.max() < 0.1001
+
+
+def test_occlusion_ends_at_the_target():
+    scene = ball()
+    origins, directions = np.zeros((2, 3), np.float32), np.array([[1, 0, 0], [1, 0, 0]], np.float32)
+    assert scene.occluded(origins, directions, np.array([0.09, 0.2], np.float32)).tolist() == [False, True]
+
+
+def test_rows_that_do_not_match_are_refused_instead_of_read_out_of_bounds():
+    scene = ball()
+    with pytest.raises(ValueError, match="do not match"):
+        scene.intersect(np.zeros((5, 3), np.float32), np.zeros((4, 3), np.float32))
+    with pytest.raises(ValueError, match="do not match"):
+        scene.occluded(np.zeros((5, 3), np.float32), np.zeros((5, 3), np.float32), np.zeros(4, np.float32))
+
+
+def test_chunks_cover_everything_once_and_report_progress():
+    seen, reports = np.zeros(1000, int), []
+
+    def work(start, stop):
+        seen[start:stop] += 1
+
+    map_chunks(work, 1000, 64, threads=3, progress=reports.append)
+    assert (seen == 1).all()
+    assert reports[-1] == 1.0 and reports == sorted(reports)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_cancelling_stops_between_chunks_and_errors_come_through(threads):
+    done = []
+    with pytest.raises(Cancelled):
+        map_chunks(lambda a, b: done.append(a), 1000, 10, threads, cancelled=lambda: len(done) >= 5)
+    assert 5 <= len(done) < 20
+
+    def fails(start, stop):
+        raise KeyError(start)
+
+    with pytest.raises(KeyError):
+        map_chunks(fails, 100, 10, threads)
