@@ -1,0 +1,177 @@
+"""A frame on disk: an OpenEXR of named layers, a PNG as the sensor sees it, and a JSON sidecar.
+
+    laser.<name>.direct.Y    radiance of one laser, W/(m^2 sr)          position.X/Y/Z   m, world frame
+    ambient.R/G/B            radiance in bands, W/(m^2 sr)              normal.X/Y/Z     unit, world frame
+    depth_z.Z, depth_range.Z m                                          object_id.Y      uint32, 2^32 - 1 for none
+
+All layers are float32 but the object's, compressed without loss (ZIP). The sidecar is written last and holds the EXR's
+SHA-256, so that a set of files of two frames, or of half a frame, is never read as one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.develop import Image
+from render.errors import InputError
+from render.files import atomic_write
+from render.frame import Frame, Truth
+from render.scene import Scene
+from render.sensor import Sensor
+from render.sidecar import (
+    Record,
+    curves_from,
+    from_text,
+    laser_layer,
+    numbers_from,
+    safe_name,
+    sidecar_record,
+    to_text,
+)
+
+Layers = dict[str, NDArray[Any]]
+
+TRUTH_LAYERS = {
+    "depth_z": ("depth_z.Z",),
+    "depth_range": ("depth_range.Z",),
+    "position": ("position.X", "position.Y", "position.Z"),
+    "normal": ("normal.X", "normal.Y", "normal.Z"),
+}
+AMBIENT_LAYERS = ("ambient.R", "ambient.G", "ambient.B")
+OBJECT_LAYER = "object_id.Y"
+
+
+def write_frame(
+    folder: Path, stem: str, frame: Frame, image: Image | None, scene: Scene, *, sensor: Sensor | None = None
+) -> list[Path]:
+    """Write stem.exr, stem.png (with an image) and stem.json into the folder; the paths, in that order.
+
+    Characters of the stem and of the lasers' names that do not suit a file or a layer are percent-encoded.
+    Raises InputError: a file cannot be written, the frame is empty or not of this scene.
+    """
+    name = safe_name(stem)
+    layers = _layers(frame, scene)
+    written = []
+    exr = _encode_exr(layers)
+    written.append(_write(folder / f"{name}.exr", exr))
+    if image is not None:
+        written.append(_write(folder / f"{name}.png", _encode_png(image.pixels)))
+    record = {
+        **sidecar_record(frame, image, scene, sensor),
+        "ambient": frame.ambient is not None,
+        "truth": frame.truth is not None,
+        "exr_sha256": hashlib.sha256(exr).hexdigest(),
+    }
+    written.append(_write(folder / f"{name}.json", to_text(record).encode()))
+    return written
+
+
+def read_frame(path: Path | str) -> Frame:
+    """The frame of a pair of EXR and JSON; path is that of either. Equal bit for bit to the one written.
+
+    Raises InputError: a file is missing, damaged, of a newer version, or not of the same frame as the other.
+    """
+    sidecar, exr = Path(path).with_suffix(".json"), Path(path).with_suffix(".exr")
+    try:
+        text = _read(sidecar).decode()
+    except UnicodeDecodeError:
+        raise InputError("the frame's description is not UTF-8 text", where=str(sidecar)) from None
+    record = from_text(text, str(sidecar))
+    content = _read(exr)
+    if hashlib.sha256(content).hexdigest() != record.get("exr_sha256"):
+        allowed, cure = f"the file written together with {sidecar.name}", "render again"
+        raise InputError("the image is damaged or of another frame", where=str(exr), allowed=allowed, cure=cure)
+    try:
+        return _frame(record, _decode_exr(content))
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError, RuntimeError) as error:
+        found = f"{type(error).__name__}: {error}"
+        raise InputError("the frame's description is damaged", where=str(sidecar), found=found) from None
+
+
+def _layers(frame: Frame, scene: Scene) -> Layers:
+    if len(frame.laser_direct) != len(scene.lasers) or len(frame.curves) not in (0, len(scene.lasers)):
+        found = f"{len(frame.laser_direct)} laser images, {len(frame.curves)} curves"
+        raise InputError("the frame is not of this scene", where="frame", found=found, allowed=f"{len(scene.lasers)}")
+    layers = {laser_layer(laser.name): light for laser, light in zip(scene.lasers, frame.laser_direct, strict=True)}
+    if frame.ambient is not None:
+        layers |= {layer: frame.ambient[..., i] for i, layer in enumerate(AMBIENT_LAYERS)}
+    if frame.truth is not None:
+        for name, parts in TRUTH_LAYERS.items():
+            values = getattr(frame.truth, name)
+            layers |= {layer: values[..., i] if len(parts) > 1 else values for i, layer in enumerate(parts)}
+        layers[OBJECT_LAYER] = frame.truth.object_id.astype(np.int32).view(np.uint32)
+    if not layers:
+        raise InputError("the frame is empty", where="frame", allowed="at least one laser, ambient light or truth")
+    shapes = {values.shape for values in layers.values()}
+    if shapes != {(scene.camera.height, scene.camera.width)}:
+        allowed = f"{scene.camera.width} x {scene.camera.height} px"
+        raise InputError("the frame is not of this scene", where="frame", found=f"arrays of {shapes}", allowed=allowed)
+    return layers
+
+
+def _frame(record: Record, layers: Layers) -> Frame:
+    lasers = tuple(layers[laser["layer"]] for laser in record["lasers"])
+    truth = None
+    if record["truth"]:
+        parts = {name: [layers[layer] for layer in names] for name, names in TRUTH_LAYERS.items()}
+        arrays = {name: np.stack(found, axis=-1) if len(found) > 1 else found[0] for name, found in parts.items()}
+        truth = Truth(**arrays, object_id=layers[OBJECT_LAYER].view(np.int32))
+    return Frame(
+        step=int(record["step"]),
+        laser_direct=lasers,
+        ambient=np.stack([layers[layer] for layer in AMBIENT_LAYERS], axis=-1) if record["ambient"] else None,
+        curves=curves_from(record),
+        truth=truth,
+        plan=str(record["plan"]),
+        seconds=numbers_from(record["seconds"]),
+        counts=numbers_from(record["counts"]),
+    )
+
+
+def _encode_exr(layers: Layers) -> bytes:
+    """Through memory: the library's own file writing says nothing of a full disk."""
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    channels = {
+        name: np.ascontiguousarray(values, dtype=values.dtype if values.dtype == np.uint32 else np.float32)
+        for name, values in layers.items()
+    }
+    stream = io.BytesIO()
+    OpenEXR.File(header, channels).write(stream)
+    return stream.getvalue()
+
+
+def _decode_exr(content: bytes) -> Layers:
+    import OpenEXR
+
+    channels = OpenEXR.File(io.BytesIO(content), separate_channels=True).channels()
+    return {name: np.ascontiguousarray(channel.pixels) for name, channel in channels.items()}
+
+
+def _encode_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    import cv2
+
+    done, encoded = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])  # fast; noise hardly shrinks further
+    if not done:
+        raise InputError("the image cannot be encoded as PNG", where="image", found=f"{pixels.shape} {pixels.dtype}")
+    return encoded.tobytes()
+
+
+def _write(path: Path, content: bytes) -> Path:
+    with atomic_write(path) as temporary:
+        temporary.write_bytes(content)
+    return path
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError("the file cannot be read", where=str(path), found=error.strerror or error) from None
