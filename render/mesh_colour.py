@@ -16,6 +16,8 @@ from render.texture import MAX_PIXELS, linear_reflectance
 Float32 = NDArray[np.float32]
 Colour = tuple[float, float, float]
 
+MAX_UV = 1e6
+"""Beyond, float32 holds no position within a texture."""
 PALETTE_WIDTH = 4096
 """A power of two, so that texel centres are exact in float32."""
 
@@ -68,9 +70,9 @@ def part_look(geometry: Any, triangles: NDArray[np.int64], *, colours: bool, lin
 
 
 def part_uv(geometry: Any, triangles: NDArray[np.int64]) -> Float32 | None:
-    """(t, 3, 2) UV of one trimesh geometry, or None."""
+    """(t, 3, 2) UV of one trimesh geometry, or None where it has none or they are not usable numbers."""
     uv = getattr(geometry.visual, "uv", None)
-    if uv is None or np.shape(uv) != (len(geometry.vertices), 2) or not np.isfinite(uv).all():
+    if uv is None or np.shape(uv) != (len(geometry.vertices), 2) or not (np.abs(uv) <= MAX_UV).all():
         return None
     return np.asarray(uv, dtype=np.float32)[triangles]
 

@@ -50,7 +50,7 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
         return mesh
     if mesh.uv is None:
         raise InputError(
-            "the albedo is a texture, but the mesh has no UV",
+            "the albedo is a texture, but the mesh has no usable UV",
             where=where,
             found=item.shape.path if isinstance(item.shape, MeshFile) else item.shape.kind,
             cure="give the albedo as a number, or unwrap the mesh and export it with UV",

@@ -193,7 +193,10 @@ def test_an_unsupported_gltf_feature_is_told_instead_of_being_misread(tmp_path: 
 
 def test_a_texture_asks_for_uv(tmp_path: Path) -> None:
     text = message_of_text(tmp_path, "a.obj", TRIANGLE + "f 1 2 3\n", albedo=Texture(path="wood.png"))
-    assert "the albedo is a texture, but the mesh has no UV; found a.obj" in text and "unwrap" in text
+    assert "the albedo is a texture, but the mesh has no usable UV; found a.obj" in text and "unwrap" in text
+    damaged = TRIANGLE + "vt 0 0\nvt nan 1\nvt 1e300 1\nf 1/1 2/2 3/3\n"
+    assert "no usable UV" in message_of_text(tmp_path, "b.obj", damaged, albedo=Texture(path="wood.png"))
+    assert len(load_mesh(thing("b.obj"), tmp_path).triangles) == 1
 
 
 def test_an_absent_texture_is_told_with_its_field(tmp_path: Path) -> None:
