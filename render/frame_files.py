@@ -134,7 +134,7 @@ def _frame(record: Record, layers: Layers) -> Frame:
     )
 
 
-def _encode_exr(layers: Layers) -> bytes:
+def _encode_exr(layers: Layers) -> memoryview:
     """Through memory: the library's own file writing says nothing of a full disk."""
     import OpenEXR
 
@@ -145,7 +145,7 @@ def _encode_exr(layers: Layers) -> bytes:
     }
     stream = io.BytesIO()
     OpenEXR.File(header, channels).write(stream)
-    return stream.getvalue()
+    return stream.getbuffer()
 
 
 def _decode_exr(content: bytes) -> Layers:
@@ -164,7 +164,7 @@ def _encode_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     return encoded.tobytes()
 
 
-def _write(path: Path, content: bytes) -> Path:
+def _write(path: Path, content: bytes | memoryview) -> Path:
     with atomic_write(path) as temporary:
         temporary.write_bytes(content)
     return path
