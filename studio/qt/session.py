@@ -1,0 +1,116 @@
+"""What all panels share: the document, one selection, one hovered scan line, and the renders made so far.
+
+Panels never talk to each other: they change the session, and follow its signals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from render.errors import InputError
+from render.frame import Frame
+from render.world import World
+from studio.document import Document, FieldPath
+from studio.project import Project
+from studio.scan import Measurement
+
+
+@dataclass
+class Render:
+    """One finished or refining render in the history."""
+
+    number: int
+    project: Project
+    """As it was when the render began."""
+    world: World
+    frame: Frame
+    measurements: dict[str, list[Measurement]] = field(default_factory=dict)
+    """By extraction method: one for each laser."""
+    final: bool = True
+
+
+class Session(QObject):
+    """The state of the desktop, in one place."""
+
+    project_changed = Signal()
+    """The document's project is another one; while a drag goes on, once a step."""
+    drag_changed = Signal(bool)
+    """A drag began or ended: panels that are slow to update wait for its end."""
+    selection_changed = Signal()
+    hover_changed = Signal()
+    """`hovered` is another scan line."""
+    renders_changed = Signal()
+    """A render joined, changed or left the history, or another one is shown."""
+    measured = Signal()
+    """The shown render was developed and measured again (power, exposure, method)."""
+    message = Signal(str, str)
+    """level ("info", "warning", "error") and text, for log and status bar."""
+    document_replaced = Signal()
+    """Another project was opened."""
+
+    def __init__(self, document: Document) -> None:
+        super().__init__()
+        self.dragging = False
+        self.selection: FieldPath = ()
+        self.hovered: int | None = None
+        self.renders: list[Render] = []
+        self.shown: Render | None = None
+        self.document = document
+        document.listeners.append(self.project_changed.emit)
+
+    @property
+    def project(self) -> Project:
+        return self.document.project
+
+    def replace_document(self, document: Document) -> None:
+        """Open another project: history and selection start anew."""
+        self.document.listeners.clear()
+        self.document = document
+        document.listeners.append(self.project_changed.emit)
+        self.selection, self.hovered, self.renders, self.shown = (), None, [], None
+        self.document_replaced.emit()
+        self.project_changed.emit()
+        self.selection_changed.emit()
+        self.renders_changed.emit()
+
+    def select(self, path: FieldPath) -> None:
+        """Select an item of the scene by its path: ("scene", "objects", 0), ("scene", "rig", "camera"), ()."""
+        if path != self.selection:
+            self.selection = path
+            self.selection_changed.emit()
+
+    def hover(self, scan_line: int | None) -> None:
+        if scan_line != self.hovered:
+            self.hovered = scan_line
+            self.hover_changed.emit()
+
+    def begin_drag(self) -> None:
+        self.dragging = True
+        self.drag_changed.emit(True)
+
+    def end_drag(self) -> None:
+        """The drag becomes one entry of the undo history."""
+        self.dragging = False
+        self.document.end_merge()
+        self.drag_changed.emit(False)
+
+    def set(self, path: FieldPath, value: Any, label: str = "", merge: str = "") -> bool:
+        """Change a value; a bad one is told in `message` and refused."""
+        try:
+            self.document.set(path, value, label, merge)
+        except InputError as error:
+            self.message.emit("error", str(error))
+            return False
+        return True
+
+    def add_render(self, render: Render) -> None:
+        self.renders.append(render)
+        self.shown = render
+        self.renders_changed.emit()
+
+    def show(self, render: Render | None) -> None:
+        self.shown = render
+        self.renders_changed.emit()
