@@ -52,6 +52,30 @@ def _fraction(x: float) -> float:
 
 
 @numba.njit(nogil=True, cache=True)
+def light_in_view(lights: Float, o0: float, o1: float, o2: float, d0: float, d1: float, d2: float, far: float) -> int:
+    """The rectangle whose shining side the ray o + f d meets first, before f = far; -1 for none."""
+    seen = -1
+    for k in range(lights.shape[0]):
+        light = lights[k]
+        if light[0] != RECTANGLE:
+            continue
+        facing = light[13] * d0 + light[14] * d1 + light[15] * d2
+        if facing >= 0.0:
+            continue
+        f = (light[13] * (light[4] - o0) + light[14] * (light[5] - o1) + light[15] * (light[6] - o2)) / facing
+        if not 0.0 < f < far:
+            continue
+        q0, q1, q2 = o0 + f * d0 - light[4], o1 + f * d1 - light[5], o2 + f * d2 - light[6]
+        along_x = light[7] * q0 + light[8] * q1 + light[9] * q2
+        along_y = light[10] * q0 + light[11] * q1 + light[12] * q2
+        within_x = abs(along_x) <= light[7] ** 2 + light[8] ** 2 + light[9] ** 2
+        within_y = abs(along_y) <= light[10] ** 2 + light[11] ** 2 + light[12] ** 2
+        if within_x and within_y:
+            seen, far = k, f
+    return seen
+
+
+@numba.njit(nogil=True, cache=True)
 def shade_ambient(
     surface: Surface,
     T_world_camera: Float,
@@ -75,16 +99,18 @@ def shade_ambient(
 
     Returns the number of shadow rays; light_out (.., 3) is what a clear one adds to its pixel `owner`.
     """
-    m, vertices, triangles, albedo = T_world_camera, surface.vertices, surface.triangles, surface.albedo
+    m, vertices, triangles = T_world_camera, surface.vertices, surface.triangles
     n = cells * cells
     share = 1.0 / n
-    red, green, blue = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    rho = np.empty(3)
+    rho, starts = np.empty(3), np.empty((lights.shape[0] + 1, 2))
     has_environment = environment[0] + environment[1] + environment[2] > 0.0
     o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
     count = 0
     for r in range(triangle.shape[0]):
         i, cell, t = r // n, r % n, triangle[r]
+        if cell == 0:
+            for k in range(len(starts)):
+                starts[k, 0], starts[k, 1] = uniform(seed, pixels[i], k, 0), uniform(seed, pixels[i], k, 1)
         x, y = normalised[r, 0], normalised[r, 1]
         if x != x:
             continue
@@ -93,7 +119,6 @@ def shade_ambient(
         d2 = m[2, 0] * x + m[2, 1] * y + m[2, 2]
         s = np.inf
         n0 = n1 = n2 = p0 = p1 = p2 = 0.0
-        ab0 = ab1 = ab2 = ac0 = ac1 = ac2 = 0.0
         if t >= 0:
             ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
             a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
@@ -109,24 +134,7 @@ def shade_ambient(
             s = -height / cosine
             n0, n1, n2 = n0 / length, n1 / length, n2 / length
             p0, p1, p2 = o0 + s * d0, o1 + s * d1, o2 + s * d2
-        # what the camera ray sees of the lights themselves
-        seen = -1
-        nearest = s
-        for k in range(lights.shape[0]):
-            if lights[k, 0] == RECTANGLE:
-                facing = lights[k, 13] * d0 + lights[k, 14] * d1 + lights[k, 15] * d2
-                if facing < 0.0:
-                    h = lights[k, 13] * (lights[k, 4] - o0)
-                    h += lights[k, 14] * (lights[k, 5] - o1) + lights[k, 15] * (lights[k, 6] - o2)
-                    f = h / facing
-                    if 0.0 < f < nearest:
-                        q0, q1, q2 = o0 + f * d0 - lights[k, 4], o1 + f * d1 - lights[k, 5], o2 + f * d2 - lights[k, 6]
-                        hx = lights[k, 7] * q0 + lights[k, 8] * q1 + lights[k, 9] * q2
-                        hy = lights[k, 10] * q0 + lights[k, 11] * q1 + lights[k, 12] * q2
-                        xx = lights[k, 7] ** 2 + lights[k, 8] ** 2 + lights[k, 9] ** 2
-                        yy = lights[k, 10] ** 2 + lights[k, 11] ** 2 + lights[k, 12] ** 2
-                        if abs(hx) <= xx and abs(hy) <= yy:
-                            seen, nearest = k, f
+        seen = light_in_view(lights, o0, o1, o2, d0, d1, d2, s)
         if seen >= 0:
             for band in range(3):
                 image[i, band] += share * lights[seen, 1 + band]
@@ -135,19 +143,13 @@ def shade_ambient(
             for band in range(3):
                 image[i, band] += share * environment[band]
             continue
-        item = surface.object_id[t]
-        if surface.texture_shape[item, 1] == 0:
-            rho[0], rho[1], rho[2] = albedo[item, 0], albedo[item, 1], albedo[item, 2]
-        else:
-            for band in range(3):
-                weights = red if band == 0 else (green if band == 1 else blue)
-                rho[band] = reflectance(surface, t, p0, p1, p2, weights)
+        reflectance(surface, t, p0, p1, p2, rho)
         s0 = p0 - centre[0] + n0 * surface_offset
         s1 = p1 - centre[1] + n1 * surface_offset
         s2 = p2 - centre[2] + n2 * surface_offset
         if has_environment:
-            f = _fraction(uniform(seed, pixels[i], 0, 0) + cell * R2_X)
-            g = _fraction(uniform(seed, pixels[i], 0, 1) + cell * R2_Y)
+            f = _fraction(starts[0, 0] + cell * R2_X)
+            g = _fraction(starts[0, 1] + cell * R2_Y)
             # cosine-distributed about the normal: the radiance is then albedo times what the ray sees
             radius, angle = math.sqrt(f), 2.0 * math.pi * g
             v0, v1, v2 = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - f)
@@ -167,8 +169,8 @@ def shade_ambient(
             t0, t1, t2 = lights[k, 4] - p0, lights[k, 5] - p1, lights[k, 6] - p2
             area = 1.0
             if lights[k, 0] == RECTANGLE:
-                f = 2.0 * _fraction(uniform(seed, pixels[i], k + 1, 0) + cell * R2_X) - 1.0
-                g = 2.0 * _fraction(uniform(seed, pixels[i], k + 1, 1) + cell * R2_Y) - 1.0
+                f = 2.0 * _fraction(starts[k + 1, 0] + cell * R2_X) - 1.0
+                g = 2.0 * _fraction(starts[k + 1, 1] + cell * R2_Y) - 1.0
                 t0 += f * lights[k, 7] + g * lights[k, 10]
                 t1 += f * lights[k, 8] + g * lights[k, 11]
                 t2 += f * lights[k, 9] + g * lights[k, 12]

@@ -122,6 +122,7 @@ def shade_sheet(
     distorted = bool(np.any(k))
     o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
     emitter, _ = sheet_sigma(0.0, beam)
+    rgb = np.empty(3)
     count = 0
     half = 0.5 / cells
     for r in range(triangle.shape[0]):
@@ -192,7 +193,8 @@ def shade_sheet(
         ln1 = w[1, 0] * n0 + w[1, 1] * n1 + w[1, 2] * n2
         ln2 = w[2, 0] * n0 + w[2, 1] * n1 + w[2, 2] * n2
         power = beam[0] * h / (lz * sigma) * abs(ln0 * q * slope + ln1 * ly / lz + ln2)
-        radiance = power * reflectance(surface, t, p0, p1, p2, weights) / math.pi
+        reflectance(surface, t, p0, p1, p2, rgb)
+        radiance = power / math.pi * (weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2])
         if radiance <= 0.0:
             continue
         values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel

@@ -40,12 +40,13 @@ class View(NamedTuple):
 
 
 @numba.njit(nogil=True, cache=True)
-def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, weights: Float) -> float:
-    """Albedo, weighted over R, G, B by `weights` (3,), at the point p of triangle t: constant or from its texture."""
+def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, rgb: Float) -> None:
+    """Albedo at the point p of triangle t -> rgb (3,): the object's constant colour or its texture."""
     item = surface.object_id[t]
     if surface.texture_shape[item, 1] == 0:
-        rgb = surface.albedo[item]
-        return weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
+        for band in range(3):
+            rgb[band] = surface.albedo[item, band]
+        return
     a, b, c = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
     v, uv = surface.vertices, surface.uv
     ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
@@ -66,12 +67,11 @@ def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, weigh
     x, y = (s - math.floor(s)) * columns - 0.5, (1.0 - (r - math.floor(r))) * rows - 0.5
     i, j = int(math.floor(x)), int(math.floor(y))
     fx, fy = x - i, y - j
-    total = 0.0
+    rgb[0] = rgb[1] = rgb[2] = 0.0
     for dj in range(2):
+        row = start + (j + dj) % rows * columns
         for di in range(2):
-            texel = 3 * (start + (j + dj) % rows * columns + (i + di) % columns)
+            texel = 3 * (row + (i + di) % columns)
             weight = (fx if di else 1.0 - fx) * (fy if dj else 1.0 - fy)
             for band in range(3):
-                if weights[band] != 0.0:
-                    total += weight * weights[band] * surface.textures[texel + band]
-    return total
+                rgb[band] += weight * surface.textures[texel + band]

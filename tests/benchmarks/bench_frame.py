@@ -1,0 +1,85 @@
+"""One 2448 x 2048 frame of the weld joint, stage by stage, beside the bars of the founding issue.
+
+Prints seconds (the least of several runs: these machines are shared), the speed-up of two threads over one, the share of
+time inside embree, and the peak memory. Nothing here passes or fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from render.ambient import ambient_image
+from render.curve import laser_curve
+from render.direct import direct_image
+from render.truth import truth_images
+from render.world import build_world
+from studio.project import Project
+
+PROJECT = Path(__file__).parents[2] / "assets/projects/weld_seam/project.json"
+
+
+def best(work: Callable[[], object], runs: int = 5) -> float:
+    seconds = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - start)
+    return min(seconds)
+
+
+def main() -> None:
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--project", type=Path, default=PROJECT)
+    arguments.add_argument("--threads", type=int, default=2)
+    options = arguments.parse_args()
+    project = Project.load(options.project)
+    scene, threads = project.scene, options.threads
+    world = build_world(scene, options.project.parent)
+    camera, laser, pose = scene.camera, scene.lasers[0], scene.T_world_camera()
+    parts = (world, camera, laser, pose, scene.T_world_laser(0))
+    print(f"{camera.width} x {camera.height}, {len(world.triangles)} triangles, {threads} threads")
+
+    def row(name: str, seconds: float, bar: str, note: str = "") -> None:
+        print(f"{name:<38}{seconds:>9.4f} s   bar {bar:<9}{note}")
+
+    for target in (0.01, 0.001):
+        image = direct_image(*parts, target=target)
+        one = best(lambda: direct_image(*parts, target=target, threads=1))
+        many = best(lambda: direct_image(*parts, target=target, threads=threads))
+        row(
+            f"laser light to {target:.1%}",
+            many,
+            "0.2 s" if target == 0.01 else "-",
+            f"estimated error {image.error:.2%}, {image.samples} samples, {one / many:.2f} x one thread (bar 1.8)",
+        )
+    reference = direct_image(*parts, target=1e-4, seed=99).radiance.astype(np.float64)
+    rough = direct_image(*parts, target=0.01, seed=1).radiance
+    lit = reference > 0
+    error = np.sqrt(np.mean((rough - reference)[lit] ** 2) / np.mean(reference[lit] ** 2))
+    print(f"{'  measured error of the first':<38}{error:>9.2%}")
+    row("exact line", best(lambda: laser_curve(*parts)), "0.1 s")
+    row("truth images", best(lambda: truth_images(world, camera, pose), 3), "1 s")
+    world.rays.seconds, before = 0.0, world.rays.rays
+    start = time.perf_counter()
+    direct_image(*parts, target=0.01)
+    laser_curve(*parts)
+    truth_images(world, camera, pose)
+    ambient = best(lambda: ambient_image(world, scene, camera, pose, samples=16), 1)
+    whole = time.perf_counter() - start
+    row("ambient light, 16 samples", ambient, "30 s")
+    rays = world.rays.rays - before
+    print(
+        f"{'inside embree':<38}{world.rays.seconds / threads / whole:>9.0%}     bar 50 %     "
+        f"{rays / 1e6:.0f} million rays, {rays / whole / 1e6:.1f} million a second"
+    )
+    print(f"{'peak memory':<38}{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:>9.2f} GB    bar 2 GB")
+
+
+if __name__ == "__main__":
+    main()
