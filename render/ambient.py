@@ -46,12 +46,12 @@ def pack_lights(scene: Scene) -> Float:
     return rows
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _fraction(x: float) -> float:
     return x - math.floor(x)
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def light_in_view(lights: Float, o0: float, o1: float, o2: float, d0: float, d1: float, d2: float, far: float) -> int:
     """The rectangle whose shining side the ray o + f d meets first, before f = far; -1 for none."""
     seen = -1
@@ -75,7 +75,7 @@ def light_in_view(lights: Float, o0: float, o1: float, o2: float, d0: float, d1:
     return seen
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def shade_ambient(
     surface: Surface,
     T_world_camera: Float,
@@ -194,7 +194,7 @@ def shade_ambient(
     return count
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def add_clear(light_out: Float32, occluded: NDArray[np.bool_], owner: Int, count: int, image: Float32) -> None:
     """Add the worth of every clear shadow ray to its pixel."""
     for j in range(count):

@@ -21,7 +21,7 @@ SHEET_SIGMAS = 5.0
 """The sheet is followed this far out: 6e-7 of its power lies beyond."""
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def sheet_sigma(z: float, beam: Array) -> tuple[float, float]:
     """sigma(z) and d sigma / dz, m."""
     if beam[1] == 0.0:
@@ -31,7 +31,7 @@ def sheet_sigma(z: float, beam: Array) -> tuple[float, float]:
     return beam[1] * root, beam[1] * t / (beam[3] * root)
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def fan_density(y: float, beam: Array) -> float:
     """h(Y), unit area on |Y| <= tan(fan / 2)."""
     edge = beam[4]
@@ -46,7 +46,7 @@ def fan_density(y: float, beam: Array) -> float:
     return 0.5 / edge
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def irradiance(x: float, y: float, z: float, nx: float, ny: float, nz: float, beam: Array) -> float:
     """Irradiance (W/m^2) at a point of the laser frame on a surface of unit normal n, either side."""
     if z <= 0.0:
@@ -58,7 +58,7 @@ def irradiance(x: float, y: float, z: float, nx: float, ny: float, nz: float, be
     return beam[0] * g * fan_density(y / z, beam) / z * cosine
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def irradiance_at(points: Array, normals: Array, beam: Array) -> Array:
     """(n, 3) points and unit normals in the laser frame -> (n,) irradiance, W/m^2, without occlusion."""
     out = np.empty(points.shape[0])

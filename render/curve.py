@@ -30,7 +30,7 @@ PIECE_PX = 8.0
 """With distortion a segment is solved in pieces of this length, in which v is taken to be monotonic."""
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def sheet_side(vertices: Float, T_laser_world: Float) -> Float:
     """(v, 3) world -> (v,) signed distance to the sheet's plane, m."""
     out = np.empty(vertices.shape[0])
@@ -40,7 +40,7 @@ def sheet_side(vertices: Float, T_laser_world: Float) -> Float:
     return out
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def crossing_triangles(side: Float, triangles: Int) -> Int:
     """(v,) sides, (t, 3) -> (m,) triangles with vertices on both sides."""
     out = np.empty(triangles.shape[0], dtype=np.int32)
@@ -53,7 +53,7 @@ def crossing_triangles(side: Float, triangles: Int) -> Int:
     return out[:count].copy()
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def cut_triangles(
     vertices: Float, triangles: Int, side: Float, crossing: Int, camera: Float, laser: Float
 ) -> tuple[Float, Int]:
@@ -84,7 +84,7 @@ def cut_triangles(
     return segments[:count].copy(), owner[:count].copy()
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def clip_to_fan(segments: Float, T_laser_world: Float, tan_half_fan: float) -> Float:
     """(m, 2, 3) world -> (m, 2) range of each segment's parameter inside the fan; (1, 0) where it is outside."""
     spans = np.empty((segments.shape[0], 2))
@@ -114,7 +114,7 @@ def clip_to_fan(segments: Float, T_laser_world: Float, tan_half_fan: float) -> F
     return spans
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def project_point(p: Float, view: View, tilt: Float, distorted: bool) -> tuple[float, float]:
     """Camera-frame point -> (u, v), NaN where it has no image; `tilt` is that of the view's distortion."""
     if p[2] <= NEAR:
@@ -128,7 +128,7 @@ def project_point(p: Float, view: View, tilt: Float, distorted: bool) -> tuple[f
     return intrinsics[0] * x + intrinsics[4] * y + intrinsics[2], intrinsics[1] * y + intrinsics[3]
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def scan_line_crossings(
     segments: Float, spans: Float, view: View, height: int, along_rows: bool
 ) -> tuple[Float, Int, Int]:

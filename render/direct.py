@@ -47,7 +47,7 @@ class DirectImage:
     samples: int
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def camera_rays(
     view: View,
     pixels: Int,
@@ -92,7 +92,7 @@ def camera_rays(
                 directions[r, axis] = d if ok else 0.0
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def shade_sheet(
     surface: Surface,
     view: View,
@@ -214,7 +214,7 @@ def shade_sheet(
     return count
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _sheet_slope(
     xs: float,
     ys: float,
@@ -245,7 +245,7 @@ def _sheet_slope(
     return (dx - q * slope * dz) / sigma
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _mean_gaussian(q: float, half: float) -> float:
     """Mean of the unit Gaussian over [q - half, q + half]; 0 beyond the sheet's end."""
     half = abs(half)
@@ -258,7 +258,7 @@ def _mean_gaussian(q: float, half: float) -> float:
     return 0.25 * (math.erfc((p - half) / SQRT2) - math.erfc((p + half) / SQRT2)) / half
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _mean_over(q: float, half_u: float, half_v: float) -> float:
     """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v."""
     half_v = abs(half_v)
@@ -277,7 +277,7 @@ def _mean_over(q: float, half_u: float, half_v: float) -> float:
     return total / nodes
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def gather(
     values: Float, occluded: NDArray[np.bool_], sample: Int, count: int, cells: int, mean: Float, error: Float
 ) -> None:

@@ -19,7 +19,7 @@ FOLD_ANGLES = 720
 MAX_RADIUS = 20.0
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def tilt_matrix(tau_x: float, tau_y: float) -> Array:
     """(3, 3) homography of a tilted sensor (OpenCV, computeTiltProjectionMatrix)."""
     cx, sx, cy, sy = math.cos(tau_x), math.sin(tau_x), math.cos(tau_y), math.sin(tau_y)
@@ -58,7 +58,7 @@ def distort(x: float, y: float, k: Array, tilt: Array) -> tuple[float, float, fl
     return xt, yt, h00 * xx + h01 * yx, h00 * xy + h01 * yy, h10 * xx + h11 * yx, h10 * xy + h11 * yy
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def fold_radius_at(x: float, y: float, folds: Array) -> float:
     """Fold radius in the direction of (x, y), interpolated in the table of `fold_radii`."""
     position = (math.atan2(y, x) / (2.0 * math.pi)) % 1.0 * FOLD_ANGLES
@@ -67,7 +67,7 @@ def fold_radius_at(x: float, y: float, folds: Array) -> float:
     return (1.0 - t) * folds[i % FOLD_ANGLES] + t * folds[(i + 1) % FOLD_ANGLES]
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _determinant(r: float, c: float, s: float, k: Array, tilt: Array) -> float:
     _, _, xx, xy, yx, yy = distort(r * c, r * s, k, tilt)
     det = xx * yy - xy * yx
@@ -75,7 +75,7 @@ def _determinant(r: float, c: float, s: float, k: Array, tilt: Array) -> float:
     return min(det, xx * c * c + (xy + yx) * c * s + yy * s * s)
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def fold_radii(k: Array) -> Array:
     """(14,) coefficients -> (720,) radius, by angle, up to which the map is one-to-one (at most 20, i.e. 87 deg)."""
     folds = np.full(FOLD_ANGLES, MAX_RADIUS)
@@ -101,7 +101,7 @@ def fold_radii(k: Array) -> Array:
     return folds
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def distort_points(points: Array, k: Array, folds: Array) -> tuple[Array, Mask]:
     """(n, 2) normalised -> (n, 2) distorted, (n,) inside the fold."""
     n = points.shape[0]
@@ -117,7 +117,7 @@ def distort_points(points: Array, k: Array, folds: Array) -> tuple[Array, Mask]:
     return out, inside
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def undistort(xd: float, yd: float, k: Array, tilt: Array, folds: Array, tolerance: float) -> tuple[float, float, bool]:
     """Invert `distort` by Newton's method, kept inside the fold and damped so that the residual always falls."""
     x, y = xd, yd
@@ -150,7 +150,7 @@ def undistort(xd: float, yd: float, k: Array, tilt: Array, folds: Array, toleran
     return x, y, error <= tolerance
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def undistort_points(points: Array, k: Array, folds: Array, tolerance: float) -> tuple[Array, Mask]:
     """(n, 2) distorted -> (n, 2) normalised, (n,) solved to `tolerance` (normalised units)."""
     n = points.shape[0]

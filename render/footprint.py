@@ -29,7 +29,7 @@ TRIANGLES_A_CHUNK = 1 << 15
 MARGIN_PX = 1
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _clip(polygon: Float, count: int, plane: Float, out: Float) -> int:
     """Sutherland-Hodgman: keep the part of polygon (count, 3) where plane . (p, 1) >= 0."""
     kept = 0
@@ -48,7 +48,7 @@ def _clip(polygon: Float, count: int, plane: Float, out: Float) -> int:
     return kept
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def mark_triangles(
     start: int,
     stop: int,
@@ -153,7 +153,7 @@ def mark_triangles(
                 mask[y, x] = 1
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def marked_pixels(mask: NDArray[np.uint8]) -> Int:
     """(n,) flags -> ascending indices of the set ones; eight at a time, since nearly all are clear."""
     words = mask[: len(mask) // 8 * 8].view(np.uint64)

@@ -39,7 +39,7 @@ class View(NamedTuple):
     T_world_camera: Float
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, rgb: Float) -> None:
     """Albedo at the point p of triangle t -> rgb (3,): the object's constant colour or its texture."""
     item = surface.object_id[t]

@@ -21,7 +21,7 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def fill_truth(
     surface: Surface,
     T_world_camera: Float,
