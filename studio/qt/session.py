@@ -42,6 +42,8 @@ class Session(QObject):
     selection_changed = Signal()
     hover_changed = Signal()
     """`hovered` is another scan line."""
+    step_changed = Signal()
+    """`step`, the step of the motion that is looked at, is another one."""
     renders_changed = Signal()
     """A render joined, changed or left the history, or another one is shown."""
     measured = Signal()
@@ -56,6 +58,7 @@ class Session(QObject):
         self.dragging = False
         self.selection: FieldPath = ()
         self.hovered: int | None = None
+        self.step = 0
         self.renders: list[Render] = []
         self.shown: Render | None = None
         self.document = document
@@ -70,7 +73,7 @@ class Session(QObject):
         self.document.listeners.clear()
         self.document = document
         document.listeners.append(self.project_changed.emit)
-        self.selection, self.hovered, self.renders, self.shown = (), None, [], None
+        self.selection, self.hovered, self.step, self.renders, self.shown = (), None, 0, [], None
         self.document_replaced.emit()
         self.project_changed.emit()
         self.selection_changed.emit()
@@ -86,6 +89,13 @@ class Session(QObject):
         if scan_line != self.hovered:
             self.hovered = scan_line
             self.hover_changed.emit()
+
+    def look_at_step(self, step: int) -> None:
+        """Another step of the motion; beyond its ends the nearest one."""
+        step = min(max(step, 0), self.project.scene.frame_count - 1)
+        if step != self.step:
+            self.step = step
+            self.step_changed.emit()
 
     def begin_drag(self) -> None:
         self.dragging = True
