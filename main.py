@@ -95,13 +95,16 @@ def common(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+THREADS = click.option("--threads", type=click.IntRange(1, 1024), help="Threads  [default: all processors].")
+
+
 def working(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of the commands that compute and write."""
     for option in (
         click.option("--steps", type=click.IntRange(1), help="Only the first so many frames of a moving scan."),
         click.option("--scale", type=click.FloatRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
         click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Random seed  [default: the project's]."),
-        click.option("--threads", type=click.IntRange(1, 1024), help="Threads  [default: all processors]."),
+        THREADS,
         click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/<name>]."),
     ):
         command = option(command)
@@ -123,7 +126,7 @@ def cli(context: click.Context) -> None:
         return
     reason = why_no_studio()
     if reason is None:
-        from studio.qt.app import open_studio  # type: ignore[import-not-found]
+        from studio.qt.app import open_studio
 
         context.exit(open_studio())
     click.echo(f"The studio does not open here: {reason}. Running the sample scan without it.", err=True)
@@ -134,8 +137,10 @@ def why_no_studio() -> str | None:
     """The reason why no window can open, or None."""
     from importlib.util import find_spec
 
-    if find_spec("studio.qt") is None:
+    if find_spec("studio.qt") is None or find_spec("studio.qt.app") is None:
         return "this version has no desktop yet"
+    if find_spec("PySide6") is None:
+        return "the Qt library (PySide6) is not installed"
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return "there is no display"
     return None
@@ -166,7 +171,9 @@ def render(project: Path | None, **options: Any) -> None:
 @cli.command()
 @click.argument("source", type=click.Path(path_type=Path))
 @click.option("--project", type=click.Path(path_type=Path), help="Project with camera, laser and settings.")
+@click.option("--laser", type=click.IntRange(0), default=0, show_default=True, help="Which laser made the line.")
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside the source].")
+@THREADS
 @common
 def reconstruct(source: Path, **options: Any) -> None:
     """Points from rendered frames (a folder that `render` wrote) or from a photograph (with --project)."""
@@ -178,6 +185,7 @@ def reconstruct(source: Path, **options: Any) -> None:
 
 @cli.command()
 @click.argument("folder", type=click.Path(path_type=Path))
+@THREADS
 @common
 def report(folder: Path, **options: Any) -> None:
     """Rebuild the report of a finished scan from its folder."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from render.errors import InputError
 from studio.console import print_json, print_table, stage_progress
 from studio.project import Project, project_file
 from studio.templates import DESCRIPTIONS, new_project, template_folder
@@ -14,6 +17,7 @@ if TYPE_CHECKING:
     from studio.inspection import Inspection, LaserView
 
 SAMPLE = "weld_seam"
+OUTPUT = "scan-output"
 
 
 def load_project(path: Path | None) -> tuple[Project, Path]:
@@ -55,6 +59,155 @@ def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
         print_table(f"Laser {view.name}", _laser_rows(view, found.full_well))
     for warning in found.warnings:
         print(f"\nwarning: {warning}")
+
+
+def run_project(
+    path: Path | None,
+    *,
+    out: Path | None,
+    threads: int | None,
+    seed: int | None,
+    scale: float,
+    steps: int | None,
+    quiet: bool,
+    as_json: bool,
+    measure: bool = True,
+) -> None:
+    """`run`, and `render` with `measure` off."""
+    project, root = load_project(path)
+    folder = out if out is not None else Path(OUTPUT) / folder_name(project.name)
+    check_output(folder)
+    from studio.scan import run_scan
+
+    with stage_progress(quiet) as progress:
+        done = run_scan(
+            project,
+            root,
+            out=folder,
+            steps=steps,
+            threads=threads,
+            seed=seed,
+            image_scale=scale,
+            measure=measure,
+            progress=progress,
+        )
+    if as_json:
+        print_json({"ok": True, "folder": str(folder), "files": [str(file) for file in done.files], **done.manifest})
+        return
+    _print_results(done.manifest)
+    for note in done.manifest["notes"]:
+        print(f"warning: {note}")
+    print(f"{len(done.manifest['frames'])} frame(s) in {folder}, {done.manifest['seconds']['all']:.1f} s")
+    for report in done.report:
+        print(f"report: {report}")
+
+
+def render_project(path: Path | None, **options: Any) -> None:
+    """`render`: frames and truth only."""
+    run_project(path, measure=False, **options)
+
+
+def reconstruct_source(
+    source: Path, *, project: Path | None, laser: int, out: Path | None, threads: int | None, quiet: bool, as_json: bool
+) -> None:
+    """`reconstruct`: from a scan's folder, or from an image with a project."""
+    from studio.reconstruct import reconstruct_folder, reconstruct_image
+    from studio.scan_folder import open_folder
+    from studio.stages import Clock
+
+    if source.is_dir():
+        found = open_folder(source)
+        chosen, root = (found.project, found.root) if project is None else load_project(project)
+        folder = out if out is not None else source
+        check_output(folder)
+        with stage_progress(quiet) as progress:
+            clock = Clock(progress, never)
+            result = reconstruct_folder(found, chosen, root, folder, clock, report=False, threads=threads)
+    else:
+        if not source.exists():
+            raise InputError("there is no such image or scan folder", where=str(source))
+        if project is None:
+            raise InputError(
+                "an image does not say by which camera and laser it was taken",
+                where=str(source),
+                cure="give the project with --project",
+            )
+        chosen, _ = load_project(project)
+        folder = out if out is not None else source.parent
+        check_output(folder)
+        with stage_progress(quiet) as progress:
+            result = reconstruct_image(source, chosen, laser, folder, Clock(progress, never), threads)
+    _print_reconstruction(result, as_json)
+
+
+def rebuild_report(folder: Path, *, threads: int | None, quiet: bool, as_json: bool) -> None:
+    """`report`: measure the frames of a finished scan again and write its report."""
+    from studio.reconstruct import reconstruct_folder
+    from studio.scan_folder import open_folder
+    from studio.stages import Clock
+
+    found = open_folder(folder)
+    with stage_progress(quiet) as progress:
+        clock = Clock(progress, never)
+        result = reconstruct_folder(found, found.project, found.root, folder, clock, report=True, threads=threads)
+    _print_reconstruction(result, as_json)
+
+
+def folder_name(name: str) -> str:
+    """A project's name as a folder: lower case, words joined by underscores."""
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "project"
+
+
+def check_output(folder: Path) -> None:
+    """InputError before any work where results could not be written afterwards."""
+    place = folder
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        raise InputError(
+            "the output folder cannot be written",
+            where=str(folder),
+            found="a file of that name" if place.is_file() else f"no permission to write in {place}",
+            cure="choose another with --out",
+        )
+
+
+def never() -> bool:
+    """Ctrl-C raises KeyboardInterrupt; nothing else cancels a command."""
+    return False
+
+
+def _print_reconstruction(result: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print_json({"ok": True, **result})
+        return
+    _print_results(result)
+    if "flags" in result:
+        print(f"{result['points']} points on {result['scan_lines']} scan lines")
+    for file in result["files"]:
+        print(f"wrote {file}")
+
+
+def _print_results(result: dict[str, Any]) -> None:
+    """One line a laser and method."""
+
+    def micro(error: dict[str, float | None], name: str) -> str:
+        value = error[name]
+        return "-" if value is None else f"{value * 1e6:.1f} um"
+
+    rows = [
+        (
+            f"{row['laser']}: {row['method'].replace('_', ' ')}",
+            f"{row['points']}",
+            "-" if row["completeness"] is None else f"{row['completeness']:.1%}",
+            f"{row['false_scan_lines']}",
+            *(micro(row["depth_m"], name) for name in ("bias", "rmse", "robust_sigma", "p95")),
+        )
+        for row in result.get("results", [])
+    ]
+    header = ("Depth error", "points", "complete", "false", "bias", "RMSE", "robust sigma", "P95")
+    if rows:
+        print_table(result["name"], rows, header=header)
 
 
 def _project_rows(project: Project, found: Inspection) -> list[tuple[str, str]]:

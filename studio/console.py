@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,10 @@ if TYPE_CHECKING:
 
 StageProgress = Callable[[str, float], None]
 REFRESH_SECONDS = 0.1
+PLAIN_WIDTH = 160
+"""Columns where there is no terminal to ask."""
+FRAMES = "frames"
+"""The stage that counts the frames of a moving scan."""
 
 
 def silent(stage: str, done: float) -> None:
@@ -38,16 +42,68 @@ def print_json(result: dict[str, Any]) -> None:
     sys.stdout.flush()
 
 
-def print_table(title: str, rows: list[tuple[str, str]], *, stream: Any = None) -> None:
-    """Names and values in two columns."""
+def print_table(title: str, rows: Sequence[Sequence[str]], *, header: Sequence[str] = (), file: Any = None) -> None:
+    """A titled table; the first column names the row, numbers below a header are aligned to the right."""
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", title_style="bold", show_header=False, box=None, pad_edge=False)
-    table.add_column(style="dim", no_wrap=True)
-    table.add_column(overflow="fold")
-    for name, value in rows:
-        table.add_row(name, value)
-    _console(stream or sys.stdout).print(table)
+    table = Table(title=title, title_justify="left", title_style="bold", show_header=bool(header), box=None, pad_edge=False)
+    for i in range(max(map(len, rows), default=0)):
+        right = bool(header) and i > 0
+        style = "dim" if i == 0 and not header else None
+        table.add_column(header[i] if header else "", style=style, justify="right" if right else "left", no_wrap=i == 0)
+    for row in rows:
+        table.add_row(*row)
+    _console(file or sys.stdout).print(table)
+
+
+@contextmanager
+def _bars() -> Iterator[StageProgress]:
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description:<34}"),
+        BarColumn(bar_width=30),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    tasks: dict[str, Any] = {}
+    shown: dict[str, float] = {}
+    with Progress(*columns, console=_console(sys.stderr)) as bars:
+
+        def report(stage: str, done: float) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=1.0)
+            elif done <= 0.0 and bars.tasks[tasks[stage]].finished:
+                bars.reset(tasks[stage])  # the same stage of the next frame
+            now = time.monotonic()
+            if done >= 1.0 or now - shown.get(stage, 0.0) >= REFRESH_SECONDS:
+                shown[stage] = now
+                bars.update(tasks[stage], completed=done)
+
+        yield report
+    else:
+        yield _lines()
+
+
+def print_json(result: dict[str, Any]) -> None:
+    """The machine-readable result, one JSON object, the only thing on standard output."""
+    sys.stdout.write(json.dumps(result, indent=2, allow_nan=False, default=str) + "\n")
+    sys.stdout.flush()
+
+
+def print_table(title: str, rows: Sequence[Sequence[str]], *, header: Sequence[str] = (), file: Any = None) -> None:
+    """A titled table; the first column names the row, numbers below a header are aligned to the right."""
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", title_style="bold", show_header=bool(header), box=None, pad_edge=False)
+    for i in range(max(map(len, rows), default=0)):
+        right = bool(header) and i > 0
+        style = "dim" if i == 0 and not header else None
+        table.add_column(header[i] if header else "", style=style, justify="right" if right else "left", no_wrap=i == 0)
+    for row in rows:
+        table.add_row(*row)
+    _console(file or sys.stdout).print(table)
 
 
 @contextmanager
@@ -78,13 +134,16 @@ def _bars() -> Iterator[StageProgress]:
 
 def _lines() -> StageProgress:
     started: dict[str, float] = {}
+    told: set[str] = set()
 
     def report(stage: str, done: float) -> None:
         if done <= 0.0:
             started[stage] = time.monotonic()
-        elif done >= 1.0:
-            seconds = time.monotonic() - started.pop(stage, time.monotonic())
-            print(f"{stage}: {seconds:.1f} s", file=sys.stderr)
+        elif stage == FRAMES:
+            print(f"{stage}: {done:.0%}", file=sys.stderr)
+        elif done >= 1.0 and stage in started and stage not in told:  # of many frames the first speaks for all
+            told.add(stage)
+            print(f"{stage}: {time.monotonic() - started[stage]:.1f} s", file=sys.stderr)
 
     return report
 
@@ -92,4 +151,4 @@ def _lines() -> StageProgress:
 def _console(stream: Any) -> Console:
     from rich.console import Console
 
-    return Console(file=stream, highlight=False, soft_wrap=not stream.isatty())
+    return Console(file=stream, highlight=False, width=None if stream.isatty() else PLAIN_WIDTH)

@@ -1,153 +1,123 @@
-"""The scan stage by stage: render, develop, extract, triangulate, compare; each timed and told to whoever watches."""
+"""A whole scan: every step rendered, measured and written as it goes, the points and the report at the end."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+import warnings
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from analysis.error import Errors, compare
-from analysis.line.extract import extract
-from analysis.line.noise import NoiseModel
-from analysis.line.result import Line
-from analysis.triangulate import Points, triangulate
+import numpy as np
+
+from analysis.report.model import FrameResult
 from render.develop import Image, develop
-from render.errors import Cancelled
+from render.errors import InputError
 from render.frame import Frame
-from render.motion import NoMotion
-from render.render import render_world
-from render.world import World, build_world
+from render.frame_files import write_frame
+from render.world import build_world
+from studio import scan_folder
 from studio.project import Project
+from studio.results import measure_frame, now, write_points, write_reports
+from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, render_step, scaled, step_world
+from studio.summary import summarise
+from studio.warm_up import warm_up
 
-StageProgress = Callable[[str, float], None]
-Cancel = Callable[[], bool]
+__all__ = ["Measurement", "ScanResult", "run_scan"]
 
-COMPILING = "compiling kernels (first run only)"
+PREPARING = "preparing kernels (compiled on the first run)"
+IMAGES_KEPT = 16
+"""Of a long scan only so many images stay in memory for the report, evenly spread."""
 
 
 @dataclass(frozen=True)
-class Measurement:
-    """What one laser's image of one frame gave."""
+class ScanResult:
+    """What a scan left on disk."""
 
-    step: int
-    laser: int
-    image: Image
-    line: Line
-    points: Points
-    errors: Errors
+    folder: Path
+    files: tuple[Path, ...]
+    report: tuple[Path, ...]
+    manifest: dict[str, Any]
 
 
-@dataclass
-class Clock:
-    """Wall time by stage, and progress of the stages; `prefix` tells the frames of a moving scan apart."""
-
-    progress: StageProgress
-    cancelled: Cancel
-    seconds: dict[str, float] = field(default_factory=dict)
-    prefix: str = ""
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[Callable[[float], None]]:
-        """Time a stage under its name. Cancelled: the user asked to stop before it began."""
-        if self.cancelled():
-            raise Cancelled
-        shown = self.prefix + name
-        self.progress(shown, 0.0)
-        start = time.perf_counter()
-        yield lambda done: self.progress(shown, min(done, 0.999))
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-        self.progress(shown, 1.0)
-
-    def render_progress(self, name: str, done: float) -> None:
-        """For `render_world`, which names its own stages."""
-        self.progress(self.prefix + name, done)
+def never() -> bool:
+    """A scan that nobody cancels."""
+    return False
 
 
-def scaled(project: Project, image_scale: float) -> Project:
-    """The same project with `image_scale` times the pixels a side, exposed so that the image is about as bright.
+def run_scan(
+    project: Project,
+    root: Path,
+    *,
+    out: Path,
+    steps: int | None = None,
+    threads: int | None = None,
+    seed: int | None = None,
+    image_scale: float = 1.0,
+    measure: bool = True,
+    progress: StageProgress = lambda stage, done: None,
+    cancelled: Cancel = never,
+) -> ScanResult:
+    """Scan `project`, whose files are below `root`, into the folder `out`.
 
-    The pixels grow as the image shrinks, and with them the light of each; the exposure time takes that back.
+    steps: only the first so many frames; seed: in place of the project's; measure: off, stops after the frames.
+    InputError: bad project, mesh or texture, nothing to see, `out` not writable. Cancelled: files so far stay, whole.
     """
-    if image_scale == 1.0:
-        return project
-    scene = project.scene.scaled(image_scale)
-    sensor = project.sensor.model_copy(update={"exposure_time": project.sensor.exposure_time * image_scale**2})
-    return project.model_copy(update={"scene": scene, "sensor": sensor})
+    began = time.perf_counter()
+    project = scaled(project, image_scale)
+    if seed is not None:
+        project = project.model_copy(update={"seed": seed})
+    if measure and not project.scene.lasers:
+        raise InputError("the rig has no laser, so there is no line to measure", where="scene.rig.lasers", found="none")
+    count = min(steps or project.scene.frame_count, project.scene.frame_count)
+    clock = Clock(progress, cancelled)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", UserWarning)
+        with clock.stage("loading meshes"):
+            first = build_world(project.scene, root, 0)
+        scan_folder.begin(out, project)
+        with clock.stage(PREPARING):
+            warm_up(clock, threads)
+        results: list[FrameResult] = []
+        shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
+        files: list[Path] = []
+        names: list[str] = []
+        world = first
+        for step in clock.frames(count):
+            world = world if step == 0 else step_world(project, root, step, world)
+            frame = render_step(project, world, step, clock, threads)
+            images = develop_step(project, frame, clock, threads)
+            with clock.stage("writing frames"):
+                stem = scan_folder.frame_stem(step)
+                written = write_frame(
+                    out, stem, frame, together(project, frame, images), project.scene, sensor=project.sensor
+                )
+                files += written
+                names.append(written[-1].name)
+            if measure:
+                results.append(measure_frame(project, frame, world, images, clock, threads, keep=step in shown))
+        notes = [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
+        result: dict[str, Any] = {
+            "name": project.name,
+            "created": now(),
+            "frames": names,
+            "image_scale": image_scale,
+            "seed": project.seed,
+            "notes": notes,
+        }
+        reports: list[Path] = []
+        if measure:
+            files += write_points(out, project, results, clock)
+            result["results"] = summarise(results, project.scene)
+            reports = write_reports(out, project, first, results, clock, notes=notes, created=result["created"])
+    result["report"] = [path.name for path in reports]
+    result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
+    manifest = scan_folder.finish(out, root, result)
+    return ScanResult(out, (*files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
 
 
-def step_world(project: Project, root: Path, step: int, before: World | None) -> World:
-    """The placed triangles of a step; the ones before where the objects stand still."""
-    motion = project.scene.motion
-    objects_move = not isinstance(motion, NoMotion) and motion.moves == "objects"
-    return before if before is not None and not objects_move else build_world(project.scene, root, step)
-
-
-def render_step(project: Project, world: World, step: int, clock: Clock, threads: int | None) -> Frame:
-    """Radiance and truth of one step."""
-    frame = render_world(
-        world,
-        project.scene,
-        settings=project.render,
-        step=step,
-        axis=project.extraction.axis,
-        seed=project.seed,
-        threads=threads,
-        progress=clock.render_progress,
-        cancelled=clock.cancelled,
-    )
-    for name, seconds in frame.seconds.items():
-        clock.seconds[name] = clock.seconds.get(name, 0.0) + seconds
-    return frame
-
-
-def develop_step(project: Project, frame: Frame, clock: Clock, threads: int | None) -> list[Image]:
-    """One image for each laser: they fire one after the other, so that no line hides another."""
-    scene, images = project.scene, []
-    with clock.stage("sensor"):
-        for i in range(len(scene.lasers)):
-            power = [laser.power if i == k else 0.0 for k, laser in enumerate(scene.lasers)]
-            seed = (project.seed + i) % 2**63
-            images.append(develop(frame, scene, project.sensor, seed=seed, threads=threads, laser_power=power))
-    return images
-
-
-def measure_step(
-    project: Project, frame: Frame, world: World, images: list[Image], clock: Clock, threads: int | None
-) -> list[Measurement]:
-    """Line, points and errors of every laser's image."""
-    found = []
-    for i, image in enumerate(images):
-        with clock.stage("line extraction"):
-            line = extract_line(project, image, threads)
-        with clock.stage("triangulation"):
-            points = triangulate_line(project, line, i, frame.step)
-        with clock.stage("comparison with the truth"):
-            pose = project.scene.T_world_camera(frame.step)
-            errors = compare(points, line, frame.curves[i], world.vertices, world.triangles, pose)
-        found.append(Measurement(frame.step, i, image, line, points, errors))
-    return found
-
-
-def extract_line(project: Project, image: Image, threads: int | None) -> Line:
-    """The line in an image whose sensor is known."""
-    noise = NoiseModel(
-        gain=image.gain, black_level=image.black_level, read_noise=image.read_noise, saturation=image.saturation
-    )
-    settings = project.extraction
-    if image.pattern is not None and settings.pattern is None:
-        settings = settings.model_copy(update={"pattern": image.pattern})
-    return extract(image.pixels, settings=settings, noise=noise, threads=threads)
-
-
-def triangulate_line(project: Project, line: Line, laser: int, step: int) -> Points:
-    """Points of one laser's line at a step."""
-    scene = project.scene
-    return triangulate(
-        line,
-        scene.camera,
-        scene.laser_plane(laser),
-        T_rig_camera=scene.camera.T_rig_camera.matrix,
-        T_world_camera=scene.T_world_camera(step),
-    )
+def together(project: Project, frame: Frame, images: list[Image]) -> Image:
+    """The image to keep as a file: the only laser's own, else one with all lasers at once."""
+    if len(images) == 1:
+        return images[0]
+    return develop(frame, project.scene, project.sensor, seed=project.seed)

@@ -1,0 +1,130 @@
+"""Points without rendering: from the frames of an earlier scan, or from a photograph of a real scanner."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.cloud import cloud, write_csv, write_ply
+from analysis.line.extract import extract
+from analysis.line.result import Flag
+from analysis.report.model import FrameResult
+from render.errors import InputError
+from render.frame_files import read_frame
+from render.world import build_world
+from studio import scan_folder
+from studio.project import Project
+from studio.results import measure_frame, now, write_points, write_reports
+from studio.stages import Clock, develop_step, step_world, triangulate_line
+from studio.summary import summarise
+
+MAX_IMAGE_BYTES = 2**30
+
+
+def reconstruct_folder(
+    found: scan_folder.ScanFolder,
+    project: Project,
+    root: Path,
+    out: Path,
+    clock: Clock,
+    *,
+    report: bool,
+    threads: int | None = None,
+) -> dict[str, Any]:
+    """Develop, extract and triangulate the frames of a scan anew; `project` may have another sensor or extraction.
+
+    Writes points and, where asked for, the report into `out`. InputError: frames missing or not of this project.
+    """
+    results: list[FrameResult] = []
+    with clock.stage("loading meshes"):
+        first = world = build_world(project.scene, root, 0)
+    for n in clock.frames(len(found.frames)):
+        path = found.frames[n]
+        with clock.stage("reading frames"):
+            frame = read_frame(path)
+        if not 0 <= frame.step < project.scene.frame_count:
+            allowed = f"0 to {project.scene.frame_count - 1}"
+            raise InputError(
+                "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
+            )
+        world = step_world(project, root, frame.step, None if frame.step == 0 else world)
+        images = develop_step(project, frame, clock, threads)
+        results.append(measure_frame(project, frame, world, images, clock, threads, keep=len(found.frames) <= 16))
+    if not results or not project.scene.lasers:
+        raise InputError("the scan holds no laser image", where=str(found.folder))
+    files = write_points(out, project, results, clock)
+    if report:
+        notes = [str(note) for note in found.manifest.get("notes", [])]
+        created = str(found.manifest.get("created", now()))
+        files += write_reports(out, project, first, results, clock, notes=notes, created=created)
+    return {
+        "name": project.name,
+        "files": [str(path) for path in files],
+        "results": summarise(results, project.scene),
+        "seconds": clock.seconds,
+    }
+
+
+def reconstruct_image(
+    path: Path, project: Project, laser: int, out: Path, clock: Clock, threads: int | None = None
+) -> dict[str, Any]:
+    """Points of one laser in a photograph; the noise is estimated from it. There is no truth to compare with.
+
+    InputError: the image cannot be read or is not of the camera's size, or there is no such laser.
+    """
+    camera, lasers = project.scene.camera, project.scene.lasers
+    if not 0 <= laser < len(lasers):
+        raise InputError("there is no such laser in the project", found=laser, allowed=f"0 to {len(lasers) - 1}")
+    image = read_image(path)
+    if image.shape[:2] != (camera.height, camera.width):
+        raise InputError(
+            "the image is not of the camera's size",
+            where=str(path),
+            found=f"{image.shape[1]} x {image.shape[0]} px",
+            allowed=f"{camera.width} x {camera.height} px",
+        )
+    with clock.stage("line extraction"):
+        line = extract(image, settings=project.extraction, threads=threads)
+    with clock.stage("triangulation"):
+        points = triangulate_line(project, line, laser, 0)
+    with clock.stage("writing points"):
+        columns = cloud(points, None, laser, 0, project.scene)
+        files = [out / f"{path.stem}.ply", out / f"{path.stem}.csv"]
+        write_ply(files[0], columns)
+        write_csv(files[1], columns)
+    flags, counts = np.unique(line.flag[:, 0], return_counts=True)
+    return {
+        "name": project.name,
+        "files": [str(file) for file in files],
+        "points": int(points.valid.sum()),
+        "scan_lines": len(line.u),
+        "flags": {Flag(int(flag)).name: int(count) for flag, count in zip(flags, counts, strict=True)},
+        "seconds": clock.seconds,
+    }
+
+
+def read_image(path: Path) -> NDArray[Any]:
+    """(h, w) or (h, w, 3) RGB digital numbers of a PNG, TIFF, JPEG or BMP. InputError: missing, too big or damaged."""
+    import cv2
+
+    try:
+        size = path.stat().st_size
+        if size > MAX_IMAGE_BYTES:
+            raise InputError(
+                "the image is too big", where=str(path), found=f"{size} bytes", allowed=f"{MAX_IMAGE_BYTES}"
+            )
+        data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
+    except OSError as error:
+        raise InputError("the image cannot be read", where=str(path), found=error.strerror or error) from None
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if len(data) else None
+    except cv2.error as error:
+        raise InputError("the image cannot be decoded", where=str(path), found=error.err) from None
+    if image is None:
+        raise InputError("the file is not an image", where=str(path), allowed="PNG, TIFF, JPEG or BMP")
+    if image.ndim == 3:
+        image = np.ascontiguousarray(image[:, :, 2::-1])
+    return np.asarray(image)

@@ -1,0 +1,163 @@
+"""The stages of a scan: render, develop, extract, triangulate, compare; each timed and told to whoever watches."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from analysis.error import Errors, compare
+from analysis.line.extract import extract
+from analysis.line.noise import NoiseModel
+from analysis.line.result import Line
+from analysis.line.settings import Method
+from analysis.triangulate import Points, triangulate
+from render.develop import Image, develop
+from render.errors import Cancelled
+from render.frame import Frame
+from render.motion import NoMotion
+from render.render import render_world
+from render.world import World, build_world
+from studio.project import Project
+
+StageProgress = Callable[[str, float], None]
+Cancel = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What one laser's image of one frame gave, by one method."""
+
+    step: int
+    laser: int
+    image: Image
+    line: Line
+    points: Points
+    errors: Errors
+
+
+@dataclass
+class Clock:
+    """Wall time by stage, and progress of the stages."""
+
+    progress: StageProgress
+    cancelled: Cancel
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Callable[[float], None]]:
+        """Time a stage under its name. Cancelled: the user asked to stop before it began."""
+        if self.cancelled():
+            raise Cancelled
+        self.progress(name, 0.0)
+        start = time.perf_counter()
+        yield lambda done: self.progress(name, min(done, 0.999))
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+        self.progress(name, 1.0)
+
+    def frames(self, count: int) -> Iterator[int]:
+        """0..count - 1, told as the progress of "frames" where there are several."""
+        for i in range(count):
+            if count > 1:
+                self.progress("frames", i / count)
+            yield i
+        if count > 1:
+            self.progress("frames", 1.0)
+
+
+def scaled(project: Project, image_scale: float) -> Project:
+    """The same project with `image_scale` times the pixels a side, exposed so that the image is about as bright.
+
+    The pixels grow as the image shrinks, and with them the light of each; the exposure time takes that back.
+    """
+    if image_scale == 1.0:
+        return project
+    scene = project.scene.scaled(image_scale)
+    sensor = project.sensor.model_copy(update={"exposure_time": project.sensor.exposure_time * image_scale**2})
+    return project.model_copy(update={"scene": scene, "sensor": sensor})
+
+
+def step_world(project: Project, root: Path, step: int, before: World | None) -> World:
+    """The placed triangles of a step; the ones before where the objects stand still."""
+    motion = project.scene.motion
+    objects_move = not isinstance(motion, NoMotion) and motion.moves == "objects"
+    return before if before is not None and not objects_move else build_world(project.scene, root, step)
+
+
+def render_step(project: Project, world: World, step: int, clock: Clock, threads: int | None) -> Frame:
+    """Radiance and truth of one step."""
+    frame = render_world(
+        world,
+        project.scene,
+        settings=project.render,
+        step=step,
+        axis=project.extraction.axis,
+        seed=project.seed,
+        threads=threads,
+        progress=clock.progress,
+        cancelled=clock.cancelled,
+    )
+    for name, seconds in frame.seconds.items():
+        clock.seconds[name] = clock.seconds.get(name, 0.0) + seconds
+    return frame
+
+
+def develop_step(project: Project, frame: Frame, clock: Clock, threads: int | None) -> list[Image]:
+    """One image for each laser: they fire one after the other, so that no line hides another."""
+    scene, images = project.scene, []
+    with clock.stage("sensor"):
+        for i in range(len(scene.lasers)):
+            power = [laser.power if i == k else 0.0 for k, laser in enumerate(scene.lasers)]
+            seed = (project.seed + i) % 2**63
+            images.append(develop(frame, scene, project.sensor, seed=seed, threads=threads, laser_power=power))
+    return images
+
+
+def measure_step(
+    project: Project,
+    frame: Frame,
+    world: World,
+    images: list[Image],
+    clock: Clock,
+    threads: int | None,
+    method: Method | None = None,
+) -> list[Measurement]:
+    """Line, points and errors of every laser's image, by the project's method or another."""
+    found = []
+    for i, image in enumerate(images):
+        with clock.stage("line extraction"):
+            line = extract_line(project, image, threads, method)
+        with clock.stage("triangulation"):
+            points = triangulate_line(project, line, i, frame.step)
+        with clock.stage("comparison with the truth"):
+            pose = project.scene.T_world_camera(frame.step)
+            errors = compare(points, line, frame.curves[i], world.vertices, world.triangles, pose)
+        found.append(Measurement(frame.step, i, image, line, points, errors))
+    return found
+
+
+def extract_line(project: Project, image: Image, threads: int | None, method: Method | None = None) -> Line:
+    """The line in an image whose sensor is known, by the project's method or another."""
+    noise = NoiseModel(
+        gain=image.gain, black_level=image.black_level, read_noise=image.read_noise, saturation=image.saturation
+    )
+    settings = project.extraction
+    if method == "likelihood" != settings.method:
+        settings = settings.model_copy(update={"smoothing": 0.0})  # it needs independent pixels
+    if image.pattern is not None and settings.pattern is None:
+        settings = settings.model_copy(update={"pattern": image.pattern})
+    return extract(image.pixels, method=method, settings=settings, noise=noise, threads=threads)
+
+
+def triangulate_line(project: Project, line: Line, laser: int, step: int) -> Points:
+    """Points of one laser's line at a step."""
+    scene = project.scene
+    return triangulate(
+        line,
+        scene.camera,
+        scene.laser_plane(laser),
+        T_rig_camera=scene.camera.T_rig_camera.matrix,
+        T_world_camera=scene.T_world_camera(step),
+    )

@@ -1,0 +1,192 @@
+"""The command line: one message and a meaningful exit code for everything that can happen."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import main
+from render.errors import Cancelled, InputError
+from studio.templates import DESCRIPTIONS, template_folder
+
+ROOT = Path(__file__).resolve().parents[1]
+HELP_SECONDS = 0.3
+
+
+def call(*arguments: object) -> Result:
+    return CliRunner().invoke(main.cli, [str(argument) for argument in arguments])
+
+
+def spawn(*arguments: object, **options: Any) -> subprocess.Popen[str]:
+    command = [sys.executable, str(ROOT / "main.py"), *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+
+
+class TestHelp:
+    def test_help_answers_at_once(self) -> None:
+        """The best of three, so that a busy machine does not fail it."""
+        seconds = []
+        for _ in range(3):
+            start = time.perf_counter()
+            process = spawn("--help")
+            text, _ = process.communicate(timeout=30)
+            seconds.append(time.perf_counter() - start)
+            assert process.returncode == 0 and "reconstruct" in text
+        assert min(seconds) < HELP_SECONDS
+
+    @pytest.mark.parametrize("command", ["run", "render", "reconstruct", "report", "inspect", "new"])
+    def test_every_command_explains_itself(self, command: str) -> None:
+        done = call(command, "--help")
+        assert done.exit_code == 0 and "--json" in done.stdout
+
+
+class TestExitCodes:
+    @pytest.mark.parametrize(
+        ("error", "code", "text"),
+        [
+            (InputError("albedo is out of range", where="weld.json", found=2), 2, "weld.json: albedo is out of range"),
+            (Cancelled(), 130, "interrupted"),
+            (KeyboardInterrupt(), 130, "interrupted"),
+            (ModuleNotFoundError("No module named 'open3d'", name="open3d"), 2, "make run"),
+            (MemoryError(), 2, "--scale"),
+            (PermissionError(13, "Permission denied", "/x"), 2, "/x: Permission denied"),
+            (ZeroDivisionError("division by zero"), 3, "please report"),
+        ],
+        ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
+    )
+    def test_every_end_has_its_code_and_no_traceback(
+        self, error: BaseException, code: int, text: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def fail(*_: object, **__: object) -> None:
+            raise error
+
+        monkeypatch.setattr("studio.commands.inspect_project", fail)
+        done = call("inspect", "--json")
+        assert done.exit_code == code
+        assert text in done.stderr and "Traceback" not in done.output
+        answer = json.loads(done.stdout)
+        assert answer["ok"] is False and answer["exit_code"] == code and text in answer["error"]["message"]
+
+    def test_debug_shows_where_it_happened(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("studio.commands.inspect_project", lambda *_, **__: 1 / 0)
+        done = call("inspect", "--debug")
+        assert done.exit_code == 3 and "Traceback" in done.stderr and "ZeroDivisionError" in done.stderr
+
+    @pytest.mark.parametrize("arguments", [["scan"], ["run", "--threads", "0"], ["run", "--scale", "x"], ["report"]])
+    def test_wrong_usage_is_bad_input(self, arguments: list[str]) -> None:
+        done = call(*arguments)
+        assert done.exit_code == 2 and "Traceback" not in done.output
+
+    def test_a_missing_system_library_is_named_before_anything_is_imported(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from studio.system import LIBRARIES
+
+        monkeypatch.setattr(main, "missing_needs", lambda: [LIBRARIES[0]])
+        done = call("inspect")
+        assert done.exit_code == 2 and LIBRARIES[0].package in done.stderr and "install" in done.stderr
+
+
+class TestBadProjects:
+    @pytest.mark.parametrize("command", ["run", "render", "inspect"])
+    @pytest.mark.parametrize("text", ["", "{", "[]", '{"schema_version": 99}', "\x00\x01", '{"schema_version": 1}'])
+    def test_a_damaged_project_is_refused_and_nothing_is_written(
+        self, command: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        file = tmp_path / "weld.json"
+        file.write_text(text)
+        done = call(command, file)
+        assert done.exit_code == 2
+        assert "weld.json" in done.stderr and "Traceback" not in done.output
+        assert list(tmp_path.iterdir()) == [file] and file.read_text() == text
+
+    def test_a_mesh_outside_the_folder_is_not_touched(self, tmp_path: Path) -> None:
+        project = tmp_path / "inside" / "weld.json"
+        project.parent.mkdir()
+        data = json.loads((template_folder("plane") / "project.json").read_text())
+        data["scene"]["objects"][0]["shape"] = {"kind": "file", "path": "../secret.stl"}
+        project.write_text(json.dumps(data))
+        (tmp_path / "secret.stl").write_text("solid")
+        done = call("inspect", project)
+        assert done.exit_code == 2 and "leaves the project folder" in done.stderr
+
+    def test_a_name_that_cannot_be_printed_is_still_told(self, tmp_path: Path) -> None:
+        data = json.loads((template_folder("plane") / "project.json").read_text())
+        data["\ud800"] = 1
+        (tmp_path / "a.json").write_text(json.dumps(data))
+        done = call("inspect", tmp_path / "a.json")
+        assert done.exit_code == 2 and "unknown key" in done.stderr
+
+
+class TestNew:
+    def test_templates_are_listed(self) -> None:
+        assert set(json.loads(call("new", "--json").stdout)["templates"]) == set(DESCRIPTIONS)
+        assert "weld_seam" in call("new").stdout
+
+    def test_a_new_project_can_be_inspected(self, tmp_path: Path) -> None:
+        made = json.loads(call("new", "plane", tmp_path / "p", "--json").stdout)
+        answer = json.loads(call("inspect", made["project"], "--json").stdout)
+        assert answer["ok"] and answer["lasers"][0]["scan_lines_hit"] > 1900
+
+    def test_nothing_is_overwritten_without_force(self, tmp_path: Path) -> None:
+        assert call("new", "plane", tmp_path).exit_code == 0
+        (tmp_path / "project.json").write_text("mine")
+        done = call("new", "plane", tmp_path)
+        assert done.exit_code == 2 and "--force" in done.stderr
+        assert (tmp_path / "project.json").read_text() == "mine"
+        assert call("new", "plane", tmp_path, "--force").exit_code == 0
+
+    def test_a_slip_of_the_pen_is_corrected(self, tmp_path: Path) -> None:
+        done = call("new", "weld_sem", tmp_path / "p")
+        assert done.exit_code == 2 and "did you mean weld_seam?" in done.stderr
+        assert not (tmp_path / "p").exists()
+
+
+class TestStudio:
+    def test_without_a_display_the_reason_is_plain(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        ran: list[object] = []
+        monkeypatch.delenv("DISPLAY", raising=False)
+        monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+        monkeypatch.setattr("studio.commands.run_project", lambda *given, **_: ran.append(given))
+        done = call()
+        assert done.exit_code == 0 and "does not open here" in done.stderr and ran == [(None,)]
+
+
+class TestProcess:
+    def test_json_is_alone_on_standard_output(self) -> None:
+        process = spawn("inspect", "--json")
+        text, _ = process.communicate(timeout=120)
+        assert process.returncode == 0 and json.loads(text)["ok"]
+
+    def test_a_reader_that_goes_away_is_no_error(self) -> None:
+        process = spawn("inspect", "--json")
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        errors = process.stderr.read()
+        process.wait(timeout=120)
+        assert "Traceback" not in errors and "BrokenPipe" not in errors and process.returncode == main.BROKEN_PIPE
+
+    @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+    def test_ctrl_c_stops_a_render_without_half_a_file(self, tmp_path: Path) -> None:
+        process = spawn("render", "--out", tmp_path / "out", start_new_session=True)
+        assert process.stderr is not None
+        for line in process.stderr:  # until rendering has begun
+            if "exact line" in line:
+                break
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+        assert process.returncode == main.INTERRUPTED and "interrupted" in errors and "Traceback" not in errors
+        left = [path for path in (tmp_path / "out").rglob("*") if path.is_file()] if (tmp_path / "out").exists() else []
+        assert [path for path in left if path.name.startswith(".")] == [] and not (
+            tmp_path / "out" / "scan.json"
+        ).exists()
