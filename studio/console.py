@@ -42,18 +42,18 @@ def print_json(result: dict[str, Any]) -> None:
     sys.stdout.flush()
 
 
-def print_table(title: str, rows: Sequence[Sequence[str]], *, header: Sequence[str] = (), file: Any = None) -> None:
+def print_table(title: str, rows: Sequence[Sequence[str]], *, header: Sequence[str] = ()) -> None:
     """A titled table; the first column names the row, numbers below a header are aligned to the right."""
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", title_style="bold", show_header=bool(header), box=None, pad_edge=False)
+    table = Table(title=title, title_justify="left", title_style="bold", show_header=bool(header), box=None)
     for i in range(max(map(len, rows), default=0)):
-        right = bool(header) and i > 0
+        justify: Any = "right" if header and i > 0 else "left"
         style = "dim" if i == 0 and not header else None
-        table.add_column(header[i] if header else "", style=style, justify="right" if right else "left", no_wrap=i == 0)
+        table.add_column(header[i] if header else "", style=style, justify=justify, no_wrap=i == 0)
     for row in rows:
         table.add_row(*row)
-    _console(file or sys.stdout).print(table)
+    _console(sys.stdout).print(table)
 
 
 @contextmanager
@@ -76,54 +76,6 @@ def _bars() -> Iterator[StageProgress]:
                 tasks[stage] = bars.add_task(stage, total=1.0)
             elif done <= 0.0 and bars.tasks[tasks[stage]].finished:
                 bars.reset(tasks[stage])  # the same stage of the next frame
-            now = time.monotonic()
-            if done >= 1.0 or now - shown.get(stage, 0.0) >= REFRESH_SECONDS:
-                shown[stage] = now
-                bars.update(tasks[stage], completed=done)
-
-        yield report
-    else:
-        yield _lines()
-
-
-def print_json(result: dict[str, Any]) -> None:
-    """The machine-readable result, one JSON object, the only thing on standard output."""
-    sys.stdout.write(json.dumps(result, indent=2, allow_nan=False, default=str) + "\n")
-    sys.stdout.flush()
-
-
-def print_table(title: str, rows: Sequence[Sequence[str]], *, header: Sequence[str] = (), file: Any = None) -> None:
-    """A titled table; the first column names the row, numbers below a header are aligned to the right."""
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", title_style="bold", show_header=bool(header), box=None, pad_edge=False)
-    for i in range(max(map(len, rows), default=0)):
-        right = bool(header) and i > 0
-        style = "dim" if i == 0 and not header else None
-        table.add_column(header[i] if header else "", style=style, justify="right" if right else "left", no_wrap=i == 0)
-    for row in rows:
-        table.add_row(*row)
-    _console(file or sys.stdout).print(table)
-
-
-@contextmanager
-def _bars() -> Iterator[StageProgress]:
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description:<34}"),
-        BarColumn(bar_width=30),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    tasks: dict[str, Any] = {}
-    shown: dict[str, float] = {}
-    with Progress(*columns, console=_console(sys.stderr)) as bars:
-
-        def report(stage: str, done: float) -> None:
-            if stage not in tasks or (done == 0.0 and bars.tasks[tasks[stage]].finished):
-                tasks[stage] = bars.add_task(stage, total=1.0)
             now = time.monotonic()
             if done >= 1.0 or now - shown.get(stage, 0.0) >= REFRESH_SECONDS:
                 shown[stage] = now
