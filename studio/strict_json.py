@@ -36,6 +36,13 @@ def parse_object(text: str, where: str, what: str = "project file") -> dict[str,
         raise InputError(f"the {what} is not a JSON object", where=where, found=brief(value), allowed="{ ... }")
     if _depth(value) > MAX_DEPTH:
         raise InputError(f"the {what} is nested too deeply", where=where, allowed=f"{MAX_DEPTH} levels")
+    try:
+        json.dumps(value, ensure_ascii=False).encode("utf-8")
+    except UnicodeEncodeError as error:  # half of a pair, written as an escape
+        half = f"\\u{ord(error.object[error.start]):04x}"
+        raise InputError(
+            f"the {what} holds half a character", where=where, found=half, allowed="Unicode text"
+        ) from None
     return value
 
 

@@ -125,7 +125,7 @@ class TestBadProjects:
         data["\ud800"] = 1
         (tmp_path / "a.json").write_text(json.dumps(data))
         done = call("inspect", tmp_path / "a.json")
-        assert done.exit_code == 2 and "unknown key" in done.stderr
+        assert done.exit_code == 2 and "half a character; found \\ud800" in done.stderr
 
 
 class TestNew:
