@@ -7,6 +7,8 @@ through their common point is counted once.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -217,12 +219,38 @@ def laser_curve(
     threads: int | None = None,
 ) -> LaserCurve:
     """The lit and seen line of one laser. Poses (4, 4)."""
-    T_laser_world, T_camera_world = invert(T_world_laser), invert(T_world_camera)
-    side = sheet_side(world.vertices, T_laser_world)
+    side = sheet_side(world.vertices, invert(T_world_laser))
     crossing = crossing_triangles(side, world.triangles)
     segments, triangle = cut_triangles(
         world.vertices, world.triangles, side, crossing, T_world_camera[:3, 3].copy(), T_world_laser[:3, 3].copy()
     )
+    corners = world.vertices[world.triangles[triangle]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    def clear(points: Float, facing: Float, towards: Float) -> NDArray[np.bool_]:
+        return visible(world.rays, points, facing, towards, threads)
+
+    return curve_of_cut(
+        segments, normals, world.object_id[triangle], camera, laser, T_world_camera, T_world_laser, axis, clear
+    )
+
+
+def curve_of_cut(
+    segments: Float,
+    normals: Float,
+    object_id: Int,
+    camera: Camera,
+    laser: LineLaser,
+    T_world_camera: Float,
+    T_world_laser: Float,
+    axis: Axis,
+    clear: Callable[[Float, Float, Float], NDArray[np.bool_]],
+) -> LaserCurve:
+    """The line that (m, 2, 3) cut segments, their (m, 3) facet normals (any length) and (m,) objects give, world frame.
+
+    clear(points, normals, towards) says, as `visible` does, which points see a target.
+    """
+    T_laser_world, T_camera_world = invert(T_world_laser), invert(T_world_camera)
     spans = clip_to_fan(segments, T_laser_world, laser.tan_half_fan)
     values, index, owner = scan_line_crossings(
         transform_points(T_camera_world, segments),
@@ -232,21 +260,18 @@ def laser_curve(
         axis == "rows",
     )
     points = transform_points(T_world_camera, values[:, 1:])
-    corners = world.vertices[world.triangles[triangle[owner]]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    facing = normals[owner]
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
     to_camera, to_laser = T_world_camera[:3, 3] - points, T_world_laser[:3, 3] - points
-    normals *= np.sign(np.einsum("ij,ij->i", normals, to_camera))[:, None]
-    seen = visible(world.rays, points, normals, to_camera, threads) & visible(
-        world.rays, points, normals, to_laser, threads
-    )
+    facing *= np.sign(np.einsum("ij,ij->i", facing, to_camera))[:, None]
+    seen = clear(points, facing, to_camera) & clear(points, facing, to_laser)
     order = np.flatnonzero(seen)
     order = order[np.lexsort((values[order, 0], index[order]))]
     inside = spans[:, 0] < spans[:, 1]
     kept = segments[inside]
     ends = kept[:, :1] + spans[inside][:, :, None] * (kept[:, 1:] - kept[:, :1])
     point = np.ascontiguousarray(values[order, 1:])
-    normal = normals[order]
+    normal = facing[order]
     return LaserCurve(
         axis=axis,
         index=index[order],
@@ -254,7 +279,7 @@ def laser_curve(
         point=point,
         depth_z=point[:, 2].copy(),
         depth_range=np.linalg.norm(point, axis=1),
-        object_id=world.object_id[triangle[owner[order]]],
+        object_id=object_id[owner[order]],
         camera_angle=_angle(normal, to_camera[order]),
         laser_angle=_angle(normal, to_laser[order]),
         irradiance=irradiance_at(
