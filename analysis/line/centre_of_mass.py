@@ -84,7 +84,8 @@ def weigh_seeds(
                 if mask[row, i] & MISSING == 0:
                     x[count] = i
                     weight[count] = (i - u) / mass
-                    variance[count] = max(float(signal[row, i]), 0.0) + floor[row, min(i, floor.shape[1] - 1)]
+                    still = float(floor[row, min(i, floor.shape[1] - 1)])
+                    variance[count] = max(signal[row, i] + still, 0.1 * abs(still))
                     count += 1
             out[row, k, 0] = u
             clipped = CLIPPED / seed[WIDTH] if reason == _SATURATED else 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -52,8 +53,11 @@ class Lines:
         signal, mask, floor = self._read(low, high)
         signal[(mask & MISSING) > 0] = 0.0
         smooth = gaussian_filter(signal, self.smoothing, mode="nearest", radius=halo)
+        # Cov(i, j) = exp(-(i - j)^2 / 4 s^2) / (4 pi s^2) times the raw variance, smoothed by s / sqrt2, half-way: the
+        # floor is what that variance is above the smoothed signal, the factor is `smoothing_correlation`
+        variance = gaussian_filter(signal + floor, self.smoothing * math.sqrt(0.5), mode="nearest", radius=halo)
         keep = slice(start - low, stop - low)
-        return np.ascontiguousarray(smooth[keep]), mask[keep].copy(), np.ascontiguousarray(floor[keep])
+        return smooth[keep].copy(), mask[keep].copy(), variance[keep] - smooth[keep]
 
     def _read(self, start: int, stop: int) -> tuple[Float32, Mask, Float32]:
         chunk = self.image[start:stop]

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from analysis.line.channel import SATURATED
 from analysis.line.matched_filter import (
-    BLOCK,
     FILTER_SIGMA,
     RADIUS,
     background_at,
     block_background,
+    block_size,
     load_row,
     local_maxima,
     noise_margin,
@@ -118,6 +118,7 @@ def detect(
     floor: Float32,
     threshold: float,
     step: float,
+    gain: float,
     width: float,
     max_width: float,
     seeds: Array,
@@ -125,12 +126,15 @@ def detect(
 ) -> None:
     """Scan lines (n, w) in electrons -> seeds (n, k, 6) and flags (n, k), strongest first.
 
-    floor (n, w) or (n, 1): variance of a pixel without signal. step: of quantisation, e-. width: known sigma in px, or 0 to measure it.
+    floor (n, w) or (n, 1): variance of a pixel without signal. step: of quantisation, e-.
+    gain: variance of the filter's response over that of a pixel (`response_gain`).
+    width: known sigma in px, or 0 to measure it.
     """
     n, w = signal.shape
     wanted = seeds.shape[1]
     row, response = np.empty(w + 2 * RADIUS, np.float32), np.empty(w, np.float32)
-    blocks = max(1, w // BLOCK)
+    block = block_size(w)
+    blocks = max(1, w // block)
     means, level, margin = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     at, height = np.empty(w, np.int32), np.empty(w)
     for y in range(n):
@@ -143,11 +147,11 @@ def detect(
             continue
         respond(row, response)
         block_background(response, means, level)
-        noise_margin(response, floor[y], w / usable, level, blocks, threshold, step, margin)
-        found = local_maxima(response, level, margin, blocks, at)
+        noise_margin(response, floor[y], gain * w / usable, level, threshold, step, margin)
+        found = local_maxima(response, level, margin, at)
         for j in range(found):
             pixel = np.int64(at[j])
-            height[j] = response[pixel] - background_at(pixel, level, blocks)
+            height[j] = response[pixel] - background_at(pixel, level, block)
         line = row[RADIUS : RADIUS + w]
         taken = 0
         while taken < wanted:
@@ -159,7 +163,7 @@ def detect(
                 break
             seed = seeds[y, taken]
             pixel = np.int64(at[best])
-            base = background_at(pixel, level, blocks)
+            base = background_at(pixel, level, block)
             flags[y, taken] = _measure(line, response, mask[y], pixel, base, width, max_width, seed)
             claim = max(3.0 * seed[WIDTH], 3.0) + seed[PLATEAU]
             strength, reach = height[best], np.inf

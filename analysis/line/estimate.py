@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -11,11 +12,12 @@ from numpy.typing import NDArray
 from analysis.line.channel import COLOURS, MISSING, scan_lines
 from analysis.line.measure import measure
 from analysis.line.noise import FULL_SCALES, NoiseModel, image_saturation
+from analysis.line.result import Line
 from analysis.line.settings import ExtractionSettings
 
 LINES = 256
 """Scan lines looked at."""
-ROUNDS = 4
+ROUNDS = 6
 FULL_WELL = 1e4
 """Electrons taken for the highest number when no line says better."""
 
@@ -23,9 +25,9 @@ FULL_WELL = 1e4
 def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseModel:
     """Checked image (h, w) or (h, w, 3) -> NoiseModel whose black level is 0 and whose gain is that of the residuals.
 
-    Noise without light is that of the differences of neighbours along the scan line, edges clipped out. The gain is the photon transfer of the line's own fit: where shot noise rules, the
-    median reduced chi-square of likelihood fits is the gain over the one assumed, and four rounds settle it. What the
-    Gaussian model cannot follow (speckle, a lens with tails) counts as noise, so that sigma_u stays honest.
+    Noise without light is that of the differences of neighbours along the scan line, edges clipped out. The gain is
+    the photon transfer of the line's own fit: the one that makes the typical reduced chi-square of likelihood fits 1.
+    What the Gaussian model cannot follow (speckle, a lens with tails) counts as noise, so that sigma_u stays honest.
     """
     axis = 0 if settings.axis == "rows" else 1
     stride = max(1, image.shape[axis] // LINES) | 1  # odd: keeps the rows of a Bayer pattern alternating
@@ -38,17 +40,34 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
     colours = 1.5 if lines.channel in COLOURS and image.ndim == 3 else 1.0  # variance of a colour difference
     dark_variance = _difference_variance(np.where(mask & MISSING, np.nan, signal), numbers.step) / colours
     level = max(float(np.median(sample[np.isfinite(sample)])), 0.0)
-    gain = _full_scale(image) / FULL_WELL
-    for _ in range(ROUNDS):
-        read_noise = np.sqrt(max(dark_variance - gain * level, 0.0)) / gain
-        noise = numbers.model_copy(update={"gain": gain, "read_noise": read_noise})
-        chi2 = measure(replace(lines, noise=noise), settings, threads=1).chi2
-        chi2 = chi2[np.isfinite(chi2)]
-        if chi2.size < 8:
+
+    def model(gain: float) -> NoiseModel:
+        read_variance = max(dark_variance - gain * level - numbers.step**2 / 12.0, 0.0)
+        return numbers.model_copy(update={"gain": gain, "read_noise": math.sqrt(read_variance) / gain})
+
+    log_gain, slope, before = math.log(_full_scale(image) / FULL_WELL), -1.0, (0.0, 0.0)
+    for number in range(ROUNDS):
+        ratio = _residual_ratio(measure(replace(lines, noise=model(math.exp(log_gain))), settings, threads=1))
+        if ratio is None:
             break
-        gain *= float(np.clip(np.median(chi2), 1e-2, 1e2))
-    read_noise = np.sqrt(max(dark_variance - gain * level, 0.0)) / gain
-    return numbers.model_copy(update={"gain": gain, "read_noise": read_noise})
+        # secant on log(chi2) against log(gain): -1 where shot noise is all, flatter where read noise holds part of it
+        if number > 0 and abs(log_gain - before[0]) > 1e-3:
+            slope = float(np.clip((math.log(ratio) - before[1]) / (log_gain - before[0]), -1.0, -0.2))
+        before = (log_gain, math.log(ratio))
+        log_gain -= float(np.clip(before[1] / slope, -5.0, 5.0))
+        if abs(before[1]) < 0.01:
+            break
+    return model(math.exp(log_gain))
+
+
+def _residual_ratio(line: Line) -> float | None:
+    """Typical residual variance over the one assumed: median reduced chi-square over that of its distribution."""
+    valid = np.isfinite(line.chi2)
+    if valid.sum() < 8:
+        return None
+    freedom = np.maximum(2.0 * np.ceil(4.0 * line.width[valid] + 1.5) - 3.0, 1.0)
+    # Wilson and Hilferty (1931): median of chi2 / f is (1 - 2 / 9f)^3
+    return max(float(np.median(line.chi2[valid] / (1.0 - 2.0 / (9.0 * freedom)) ** 3)), 1e-3)
 
 
 def _full_scale(image: NDArray[Any]) -> float:

@@ -37,6 +37,8 @@ def extract(
     array = check_image(image)
     if noise is None:
         noise = estimate_noise(array, chosen)
+    if chosen.method == "likelihood":
+        chosen = chosen.model_copy(update={"smoothing": 0.0})
     lines = scan_lines(array, chosen, noise)
     return measure(lines, chosen, threads)
 

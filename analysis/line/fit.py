@@ -22,7 +22,7 @@ Mask = NDArray[np.uint8]
 
 ITERATIONS = 30
 SMALL_STEP, ACCEPTED_STEP = 1e-5, 1e-3
-"""Squared standard deviations: stop at the first; out of iterations, the second will do (scoring converges linearly)."""
+"""Squared standard deviations: stop at the first; out of iterations the second will do (scoring is linear at worst)."""
 NARROWEST = 0.35
 """px; a narrower line falls into one pixel, where its width leaves no trace and drags the centre along."""
 
@@ -226,14 +226,14 @@ def fit_seeds(
                     break
             if count < 5:
                 flags[row, k] = _TOO_FEW
+            elif min(p[1], seed[CENTRE]) < 0.5 or max(p[1], seed[CENTRE]) > w - 1.5:
+                flags[row, k] = _AT_BORDER  # less than half of it is seen: any slope would fit
             elif not converged:
                 flags[row, k] = _NOT_CONVERGED
             elif p[2] > max_width:
                 flags[row, k] = _TOO_WIDE
             elif abs(p[1] - seed[CENTRE]) > max(half, 1.0):
                 flags[row, k] = _OUT_OF_WINDOW
-            elif p[1] < 0.0 or p[1] > w - 1.0:
-                flags[row, k] = _AT_BORDER
             elif not _solve(hessian, 0.0, unit, factor, influence):
                 flags[row, k] = _NOT_CONVERGED
             if flags[row, k] > _SATURATED:
@@ -241,7 +241,7 @@ def fit_seeds(
             chi2 = 0.0
             for i in range(count):
                 mu = p[0] * shape[0, i] + p[3]
-                variance[i] = max(mu + base[i], 0.1 * base[i])
+                variance[i] = max(mu + base[i], 0.1 * abs(base[i]))
                 # how much the centre moves for one electron more in this pixel
                 weight[i] = influence[0] * shape[0, i] + influence[3]
                 weight[i] += p[0] * (influence[1] * shape[1, i] + influence[2] * shape[2, i])

@@ -18,6 +18,7 @@ FILTER_SIGMA = 1.5
 """px; for lines of 0.6 to 4 px it gives up less than 20 % of the best signal-to-noise."""
 RADIUS = 4
 BLOCK = 32
+"""px; the background is sought on blocks of pixels, at least 8 of them."""
 TEXTURE = 1.25
 """A row whose response spreads this much more than its noise is textured: the spread is its noise then."""
 
@@ -27,8 +28,14 @@ T0, T1, T2, T3, T4 = (np.float32(t) for t in _taps)
 NOISE_GAIN = float(2.0 * (_taps**2).sum() - _taps[0] ** 2)
 """Variance of the response over that of a pixel."""
 SKEW_GAIN = float(2.0 * (_taps**3).sum() - _taps[0] ** 3)
-LEVEL_GAIN = 0.5 * math.pi / (7 * BLOCK)
-"""Variance of the background, a median of 7 block means, over that of a pixel."""
+
+
+def response_gain(correlation: Array) -> float:
+    """Variance of the response over that of a raw pixel, for pixels whose covariance at distance d is (m,)."""
+    kernel = np.concatenate([_taps[:0:-1], _taps])
+    overlap = np.correlate(kernel, kernel, "full")[2 * RADIUS :]
+    m = min(len(overlap), len(correlation))
+    return float(2.0 * (overlap[:m] * correlation[:m]).sum() - overlap[0] * correlation[0])
 
 
 @njit(nogil=True, cache=True)
@@ -73,99 +80,129 @@ def respond(row: Float32, out: Float32) -> None:
 
 
 @njit(nogil=True, cache=True)
-def block_background(response: Float32, means: Array, level: Array) -> int:
-    """Medians of the means of 7 neighbouring blocks: a line spoils 2 or 3 of them. Returns the number of blocks."""
-    w = response.shape[0]
-    blocks = max(1, w // BLOCK)
-    for b in range(blocks):
-        start = b * BLOCK
-        stop = start + BLOCK if b < blocks - 1 else w
-        total, count = 0.0, 0
-        for i in range(start + 1, stop, 4):  # the response is smooth: every fourth value holds nearly all of it
-            total += response[i]
-            count += 1
-        means[b] = total / max(count, 1)
-    sorted_means = np.empty(7)
-    for b in range(blocks):
-        low = max(0, min(b - 3, blocks - 7))
-        count = min(blocks, low + 7) - low
-        for j in range(count):
-            value = means[low + j]
-            k = j
-            while k > 0 and sorted_means[k - 1] > value:
-                sorted_means[k] = sorted_means[k - 1]
-                k -= 1
-            sorted_means[k] = value
-        level[b] = 0.5 * (sorted_means[(count - 1) // 2] + sorted_means[count // 2])
-    return blocks
+def block_size(w: int) -> int:
+    """Pixels in a block, at most BLOCK."""
+    return max(4, min(BLOCK, w // 8))
 
 
 @njit(nogil=True, cache=True)
-def background_at(x: float, level: Array, blocks: int) -> float:
-    position = (x + 0.5) / BLOCK - 0.5
-    b = math.floor(position)
-    if b < 0:
+def _insert(ordered: Array, count: int, value: float) -> None:
+    """Put a value into its place among the `count` first."""
+    while count > 0 and ordered[count - 1] > value:
+        ordered[count] = ordered[count - 1]
+        count -= 1
+    ordered[count] = value
+
+
+@njit(nogil=True, cache=True)
+def block_background(response: Float32, means: Array, level: Array) -> None:
+    """Robust level at the centre of each block: the median over up to 7 blocks, of which a line spoils 2 or 3.
+
+    As many blocks left as right, so that a slope does no harm. Near the image's ends either fewer blocks are taken or
+    a straight line stands in for those beyond; a line can only raise one of the two.
+    """
+    w, blocks = response.shape[0], means.shape[0]
+    block = block_size(w)
+    for b in range(blocks):
+        total, count = 0.0, 0
+        for i in range(b * block + 1, min((b + 1) * block, w), 4):  # smooth: every fourth holds nearly all of it
+            total += response[i]
+            count += 1
+        means[b] = total / count if count else response[0]
+    near, far = np.empty(7), np.empty(7)
+    for b in range(blocks):
+        near[0] = far[0] = means[b]
+        pairs = continued = 0
+        for distance in range(1, 4):
+            left, right = b - distance, b + distance
+            if left >= 0 and right < blocks:
+                _insert(near, 1 + 2 * pairs, means[left])
+                _insert(near, 2 + 2 * pairs, means[right])
+                _insert(far, 1 + 2 * continued, means[left])
+                _insert(far, 2 + 2 * continued, means[right])
+                pairs += 1
+                continued += 1
+            else:
+                inner = right if left < 0 else left
+                outer = 2 * inner - b
+                if 0 <= outer < blocks:
+                    _insert(far, 1 + 2 * continued, means[inner])
+                    _insert(far, 2 + 2 * continued, 2.0 * means[inner] - means[outer])
+                    continued += 1
+        level[b] = min(near[pairs], far[continued])
+
+
+@njit(nogil=True, cache=True)
+def background_at(x: float, level: Array, block: int) -> float:
+    """The level at x, on straight lines between the centres of blocks."""
+    blocks = level.shape[0]
+    if blocks == 1:
         return level[0]
-    if b >= blocks - 1:
-        return level[blocks - 1]
+    position = (x + 0.5) / block - 0.5
+    b = min(max(math.floor(position), 0), blocks - 2)
     t = position - b
     return (1.0 - t) * level[b] + t * level[b + 1]
 
 
 @njit(nogil=True, cache=True)
 def noise_margin(
-    response: Float32, floor: Float32, scale: float, level: Array, blocks: int, threshold: float, step: float, margin: Array
+    response: Float32,
+    floor: Float32,
+    gain: float,
+    level: Array,
+    threshold: float,
+    step: float,
+    margin: Array,
 ) -> None:
     """How far above the background a response must rise at each block: threshold times its noise; floor (w,) or (1,).
+    gain: variance of the response over that of a pixel.
 
     Photon counts lean upwards: Cornish and Fisher's (1938) first term keeps the rate of false peaks that of a Gaussian.
     Texture counts as noise. Noise below half a quantisation step is no longer Gaussian, but it cannot reach one `step`.
     """
-    w = response.shape[0]
+    w, blocks = response.shape[0], level.shape[0]
+    block = block_size(w)
+    level_gain = 0.5 * math.pi / (block * min(5, blocks))  # a median of block means
     sigma = np.empty(blocks)
     for b in range(blocks):
         photons = max(level[b], 0.0)
-        variance = photons + floor[min(b * BLOCK + BLOCK // 2, floor.shape[0] - 1)]
-        sigma[b] = math.sqrt(scale * (NOISE_GAIN + LEVEL_GAIN) * variance)
+        variance = max(photons + floor[min(b * block + block // 2, floor.shape[0] - 1)], 1e-2)
+        sigma[b] = math.sqrt(gain * (1.0 + level_gain / NOISE_GAIN) * variance)
         skew = SKEW_GAIN * photons / (NOISE_GAIN * variance) ** 1.5
         margin[b] = max((threshold + skew * max(threshold * threshold - 1.0, 0.0) / 6.0) * sigma[b], step)
     spread, count = 0, 0
     for i in range(2, w, 8):
-        b = min(i // BLOCK, blocks - 1)
-        spread += abs(response[i] - background_at(i, level, blocks)) > 0.6745 * TEXTURE * sigma[b]
+        b = min(i // block, blocks - 1)
+        spread += abs(response[i] - background_at(i, level, block)) > 0.6745 * TEXTURE * sigma[b]
         count += 1
     if 2 * spread <= count + 3.0 * math.sqrt(count):  # three sigma of a fair coin
         return
     size = np.empty(blocks)
     for b in range(blocks):
         total, count = 0.0, 0
-        for i in range(b * BLOCK + 1, min((b + 1) * BLOCK, w), 2):
-            total += abs(response[i] - background_at(i, level, blocks))
+        for i in range(b * block + 1, min((b + 1) * block, w), 2):
+            total += abs(response[i] - background_at(i, level, block))
             count += 1
-        value = total / max(count, 1)
-        k = b
-        while k > 0 and size[k - 1] > value:
-            size[k] = size[k - 1]
-            k -= 1
-        size[k] = value
+        _insert(size, b, total / max(count, 1))
     texture = 1.2533 * size[blocks // 2]
     for b in range(blocks):
         margin[b] = max(margin[b], threshold * texture)
 
 
 @njit(nogil=True, cache=True)
-def local_maxima(response: Float32, level: Array, margin: Array, blocks: int, at: NDArray[np.int32]) -> int:
+def local_maxima(response: Float32, level: Array, margin: Array, at: NDArray[np.int32]) -> int:
     """Pixels where the response is a maximum and exceeds background + margin; returns how many."""
-    w = response.shape[0]
+    w, blocks = response.shape[0], level.shape[0]
+    block = block_size(w)
     found = 0
-    for b in range(-1, blocks):
+    for b in range(max(1, blocks - 1)):
         # from the centre of one block to the next, the bound is a straight line
-        left, right = max(b, 0), min(b + 1, blocks - 1)
-        start = 0 if b < 0 else b * BLOCK + BLOCK // 2
-        stop = w if b == blocks - 1 else (b + 1) * BLOCK + BLOCK // 2
-        low, high = level[left] + margin[left], level[right] + margin[right]
-        slope = np.float32((high - low) / BLOCK)
-        bound = np.float32(low)
+        after_b = min(b + 1, blocks - 1)
+        low, high = level[b] + margin[b], level[after_b] + margin[after_b]
+        slope = np.float32((high - low) / block)
+        start = 0 if b == 0 else b * block + block // 2
+        stop = w if b >= blocks - 2 else (b + 1) * block + block // 2
+        bound = np.float32(low) + slope * np.float32(start - (b * block + 0.5 * block - 0.5))
         for i in range(start, stop):
             value = response[i]
             if value > bound + slope * np.float32(i - start):

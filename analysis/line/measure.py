@@ -8,6 +8,7 @@ from analysis.line.centre_of_mass import weigh_seeds
 from analysis.line.channel import Lines, smoothing_correlation
 from analysis.line.detect import SEED_COLUMNS, detect
 from analysis.line.fit import fit_seeds
+from analysis.line.matched_filter import response_gain
 from analysis.line.result import Line
 from analysis.line.settings import ExtractionSettings
 from render.threads import map_chunks
@@ -22,13 +23,14 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None) -> 
     out = np.empty((lines.count, settings.peaks, 6))
     flags = np.empty((lines.count, settings.peaks), np.uint8)
     known = settings.width or 0.0
+    gain = response_gain(correlation)
     step = lines.noise.step / lines.noise.gain
 
     def work(start: int, stop: int) -> None:
         signal, mask, floor = lines.read(start, stop)
         here, flag = out[start:stop], flags[start:stop]
         seeds = np.empty((stop - start, settings.peaks, SEED_COLUMNS))
-        detect(signal, mask, floor, settings.threshold, step, known, settings.max_width, seeds, flag)
+        detect(signal, mask, floor, settings.threshold, step, gain, known, settings.max_width, seeds, flag)
         if settings.method == "centre_of_mass":
             weigh_seeds(signal, mask, floor, seeds, flag, correlation, here)
         else:

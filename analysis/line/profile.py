@@ -46,7 +46,7 @@ def profile(x: Array, n: int, centre: float, sigma: float, integrated: bool, out
 
 @njit(nogil=True, cache=True)
 def linear_variance(weight: Array, variance: Array, x: Array, n: int, correlation: Array) -> float:
-    """Variance of sum(weight * pixel) over (n,) pixels, their covariance at distance d correlation[d] sqrt(v_i v_j).
+    """Variance of sum(weight * pixel) over (n,) pixels; their covariance at distance d is correlation[d] * variance.
 
     correlation (m,): [1] for a raw image; smoothing spreads it over more distances.
     """
@@ -57,5 +57,6 @@ def linear_variance(weight: Array, variance: Array, x: Array, n: int, correlatio
             distance = int(x[j] - x[i])
             if distance >= correlation.shape[0]:
                 break
-            total += 2.0 * correlation[distance] * weight[i] * weight[j] * math.sqrt(variance[i] * variance[j])
+            half_way = 0.5 * (variance[(i + j) // 2] + variance[(i + j + 1) // 2])
+            total += 2.0 * correlation[distance] * weight[i] * weight[j] * half_way
     return total

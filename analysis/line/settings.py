@@ -38,7 +38,8 @@ class ExtractionSettings(Model):
         0.0,
         unit="px",
         label="Smoothing",
-        help="Gaussian sigma over rows and columns before the fit. Biases curved lines; the paper used 3.",
+        help="Gaussian sigma over rows and columns before the measurement. Biases curved lines; the paper used 3. "
+        "Likelihood needs independent pixels and does without.",
         ge=0,
         le=20,
     )
@@ -47,9 +48,7 @@ class ExtractionSettings(Model):
     )
 
     @model_validator(mode="after")
-    def _method_takes_options(self) -> ExtractionSettings:
-        if self.method == "likelihood" and self.smoothing > 0:
-            raise ValueError(f"smoothing is {self.smoothing}; allowed for likelihood: 0 (it needs independent pixels)")
+    def _bayer_has_colours(self) -> ExtractionSettings:
         if self.channel == "mono" and self.pattern is not None:
             raise ValueError("channel is mono; allowed with a Bayer pattern: red, green, blue, auto")
         return self
