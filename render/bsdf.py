@@ -1,0 +1,256 @@
+"""How surfaces scatter: one evaluate, one density and one sampling routine over all materials.
+
+Local frame: z is the normal. `o` is the direction light is followed back along or the one it comes from, `i` the other;
+both point away from the surface. A material is one row of numbers, the reflectance at the point comes with it:
+
+    row   0 kind   1 alpha x   2 alpha y   3 index of refraction   4.. n of each band   7.. k of each band
+          10 internal diffuse reflectance of a coat
+    rgb   reflectance of the diffuse part, or the tint of the specular one, for each band
+
+Every material but glass is two-sided: light on either side is treated alike, and none passes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.fresnel import conductor, dielectric
+from render.microfacet import density, sample_normal, smith_lambda, visible_density
+
+Array = NDArray[np.float64]
+
+LAMBERTIAN, CONDUCTOR, DIELECTRIC, COATED = 0.0, 1.0, 2.0, 3.0
+ROW = 12
+SMOOTH = 1e-4
+"""Below this roughness a boundary is a mirror: its density is a delta function."""
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def is_smooth(row: Array) -> bool:
+    """The material scatters into single directions only."""
+    return (row[0] == CONDUCTOR or row[0] == DIELECTRIC) and max(row[1], row[2]) < SMOOTH
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def specular_share(row: Array, rgb: Array, cosine: float) -> float:
+    """Probability with which a coat's reflection is sampled rather than its base."""
+    reflected, _ = dielectric(cosine, row[3])
+    base = (1.0 - reflected) * (rgb[0] + rgb[1] + rgb[2]) / 3.0
+    return reflected / (reflected + base) if reflected + base > 0.0 else 1.0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def evaluate(
+    row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, f: Array
+) -> None:
+    """f(o, i) in 1/sr for each band -> f (3,), without the cosine; 0 for the delta parts."""
+    f[0] = f[1] = f[2] = 0.0
+    if oz == 0.0 or iz == 0.0 or is_smooth(row):
+        return
+    if row[0] == DIELECTRIC:
+        value = rough_dielectric(row, ox, oy, oz, ix, iy, iz)
+        for band in range(3):
+            f[band] = value * rgb[band]
+        return
+    if oz * iz < 0.0:
+        return
+    if oz < 0.0:
+        oz, iz = -oz, -iz
+    if row[0] == LAMBERTIAN:
+        for band in range(3):
+            f[band] = rgb[band] / math.pi
+        return
+    ax, ay = row[1], row[2]
+    hx, hy, hz = ox + ix, oy + iy, oz + iz
+    length = math.sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx / length, hy / length, hz / length
+    cosine = ox * hx + oy * hy + oz * hz
+    shadowed = 1.0 + smith_lambda(ox, oy, oz, ax, ay) + smith_lambda(ix, iy, iz, ax, ay)
+    facets = density(hx, hy, hz, ax, ay) / (4.0 * oz * iz * shadowed)
+    if row[0] == CONDUCTOR:
+        for band in range(3):
+            f[band] = rgb[band] * facets * conductor(cosine, row[4 + band], row[7 + band])
+        return
+    # coat: its own reflection, and the base seen through it twice, with the light that the coat sends back to the base
+    coat, _ = dielectric(cosine, row[3])
+    enters, _ = dielectric(iz, row[3])
+    leaves, _ = dielectric(oz, row[3])
+    through = (1.0 - enters) * (1.0 - leaves) / (row[3] * row[3])
+    for band in range(3):
+        base = rgb[band] * through / (math.pi * (1.0 - rgb[band] * row[10]))
+        f[band] = coat * facets + base
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def rough_dielectric(row: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
+    """f(o, i) of a rough glass boundary, o the direction light is followed from (Walter et al. 2007, eqs. 20, 21).
+
+    Refraction carries no (eta_o / eta_i)^2: what is transported is power, as both kinds of path here need it.
+    """
+    ax, ay = row[1], row[2]
+    # index beyond the boundary, as seen from o's side, over that before it
+    eta = row[3] if oz > 0.0 else 1.0 / row[3]
+    if oz < 0.0:
+        oz, iz = -oz, -iz
+    if iz > 0.0:
+        hx, hy, hz = ox + ix, oy + iy, oz + iz
+    else:
+        hx, hy, hz = ox + eta * ix, oy + eta * iy, oz + eta * iz
+    length = math.sqrt(hx * hx + hy * hy + hz * hz)
+    if length == 0.0:
+        return 0.0
+    if hz < 0.0:
+        length = -length
+    hx, hy, hz = hx / length, hy / length, hz / length
+    oh, ih = ox * hx + oy * hy + oz * hz, ix * hx + iy * hy + iz * hz
+    if oh * oz <= 0.0 or ih * iz <= 0.0:
+        return 0.0
+    reflected, _ = dielectric(oh, eta)
+    d = density(hx, hy, hz, ax, ay)
+    shadow_o, shadow_i = smith_lambda(ox, oy, oz, ax, ay), smith_lambda(ix, iy, abs(iz), ax, ay)
+    if iz > 0.0:
+        return reflected * d / (4.0 * oz * iz * (1.0 + shadow_o + shadow_i))
+    jacobian = (oh + eta * ih) ** 2
+    masking = 1.0 / ((1.0 + shadow_o) * (1.0 + shadow_i))
+    return (1.0 - reflected) * d * masking * eta * eta * abs(oh * ih) / (oz * abs(iz) * jacobian)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def pdf(row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
+    """Density of `sample` for i given o, 1/sr; 0 for the delta parts."""
+    if oz == 0.0 or iz == 0.0 or is_smooth(row):
+        return 0.0
+    ax, ay = row[1], row[2]
+    if row[0] == DIELECTRIC:
+        eta = row[3] if oz > 0.0 else 1.0 / row[3]
+        if oz < 0.0:
+            oz, iz = -oz, -iz
+        if iz > 0.0:
+            hx, hy, hz = ox + ix, oy + iy, oz + iz
+        else:
+            hx, hy, hz = ox + eta * ix, oy + eta * iy, oz + eta * iz
+        length = math.sqrt(hx * hx + hy * hy + hz * hz)
+        if length == 0.0:
+            return 0.0
+        if hz < 0.0:
+            length = -length
+        hx, hy, hz = hx / length, hy / length, hz / length
+        oh, ih = ox * hx + oy * hy + oz * hz, ix * hx + iy * hy + iz * hz
+        if oh <= 0.0 or ih * iz <= 0.0:
+            return 0.0
+        reflected, _ = dielectric(oh, eta)
+        visible = visible_density(ox, oy, oz, hx, hy, hz, ax, ay)
+        if iz > 0.0:
+            return reflected * visible / (4.0 * oh)
+        return (1.0 - reflected) * visible * eta * eta * abs(ih) / (oh + eta * ih) ** 2
+    if oz * iz < 0.0:
+        return 0.0
+    if oz < 0.0:
+        oz, iz = -oz, -iz
+    if row[0] == LAMBERTIAN:
+        return iz / math.pi
+    hx, hy, hz = ox + ix, oy + iy, oz + iz
+    length = math.sqrt(hx * hx + hy * hy + hz * hz)
+    hx, hy, hz = hx / length, hy / length, hz / length
+    cosine = ox * hx + oy * hy + oz * hz
+    facets = visible_density(ox, oy, oz, hx, hy, hz, ax, ay) / (4.0 * cosine) if cosine > 0.0 else 0.0
+    if row[0] == CONDUCTOR:
+        return facets
+    share = specular_share(row, rgb, oz)
+    return share * facets + (1.0 - share) * iz / math.pi
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def sample(
+    row: Array,
+    rgb: Array,
+    ox: float,
+    oy: float,
+    oz: float,
+    choice: float,
+    r1: float,
+    r2: float,
+    direction: Array,
+    weight: Array,
+) -> float:
+    """Draw i given o -> direction (3,), weight (3,) = f |cos i| / density for each band.
+
+    Returns the density, 1/sr; -1 for a delta part (its weight then holds its share), 0 when nothing is scattered.
+    """
+    weight[0] = weight[1] = weight[2] = 0.0
+    if oz == 0.0:
+        return 0.0
+    side = 1.0 if oz > 0.0 else -1.0
+    ax, ay = row[1], row[2]
+    smooth = is_smooth(row)
+    if row[0] == DIELECTRIC:
+        eta = row[3] if oz > 0.0 else 1.0 / row[3]
+        z = abs(oz)
+        hx = hy = 0.0
+        hz = 1.0
+        if not smooth:
+            hx, hy, hz = sample_normal(ox, oy, z, ax, ay, r1, r2)
+        oh = ox * hx + oy * hy + z * hz
+        reflected, beyond = dielectric(oh, eta)
+        if choice < reflected:
+            x, y, w = 2.0 * oh * hx - ox, 2.0 * oh * hy - oy, 2.0 * oh * hz - z
+            if w <= 0.0:
+                return 0.0
+        else:
+            t = oh / eta - beyond
+            x, y, w = t * hx - ox / eta, t * hy - oy / eta, t * hz - z / eta
+            if w >= 0.0:
+                return 0.0
+        direction[0], direction[1], direction[2] = x, y, side * w
+        if smooth:
+            for band in range(3):
+                weight[band] = rgb[band]
+            return -1.0
+        shadow_o, shadow_i = smith_lambda(ox, oy, z, ax, ay), smith_lambda(x, y, abs(w), ax, ay)
+        ratio = (1.0 + shadow_o) / (1.0 + shadow_o + shadow_i) if w > 0.0 else 1.0 / (1.0 + shadow_i)
+        for band in range(3):
+            weight[band] = rgb[band] * ratio
+        return pdf(row, rgb, ox, oy, oz, x, y, side * w)
+    z = abs(oz)
+    if row[0] == CONDUCTOR:
+        hx = hy = 0.0
+        hz = 1.0
+        if not smooth:
+            hx, hy, hz = sample_normal(ox, oy, z, ax, ay, r1, r2)
+        oh = ox * hx + oy * hy + z * hz
+        x, y, w = 2.0 * oh * hx - ox, 2.0 * oh * hy - oy, 2.0 * oh * hz - z
+        if w <= 0.0:
+            return 0.0
+        direction[0], direction[1], direction[2] = x, y, side * w
+        ratio = 1.0
+        if not smooth:
+            shadow_o, shadow_i = smith_lambda(ox, oy, z, ax, ay), smith_lambda(x, y, w, ax, ay)
+            ratio = (1.0 + shadow_o) / (1.0 + shadow_o + shadow_i)
+        for band in range(3):
+            weight[band] = rgb[band] * ratio * conductor(oh, row[4 + band], row[7 + band])
+        return -1.0 if smooth else pdf(row, rgb, ox, oy, z, x, y, w)
+    if row[0] == COATED and choice < specular_share(row, rgb, z):
+        hx, hy, hz = sample_normal(ox, oy, z, ax, ay, r1, r2)
+        oh = ox * hx + oy * hy + z * hz
+        x, y, w = 2.0 * oh * hx - ox, 2.0 * oh * hy - oy, 2.0 * oh * hz - z
+    else:
+        radius, angle = math.sqrt(r1), 2.0 * math.pi * r2
+        x, y, w = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(max(0.0, 1.0 - r1))
+    if w <= 0.0:
+        return 0.0
+    direction[0], direction[1], direction[2] = x, y, side * w
+    if row[0] == LAMBERTIAN:
+        for band in range(3):
+            weight[band] = rgb[band]
+        return w / math.pi
+    chance = pdf(row, rgb, ox, oy, z, x, y, w)
+    if chance <= 0.0:
+        return 0.0
+    evaluate(row, rgb, ox, oy, z, x, y, w, weight)
+    for band in range(3):
+        weight[band] *= w / chance
+    return chance
