@@ -1,0 +1,244 @@
+"""One frame that gets better while it is looked at: a quick one first, then truth and ever more samples.
+
+The last frame holds the same numbers, bit for bit, as `render_world` gives for the same settings. The ambient passes
+before it are thrown away (a third more work at most), so that no number depends on how it was looked at.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.ambient import ambient_image
+from render.checks import check_placement
+from render.curve import laser_curve
+from render.direct import direct_image
+from render.frame import Axis, Frame, LaserCurve
+from render.render import PLAN
+from render.scene import Scene
+from render.settings import RenderSettings
+from render.threads import Cancel
+from render.truth import truth_images
+from render.world import World
+
+Float32 = NDArray[np.float32]
+Progress = Callable[[str, float], None]
+"""progress(what is being done, share of the whole 0..1)."""
+
+QUICK_ERROR = 0.05
+"""Relative error of the laser light in the first frame."""
+GROWTH = 4
+"""Of the samples from one ambient pass to the next."""
+AMBIENT_ERROR = "relative error, ambient"
+AMBIENT_SAMPLES = "samples a pixel, ambient"
+
+
+def has_ambient(scene: Scene) -> bool:
+    """There is light besides the lasers."""
+    return bool(scene.lights) or any(scene.environment.radiance)
+
+
+def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
+    """What will be computed, what is left out, and why; one line each."""
+    camera = scene.camera
+    lines = [*PLAN]
+    if has_ambient(scene):
+        lines.append(
+            f"ambient: lamps and surroundings by way of one surface, {_rounded(settings.ambient_samples)} samples on "
+            f"each of {camera.width} x {camera.height} pixels"
+        )
+    else:
+        lines.append("ambient: none, the scene has no lamp and dark surroundings")
+    lines.append(
+        "truth: depth, position, normal and object at every pixel's centre"
+        if settings.truth_images
+        else "left out: truth at every pixel (switched off); the exact line is there"
+    )
+    return tuple(lines)
+
+
+def ambient_passes(samples: int) -> tuple[int, ...]:
+    """Samples a pixel of each pass: 1, 4, 16, ... and at last what is asked for."""
+    passes, n = [], 1
+    while n * 2 <= samples:
+        passes.append(n)
+        n *= GROWTH
+    return (*passes, samples)
+
+
+def refine(
+    world: World,
+    scene: Scene,
+    *,
+    settings: RenderSettings | None = None,
+    step: int = 0,
+    axis: Axis = "rows",
+    seed: int = 0,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    cancelled: Cancel | None = None,
+) -> Iterator[Frame]:
+    """Frames of a world placed for `step`, each usable and better than the one before; the last is the final one.
+
+    `Frame.ambient` and `Frame.truth` are None until their turn comes. `Frame.counts` tells the estimated relative error
+    of each laser and, from the second pass on, of the ambient light. Raises InputError, Cancelled.
+    """
+    settings = settings or RenderSettings()
+    clock = _Clock(_workload(world, scene, settings), progress)
+    with clock.stage("acceleration structure", len(world.triangles) * 10):
+        check_placement(world, scene, step)
+        rays = world.rays
+    ray_start, embree_start = rays.rays, rays.seconds
+    frame = Frame(step, (), None, (), None, "\n".join(PLAN))
+
+    def told(frame: Frame, **counts: float) -> Frame:
+        so_far = {"rays": rays.rays - ray_start, "seconds in embree, all threads": rays.seconds - embree_start}
+        return replace(frame, seconds=dict(clock.seconds), counts={**frame.counts, **counts, **so_far})
+
+    pixels = scene.camera.width * scene.camera.height
+    with clock.stage("exact line", 0):
+        curves = tuple(_curves(world, scene, step, axis, threads))
+    targets = (QUICK_ERROR, settings.laser_error) if settings.laser_error < QUICK_ERROR else (settings.laser_error,)
+    for target in targets:
+        with clock.stage("laser light", _laser_work(pixels, scene, target)) as report:
+            images, counts = _lasers(world, scene, step, target, seed, threads, report, cancelled)
+        frame = told(replace(frame, laser_direct=images, curves=curves), **counts)
+        yield frame
+    if settings.truth_images:
+        with clock.stage("truth images", pixels) as report:
+            camera, pose = scene.camera, scene.T_world_camera(step)
+            truth = truth_images(world, camera, pose, threads=threads, cancelled=cancelled, progress=report)
+        frame = told(replace(frame, truth=truth))
+        yield frame
+    passes = ambient_passes(settings.ambient_samples) if has_ambient(scene) else ()
+    for i, samples in enumerate(passes):
+        # independent of the last pass, whose numbers are those of render_world
+        own = seed if i == len(passes) - 1 else (seed + 1_000_003 * (i + 1)) % 2**63
+        with clock.stage(f"ambient light, {samples} samples", _ambient_work(pixels, scene, samples)) as report:
+            image = ambient_image(
+                world,
+                scene,
+                scene.camera,
+                scene.T_world_camera(step),
+                samples=samples,
+                seed=own,
+                threads=threads,
+                cancelled=cancelled,
+                progress=report,
+            )
+        known = {AMBIENT_SAMPLES: float(_rounded(samples))}
+        if frame.ambient is not None:
+            known[AMBIENT_ERROR] = pass_error(frame.ambient, image, passes[i - 1], samples)
+        frame = told(replace(frame, ambient=image), **known)
+        yield frame
+
+
+def pass_error(before: Float32, now: Float32, samples_before: int, samples: int) -> float:
+    """Relative RMS error of `now` (h, w, 3), from its difference to an independent pass with fewer samples.
+
+    The squared difference is the sum of both variances, which fall at least as 1 / samples: an upper estimate.
+    """
+    difference, power = 0.0, 0.0
+    # in bands of rows: the whole in float64 would be six times the image
+    for i in range(0, len(now), 64):
+        a, b = before[i : i + 64].astype(np.float64), now[i : i + 64].astype(np.float64)
+        difference += float(np.sum((a - b) ** 2))
+        power += float(np.sum(b * b))
+    if power == 0.0:
+        return 0.0
+    return math.sqrt(difference / power / (1.0 + _rounded(samples) / _rounded(samples_before)))
+
+
+def _rounded(samples: int) -> int:
+    """As `ambient_image` rounds up: a square."""
+    return math.ceil(math.sqrt(samples)) ** 2
+
+
+def _curves(world: World, scene: Scene, step: int, axis: Axis, threads: int | None) -> Iterator[LaserCurve]:
+    for i, laser in enumerate(scene.lasers):
+        poses = scene.T_world_camera(step), scene.T_world_laser(i, step)
+        yield laser_curve(world, scene.camera, laser, *poses, axis, threads)
+
+
+def _lasers(
+    world: World,
+    scene: Scene,
+    step: int,
+    target: float,
+    seed: int,
+    threads: int | None,
+    report: Callable[[float], None],
+    cancelled: Cancel | None,
+) -> tuple[tuple[Float32, ...], dict[str, float]]:
+    """The direct light of every laser, and what it took."""
+    images, counts = [], {}
+    for i, laser in enumerate(scene.lasers):
+        image = direct_image(
+            world,
+            scene.camera,
+            laser,
+            scene.T_world_camera(step),
+            scene.T_world_laser(i, step),
+            target=target,
+            seed=seed + i,
+            threads=threads,
+            cancelled=cancelled,
+            progress=lambda done, i=i: report((i + done) / len(scene.lasers)),  # type: ignore[misc]
+        )
+        images.append(image.radiance)
+        counts[f"relative error, {laser.name}"] = image.error
+        counts[f"lit pixels, {laser.name}"] = image.pixels
+        counts[f"samples, {laser.name}"] = image.samples
+    return tuple(images), counts
+
+
+def _laser_work(pixels: int, scene: Scene, target: float) -> float:
+    """About how many rays: a strip of a twentieth of the image, four rays a pixel, a few more for a finer target."""
+    return 0.2 * pixels * len(scene.lasers) * (1.0 + 0.2 * math.log2(max(1.0, QUICK_ERROR / target)))
+
+
+def _ambient_work(pixels: int, scene: Scene, samples: int) -> float:
+    return float(pixels) * _rounded(samples) * (1 + len(scene.lights) + any(scene.environment.radiance))
+
+
+def _workload(world: World, scene: Scene, settings: RenderSettings) -> float:
+    """The sum of what the stages say of themselves."""
+    pixels = scene.camera.width * scene.camera.height
+    total = len(world.triangles) * 10 + _laser_work(pixels, scene, settings.laser_error)
+    total += _laser_work(pixels, scene, QUICK_ERROR) if settings.laser_error < QUICK_ERROR else 0.0
+    total += pixels if settings.truth_images else 0.0
+    if has_ambient(scene):
+        total += sum(_ambient_work(pixels, scene, samples) for samples in ambient_passes(settings.ambient_samples))
+    return max(total, 1.0)
+
+
+@dataclass
+class _Clock:
+    """Seconds by stage, and the share of the whole work that is done."""
+
+    total: float
+    progress: Progress | None
+    finished: float = 0.0
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str, work: float) -> Iterator[Callable[[float], None]]:
+        """Time a stage; yields the function that takes its own progress, 0..1."""
+        start = time.perf_counter()
+
+        def report(done: float) -> None:
+            if self.progress is not None:
+                self.progress(name, (self.finished + done * work) / self.total)
+
+        report(0.0)
+        yield report
+        # passes of one kind are one stage in the summary, as in render_world
+        kind = name.partition(",")[0]
+        self.seconds[kind] = self.seconds.get(kind, 0.0) + time.perf_counter() - start
+        self.finished += work
