@@ -148,6 +148,7 @@ def why_no_studio() -> str | None:
 
 @cli.command()
 @PROJECT
+@click.option("--report/--no-report", default=True, show_default=True, help="Write the HTML and PDF report.")
 @working
 def run(project: Path | None, **options: Any) -> None:
     """Scan a project: render, extract the line, triangulate, compare with the truth, report. Default: the sample."""

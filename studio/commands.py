@@ -72,6 +72,7 @@ def run_project(
     quiet: bool,
     as_json: bool,
     measure: bool = True,
+    report: bool = True,
 ) -> None:
     """`run`, and `render` with `measure` off."""
     project, root = load_project(path)
@@ -89,6 +90,7 @@ def run_project(
             seed=seed,
             image_scale=scale,
             measure=measure,
+            report=report,
             progress=progress,
         )
     if as_json:
@@ -98,8 +100,8 @@ def run_project(
     for note in done.manifest["notes"]:
         print(f"warning: {note}")
     print(f"{len(done.manifest['frames'])} frame(s) in {folder}, {done.manifest['seconds']['all']:.1f} s")
-    for report in done.report:
-        print(f"report: {report}")
+    for file in done.report:
+        print(f"report: {file}")
 
 
 def render_project(path: Path | None, **options: Any) -> None:

@@ -55,12 +55,14 @@ def run_scan(
     seed: int | None = None,
     image_scale: float = 1.0,
     measure: bool = True,
+    report: bool = True,
     progress: StageProgress = lambda stage, done: None,
     cancelled: Cancel = never,
 ) -> ScanResult:
     """Scan `project`, whose files are below `root`, into the folder `out`.
 
-    steps: only the first so many frames; seed: in place of the project's; measure: off, stops after the frames.
+    steps: only the first so many frames; seed: in place of the project's; measure off: stop after the frames;
+    report off: stop after the points.
     InputError: bad project, mesh or texture, nothing to see, `out` not writable. Cancelled: files so far stay, whole.
     """
     began = time.perf_counter()
@@ -109,7 +111,8 @@ def run_scan(
         if measure:
             files += write_points(out, project, results, clock)
             result["results"] = summarise(results, project.scene)
-            reports = write_reports(out, project, first, results, clock, notes=notes, created=result["created"])
+            if report:
+                reports = write_reports(out, project, first, results, clock, notes=notes, created=result["created"])
     result["report"] = [path.name for path in reports]
     result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
     manifest = scan_folder.finish(out, root, result)

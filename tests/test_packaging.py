@@ -14,6 +14,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import main
+from studio.project import Project
 
 ROOT = Path(__file__).resolve().parents[1]
 TOP_LEVEL = {
@@ -135,3 +136,18 @@ def test_files_stay_small() -> None:
             if lines > MOST_LINES:
                 long[str(path)] = lines
     assert long == {}
+
+
+def test_the_project_in_the_readme_is_a_project() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```json\n(.*?)```", readme, re.DOTALL)
+    assert len(blocks) == 1
+    assert Project.from_text(blocks[0]).scene.frame_count == 5
+
+
+def test_every_command_in_the_readme_exists() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    used = set(re.findall(r"^python main\.py (\w+)", readme, re.MULTILINE))
+    assert used == set(main.cli.commands)
+    targets = set(re.findall(r"^make (\w+)", readme + (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), re.M))
+    assert targets <= set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
