@@ -79,7 +79,8 @@ def test_the_build_tool_is_pinned_to_the_same_version() -> None:
 
 def test_pins_satisfy_the_declared_ranges() -> None:
     project = PYPROJECT["project"]
-    for text in [*project["dependencies"], *sum(project["optional-dependencies"].values(), [])]:
+    extras = [text for texts in project["optional-dependencies"].values() for text in texts]
+    for text in [*project["dependencies"], *extras]:
         requirement = Requirement(text)
         assert pinned()[canonicalize_name(requirement.name)] in requirement.specifier, text
 
