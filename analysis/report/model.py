@@ -38,8 +38,8 @@ class LaserResult:
     extractions: tuple[Extraction, ...]
     """At least one; the first is the one that the headline speaks of, others are compared with it."""
     image: NDArray[np.generic] | None
-    """(h, w) or (h, w, 3) digital numbers (DN) that the lines were extracted from. May be None on frames that the report
-    shall not show; the report shows one frame, chosen among those whose lasers all have an image."""
+    """(h, w) or (h, w, 3) digital numbers (DN) that the lines were extracted from. May be None on frames that the
+    report shall not show; it shows one frame, chosen among those whose lasers all have an image."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class FrameResult:
     plan: str = ""
     """`Frame.plan`: what was computed, what was left out and why, one line each."""
     seconds: dict[str, float] = field(default_factory=dict)
-    """Wall time by stage, s, of this frame: the stages of `Frame.seconds` and those after it. Summed over the frames."""
+    """Wall time by stage, s, of this frame: those of `Frame.seconds` and those after it. Summed over the frames."""
     counts: dict[str, float] = field(default_factory=dict)
     """`Frame.counts`; what counts is summed over the frames, what is named "error" or "fraction" is averaged."""
 

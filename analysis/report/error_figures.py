@@ -1,0 +1,133 @@
+"""Figures of the errors as a whole: where they are, how they are spread, how they go from step to step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.report.colour import ACCENT, DIVERGING, INK, MUTED, TRUTH, method_colour, method_name
+from analysis.report.model import FrameResult, ReportInput
+from analysis.report.style import WIDTH, figure, image_uri, png_uri, short
+
+Float = NDArray[np.float64]
+
+MARGIN = 24
+"""px left around a cropped picture."""
+WIDEST = 1400
+"""px; pictures are scaled down to this."""
+
+
+def nice_limit(error: Float) -> float:
+    """1, 2 or 5 times a power of ten that holds 98 % of the errors, m; 1 um when there are none."""
+    size = np.abs(error[np.isfinite(error)])
+    top = float(np.percentile(size, 98)) if len(size) else 0.0
+    if top <= 0.0:
+        return 1e-6
+    power = 10.0 ** np.floor(np.log10(top))
+    return float(next(step * power for step in (1, 2, 5, 10) if step * power >= top * (1 - 1e-9)))
+
+
+def cropped(path: Path) -> NDArray[np.uint8]:
+    """(h, w, 3) picture without its white margins."""
+    from PIL import Image
+
+    pixels = np.asarray(Image.open(path).convert("RGB"))
+    drawn = np.any(pixels < 250, axis=2)
+    if not np.any(drawn):
+        return pixels
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    top, left = max(0, rows[0] - MARGIN), max(0, columns[0] - MARGIN)
+    picture = Image.fromarray(pixels[top : rows[-1] + MARGIN, left : columns[-1] + MARGIN])
+    if picture.width > WIDEST:
+        picture = picture.resize((WIDEST, picture.height * WIDEST // picture.width), Image.Resampling.LANCZOS)
+    return np.asarray(picture)
+
+
+def scene_figure(path: Path) -> str:
+    """The scene picture."""
+    return image_uri(cropped(path))
+
+
+def error_map_figure(path: Path, error: Float, limit: float, sigma: float) -> str:
+    """The coloured cloud, and below it the histogram of the same errors, whose bars are the scale of the colours."""
+    import matplotlib
+    from matplotlib.colors import Normalize
+
+    picture = cropped(path)
+    colours, norm = matplotlib.colormaps[DIVERGING], Normalize(-limit * 1e6, limit * 1e6)
+    tall = min(WIDTH * picture.shape[0] / picture.shape[1], 4.6)
+    with figure(tall + 2.0) as made:
+        cloud, histogram = made.subplots(2, 1, height_ratios=(tall, 1.7))
+        cloud.imshow(picture, interpolation="antialiased")
+        cloud.set_axis_off()
+        cloud.set_title("Measured points on the part, coloured by their distance from it")
+        finite = error[np.isfinite(error)] * 1e6
+        edges = np.linspace(-limit * 1.5e6, limit * 1.5e6, 76)
+        counts, _ = np.histogram(np.clip(finite, edges[0], edges[-1]), edges)
+        middle = (edges[1:] + edges[:-1]) / 2
+        histogram.bar(
+            middle, counts, width=np.diff(edges), color=colours(norm(middle)), edgecolor="#9aa5b0", linewidth=0.3
+        )
+        if len(finite) and sigma > 0:
+            normal = np.exp(-0.5 * ((middle - np.median(finite)) / (sigma * 1e6)) ** 2)
+            normal *= len(finite) * (edges[1] - edges[0]) / (sigma * 1e6 * np.sqrt(2 * np.pi))
+            histogram.plot(middle, normal, color=INK, lw=0.9, label="normal distribution of the robust sigma")
+            histogram.legend(loc="upper right")
+        histogram.axvline(0, color=TRUTH, lw=1.2)
+        histogram.set(xlabel="signed distance from the surface (µm), the colours of the picture; + towards the camera")
+        histogram.set(ylabel="points", xlim=(edges[0], edges[-1]))
+        histogram.set_title("Distribution of the errors (the outermost bars hold all that lies beyond)")
+        return png_uri(made)
+
+
+def steps_figure(report: ReportInput) -> str:
+    """Depth error and completeness from step to step."""
+    steps = [frame.step for frame in report.frames]
+    style: dict[str, Any] = {"lw": 1.1, "marker": "o", "ms": 2.6 if len(steps) < 60 else 0}
+    with figure(2.9) as made:
+        error, rows = made.subplots(2, 1, sharex=True, height_ratios=(1.6, 1))
+        for i, laser in enumerate(report.scene.lasers):
+            results = [frame.lasers[i].extractions[0].errors for frame in report.frames]
+            line = ("-", "--", ":", "-.")[i % 4]
+            name = "" if len(report.scene.lasers) == 1 else f", {short(laser.name)}"
+            colour = method_colour(report.frames[0].lasers[i].extractions[0].line.method)
+            rmse = [result.depth_z.rmse * 1e6 for result in results]
+            bias = [result.depth_z.bias * 1e6 for result in results]
+            error.plot(steps, rmse, ls=line, color=colour, label=f"RMSE{name}", **style)
+            error.plot(steps, bias, ls=line, color=MUTED, label=f"bias{name}", **style)
+            rows.plot(steps, [100 * result.completeness for result in results], ls=line, color=ACCENT, **style)
+        shown = report.shown_frame().step
+        for axes in (error, rows):
+            axes.axvline(shown, color=INK, lw=0.6, ls=":")
+        error.axhline(0, color=TRUTH, lw=1)
+        error.annotate(
+            "shown in detail", (shown, 1), (3, -2), xycoords=("data", "axes fraction"), textcoords="offset points",
+            fontsize=6.5, color=MUTED, va="top",
+        )  # fmt: skip
+        error.set(ylabel="depth error (µm)")
+        error.legend(loc="best", ncols=4)
+        rows.set(ylabel="complete (%)", xlabel="step", ylim=(0, 104))
+        return png_uri(made)
+
+
+def methods_figure(frame: FrameResult, laser: int) -> str:
+    """Distribution of the position error of several methods on the same image."""
+    extractions = frame.lasers[laser].extractions
+    errors = [np.abs(e.errors.position[np.isfinite(e.errors.position)]) for e in extractions]
+    with figure(2.1) as made:
+        axes = made.subplots()
+        for extraction, error in zip(extractions, errors, strict=True):
+            if len(error):
+                level = (np.arange(len(error)) + 1) / len(error) * 100
+                colour = method_colour(extraction.line.method)
+                axes.plot(np.sort(error), level, color=colour, lw=1.5, label=method_name(extraction.line.method))
+        positive = np.concatenate([np.zeros(0), *errors])
+        if np.any(positive > 0):
+            axes.set_xscale("log")
+            axes.set_xlim(left=max(1e-4, float(np.percentile(positive[positive > 0], 2))))
+        axes.set(xlabel="size of the position error (px)", ylabel="of the points (%)", ylim=(0, 101))
+        axes.legend(loc="best")
+        return png_uri(made)

@@ -1,0 +1,150 @@
+"""Draws the 3D pictures with VTK in a process of its own: where a graphics library is missing, VTK ends the process.
+
+python -m analysis.report.picture FOLDER      reads FOLDER/job.npz, writes FOLDER/scene.png and FOLDER/cloud.png
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.report.colour import ACCENT, DIVERGING, INK, SLATE, STEEL
+from analysis.report.view import SceneView, View
+
+Float = NDArray[np.float64]
+
+SIZE = (1700, 1050)
+TIME_LIMIT = 60.0
+"""s; drawing takes 3. Without a graphics card a mesh of millions takes longer, but not this long."""
+
+
+def start(folder: Path, vertices: Float, triangles: NDArray[np.int32], scene: SceneView, cloud: Float, error: Float,
+          view: View, limit: float) -> subprocess.Popen[bytes]:  # fmt: skip
+    """Begin to draw both pictures; `limit` is the error at the colours' ends, m."""
+    arrays: dict[str, Any] = {
+        "vertices": vertices, "triangles": triangles, "frustum": scene.frustum, "emitters": scene.emitters,
+        "colours": np.array(scene.colours).reshape(-1, 3), "cloud": cloud, "error": error, "limit": np.array(limit),
+        "scene_view": _pack(scene.view), "cloud_view": _pack(view),
+    }  # fmt: skip
+    for i, (corners, faces) in enumerate(scene.sheets):
+        arrays |= {f"sheet{i}": corners, f"faces{i}": faces, f"edges{i}": scene.edges[i], f"curve{i}": scene.curves[i]}
+    np.savez(folder / "job.npz", **arrays)
+    root = Path(__file__).resolve().parents[2]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])}
+    return subprocess.Popen(
+        [sys.executable, "-m", "analysis.report.picture", str(folder)],
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def finish(process: subprocess.Popen[bytes], folder: Path) -> tuple[Path, Path] | None:
+    """The two pictures, or None when they could not be drawn here."""
+    try:
+        code = process.wait(TIME_LIMIT)
+    except subprocess.TimeoutExpired:
+        code = 1
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+    made = folder / "scene.png", folder / "cloud.png"
+    return made if code == 0 and all(path.is_file() for path in made) else None
+
+
+def _pack(view: View) -> Float:
+    return np.stack([view.eye, view.target, view.up, view.low, view.high])
+
+
+def _plotter(job: Any, name: str, colour: str, mesh_alpha: float) -> Any:
+    import pyvista as pv
+
+    plotter = pv.Plotter(off_screen=True, window_size=[SIZE[0], SIZE[1]], lighting="three lights")
+    plotter.set_background("white")
+    if len(job["triangles"]):
+        mesh = pv.PolyData.from_regular_faces(job["vertices"], job["triangles"])
+        plotter.add_mesh(mesh, color=colour, ambient=0.25, diffuse=0.75, specular=0.1, opacity=mesh_alpha)
+    eye, target, up, low, high = job[name]
+    plotter.camera_position = [eye, target, up]
+    plotter.reset_camera(bounds=np.stack([low, high], axis=1).ravel().tolist(), render=False)
+    plotter.enable_anti_aliasing("msaa", multi_samples=8)
+    return plotter
+
+
+def draw_scene(job: Any, path: Path) -> None:
+    """Objects, camera with what it sees, laser sheets and the exact line."""
+    import pyvista as pv
+
+    plotter = _plotter(job, "scene_view", STEEL, 1.0)
+    centre, corners = job["frustum"][0], job["frustum"][1:]
+    size = 0.16 * float(np.linalg.norm(corners[0] - centre))
+    for corner in corners:
+        plotter.add_mesh(pv.Line(centre, corner), color=ACCENT, line_width=2, opacity=0.5)
+    body = centre + 0.16 * (corners - centre)
+    pyramid = pv.PolyData.from_regular_faces(
+        np.concatenate([centre[None], body]), np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
+    )
+    plotter.add_mesh(pyramid, color=ACCENT, opacity=0.85, ambient=0.5)
+    around = np.concatenate([corners, corners[:1]])
+    plotter.add_mesh(pv.MultipleLines(around), color=ACCENT, line_width=2, opacity=0.5)
+    # beside the apex, away from what it looks at
+    labels, places = ["camera"], [centre - 0.04 * (corners.mean(axis=0) - centre)]
+    for i, colour in enumerate(job["colours"]):
+        emitter = job["emitters"][i]
+        plotter.add_mesh(pv.Sphere(0.11 * size, emitter), color=colour, ambient=0.6)
+        plotter.add_mesh(pv.MultipleLines(job[f"edges{i}"]), color=colour, line_width=2, opacity=0.6)
+        if len(job[f"faces{i}"]):
+            sheet = pv.PolyData.from_regular_faces(job[f"sheet{i}"], job[f"faces{i}"])
+            plotter.add_mesh(sheet, color=colour, opacity=0.22, lighting=False)
+        if len(job[f"curve{i}"]):
+            segments = job[f"curve{i}"].reshape(-1, 3)
+            plotter.add_mesh(pv.line_segments_from_points(segments), color=colour, line_width=7, lighting=False)
+        labels.append("laser" if len(job["colours"]) == 1 else f"laser {i + 1}")
+        places.append(emitter - 0.04 * (job[f"edges{i}"][[0, 2]].mean(axis=0) - emitter))
+    plotter.add_point_labels(
+        np.array(places), labels, font_size=32, text_color=INK, shape=None, show_points=False, always_visible=True
+    )
+    plotter.renderer.ResetCameraClippingRange()
+    plotter.screenshot(str(path))
+    plotter.close()
+
+
+def draw_cloud(job: Any, path: Path) -> None:
+    """Measured points coloured by their signed distance, over the objects."""
+    import pyvista as pv
+
+    plotter = _plotter(job, "cloud_view", SLATE, 1.0)
+    if len(job["cloud"]):
+        # a little towards the eye, so that the points lie over the surface whose error they show
+        eye = job["cloud_view"][0]
+        towards = eye - job["cloud_view"][1]
+        reach = float(np.linalg.norm(job["cloud_view"][4] - job["cloud_view"][3]))
+        points = pv.PolyData(job["cloud"] + 0.004 * reach * towards / np.linalg.norm(towards))
+        points["error"] = job["error"]
+        limit = float(job["limit"])
+        dense = len(job["cloud"]) > 20_000
+        plotter.add_mesh(
+            points, scalars="error", cmap=DIVERGING, clim=(-limit, limit), nan_color="#f0c000", show_scalar_bar=False,
+            point_size=4 if dense else 8, render_points_as_spheres=True, lighting=False,
+        )  # fmt: skip
+    plotter.renderer.ResetCameraClippingRange()
+    plotter.screenshot(str(path))
+    plotter.close()
+
+
+def main(folder: Path) -> None:
+    """Draw both pictures of a job."""
+    with np.load(folder / "job.npz", allow_pickle=False) as job:
+        draw_scene(job, folder / "scene.png")
+        draw_cloud(job, folder / "cloud.png")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,189 @@
+"""The report's tables: measures, steps, what was scanned with what, and what it cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.measures import Measures
+from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
+from analysis.report.model import ReportInput, Tables
+from analysis.report.summary import chosen, total
+from analysis.report.units import (
+    NONE,
+    count,
+    degrees,
+    digits,
+    micrometres,
+    millimetres,
+    milliseconds,
+    milliwatts,
+    percent,
+    seconds,
+)
+from render.laser import Divergence
+from render.shape import MeshFile
+
+MOST_STEPS = 24
+MEASURE_COLUMNS = ("n", "bias", "sigma", "RMSE", "robust sigma", "P95", "outliers", "lag 1", "within ±2 sigma")
+
+
+@dataclass(frozen=True)
+class MethodTable:
+    """All measures of one method on one laser's images."""
+
+    name: str
+    colour: str
+    rows: list[tuple[str, list[str]]]
+    """Quantity with its unit, and its cells in the order of `MEASURE_COLUMNS`."""
+    lines: list[tuple[str, str]]
+    """Counts of scan lines."""
+
+
+def measure_tables(report: ReportInput) -> list[MethodTable]:
+    """One for each laser and method."""
+    tables = []
+    for i, laser in enumerate(report.scene.lasers):
+        for k in range(max((len(frame.lasers[i].extractions) for frame in report.frames), default=0)):
+            found = total(chosen(report, i, k))
+            prefix = f"{laser.name}: " if len(report.scene.lasers) > 1 else ""
+            rows = [
+                ("position, px", _cells(found.u, 1.0)),
+                ("depth_z, µm", _cells(found.depth_z, 1e6)),
+                ("off the surface, µm", _cells(found.surface, 1e6)),
+            ]
+            lines = [
+                ("with a line to be seen", count(found.truth_rows)),
+                ("with a point", count(found.valid_rows)),
+                ("rightly measured", f"{count(found.measured_rows)} ({percent(found.completeness)})"),
+                ("with a point but no line", count(found.false_rows)),
+            ]
+            tables.append(MethodTable(prefix + method_name(found.method), method_colour(found.method), rows, lines))
+    return tables
+
+
+def _cells(m: Measures, scale: float) -> list[str]:
+    lengths = [digits(scale * value) for value in (m.bias, m.sigma, m.rmse, m.robust_sigma, m.p95)]
+    lag = f"{m.autocorrelation:.2f}" if np.isfinite(m.autocorrelation) else NONE
+    return [count(m.count), *lengths, percent(m.outlier_rate), lag, percent(m.coverage)]
+
+
+def step_table(report: ReportInput) -> tuple[list[str], list[list[str]], bool]:
+    """Header, rows, and whether steps were left out; the first method, all lasers together."""
+    header = ["step", "points", "complete", "bias", "sigma", "RMSE", "P95", "outliers"]
+    picked = np.unique(np.linspace(0, len(report.frames) - 1, min(MOST_STEPS, len(report.frames))).astype(int))
+    rows = []
+    for i in picked:
+        frame = report.frames[i]
+        found = total([laser.extractions[0] for laser in frame.lasers])
+        m = found.depth_z
+        rows.append(
+            [str(frame.step), count(found.points), percent(found.completeness)]
+            + [micrometres(value) for value in (m.bias, m.sigma, m.rmse, m.p95)]
+            + [percent(m.outlier_rate)]
+        )
+    return header, rows, len(picked) < len(report.frames)
+
+
+def scene_tables(report: ReportInput) -> Tables:
+    """Camera, lasers, objects, light, motion, sensor, and the caller's own settings."""
+    scene, camera = report.scene, report.scene.camera
+    lens = camera.lens
+    focus = "far away" if lens.focus_distance is None else millimetres(lens.focus_distance)
+    shape = f"fx {camera.fx:.2f}, fy {camera.fy:.2f}, cx {camera.cx:.2f}, cy {camera.cy:.2f}, skew {camera.skew:.3g} px"
+    tables: Tables = {
+        "Camera": {
+            "Image": f"{camera.width} × {camera.height} px of {micrometres(camera.pixel_pitch)}",  # noqa: RUF001
+            "Intrinsics": shape + " (pixel centres at integers)",
+            "Image distance": millimetres(camera.fx * camera.pixel_pitch),
+            "Distortion": ", ".join(f"{c:.6g}" for c in camera.distortion) if camera.has_distortion else "none",
+            "Lens": f"f/{lens.f_number:g}, transmission {lens.transmission:g}, focused {focus}",
+        }
+    }
+    for i, laser in enumerate(scene.lasers):
+        plane = scene.laser_plane(i)
+        offset = scene.T_camera_laser(i)[:3, 3]
+        sheet = laser.sheet
+        thickness = (
+            f"divergence {sheet.full_angle * 1e3:.3g} mrad (full, 1/e²)"
+            if isinstance(sheet, Divergence)
+            else f"waist {micrometres(sheet.radius)} at {millimetres(sheet.focus_distance)}, M² {sheet.m_squared:g}"
+        )
+        tables[f"Laser “{laser.name}”"] = {
+            "Light": f"{milliwatts(laser.power)} at {laser.wavelength_nm:g} nm",
+            "Fan": f"{degrees(laser.fan_angle)}, {laser.fan_profile}",
+            "Sheet": thickness,
+            "Distance from the camera": millimetres(float(np.linalg.norm(offset))),
+            "Plane in the camera frame": ", ".join(f"{value:.6f}" for value in plane[:3])
+            + f"; {millimetres(plane[3], 6)}",
+        }
+    triangles = np.bincount(report.object_id, minlength=len(scene.visible_objects))
+    things = {}
+    for i, item in enumerate(scene.visible_objects):
+        what = item.shape.path if isinstance(item.shape, MeshFile) else item.shape.kind.replace("_", " ")
+        number = f", {count(float(triangles[i]))} triangles"
+        things[item.name] = f"{what}{number}, {item.material.kind}"
+    tables["Objects"] = things or {"Objects": "none"}
+    bands = ", ".join(f"{value:g}" for value in scene.environment.radiance)
+    tables["Light and motion"] = {
+        "Environment": f"{bands} W/(m² sr) in R, G, B" if any(scene.environment.radiance) else "dark",
+        **{light.name: light.kind + " light" for light in scene.lights},
+        "Motion": _motion(report),
+    }
+    if report.sensor is not None:
+        sensor = report.sensor
+        tables["Sensor"] = {
+            "Type": f"{sensor.colour}, {sensor.bits} bit, {digits(sensor.dn_per_electron)} DN/e⁻",
+            "Exposure": milliseconds(sensor.exposure_time),
+            "Full well": f"{count(sensor.full_well)} e⁻",
+            "Noise": f"read {sensor.read_noise:g} e⁻, dark {sensor.dark_current:g} e⁻/s",
+            "Non-uniformity": f"PRNU {percent(sensor.prnu)}, DSNU {sensor.dsnu:g} e⁻",
+            "Filter": "none"
+            if sensor.band_pass is None
+            else f"{sensor.band_pass.centre_nm:g} nm, {sensor.band_pass.width_nm:g} nm wide",
+        }
+    return tables | report.settings
+
+
+def _motion(report: ReportInput) -> str:
+    motion = report.scene.motion
+    if motion.kind == "none":
+        return "none"
+    moving = "the objects move" if motion.moves == "objects" else "the rig moves"
+    return f"{motion.kind}, {moving}, {len(report.frames)} frames"
+
+
+def laser_chips(report: ReportInput) -> list[tuple[str, str]]:
+    """Name with wavelength and power, and the colour of its light."""
+    return [
+        (f"{laser.name}, {laser.wavelength_nm:g} nm, {milliwatts(laser.power)}",
+         hex_colour(wavelength_colour(laser.wavelength_nm)))
+        for laser in report.scene.lasers
+    ]  # fmt: skip
+
+
+def timing(report: ReportInput) -> tuple[list[tuple[str, str, float]], str]:
+    """Stage, time, share of the longest (0 to 1), longest first; and the total."""
+    spent = dict(report.seconds)
+    for frame in report.frames:
+        for stage, value in frame.seconds.items():
+            spent[stage] = spent.get(stage, 0.0) + value
+    longest = max(spent.values(), default=0.0) or 1.0
+    rows = sorted(spent.items(), key=lambda item: -item[1])
+    return [(stage, seconds(value), value / longest) for stage, value in rows], seconds(sum(spent.values()))
+
+
+def counts(report: ReportInput) -> list[tuple[str, str]]:
+    """What the renderer counted: sums over the frames, means of errors and fractions."""
+    names = list(dict.fromkeys(name for frame in report.frames for name in frame.counts))
+    rows = []
+    for name in names:
+        values = [frame.counts[name] for frame in report.frames if name in frame.counts]
+        if "error" in name or "fraction" in name:
+            rows.append((name, percent(float(np.mean(values)), 2)))
+        elif "seconds" in name:
+            rows.append((name, seconds(float(np.sum(values)))))
+        else:
+            rows.append((name, count(float(np.sum(values)))))
+    return rows

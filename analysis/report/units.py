@@ -1,0 +1,70 @@
+"""Numbers as people read them: um, mm, deg, mW, ms. The only place where SI leaves the program."""
+
+from __future__ import annotations
+
+import math
+
+NONE = "–"  # noqa: RUF001 - a dash in a table
+
+
+def digits(value: float, significant: int = 3) -> str:
+    """A number with so many significant digits, no exponent between 1e-4 and 1e6."""
+    if not math.isfinite(value):
+        return NONE
+    if value == 0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if not -5 < size < 6:
+        return f"{value:.{significant - 1}e}"
+    return f"{value:.{max(0, significant - 1 - size)}f}"
+
+
+def micrometres(value: float, significant: int = 3) -> str:
+    """m -> "21.7 µm", or mm from 10 mm on."""
+    if not math.isfinite(value):
+        return NONE
+    return f"{digits(value * 1e3, significant)} mm" if abs(value) >= 0.01 else f"{digits(value * 1e6, significant)} µm"
+
+
+def millimetres(value: float, significant: int = 4) -> str:
+    """m -> "866 mm"."""
+    return f"{digits(value * 1e3, significant)} mm" if math.isfinite(value) else NONE
+
+
+def pixels(value: float, significant: int = 3) -> str:
+    """px -> "0.0252 px"."""
+    return f"{digits(value, significant)} px" if math.isfinite(value) else NONE
+
+
+def degrees(value: float, significant: int = 4) -> str:
+    """rad -> "45°"."""
+    return f"{math.degrees(value):.{significant}g}°" if math.isfinite(value) else NONE
+
+
+def milliwatts(value: float) -> str:
+    """W -> "20 mW"."""
+    return f"{value * 1e3:.4g} mW"
+
+
+def milliseconds(value: float) -> str:
+    """s -> "3.8 ms"."""
+    return f"{value * 1e3:.4g} ms"
+
+
+def seconds(value: float) -> str:
+    """s -> "0.07 s", "12.3 s", "3 min 4 s"."""
+    if value >= 120:
+        return f"{int(value // 60)} min {value % 60:.0f} s"
+    return f"{value:.2f} s" if value < 10 else f"{value:.1f} s"
+
+
+def percent(value: float, decimals: int = 1) -> str:
+    """Fraction -> "98.2 %"."""
+    return f"{100 * value:.{decimals}f} %" if math.isfinite(value) else NONE
+
+
+def count(value: float) -> str:
+    """Thousands set apart by thin spaces: "1 820"; from 10 million on "191 million"."""
+    if value >= 1e7:
+        return f"{value / 1e6:,.0f} million".replace(",", "\u2009")
+    return f"{value:,.0f}".replace(",", "\u2009")

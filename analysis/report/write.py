@@ -1,0 +1,183 @@
+"""Writes the report: one self-contained HTML file, and the same as PDF."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.report import picture, plain_picture
+from analysis.report.colour import method_colour, method_name
+from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
+from analysis.report.glossary import GLOSSARY
+from analysis.report.line_figures import camera_figure, profile_figure, three_panel_figure, zoom_figure
+from analysis.report.model import FrameResult, ReportInput
+from analysis.report.style import plain
+from analysis.report.summary import Total, chosen, headline, remarks, total
+from analysis.report.tables import (
+    MEASURE_COLUMNS,
+    counts,
+    laser_chips,
+    measure_tables,
+    scene_tables,
+    step_table,
+    timing,
+)
+from analysis.report.units import count, micrometres, percent
+from analysis.report.view import cloud_view, placed_vertices, scene_view
+from render.files import atomic_write
+
+MOST_DETAILS = 4
+"""Lasers shown in detail."""
+PLAIN_NOTE = "Drawn in a simple way, because this machine has no library to draw 3D pictures off-screen."
+
+
+def write_report(folder: Path | str, report: ReportInput) -> tuple[Path, Path]:
+    """Write `report.html` and `report.pdf` into a folder (made if missing); returns their paths.
+
+    The HTML holds all its pictures and refers to nothing outside itself. InputError: a file cannot be written.
+    """
+    page = render_page(report)
+    html, pdf = Path(folder) / "report.html", Path(folder) / "report.pdf"
+    with atomic_write(html) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    with atomic_write(pdf) as temporary:
+        _write_pdf(page, temporary)
+    return html, pdf
+
+
+def render_page(report: ReportInput) -> str:
+    """The report as one HTML page."""
+    import jinja2
+    from markupsafe import Markup
+
+    here = Path(__file__).parent
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(here), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=False
+    )
+    style = (here / "style.css").read_text(encoding="utf-8")
+    page = environment.get_template("template.html").render(style=Markup(style), **_content(report))
+    # a lone surrogate in a name cannot be encoded
+    return page.encode("utf-8", "replace").decode("utf-8")
+
+
+def _content(report: ReportInput) -> dict[str, Any]:
+    frame = report.shown_frame()
+    found = total(chosen(report))
+    view, cloud, error = cloud_view(report)
+    limit = nice_limit(error)
+    scene = scene_view(report, frame)
+    vertices = placed_vertices(report, frame.step)
+    header, rows, cut = step_table(report)
+    plan = [line.strip() for line in frame.plan.splitlines() if line.strip()]
+    left_out = "left out:"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        drawing = (vertices, report.triangles, scene, cloud, error, view, limit)
+        process = picture.start(folder, *drawing)
+        try:  # the other figures, while VTK draws
+            details = [_detail(report, frame, i) for i in range(min(MOST_DETAILS, len(frame.lasers)))]
+            steps = steps_figure(report) if len(report.frames) > 1 else None
+        finally:
+            drawn = picture.finish(process, folder)
+        note = "" if drawn is not None else PLAIN_NOTE
+        scene_png, cloud_png = drawn if drawn is not None else plain_picture.draw(folder, *drawing)
+        pictures = {
+            "scene_picture": scene_figure(scene_png),
+            "map_picture": error_map_figure(cloud_png, error, limit, found.surface.robust_sigma)
+            if len(cloud)
+            else None,
+        }
+    more = len(frame.lasers) - MOST_DETAILS
+    spent, spent_in_all = timing(report)
+    return pictures | {
+        "title": plain(report.title) or "untitled",
+        "facts": _facts(report),
+        "chips": laser_chips(report),
+        "headline": headline(report),
+        "tiles": _tiles(found),
+        "remarks": [*report.notes, *remarks(report)],
+        "several": len(report.frames) > 1,
+        "shown_step": frame.step,
+        "frame_count": len(report.frames),
+        "picture_note": note,
+        "steps_picture": steps,
+        "step_header": header,
+        "step_rows": rows,
+        "steps_cut": cut,
+        "details": details,
+        "details_left_out": f"{more} more lasers are in the tables below." if more > 0 else "",
+        "measure_tables": measure_tables(report),
+        "measure_columns": MEASURE_COLUMNS,
+        "plan_done": [line for line in plan if not line.startswith(left_out)],
+        "plan_left_out": [line.removeprefix(left_out).strip() for line in plan if line.startswith(left_out)],
+        "settings": scene_tables(report),
+        "timing": spent,
+        "time_total": spent_in_all,
+        "counts": counts(report),
+        "repeat": _repeat(report),
+        "glossary": GLOSSARY,
+    }
+
+
+def _detail(report: ReportInput, frame: FrameResult, i: int) -> dict[str, Any]:
+    """Figures and names of one laser in the shown frame."""
+    laser = frame.lasers[i]
+    first = laser.extractions[0]
+    title = "The line and its profile"
+    if len(report.scene.lasers) > 1:
+        title += f": {plain(report.scene.lasers[i].name)}"
+    if len(report.frames) > 1:
+        title += f", step {frame.step}"
+    white = report.display_max
+    if white is None:
+        white = float(np.max(laser.image)) if laser.image is not None else 1.0
+    seen = len(laser.curve.index) > 0 or bool(np.any(first.points.valid))
+    return {
+        "title": title,
+        "method": method_name(first.line.method),
+        "colour": method_colour(first.line.method),
+        "camera": camera_figure(laser, max(white, 1e-9)) if laser.image is not None else None,
+        "zoom": zoom_figure(laser, max(white, 1e-9)) if laser.image is not None else None,
+        "three": three_panel_figure(laser) if seen else None,
+        "profile": profile_figure(laser, report.scene.T_camera_laser(i)) if seen else None,
+        "methods": methods_figure(frame, i) if len(laser.extractions) > 1 else None,
+    }
+
+
+def _facts(report: ReportInput) -> str:
+    camera = report.scene.camera
+    frames = "1 frame" if len(report.frames) == 1 else f"{len(report.frames)} frames"
+    made = f"{report.created} · " if report.created else ""
+    return f"{made}{frames} · camera {camera.width} × {camera.height} px"  # noqa: RUF001
+
+
+def _tiles(found: Total) -> list[tuple[str, str, str]]:
+    if found.depth_z.count == 0:
+        return []
+    depth = found.depth_z
+    return [
+        ("Depth RMSE", micrometres(depth.rmse), f"{found.u.rmse:.3f} px in the image"),
+        ("Depth bias", micrometres(depth.bias, 2), "+ is too far"),
+        ("Depth sigma", micrometres(depth.sigma), f"robust {micrometres(depth.robust_sigma)}"),
+        ("Off the surface", micrometres(found.surface.p95), "95 % are nearer"),
+        ("Complete", percent(found.completeness), f"{count(found.points)} points"),
+    ]
+
+
+def _repeat(report: ReportInput) -> list[tuple[str, str]]:
+    seed = [("seed", str(report.seed))] if report.seed is not None else []
+    return [*seed, *report.versions.items()]
+
+
+def _write_pdf(page: str, path: Path) -> None:
+    import logging
+
+    from weasyprint import HTML
+    from weasyprint.urls import URLFetcher
+
+    logging.getLogger("weasyprint").setLevel(logging.ERROR)
+    # the page refers to nothing outside itself; if it ever did, nothing would be fetched
+    HTML(string=page, url_fetcher=URLFetcher(allowed_protocols=("data",))).write_pdf(path)
