@@ -10,6 +10,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Signal
 
+from render.develop import Image
 from render.errors import InputError
 from render.frame import Frame
 from render.world import World
@@ -30,6 +31,17 @@ class Render:
     measurements: dict[str, list[Measurement]] = field(default_factory=dict)
     """By extraction method: one for each laser."""
     final: bool = True
+    """False while it refines, and when it was stopped early."""
+    name: str = ""
+    """As the history shows it; empty: by its number."""
+    created: str = ""
+    """Time of day, as the history shows it."""
+    image_scale: float = 1.0
+    """`project` is at this scale."""
+    source: Project | None = None
+    """The project at full scale, None: `project` is."""
+    images: list[Image] = field(default_factory=list)
+    """As developed last: one for each laser, or one without any."""
 
 
 class Session(QObject):
@@ -46,6 +58,8 @@ class Session(QObject):
     """`step`, the step of the motion that is looked at, is another one."""
     renders_changed = Signal()
     """A render joined, changed or left the history, or another one is shown."""
+    developed = Signal()
+    """The shown render has new `images`; the measurements of them follow."""
     measured = Signal()
     """The shown render was developed and measured again (power, exposure, method)."""
     message = Signal(str, str)

@@ -1,0 +1,106 @@
+"""What a render can still answer: the sensor, the lens and the lasers' power change without rendering again.
+
+A render is stale when the project has changed in anything else that light meets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from analysis.line.settings import Method
+from render.camera import Lens
+from render.develop import Image, develop
+from render.errors import Cancelled
+from render.frame import Frame
+from render.scene import Scene
+from render.threads import Cancel
+from render.world import World
+from studio.project import Project
+from studio.stages import Clock, Measurement, measure_step, scaled
+
+
+@dataclass(frozen=True)
+class Development:
+    """How to develop a frame: the project as it is now, as far as the frame allows."""
+
+    project: Project
+    """The render's scene with the present sensor, lens and extraction."""
+    laser_power: tuple[float, ...]
+    """W, of each laser."""
+
+
+def is_stale(rendered: Project, now: Project) -> bool:
+    """Another render would show something that developing again cannot. Both projects at full scale."""
+    if rendered is now:
+        return False
+    same_axis = rendered.extraction.axis == now.extraction.axis
+    same_lasers = len(rendered.scene.lasers) == len(now.scene.lasers)
+    if not (same_axis and same_lasers):
+        return True
+    lit = any(
+        a.power == 0.0 < b.power for a, b in zip(rendered.scene.lasers, now.scene.lasers, strict=True)
+    )  # nothing to scale up
+    return lit or _light_path(rendered.scene) != _light_path(now.scene)
+
+
+def _light_path(scene: Scene) -> Scene:
+    """The scene without what developing decides, and without names."""
+    camera = scene.camera.model_copy(update={"lens": Lens()})
+    lasers = tuple(laser.model_copy(update={"power": 1.0, "name": "laser"}) for laser in scene.lasers)
+    objects = tuple(item.model_copy(update={"name": "object"}) for item in scene.visible_objects)
+    lights = tuple(light.model_copy(update={"name": "light"}) for light in scene.lights)
+    rig = scene.rig.model_copy(update={"camera": camera, "lasers": lasers})
+    return scene.model_copy(update={"rig": rig, "objects": objects, "lights": lights})
+
+
+def development(rendered: Project, now: Project, image_scale: float = 1.0) -> Development:
+    """How the project, as it is now, develops a frame of `rendered`, which is at `image_scale`."""
+    now = scaled(now, image_scale)
+    scene = rendered.scene
+    camera = scene.camera.model_copy(update={"lens": now.scene.camera.lens})
+    scene = scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": camera})})
+    # the frame's exact line is along its own axis
+    extraction = now.extraction.model_copy(update={"axis": rendered.extraction.axis})
+    update = {"scene": scene, "sensor": now.sensor, "extraction": extraction, "seed": now.seed}
+    powers = [laser.power for laser in now.scene.lasers]
+    if len(powers) != len(scene.lasers):
+        powers = [laser.power for laser in scene.lasers]
+    allowed = [
+        power if laser.power > 0.0 else 0.0 for power, laser in zip(powers, scene.lasers, strict=True)
+    ]  # a laser that was off left no light
+    return Development(rendered.model_copy(update=update), tuple(allowed))
+
+
+def develop_again(
+    frame: Frame, how: Development, *, noise: bool = True, threads: int | None = None, cancelled: Cancel | None = None
+) -> list[Image]:
+    """One image for each laser, fired one after the other, as in a scan. Raises InputError, Cancelled."""
+    project, images = how.project, []
+    for i in range(len(how.laser_power)):
+        if cancelled is not None and cancelled():
+            raise Cancelled
+        power = [value if i == k else 0.0 for k, value in enumerate(how.laser_power)]
+        seed = (project.seed + i) % 2**63
+        images.append(
+            develop(frame, project.scene, project.sensor, seed=seed, threads=threads, laser_power=power, noise=noise)
+        )
+    if not images:
+        images.append(develop(frame, project.scene, project.sensor, seed=project.seed, threads=threads, noise=noise))
+    return images
+
+
+def measure_again(
+    frame: Frame,
+    world: World,
+    how: Development,
+    images: list[Image],
+    methods: tuple[Method, ...],
+    *,
+    cancelled: Cancel,
+    threads: int | None = None,
+) -> dict[str, list[Measurement]]:
+    """Line, points and errors of every laser's image by each method. Raises InputError, Cancelled."""
+    if not how.laser_power:
+        return {}
+    clock = Clock(progress=lambda stage, done: None, cancelled=cancelled)
+    return {method: measure_step(how.project, frame, world, images, clock, threads, method) for method in methods}
