@@ -1,0 +1,320 @@
+"""A quick low-resolution picture of what the camera sees: shape by a light at the camera, and every laser's line.
+
+The line's radiance is that of a finished frame, averaged over the larger pixels, one ray each; the shape's shading is
+for the eye only.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.beam import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2, fan_density, sheet_sigma
+from render.camera import Camera
+from render.material import reflectance_weights
+from render.pose import invert, transform_points
+from render.scene import Scene
+from render.surface import Surface, reflectance
+from render.threads import map_chunks, thread_count
+
+if TYPE_CHECKING:
+    from studio.preview import Placed
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+Clear = Callable[[Float, Float, Float], NDArray[np.bool_]]
+
+SCALES = (1.0, 0.5, 1 / 3, 0.25, 0.2, 1 / 6, 1 / 8, 0.1, 1 / 12, 1 / 16, 1 / 24, 1 / 32, 1 / 48, 1 / 64)
+FEWEST_PIXELS = 2000
+
+
+@dataclass(frozen=True)
+class PreviewImage:
+    """Arrays (h, w) of the camera `scale` times as large a side; pixel centres as in `Camera.scaled`."""
+
+    scale: float
+    camera: Camera
+    shade: Float32
+    """(h, w, 3) RGB albedo times the cosine between facet and view, 0 where nothing is hit."""
+    laser: tuple[Float32, ...]
+    """For each laser (h, w) radiance, W/(m^2 sr), mean over the pixel."""
+    depth_z: Float32
+    """(h, w) m, NaN where nothing is hit."""
+    object_id: Int
+    """(h, w) index into `scene.visible_objects`, -1 for none."""
+    seconds: float
+
+
+class Speed:
+    """How many pixels a second this machine makes of this scene; learned from every picture."""
+
+    def __init__(self) -> None:
+        self.pixels_per_second = 2e6
+        self._last = 0.0
+
+    def learn(self, pixels: int, seconds: float) -> None:
+        self.pixels_per_second += 0.3 * (pixels / max(seconds, 1e-6) - self.pixels_per_second)
+
+    def scale(self, scene: Scene, seconds: float) -> float:
+        """The largest of SCALES that fits; the one before is kept until clearly wrong, so that nothing flickers."""
+        pixels = scene.camera.width * scene.camera.height
+        allowed = max(self.pixels_per_second * seconds, FEWEST_PIXELS)
+        if self._last and 0.5 * allowed < self._last**2 * pixels < 1.2 * allowed:
+            return self._last
+        self._last = next((s for s in SCALES if s * s * pixels <= allowed), SCALES[-1])
+        return self._last
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def reflectance_at(surface: Surface, triangle: Int, points: Float) -> Float:
+    """(n,) triangles and (n, 3) points on them -> (n, 3) albedo."""
+    out = np.empty((triangle.shape[0], 3))
+    for i in range(triangle.shape[0]):
+        reflectance(surface, triangle[i], points[i, 0], points[i, 1], points[i, 2], out[i])
+    return out
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def mean_across(q: float, slope_u: float, slope_v: float) -> float:
+    """Mean of the unit Gaussian over a pixel in which q changes by the slopes: a box, widened by the lesser slope."""
+    wide, narrow = max(abs(slope_u), abs(slope_v)), min(abs(slope_u), abs(slope_v))
+    sigma = math.sqrt(1.0 + narrow * narrow / 12.0)
+    if abs(q) > SHEET_SIGMAS * sigma + 0.5 * wide:
+        return 0.0
+    if wide < 1e-3 * sigma:
+        return math.exp(-0.5 * (q / sigma) ** 2) * INV_SQRT_2PI / sigma
+    low, high = (q - 0.5 * wide) / (sigma * SQRT2), (q + 0.5 * wide) / (sigma * SQRT2)
+    return 0.5 * (math.erf(high) - math.erf(low)) / wide
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def shade_pixels(
+    surface: Surface,
+    T_object_camera: Float,
+    pixel: Float,
+    directions: Float32,
+    triangle: Int,
+    far: Float32,
+    T_laser_object: Float,
+    beams: Float,
+    weights: Float,
+    shade: Float32,
+    light: Float32,
+) -> None:
+    """Rays (n, 3) that hit (n,) triangles, -1 for none -> far (n,), shade (n, 3), unshadowed laser radiance (l, n).
+
+    pixel (2,): 1 / fx and 1 / fy. Of each laser: pose (l, 4, 4), `LineLaser.packed` (l, 8), weights of R, G, B (l, 3).
+    """
+    v, triangles, m = surface.vertices, surface.triangles, T_object_camera
+    rgb, steps = np.empty(3), np.empty(2)
+    for i in range(triangle.shape[0]):
+        t = triangle[i]
+        if t < 0:
+            continue
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
+        ac0, ac1, ac2 = v[c, 0] - v[a, 0], v[c, 1] - v[a, 1], v[c, 2] - v[a, 2]
+        n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+        length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+        n0, n1, n2 = n0 / length, n1 / length, n2 / length
+        d0, d1, d2 = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
+        facing = n0 * d0 + n1 * d1 + n2 * d2
+        s = (n0 * (v[a, 0] - m[0, 3]) + n1 * (v[a, 1] - m[1, 3]) + n2 * (v[a, 2] - m[2, 3])) / facing
+        far[i] = s
+        p0, p1, p2 = m[0, 3] + s * d0, m[1, 3] + s * d1, m[2, 3] + s * d2
+        reflectance(surface, t, p0, p1, p2, rgb)
+        cosine = abs(facing) / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        for band in range(3):
+            shade[i, band] = cosine * rgb[band]
+        for k in range(beams.shape[0]):
+            w, beam = T_laser_object[k], beams[k]
+            z = w[2, 0] * p0 + w[2, 1] * p1 + w[2, 2] * p2 + w[2, 3]
+            if z <= 1e-9:
+                continue
+            x = w[0, 0] * p0 + w[0, 1] * p1 + w[0, 2] * p2 + w[0, 3]
+            y = w[1, 0] * p0 + w[1, 1] * p1 + w[1, 2] * p2 + w[1, 3]
+            h = fan_density(y / z, beam)
+            if h == 0.0:
+                continue
+            sigma, slope = sheet_sigma(z, beam)
+            q = x / sigma
+            # from one pixel to the next the point moves on the facet by s (e - (n e) / (n d) d)
+            for axis in range(2):
+                e0, e1, e2 = m[0, axis] * pixel[axis], m[1, axis] * pixel[axis], m[2, axis] * pixel[axis]
+                f = (n0 * e0 + n1 * e1 + n2 * e2) / facing
+                g0, g1, g2 = s * (e0 - f * d0), s * (e1 - f * d1), s * (e2 - f * d2)
+                dx, dz = w[0, 0] * g0 + w[0, 1] * g1 + w[0, 2] * g2, w[2, 0] * g0 + w[2, 1] * g1 + w[2, 2] * g2
+                steps[axis] = (dx - q * slope * dz) / sigma
+            mean = mean_across(q, steps[0], steps[1])
+            if mean == 0.0:
+                continue
+            # the facet's normal in the laser's frame; laser and camera must be on the same side of it
+            l0 = w[0, 0] * n0 + w[0, 1] * n1 + w[0, 2] * n2
+            l1 = w[1, 0] * n0 + w[1, 1] * n1 + w[1, 2] * n2
+            l2 = w[2, 0] * n0 + w[2, 1] * n1 + w[2, 2] * n2
+            if not facing * (l0 * x + l1 * y + l2 * z) > 0.0:
+                continue
+            flux = beam[0] * h / (z * sigma) * abs(l0 * q * slope + l1 * y / z + l2)
+            albedo = weights[k, 0] * rgb[0] + weights[k, 1] * rgb[1] + weights[k, 2] * rgb[2]
+            light[k, i] = flux * mean * albedo / math.pi
+
+
+def preview_image(
+    scene: Scene,
+    step: int,
+    placed: Sequence[Placed],
+    clear: Clear,
+    scale: float,
+    speed: Speed,
+    threads: int | None = None,
+) -> PreviewImage:
+    """One ray a pixel of the scaled camera, against each object in its own frame."""
+    start_time = time.perf_counter()
+    camera = scene.camera.scaled(scale)
+    n = camera.width * camera.height
+    normalised = pixel_rays(camera.width, camera.height, *_optics(camera))
+    shade, far = np.zeros((n, 3), np.float32), np.full(n, np.inf, np.float32)
+    triangle, owner = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
+    light = np.zeros((len(scene.lasers), n), np.float32)
+    views = [_View(item, scene, step) for item in placed]
+    pixel = np.array([1.0 / camera.fx, 1.0 / camera.fy])
+    beams = np.array([laser.packed() for laser in scene.lasers]).reshape(-1, 8)
+    weights = np.array([reflectance_weights(laser.wavelength_nm) for laser in scene.lasers]).reshape(-1, 3)
+
+    def work(begin: int, end: int) -> None:
+        mine = slice(begin, end)
+        _trace(views, normalised[mine], far[mine], triangle[mine], owner[mine])
+        for k, view in enumerate(views):
+            hit = np.where(owner[mine] == k, triangle[mine], np.int32(-1))
+            if (hit >= 0).any():
+                part = np.zeros((len(scene.lasers), end - begin), np.float32)
+                shade_pixels(
+                    view.item.body.surface,
+                    view.T_object_camera,
+                    pixel,
+                    view.directions(normalised[mine]),
+                    hit,
+                    far[mine],
+                    view.T_laser_object,
+                    beams,
+                    weights,
+                    shade[mine],
+                    part,
+                )
+                light[:, mine] += part
+
+    map_chunks(work, n, max(4096, -(-n // (2 * thread_count(threads)))), threads)
+    for i in range(len(scene.lasers)):
+        _shadow(light[i], views, normalised, triangle, owner, scene.T_world_laser(i, step)[:3, 3], clear)
+    depth = np.where(owner >= 0, far, np.float32(np.nan))
+    index = np.array([*(item.index for item in placed), -1], dtype=np.int32)
+    seconds = time.perf_counter() - start_time
+    speed.learn(n, seconds)
+    shape = (camera.height, camera.width)
+    return PreviewImage(
+        scale,
+        camera,
+        shade.reshape(*shape, 3),
+        tuple(image.reshape(shape) for image in light),
+        depth.reshape(shape),
+        index[owner].reshape(shape),
+        seconds,
+    )
+
+
+def pixel_rays(width: int, height: int, optics: tuple[float, ...], distortion: tuple[float, ...]) -> Float:
+    """(h w, 2) undistorted (X/Z, Y/Z) of every pixel centre, NaN where there is no ray; read-only."""
+    return _pixel_rays(width, height, optics, distortion)
+
+
+@lru_cache(maxsize=4)
+def _pixel_rays(width: int, height: int, optics: tuple[float, ...], distortion: tuple[float, ...]) -> Float:
+    fx, fy, cx, cy, skew = optics
+    camera = Camera(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy, skew=skew, distortion=distortion)
+    pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(np.float64)
+    normalised = camera.normalise(pixels)[0].reshape(-1, 2)
+    normalised.flags.writeable = False
+    return normalised
+
+
+def _optics(camera: Camera) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return (camera.fx, camera.fy, camera.cx, camera.cy, camera.skew), camera.distortion
+
+
+class _View:
+    """The camera in an object's frame, and the part of the image that the object's box can cover."""
+
+    def __init__(self, item: Placed, scene: Scene, step: int) -> None:
+        self.item = item
+        self.T_object_camera = item.T_object_world @ scene.T_world_camera(step)
+        self.T_laser_object = np.zeros((len(scene.lasers), 4, 4))
+        for i in range(len(scene.lasers)):
+            self.T_laser_object[i] = invert(scene.T_world_laser(i, step)) @ item.T_world_object
+        corners = np.stack(np.meshgrid(*item.body.bounds.T), axis=-1).reshape(-1, 3)
+        points = transform_points(invert(self.T_object_camera), corners)
+        self.behind = bool(points[:, 2].max() <= 0.0)
+        self.low, self.high = np.full(2, -np.inf), np.full(2, np.inf)
+        if points[:, 2].min() > 1e-6:
+            flat = points[:, :2] / points[:, 2:]
+            margin = 1e-6 + 1e-3 * np.ptp(flat, axis=0)
+            self.low, self.high = flat.min(axis=0) - margin, flat.max(axis=0) + margin
+
+    def directions(self, normalised: Float) -> Float32:
+        """(n, 2) -> (n, 3) in the object's frame, not unit: a hit's distance is then depth_z."""
+        R = self.T_object_camera[:3, :3]
+        return np.ascontiguousarray(normalised @ R[:, :2].T + R[:, 2], dtype=np.float32)
+
+
+def _trace(views: list[_View], normalised: Float, far: Float32, triangle: Int, owner: Int) -> None:
+    """Nearest hit of each ray over all objects, in place."""
+    has_ray = np.isfinite(normalised[:, 0])
+    for k, view in enumerate(views):
+        if view.behind:
+            continue
+        with np.errstate(invalid="ignore"):
+            some = np.flatnonzero(np.all((normalised >= view.low) & (normalised <= view.high), axis=1) & has_ray)
+        if len(some) == 0:
+            continue
+        rays = view.item.body.rays
+        origin = np.broadcast_to((view.T_object_camera[:3, 3] - rays.centre).astype(np.float32), (len(some), 3))
+        hit, distance = rays.intersect(origin, view.directions(normalised[some]), far[some])
+        found = np.flatnonzero(hit >= 0)
+        chosen = some[found]
+        far[chosen], triangle[chosen], owner[chosen] = distance[found], hit[found], k
+
+
+def _shadow(
+    light: Float32,
+    views: list[_View],
+    normalised: Float,
+    triangle: Int,
+    owner: Int,
+    laser: Float,
+    clear: Clear,
+) -> None:
+    """Darken, in place, the pixels that something keeps the laser from."""
+    lit = np.flatnonzero(light)
+    points, normals = np.empty((len(lit), 3)), np.empty((len(lit), 3))
+    for k, view in enumerate(views):
+        mine = np.flatnonzero(owner[lit] == k)
+        surface, T = view.item.body.surface, view.item.T_world_object
+        direction = normalised[lit[mine]] @ view.T_object_camera[:3, :2].T + view.T_object_camera[:3, 2]
+        origin = view.T_object_camera[:3, 3]
+        corners = surface.vertices[surface.triangles[triangle[lit[mine]]]]
+        facet = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        facing = np.einsum("ij,ij->i", facet, direction)
+        # in float64, or a rounded point lies in its own shadow
+        distance = np.einsum("ij,ij->i", facet, corners[:, 0] - origin) / facing
+        points[mine] = transform_points(T, origin + distance[:, None] * direction)
+        facet *= -np.sign(facing)[:, None]
+        normals[mine] = facet / np.linalg.norm(facet, axis=1, keepdims=True) @ T[:3, :3].T
+    light[lit[~clear(points, normals, laser - points)]] = 0.0
