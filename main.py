@@ -12,11 +12,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from studio.system import message, missing_needs, missing_python_package
-
 try:
     import click
+
+    from studio.system import message, missing_needs, missing_python_package
+except KeyboardInterrupt:
+    sys.exit(130)
 except ModuleNotFoundError as missing:
+    from studio.system import missing_python_package
+
     print(missing_python_package(missing.name), file=sys.stderr)
     sys.exit(2)
 
@@ -45,7 +49,7 @@ def _report_error(error: BaseException, context: click.Context) -> int:
 
     options = context.find_root().meta
     details: dict[str, Any] = {}
-    if isinstance(error, BrokenPipeError):
+    if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter complains when it closes
         return BROKEN_PIPE
     if isinstance(error, (KeyboardInterrupt, Cancelled, click.Abort)):
