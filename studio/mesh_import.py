@@ -1,0 +1,133 @@
+"""A mesh file from anywhere becomes part of the project: copied beside it with its side files, its unit judged."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import unquote
+
+import numpy as np
+
+from render.errors import InputError
+from render.files import atomic_write, sha256
+from render.mesh_files import LARGE_EXTENT, load_mesh
+from render.mesh_reader import EXTENSIONS, read_parts
+from render.scene import SceneObject
+from render.shape import UNITS, MeshFile, Unit
+
+FOLDER = "meshes"
+TOO_LARGE = 5.0
+"""Times the camera's view; a mesh larger than that in metres is taken for millimetres."""
+
+
+@dataclass(frozen=True)
+class ImportedMesh:
+    """path: relative to the project, with slashes; bounds: lowest and highest corner, m, in that unit."""
+
+    path: str
+    unit: Unit
+    bounds: tuple[tuple[float, ...], tuple[float, ...]]
+    triangles: int
+
+    @property
+    def size(self) -> tuple[float, ...]:
+        return tuple(high - low for low, high in zip(*self.bounds, strict=True))
+
+
+def is_mesh(file: Path) -> bool:
+    """By its suffix."""
+    return file.suffix[1:].lower() in EXTENSIONS
+
+
+def needs_copy(file: Path, root: Path) -> bool:
+    """The file is outside the project's folder, where a project may not read."""
+    return not file.resolve().is_relative_to(root.resolve())
+
+
+def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
+    """Copy a mesh (where needed), read and judge it. Takes as long as reading does.
+
+    root: the project's folder; a file from outside is copied into `meshes/` in it, with its material, buffer and image
+    files; view: width of what the camera sees, m, to tell metres from millimetres. What was copied is removed again if
+    the mesh is no good. InputError: no mesh, damaged, or the folder cannot be written.
+    """
+    if not is_mesh(file):
+        allowed = ", ".join(f".{name}" for name in EXTENSIONS)
+        raise InputError("this is not a mesh file", where=str(file), found=file.suffix or file.name, allowed=allowed)
+    if not file.is_file():
+        raise InputError("there is no such file", where=str(file))
+    made: list[Path] = []
+    try:
+        inside = _copied(file, root, made) if needs_copy(file, root) else file.resolve()
+        return _judged(inside, root, view)
+    except BaseException:
+        for copy in made:
+            copy.unlink(missing_ok=True)
+        raise
+
+
+def side_files(file: Path) -> list[str]:
+    """Files that a mesh file names: OBJ materials with their images, glTF buffers and images."""
+    suffix = file.suffix.lower()
+    if suffix == ".gltf":
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            entries = [*data.get("buffers", []), *data.get("images", [])]
+            uris = [unquote(entry["uri"]) for entry in entries if not entry.get("uri", "data:").startswith("data:")]
+        except (ValueError, AttributeError, TypeError):
+            return []  # reading it will tell what is wrong
+        return uris
+    if suffix != ".obj":
+        return []
+    libraries = _words_after(file, r"mtllib")
+    images = [name for library in libraries for name in _words_after(file.parent / library, r"(?:map_\w+|bump|disp)")]
+    return libraries + images
+
+
+def _words_after(file: Path, keyword: str) -> list[str]:
+    """The last word of each line that begins with a keyword."""
+    pattern = re.compile(rf"\s*{keyword}\s+(?:.*\s)?(\S+)\s*", re.IGNORECASE)
+    try:
+        with open(file, encoding="utf-8", errors="replace") as lines:
+            return [match[1].replace("\\", "/") for line in lines if (match := pattern.fullmatch(line))]
+    except OSError:
+        return []
+
+
+def _copied(file: Path, root: Path, made: list[Path]) -> Path:
+    """The file in the project's mesh folder; the same bytes there are used again, another file of that name is kept."""
+    folder = root / FOLDER
+    sides = [name for name in side_files(file) if _is_below(file.parent / name, file.parent)]
+    target, number = folder / file.name, 1
+    while target.exists() and sha256(target) != sha256(file):
+        number += 1
+        target = folder / (f"{file.stem} {number}{file.suffix}" if not sides else f"{file.stem} {number}/{file.name}")
+    for source, copy in [(file, target), *((file.parent / name, target.parent / name) for name in sides)]:
+        if copy.exists() or not source.is_file():
+            continue
+        with atomic_write(copy) as temporary:
+            shutil.copyfile(source, temporary)
+        made.append(copy)
+    return target.resolve()
+
+
+def _is_below(file: Path, folder: Path) -> bool:
+    return file.resolve().is_relative_to(folder.resolve())
+
+
+def _judged(file: Path, root: Path, view: float) -> ImportedMesh:
+    relative = file.relative_to(root.resolve()).as_posix()
+    parts = read_parts(file, root, f"mesh {relative}", colours=False)
+    if not parts:
+        raise InputError("the mesh has no triangles", where=relative, cure="mesh the points first, or export the faces")
+    low = np.min([part.vertices.min(axis=0) for part in parts], axis=0)
+    high = np.max([part.vertices.max(axis=0) for part in parts], axis=0)
+    extent = float((high - low).max())
+    unit: Unit = "mm" if extent > min(LARGE_EXTENT, TOO_LARGE * view) else "m"
+    # the full checks, as rendering will make them
+    mesh = load_mesh(SceneObject(name=file.stem[:100] or "mesh", shape=MeshFile(path=relative, unit=unit)), root)
+    low, high = low * UNITS[unit], high * UNITS[unit]
+    return ImportedMesh(relative, unit, (tuple(low.tolist()), tuple(high.tolist())), len(mesh.triangles))
