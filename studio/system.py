@@ -16,6 +16,8 @@ import sys
 from dataclasses import dataclass
 
 PYTHON_NEEDED = (3, 11)
+TESTS = "--tests"
+"""Argument of this file: check what the tests need as well."""
 FONT_FOLDERS = ("/usr/share/fonts", "/usr/local/share/fonts", "~/.fonts", "~/.local/share/fonts")
 OPENGL_DRIVERS = ("/usr/lib*/dri/*_dri.so", "/usr/lib/*/dri/*_dri.so", "/usr/lib*/libEGL_nvidia.so*")
 
@@ -39,6 +41,19 @@ LIBRARIES = (
     Need("libpangoft2-1.0.so.0", "libpangoft2-1.0-0", "the PDF report (WeasyPrint)"),
     Need("libharfbuzz-subset.so.0", "libharfbuzz-subset0", "the PDF report (WeasyPrint)"),
 )
+DESKTOP_LIBRARIES = (
+    Need("libxcb.so.1", "libxcb1", "the desktop (Qt)"),
+    Need("libxcb-cursor.so.0", "libxcb-cursor0", "the desktop (Qt)"),
+    Need("libxcb-icccm.so.4", "libxcb-icccm4", "the desktop (Qt)"),
+    Need("libxcb-keysyms.so.1", "libxcb-keysyms1", "the desktop (Qt)"),
+    Need("libxcb-shape.so.0", "libxcb-shape0", "the desktop (Qt)"),
+    Need("libxkbcommon-x11.so.0", "libxkbcommon-x11-0", "the desktop (Qt)"),
+    Need("libX11-xcb.so.1", "libx11-xcb1", "the desktop (Qt)"),
+    Need("libdbus-1.so.3", "libdbus-1-3", "the desktop (Qt)"),
+    Need("libfontconfig.so.1", "libfontconfig1", "the desktop (Qt)"),
+    Need("libglib-2.0.so.0", "libglib2.0-0", "the desktop (Qt)"),
+)
+VIRTUAL_DISPLAY = Need("Xvfb", "xvfb", "the tests of the desktop")
 DRIVER = Need("an OpenGL driver", "libgl1-mesa-dri", "3D pictures (VTK)")
 FONT = Need("a TrueType font", "fonts-dejavu-core", "the PDF report (WeasyPrint)")
 
@@ -53,6 +68,13 @@ def missing_needs() -> list[Need]:
     if not any(_has_font(os.path.expanduser(folder)) for folder in FONT_FOLDERS):
         missing.append(FONT)
     return missing
+
+
+def missing_desktop_needs() -> list[Need]:
+    """What the desktop lacks beyond `missing_needs`."""
+    if not sys.platform.startswith("linux"):
+        return []
+    return [need for need in DESKTOP_LIBRARIES if not _loads(need.library)]
 
 
 def apt_command(packages: list[str]) -> str:
@@ -87,21 +109,30 @@ def main() -> int:
         print(f"Python {wanted} or newer is needed; found {found} at {sys.executable}", file=sys.stderr)
         print(f"install it with: {apt_command(['python3.11', 'python3.11-venv'])}", file=sys.stderr)
         return 2
-    missing = missing_needs()
+    missing, desktop = missing_needs(), _wanted_for_the_desktop()
     if importlib.util.find_spec("ensurepip") is None or importlib.util.find_spec("venv") is None:
         package = f"python{sys.version_info[0]}.{sys.version_info[1]}-venv"
         missing.append(Need("Python's venv module", package, "the virtual environment"))
-    if missing and os.geteuid() == 0 and shutil.which("apt-get"):
-        packages = sorted({need.package for need in missing})
+    if (missing or desktop) and os.geteuid() == 0 and shutil.which("apt-get"):
+        packages = sorted({need.package for need in missing + desktop})
         print(f"installing system libraries: {' '.join(packages)}", file=sys.stderr)
         _apt_install(packages)
-        still_missing = missing_needs()
+        still_missing, desktop = missing_needs(), _wanted_for_the_desktop()
         venv_is_here = importlib.util.find_spec("ensurepip") is not None
         missing = still_missing + [need for need in missing if need.package.endswith("-venv") and not venv_is_here]
-    if missing:
-        print(message(missing), file=sys.stderr)
-        return 2
-    return 0
+    if missing or desktop:
+        print(message(missing + desktop), file=sys.stderr)
+    # without the desktop's libraries the commands still work
+    return 2 if missing or (desktop and TESTS in sys.argv) else 0
+
+
+def _wanted_for_the_desktop() -> list[Need]:
+    """What windows need, where they can open (a display) or are to be tested (a virtual one)."""
+    if not sys.platform.startswith("linux"):
+        return []
+    tests = TESTS in sys.argv
+    wanted = missing_desktop_needs() if tests or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") else []
+    return [*wanted, VIRTUAL_DISPLAY] if tests and not shutil.which("Xvfb") else wanted
 
 
 def _loads(library: str) -> bool:

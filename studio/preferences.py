@@ -1,0 +1,84 @@
+"""What the desktop remembers from one start to the next: recent projects, theme, arrangement. Qt-free, one JSON file.
+
+Nothing here is worth a failure: a damaged file gives the defaults, a folder that cannot be written forgets.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from render.errors import InputError
+from render.files import atomic_write
+
+RECENT = 10
+APPLICATION = "blazer-studio"
+
+
+class Preferences(BaseModel):
+    """Immutable; `changed` gives the next ones."""
+
+    model_config = ConfigDict(frozen=True)
+
+    recent: tuple[str, ...] = ()
+    """Absolute paths, latest first."""
+    theme: Literal["system", "dark", "light"] = "system"
+    toured: bool = False
+    """The tour was seen or skipped, so that the next start does not begin with it."""
+    workspace: str = "setup"
+    geometry: str = ""
+    """Of the window, as Qt saves it, base64."""
+    arrangements: dict[str, str] = {}
+    """Of the panels in each workspace, as Qt saves them, base64."""
+    folder: str = ""
+    """Where a file was opened or saved last."""
+
+
+class PreferencesFile:
+    """The preferences of this person, kept in one file."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        """folder: None for the one that the system keeps for it."""
+        self.path = (folder or config_folder()) / "preferences.json"
+        self.values = _read(self.path)
+
+    def change(self, **values: object) -> None:
+        """Set some values, and write the file."""
+        self.values = Preferences.model_validate({**dict(self.values), **values})
+        with suppress(InputError, OSError), atomic_write(self.path) as temporary:
+            temporary.write_text(self.values.model_dump_json(indent=2) + "\n", encoding="utf-8")
+
+    def add_recent(self, path: Path) -> None:
+        """Put a project first in the list."""
+        text = os.path.abspath(path)
+        others = [entry for entry in self.values.recent if entry != text]
+        self.change(recent=(text, *others)[:RECENT], folder=str(Path(text).parent))
+
+    def forget_recent(self, path: Path | str) -> None:
+        self.change(recent=tuple(entry for entry in self.values.recent if entry != str(path)))
+
+
+def _read(path: Path) -> Preferences:
+    try:
+        return Preferences.model_validate(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, ValidationError):
+        return Preferences()
+
+
+def config_folder() -> Path:
+    """Where the system keeps a program's settings for this person."""
+    import platformdirs
+
+    return Path(platformdirs.user_config_dir(APPLICATION, appauthor=False))
+
+
+def recovery_folder() -> Path:
+    """Where unsaved work is kept in case of a crash."""
+    import platformdirs
+
+    return Path(platformdirs.user_state_dir(APPLICATION, appauthor=False)) / "recovery"

@@ -1,0 +1,96 @@
+"""Starts the desktop: checks what it needs, shows a splash, opens the window, and turns faults into dialogs."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from studio.display import INSTEAD, why_no_display
+from studio.system import message, missing_desktop_needs, missing_needs
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+
+    from studio.qt.window import MainWindow
+
+SAMPLE = "weld_seam"
+BAD_INPUT = 2
+
+
+def why_not() -> str | None:
+    """Why the desktop cannot open here, with what to do; None: it can."""
+    missing = [*missing_needs(), *missing_desktop_needs()]
+    if missing:
+        return f"the system lacks libraries\n{message(missing)}"
+    reason = why_no_display()
+    return None if reason is None else f"{reason}; {INSTEAD}"
+
+
+def open_studio(path: Path | None = None) -> int:
+    """Open the desktop on a project, or on the sample; returns the exit code when its window was closed."""
+    reason = why_not()
+    if reason is not None:
+        print(f"error: the studio does not open: {reason}", file=sys.stderr)
+        return BAD_INPUT
+    app = application()
+    window = start(path)
+    code = app.exec()
+    window.deleteLater()
+    return code
+
+
+def application() -> QApplication:
+    """The one Qt application, made with what Qt and its companions must know beforehand."""
+    os.environ.setdefault("QT_API", "pyside6")
+    os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
+    os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")
+    if sys.platform.startswith("linux"):
+        # VTK's window does not work on Wayland; XWayland is everywhere
+        os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
+    from PySide6.QtCore import Qt
+    from PySide6.QtGui import QGuiApplication, QSurfaceFormat
+    from PySide6.QtWidgets import QApplication
+
+    there = QApplication.instance()
+    if isinstance(there, QApplication):
+        return there
+    QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
+    surface = QSurfaceFormat.defaultFormat()
+    surface.setVersion(3, 2)
+    surface.setProfile(QSurfaceFormat.OpenGLContextProfile.CoreProfile)
+    QSurfaceFormat.setDefaultFormat(surface)
+    app = QApplication(sys.argv[:1])
+    app.setApplicationName("blazer-studio")
+    app.setApplicationDisplayName("")
+    app.setDesktopFileName("blazer-studio")
+    return app
+
+
+def start(path: Path | None) -> MainWindow:
+    """The window, shown, on a project, recovered work or the sample. A bad project is told in a dialog over the sample."""
+    from studio.preferences import PreferencesFile
+    from studio.qt import theme
+    from studio.qt.splash import Splash
+
+    preferences = PreferencesFile()
+    theme.apply(preferences.values.theme)
+    splash = Splash()
+    splash.show()
+    splash.tell("scene and sample")
+    from studio.qt.faults import catch_faults
+    from studio.qt.file_actions import template
+    from studio.qt.session import Session
+    from studio.qt.window import MainWindow
+
+    session = Session(template(SAMPLE))
+    window = MainWindow(session, preferences, making=splash.tell)
+    catch_faults(window, session)
+    window.show()
+    splash.finish(window)
+    if path is not None:
+        window.files.open(path, ask=False)
+    elif not window.files.recover() and not preferences.values.toured:
+        pass
+    return window

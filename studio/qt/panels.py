@@ -1,0 +1,55 @@
+"""The panels of the window, built one by one: heavy modules are imported when their panel is made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QWidget
+
+from studio.qt.session import Session
+
+Making = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel: its key, the title of its dock, what the splash says, where its class is."""
+
+    key: str
+    title: str
+    module: str
+    name: str
+    takes_runner: bool = False
+
+
+PANELS = (
+    Panel("scene", "Scene", "studio.qt.scene_tree", "SceneTree"),
+    Panel("viewport", "3D view", "studio.qt.viewport", "Viewport"),
+    Panel("inspector", "Inspector", "studio.qt.inspector", "Inspector"),
+    Panel("camera", "Camera view", "studio.qt.camera_view", "CameraView"),
+    Panel("readout", "Design", "studio.qt.readout_panel", "ReadoutPanel"),
+    Panel("render", "Render", "studio.qt.render_panel", "RenderPanel", True),
+    Panel("develop", "Exposure and measurement", "studio.qt.develop_panel", "DevelopPanel"),
+    Panel("results", "Results", "studio.qt.results_panel", "ResultsPanel"),
+    Panel("motion", "Motion", "studio.qt.motion_panel", "MotionPanel", True),
+    Panel("log", "Messages", "studio.qt.log_panel", "LogPanel"),
+)
+
+
+def make_panels(session: Session, runner: object, making: Making = lambda title: None) -> dict[str, QWidget]:
+    """Every panel by its key; `making` hears the title of each before it is made."""
+    made = {}
+    for panel in PANELS:
+        making(panel.title)
+        if find_spec(panel.module) is None:
+            label = QLabel(panel.title, alignment=Qt.AlignmentFlag.AlignCenter)
+            label.setObjectName("muted")
+            made[panel.key] = label
+            continue
+        kind = getattr(import_module(panel.module), panel.name)
+        made[panel.key] = kind(session, runner) if panel.takes_runner else kind(session)
+    return made

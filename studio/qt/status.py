@@ -1,0 +1,125 @@
+"""The status bar: what is being computed, how far, time left, pause and cancel; and the last message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import QTimer, Signal
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QToolButton, QWidget
+
+from studio.jobs import Job, State
+from studio.qt.icons import icon
+from studio.qt.jobs import RENDER, JobRunner
+from studio.qt.session import Session
+
+SHORT = 0.4
+"""Seconds; work that ends sooner is not worth a progress bar."""
+MESSAGE_SECONDS = {"info": 8, "warning": 20, "error": 60}
+
+
+class StatusBar(QStatusBar):
+    """Shows one job at a time, the final render before all others."""
+
+    log_asked = Signal()
+
+    def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session, self.runner = session, runner
+        self.job: Job[Any] | None = None
+        self.setSizeGripEnabled(False)
+        self.work = QLabel()
+        self.bar = QProgressBar(maximum=1000)
+        self.bar.setFixedWidth(160)
+        self.bar.setMaximumHeight(14)
+        self.bar.setTextVisible(False)
+        self.left = QLabel()
+        self.left.setObjectName("muted")
+        self.pause = self._button("pause", "Pause", self.toggle_pause)
+        self.cancel = self._button("cancel", "Cancel (Esc)", self.cancel_work)
+        self.text = _Message()
+        self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.text.clicked.connect(self.log_asked)
+        self.plan = QLabel()
+        self.plan.setObjectName("muted")
+        for widget in (self.work, self.bar, self.left, self.pause, self.cancel):
+            self.addWidget(widget)
+        self.addWidget(self.text, 1)
+        self.addPermanentWidget(self.plan)
+        self._fade = QTimer(self, singleShot=True)
+        self._fade.timeout.connect(lambda: self.text.setText(""))
+        self._show_work(False)
+        session.message.connect(self.show_text)
+        runner.progress.connect(self.follow)
+        for signal in (runner.finished, runner.failed, runner.cancelled):
+            signal.connect(self._end)
+
+    def follow(self, job: Job[Any]) -> None:
+        """A job's progress, unless a more important one is shown."""
+        if job.ended or (job.seconds < SHORT and job is not self.job):
+            return
+        if self.job is not None and self.job is not job and (not self.job.ended) and job is not self.runner.job(RENDER):
+            return
+        self.job = job
+        paused = job.state is State.PAUSED
+        self.work.setText(f"{job.name}: {job.stage}" if job.stage and job.stage != job.name else job.name)
+        self.bar.setValue(round(1000 * job.done))
+        self.left.setText("stopping" if job.cancel_asked else "paused" if paused else time_left(job.seconds_left))
+        self.pause.setIcon(icon("play" if paused else "pause"))
+        self.pause.setToolTip("Go on" if paused else "Pause")
+        self._show_work(True)
+
+    def toggle_pause(self) -> None:
+        """Hold the job that is shown, or let it go on."""
+        if self.job is not None:
+            self.job.resume() if self.job.state is State.PAUSED else self.job.pause()
+            self.follow(self.job)
+
+    def cancel_work(self) -> None:
+        """Stop the job that is shown; what it has given so far stays."""
+        if self.job is not None:
+            self.job.cancel()
+            self.follow(self.job)
+
+    def _end(self, job: Job[Any]) -> None:
+        if job is self.job:
+            self.job = None
+            self._show_work(False)
+
+    def _show_work(self, visible: bool) -> None:
+        for widget in (self.work, self.bar, self.left, self.pause, self.cancel):
+            widget.setVisible(visible)
+
+    def show_text(self, level: str, text: str) -> None:
+        """A message, for a while; a click on it opens the log."""
+        self.text.setObjectName(level if level in ("warning", "error") else "message")
+        self.text.style().unpolish(self.text)
+        self.text.style().polish(self.text)
+        self.text.setText(text.splitlines()[0] if text else "")
+        self.text.setToolTip(text)
+        self._fade.start(1000 * MESSAGE_SECONDS.get(level, 8))
+
+    def _button(self, name: str, tip: str, handler: Callable[[], None]) -> QToolButton:
+        button = QToolButton()
+        button.setIcon(icon(name))
+        button.setToolTip(tip)
+        button.clicked.connect(handler)
+        return button
+
+
+class _Message(QLabel):
+    clicked = Signal()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+        self.clicked.emit()
+
+
+def time_left(seconds: float | None) -> str:
+    """ "0:12 left"."""
+    if seconds is None:
+        return ""
+    whole = max(1, round(seconds))
+    minutes, rest = divmod(whole, 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d} left" if hours else f"{minutes}:{rest:02d} left"

@@ -1,0 +1,177 @@
+"""Dark and light: one palette each, a style sheet for what a palette cannot say, and the colours that plots use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication, QStyleFactory
+
+Choice = Literal["system", "dark", "light"]
+CHOICES: tuple[Choice, ...] = ("system", "dark", "light")
+
+
+@dataclass(frozen=True)
+class Colours:
+    """Of one theme, as #rrggbb. What means something (truth, methods, wavelengths) is in `analysis.report.colour`."""
+
+    window: str
+    base: str
+    raised: str
+    text: str
+    muted: str
+    line: str
+    accent: str
+    on_accent: str
+    warning: str
+    error: str
+    good: str
+
+
+DARK = Colours(
+    window="#20252b",
+    base="#171b20",
+    raised="#2b323a",
+    text="#dfe4e9",
+    muted="#94a0ab",
+    line="#38414a",
+    accent="#2f9fc0",
+    on_accent="#06161c",
+    warning="#e8b04a",
+    error="#f0736a",
+    good="#5fbf8f",
+)
+LIGHT = Colours(
+    window="#f1f3f5",
+    base="#ffffff",
+    raised="#ffffff",
+    text="#1c2733",
+    muted="#5d6974",
+    line="#d3d9de",
+    accent="#0b6e8a",
+    on_accent="#ffffff",
+    warning="#9a6500",
+    error="#b3261e",
+    good="#1d7a4c",
+)
+
+
+class _Notice(QObject):
+    changed = Signal()
+
+
+notice = _Notice()
+"""`notice.changed`: another theme holds; widgets that paint with their own colours follow it."""
+
+
+def apply(choice: Choice) -> None:
+    """Give the application the chosen theme; "system" follows the desktop's, light where it has none."""
+    app = QApplication.instance()
+    assert isinstance(app, QApplication)
+    hints = app.styleHints()
+    scheme = {"dark": Qt.ColorScheme.Dark, "light": Qt.ColorScheme.Light}.get(choice, Qt.ColorScheme.Unknown)
+    if hints.colorScheme() != scheme:
+        hints.setColorScheme(scheme)
+    dark = choice == "dark" or (choice == "system" and hints.colorScheme() == Qt.ColorScheme.Dark)
+    colours = DARK if dark else LIGHT
+    style = QStyleFactory.create("Fusion")
+    if style is not None and app.style().name().lower() != "fusion":
+        app.setStyle(style)
+    app.setPalette(palette(colours))
+    app.setStyleSheet(style_sheet(colours))
+    notice.changed.emit()
+
+
+def colours() -> Colours:
+    """Those of the theme that holds, judged by the application's palette."""
+    return DARK if QApplication.palette().color(QPalette.ColorRole.Window).lightness() < 128 else LIGHT
+
+
+def palette(c: Colours) -> QPalette:
+    """The Qt palette of a theme."""
+    role, group = QPalette.ColorRole, QPalette.ColorGroup
+    made = QPalette()
+    for which, colour in (
+        (role.Window, c.window),
+        (role.WindowText, c.text),
+        (role.Base, c.base),
+        (role.AlternateBase, c.window),
+        (role.Text, c.text),
+        (role.PlaceholderText, c.muted),
+        (role.Button, c.raised),
+        (role.ButtonText, c.text),
+        (role.BrightText, c.error),
+        (role.ToolTipBase, c.raised),
+        (role.ToolTipText, c.text),
+        (role.Highlight, c.accent),
+        (role.HighlightedText, c.on_accent),
+        (role.Accent, c.accent),
+        (role.Link, c.accent),
+        (role.LinkVisited, c.accent),
+        (role.Light, c.raised),
+        (role.Midlight, c.line),
+        (role.Mid, c.line),
+        (role.Dark, c.line),
+        (role.Shadow, "#000000"),
+    ):
+        made.setColor(which, QColor(colour))
+    faded = mixed(c.text, c.window, 0.45)
+    for which in (role.WindowText, role.Text, role.ButtonText):
+        made.setColor(group.Disabled, which, QColor(faded))
+    made.setColor(group.Disabled, role.Highlight, QColor(c.line))
+    return made
+
+
+def mixed(a: str, b: str, share: float) -> str:
+    """#rrggbb between two colours; share 1 is the first."""
+    one, two = QColor(a), QColor(b)
+    parts = [
+        round(share * x + (1.0 - share) * y)
+        for x, y in ((one.red(), two.red()), (one.green(), two.green()), (one.blue(), two.blue()))
+    ]
+    return QColor(*parts).name()
+
+
+def style_sheet(c: Colours) -> str:
+    """Flat docks, quiet separators, a segmented workspace switch. Only what the palette cannot say."""
+    return f"""
+    QMainWindow::separator {{ background: {c.window}; width: 5px; height: 5px; }}
+    QMainWindow::separator:hover {{ background: {c.accent}; }}
+    QDockWidget {{ font-weight: 600; }}
+    QDockWidget::title {{ background: {c.window}; padding: 5px 8px; border-bottom: 1px solid {c.line}; }}
+    QToolBar {{ background: {c.window}; border: none; border-bottom: 1px solid {c.line}; spacing: 2px; padding: 3px; }}
+    QToolBar::separator {{ background: {c.line}; width: 1px; margin: 5px 6px; }}
+    QToolButton {{ border: 1px solid transparent; border-radius: 4px; padding: 4px; }}
+    QToolButton:hover {{ background: {mixed(c.text, c.window, 0.10)}; }}
+    QToolButton:pressed, QToolButton:checked {{ background: {mixed(c.accent, c.window, 0.30)}; }}
+    QToolButton:focus {{ border-color: {c.accent}; }}
+    QToolButton#workspace {{ padding: 5px 14px; border-radius: 0; font-weight: 600;
+        background: {c.raised}; border: 1px solid {c.line}; }}
+    QToolButton#workspace:hover {{ background: {mixed(c.accent, c.raised, 0.15)}; }}
+    QToolButton#workspace:checked {{ background: {c.accent}; color: {c.on_accent}; border-color: {c.accent}; }}
+    QMenuBar {{ background: {c.window}; }}
+    QMenuBar::item {{ padding: 4px 9px; background: transparent; border-radius: 4px; }}
+    QMenuBar::item:selected {{ background: {mixed(c.text, c.window, 0.10)}; }}
+    QMenu {{ background: {c.raised}; border: 1px solid {c.line}; padding: 4px; }}
+    QMenu::item {{ padding: 5px 24px 5px 24px; border-radius: 3px; }}
+    QMenu::item:selected {{ background: {c.accent}; color: {c.on_accent}; }}
+    QMenu::item:disabled {{ color: {mixed(c.text, c.window, 0.45)}; }}
+    QMenu::separator {{ height: 1px; background: {c.line}; margin: 4px 8px; }}
+    QStatusBar {{ background: {c.window}; border-top: 1px solid {c.line}; }}
+    QStatusBar::item {{ border: none; }}
+    QToolTip {{ background: {c.raised}; color: {c.text}; border: 1px solid {c.line}; padding: 4px; }}
+    QTabBar::tab {{ padding: 5px 12px; border: none; border-bottom: 2px solid transparent; color: {c.muted}; }}
+    QTabBar::tab:selected {{ color: {c.text}; border-bottom-color: {c.accent}; }}
+    QTabBar::tab:hover {{ color: {c.text}; }}
+    QTabWidget::pane {{ border: none; border-top: 1px solid {c.line}; }}
+    QHeaderView::section {{ background: {c.window}; color: {c.muted}; border: none;
+        border-bottom: 1px solid {c.line}; padding: 4px 8px; }}
+    QTableView {{ gridline-color: {c.line}; border: none; }}
+    QProgressBar {{ background: {c.base}; border: 1px solid {c.line}; border-radius: 4px; text-align: center; }}
+    QProgressBar::chunk {{ background: {c.accent}; border-radius: 3px; }}
+    QLabel#muted {{ color: {c.muted}; }}
+    QLabel#warning {{ color: {c.warning}; }}
+    QLabel#error {{ color: {c.error}; }}
+    """

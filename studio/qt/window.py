@@ -1,0 +1,208 @@
+"""The main window: panels in docks, three workspaces, menus, toolbar and status bar over one session."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QByteArray, Qt, QTimer
+from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QSizePolicy, QToolBar, QToolButton, QWidget
+
+from studio.preferences import PreferencesFile
+from studio.qt import theme
+from studio.qt.actions import Actions
+from studio.qt.file_actions import FileActions
+from studio.qt.jobs import JobRunner
+from studio.qt.panels import PANELS, Making, make_panels
+from studio.qt.session import Session
+from studio.qt.status import StatusBar
+from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, share_out, workspace
+
+TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
+SWITCH = {"setup": "setup", "render": "render_workspace", "measure": "measure"}
+"""Workspace -> command."""
+MESHES = (".ply", ".stl", ".obj", ".glb", ".gltf", ".off")
+
+
+class MainWindow(QMainWindow):
+    """Panels know only the session; this window knows the panels."""
+
+    def __init__(
+        self,
+        session: Session,
+        preferences: PreferencesFile | None = None,
+        recovery: Path | None = None,
+        making: Making = lambda title: None,
+    ) -> None:
+        """preferences, recovery: None for those of this person; making hears the title of each panel being made."""
+        super().__init__()
+        self.session = session
+        self.preferences = preferences or PreferencesFile()
+        self.workspace = ""
+        self.setObjectName("main")
+        self.setAcceptDrops(True)
+        self.setDockOptions(QMainWindow.DockOption.AllowTabbedDocks | QMainWindow.DockOption.AllowNestedDocks)
+        self.resize(1440, 900)
+        self.commands = Actions(self)
+        self.runner = JobRunner(self)
+        self.panels = make_panels(session, self.runner, making)
+        self.docks = self._make_docks()
+        self.status = StatusBar(session, self.runner, self)
+        self.setStatusBar(self.status)
+        self.files = FileActions(self, session, self.preferences, recovery)
+        self._make_toolbar()
+        self._connect()
+        self._restore()
+        self._tell_document()
+
+    def switch_to(self, key: str) -> None:
+        """Another workspace; the panels stand as they were left there."""
+        if self.workspace:
+            self._remember_arrangement()
+        wanted = workspace(key)
+        self.workspace = wanted.key
+        arrange(self, self.docks, wanted)
+        if restore(self, self.preferences.values.arrangements.get(wanted.key, "")):
+            self.centralWidget().setVisible(wanted.viewport)
+        else:
+            QTimer.singleShot(0, self, lambda: share_out(self, self.docks, wanted))
+        self.commands[SWITCH[wanted.key]].setChecked(True)
+        self.preferences.change(workspace=wanted.key)
+
+    def rearrange(self) -> None:
+        """The panels of this workspace back where they belong."""
+        arrange(self, self.docks, workspace(self.workspace))
+
+    def show_panel(self, key: str) -> None:
+        """Bring a panel to the front, wherever it is."""
+        self.docks[key].show()
+        self.docks[key].raise_()
+
+    def choose_theme(self, choice: theme.Choice) -> None:
+        theme.apply(choice)
+        self.preferences.change(theme=choice)
+        self.commands[f"theme_{choice}"].setChecked(True)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
+        super().showEvent(event)
+        if not event.spontaneous() and self.workspace not in self.preferences.values.arrangements:
+            QTimer.singleShot(0, self, lambda: share_out(self, self.docks, workspace(self.workspace)))
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        if not self.files.may_close():
+            event.ignore()
+            return
+        self._remember_arrangement()
+        self.preferences.change(geometry=bytes(self.saveGeometry().toBase64().data()).decode())
+        self.runner.close()
+        for panel in self.panels.values():
+            panel.close()
+        self.files.close()
+        event.accept()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802 - Qt's name
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        if any(path.suffix.lower() in (*MESHES, ".json") or path.is_dir() for path in paths):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802 - Qt's name
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        event.acceptProposedAction()
+        # after the drop has ended: a dialog inside it would hold up the program that the file comes from
+        QTimer.singleShot(0, self, lambda: self.take(paths))
+
+    def take(self, paths: list[Path]) -> None:
+        """Files dropped on the window: meshes join the scene, a project is opened."""
+        for path in paths:
+            if path.suffix.lower() not in MESHES:
+                self.files.open(path)
+
+    def _make_docks(self) -> dict[str, QDockWidget]:
+        self.setCentralWidget(self.panels["viewport"])
+        docks = {}
+        for panel in PANELS:
+            if panel.key == "viewport":
+                continue
+            dock = QDockWidget(panel.title, self)
+            dock.setObjectName(panel.key)
+            dock.setWidget(self.panels[panel.key])
+            self.commands.submenus["panels"].addAction(dock.toggleViewAction())
+            docks[panel.key] = dock
+        return docks
+
+    def _make_toolbar(self) -> None:
+        bar = QToolBar("Main", self)
+        bar.setObjectName("toolbar")
+        bar.setMovable(False)
+        group = QActionGroup(self)
+        for key in TOOLBAR:
+            bar.addSeparator() if not key else bar.addAction(self.commands[key])
+        bar.addWidget(_spring())
+        for each in WORKSPACES:
+            action = self.commands[SWITCH[each.key]]
+            group.addAction(action)
+            action.setToolTip(f"{each.tip} ({action.shortcut().toString()})")
+            button = QToolButton(objectName="workspace")
+            button.setDefaultAction(action)
+            button.setText(each.title)
+            bar.addWidget(button)
+        bar.addWidget(_spring())
+        bar.addAction(self.commands["help"])
+        self.addToolBar(bar)
+        themes = QActionGroup(self)
+        for choice in theme.CHOICES:
+            themes.addAction(self.commands[f"theme_{choice}"])
+        self.commands[f"theme_{self.preferences.values.theme}"].setChecked(True)
+
+    def _connect(self) -> None:
+        on, files, session = self.commands.connect, self.files, self.session
+        for key, handler in (
+            ("new", files.new),
+            ("open", files.open_dialog),
+            ("save", files.save),
+            ("save_as", files.save_as),
+            ("quit", self.close),
+            ("undo", lambda: session.document.undo()),
+            ("redo", lambda: session.document.redo()),
+            ("pause", self.status.toggle_pause),
+            ("cancel", self.status.cancel_work),
+            ("arrange", self.rearrange),
+            ("full_screen", lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)),
+            ("log", lambda: self.show_panel("log")),
+        ):
+            on(key, handler)
+        for key, command in SWITCH.items():
+            on(command, lambda key=key: self.switch_to(key))
+        for choice in theme.CHOICES:
+            on(f"theme_{choice}", lambda choice=choice: self.choose_theme(choice))
+        recent = self.commands.submenus["recent"]
+        recent.aboutToShow.connect(lambda: files.fill_recent(recent))
+        self.status.log_asked.connect(lambda: self.show_panel("log"))
+        session.project_changed.connect(self._tell_document)
+        session.document_replaced.connect(self._tell_document)
+
+    def _restore(self) -> None:
+        values = self.preferences.values
+        if values.geometry:
+            self.restoreGeometry(QByteArray.fromBase64(QByteArray(values.geometry.encode())))
+        self.switch_to(values.workspace)
+
+    def _remember_arrangement(self) -> None:
+        kept = {**self.preferences.values.arrangements, self.workspace: remembered(self)}
+        self.preferences.change(arrangements=kept)
+
+    def _tell_document(self) -> None:
+        """Title, undo and redo follow the document."""
+        document = self.session.document
+        name = document.path.name if document.path is not None else "not saved yet"
+        self.setWindowTitle(f"{document.project.name}[*] ({name}) - Blazer Studio")
+        self.setWindowModified(self.files.unsaved)
+        for key, label in (("undo", document.undo_label), ("redo", document.redo_label)):
+            self.commands[key].setEnabled(label is not None)
+            self.commands[key].setText(f"&{key.capitalize()} {label or ''}".rstrip())
+
+
+def _spring() -> QWidget:
+    spring = QWidget()
+    spring.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+    return spring

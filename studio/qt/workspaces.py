@@ -1,0 +1,129 @@
+"""The three workspaces: arrangements of the same panels, so that no screen shows more than the task needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QByteArray, Qt
+from PySide6.QtWidgets import QDockWidget, QMainWindow
+
+Area = Qt.DockWidgetArea
+LEFT, RIGHT, BOTTOM = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
+VERSION = 1
+"""Of the arrangement; a remembered one of another version is dropped."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Docks of one area, and its share of the window's width (at the sides) or height (at the bottom)."""
+
+    area: Area
+    share: float
+    docks: tuple[tuple[str, float], ...]
+    """Name, and share of the area."""
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Its name on the switch, what it is for, and where the panels stand. What is not named is hidden."""
+
+    key: str
+    title: str
+    tip: str
+    viewport: bool
+    columns: tuple[Column, ...]
+    sides_reach_down: bool
+    """The areas at the sides, not the bottom one, hold the lower corners."""
+
+
+WORKSPACES = (
+    Workspace(
+        "setup",
+        "Set up",
+        "Place and design: camera, lasers, objects",
+        True,
+        (
+            Column(LEFT, 0.17, (("scene", 1.0),)),
+            Column(RIGHT, 0.25, (("inspector", 1.0),)),
+            Column(BOTTOM, 0.38, (("camera", 0.6), ("readout", 0.4))),
+        ),
+        True,
+    ),
+    Workspace(
+        "render",
+        "Render",
+        "The image and its light",
+        False,
+        (
+            Column(LEFT, 0.74, (("camera", 1.0),)),
+            Column(RIGHT, 0.26, (("render", 0.5), ("develop", 0.5))),
+        ),
+        True,
+    ),
+    Workspace(
+        "measure",
+        "Measure",
+        "Line, points and their error",
+        True,
+        (
+            Column(LEFT, 0.42, (("camera", 1.0),)),
+            Column(BOTTOM, 0.5, (("results", 1.0),)),
+        ),
+        False,
+    ),
+)
+"""In the order of the switch; the 3D view takes what the columns leave."""
+
+
+def workspace(key: str) -> Workspace:
+    """By its key; the first one for a key that there is not."""
+    return next((each for each in WORKSPACES if each.key == key), WORKSPACES[0])
+
+
+def arrange(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspace) -> None:
+    """Put every dock where the workspace has it."""
+    corners = (LEFT, RIGHT) if wanted.sides_reach_down else (BOTTOM, BOTTOM)
+    window.setCorner(Qt.Corner.BottomLeftCorner, corners[0])
+    window.setCorner(Qt.Corner.BottomRightCorner, corners[1])
+    shown = {name for column in wanted.columns for name, _ in column.docks}
+    for name, dock in docks.items():
+        dock.setFloating(False)
+        window.removeDockWidget(dock)
+        if name not in shown:
+            window.addDockWidget(BOTTOM if name in ("log", "motion") else RIGHT, dock)
+            dock.hide()
+    for column in wanted.columns:
+        beside = Qt.Orientation.Horizontal if column.area == BOTTOM else Qt.Orientation.Vertical
+        before: QDockWidget | None = None
+        for name, _ in column.docks:
+            if before is None:
+                window.addDockWidget(column.area, docks[name])
+            else:
+                window.splitDockWidget(before, docks[name], beside)
+            before = docks[name]
+            docks[name].show()
+    window.centralWidget().setVisible(wanted.viewport)
+    share_out(window, docks, wanted)
+
+
+def share_out(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspace) -> None:
+    """Give the docks their shares of the window's present size."""
+    for column in wanted.columns:
+        across = Qt.Orientation.Vertical if column.area == BOTTOM else Qt.Orientation.Horizontal
+        along = Qt.Orientation.Horizontal if column.area == BOTTOM else Qt.Orientation.Vertical
+        extent = window.height() if column.area == BOTTOM else window.width()
+        first = docks[column.docks[0][0]]
+        window.resizeDocks([first], [round(column.share * extent)], across)
+        if len(column.docks) > 1:
+            sizes = [round(1000 * share) for _, share in column.docks]
+            window.resizeDocks([docks[name] for name, _ in column.docks], sizes, along)
+
+
+def remembered(window: QMainWindow) -> str:
+    """The arrangement as text."""
+    return bytes(window.saveState(VERSION).toBase64().data()).decode()
+
+
+def restore(window: QMainWindow, text: str) -> bool:
+    """Bring back a remembered arrangement; False: it is not one, or of another version."""
+    return bool(text) and window.restoreState(QByteArray.fromBase64(QByteArray(text.encode())), VERSION)
