@@ -168,13 +168,15 @@ def noise_margin(
         photons = max(level[b], 0.0)
         variance = max(photons + floor[min(b * block + block // 2, floor.shape[0] - 1)], 1e-2)
         sigma[b] = math.sqrt(gain * (1.0 + level_gain / NOISE_GAIN) * variance)
-        skew = SKEW_GAIN * photons / (NOISE_GAIN * variance) ** 1.5
+        pixel_variance = NOISE_GAIN * variance
+        skew = SKEW_GAIN * photons / (pixel_variance * math.sqrt(pixel_variance))
         margin[b] = max((threshold + skew * max(threshold * threshold - 1.0, 0.0) / 6.0) * sigma[b], step)
     spread, count = 0, 0
-    for i in range(2, w, 8):
-        b = min(i // block, blocks - 1)
-        spread += abs(response[i] - background_at(i, level, block)) > 0.6745 * TEXTURE * sigma[b]
-        count += 1
+    for b in range(blocks):
+        middle, bound = level[b], 0.6745 * TEXTURE * sigma[b]
+        for i in range(b * block + 2, min((b + 1) * block, w), 8):
+            spread += abs(response[i] - middle) > bound
+            count += 1
     if 2 * spread <= count + 3.0 * math.sqrt(count):  # three sigma of a fair coin
         return
     size = np.empty(blocks)
@@ -203,6 +205,12 @@ def local_maxima(response: Float32, level: Array, margin: Array, at: NDArray[np.
         start = 0 if b == 0 else b * block + block // 2
         stop = w if b >= blocks - 2 else (b + 1) * block + block // 2
         bound = np.float32(low) + slope * np.float32(start - (b * block + 0.5 * block - 0.5))
+        lowest = min(bound, bound + slope * np.float32(stop - start))
+        above = np.int32(0)
+        for i in range(start, stop):  # without a branch: most stretches hold nothing
+            above += np.int32(response[i] > lowest)
+        if above == 0:
+            continue
         for i in range(start, stop):
             value = response[i]
             if value > bound + slope * np.float32(i - start):

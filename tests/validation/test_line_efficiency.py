@@ -1,0 +1,52 @@
+"""Line extraction over the whole grid of amplitude, width and read noise, against the Cramer-Rao bound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.line.extract import extract
+from tests.analysis.line_images import cramer_rao, electrons, expected, exposed
+
+pytestmark = pytest.mark.validation
+
+AMPLITUDES = (100, 300, 1000, 3000, 10000)
+SIGMAS = (0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0, 4.0)
+READ_NOISES = (2, 5, 10)
+ROWS = 16000
+
+
+def cells():
+    return [(a, s, r) for r in READ_NOISES for a in AMPLITUDES for s in SIGMAS if a / r >= 20]
+
+
+def test_likelihood_efficiency_and_coverage_over_the_grid():
+    rng = np.random.default_rng(2024)
+    efficiency, coverage, failures = [], [], []
+    for amplitude, sigma, read_noise in cells():
+        centre = 100 + rng.uniform(-0.5, 0.5, ROWS)
+        image = exposed(expected(200, centre, amplitude, sigma, 10.0), read_noise, rng).astype(np.float32)
+        line = extract(image, method="likelihood", noise=electrons(read_noise))
+        valid = line.valid[:, 0]
+        error = (line.u[:, 0] - centre)[valid]
+        efficiency.append(cramer_rao(amplitude, sigma, read_noise, 10.0) ** 2 / np.mean(error**2))
+        coverage.append(np.mean(np.abs(error) < 2 * line.sigma_u[valid, 0]))
+        failures.append(np.mean(~valid))
+    print(f"\nefficiency: median {np.median(efficiency):.3f}, lowest {min(efficiency):.3f} of {len(efficiency)} cells")
+    print(f"coverage of 2 sigma: {min(coverage):.3f} .. {max(coverage):.3f}; failed rows at most {max(failures):.4f}")
+    assert np.median(efficiency) >= 0.97
+    assert min(efficiency) >= 0.93
+    assert min(coverage) >= 0.93
+    assert max(coverage) <= 0.97
+    assert max(failures) < 0.005
+
+
+@pytest.mark.parametrize(("background", "read_noise"), [(0.0, 2.5), (10.0, 2.5), (100.0, 5.0), (2.0, 1.0)])
+def test_false_rows_on_noise(background, read_noise):
+    rng = np.random.default_rng(7)
+    false = 0
+    for _ in range(5):
+        image = exposed(np.full((4000, 2448), background), read_noise, rng).astype(np.float32)
+        false += int(extract(image, noise=electrons(read_noise)).valid.sum())
+    print(f"\nfalse rows: {false} of 20000")
+    assert false <= 20
