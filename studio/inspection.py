@@ -111,7 +111,7 @@ def _laser_view(project: Project, frame: Frame, i: int) -> LaserView:
     camera, rows = scene.camera, curve.axis == "rows"
     origin = scene.T_camera_laser(i)[:3, 3]
     plane = scene.laser_plane(i)
-    nearest, farthest = _working_range(camera, scene.T_camera_laser(i))
+    nearest, farthest = working_range(camera, scene.T_camera_laser(i))
     hit = np.unique(curve.index)
     peak, width = _brightness(project, frame, i, hit)
     length, length_px = _lengths(curve)
@@ -185,7 +185,7 @@ def _resolution(camera: Camera, plane: Float, curve: LaserCurve) -> tuple[float 
     return depth, float(np.median(steps)) if len(steps) else None
 
 
-def _working_range(camera: Camera, T_camera_laser: Float) -> tuple[float | None, float | None]:
+def working_range(camera: Camera, T_camera_laser: Float) -> tuple[float | None, float | None]:
     """Nearest and farthest depth_z of the fan's axis in the image; the farthest is None where it never leaves."""
     points = T_camera_laser[:3, 3] + WORKING_DISTANCES[:, None] * T_camera_laser[:3, 2]
     pixels, valid = camera.project(points)
