@@ -29,9 +29,12 @@ def measure_frame(
     """One frame by the project's method and, to compare with, by the others. `keep` the images for the report."""
     chosen = project.extraction.method
     before = dict(clock.seconds)
-    by_method: list[list[Measurement]] = []
-    for method in (chosen, *(other for other in METHODS if other != chosen)):
-        by_method.append(measure_step(project, frame, world, images, clock, threads, method))
+    by_method: list[list[Measurement]] = [measure_step(project, frame, world, images, clock, threads)]
+    with clock.stage("other methods, to compare with"):
+        aside = Clock(lambda stage, done: None, clock.cancelled)
+        for method in METHODS:
+            if method != chosen:
+                by_method.append(measure_step(project, frame, world, images, aside, threads, method))
     lasers = []
     for i, image in enumerate(images):
         extractions = tuple(Extraction(found[i].line, found[i].points, found[i].errors) for found in by_method)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from render.world import build_world
 from studio.project import Project
-from studio.stages import Clock, develop_step, measure_step, render_step, scaled
+from studio.results import measure_frame
+from studio.stages import Clock, develop_step, render_step, scaled
 from studio.templates import template_folder
 
 TEMPLATE, IMAGE_SCALE = "plane", 0.05
@@ -18,6 +19,6 @@ def warm_up(clock: Clock, threads: int | None = None) -> None:
     world = build_world(project.scene, folder, 0)
     frame = render_step(project, world, 0, quiet, threads)
     images = develop_step(project, frame, quiet, threads)
-    found = measure_step(project, frame, world, images, quiet, threads)
-    if not found[0].points.valid.any():
+    found = measure_frame(project, frame, world, images, quiet, threads, keep=False)
+    if not found.lasers[0].extractions[0].points.valid.any():
         raise RuntimeError("the warm-up scan found no point: the installation is damaged")
