@@ -7,12 +7,12 @@ INSTALLED := $(VENV)/.installed
 INSTALLED_VALIDATION := $(VENV)/.installed-validation
 WORKERS ?= 2
 
-.PHONY: run test lint validate benchmark format clean system
+.PHONY: run test lint validate benchmark format clean system system-tests
 
 run: $(INSTALLED)
 	$(BIN)/python main.py
 
-test: lint
+test: system-tests lint
 	$(BIN)/pytest -n $(WORKERS)
 
 lint: $(INSTALLED)
@@ -38,6 +38,9 @@ clean:
 # Names what the machine lacks, or installs it where the user is root on Debian or Ubuntu.
 system:
 	@$(if $(PYTHON),,$(error no Python found; install it with: apt-get update && apt-get install -y python3.11 python3.11-venv))$(PYTHON) studio/system.py
+
+system-tests: system
+	@$(PYTHON) studio/system.py --tests
 
 $(INSTALLED): pyproject.toml $(CONSTRAINTS) | system
 	$(PYTHON) -m venv $(VENV)
