@@ -15,17 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.blocks import block_boxes, crossing_in_blocks
+from render.camera import Camera
 from render.curve import curve_of_cut, cut_triangles, visible
 from render.embree import RayScene
 from render.errors import InputError
 from render.frame import LaserCurve
-from render.material import reflectance_weights
 from render.mesh_files import load_mesh
 from render.pose import Pose, invert, transform_points
-from render.scene import Scene, SceneObject
+from render.quick import reflectance_at
+from render.scene import Rig, Scene, SceneObject
 from render.surface import Surface
 from render.world import place_meshes
-from studio.preview_image import PreviewImage, Speed, preview_image, reflectance_at
+from studio.preview_image import PreviewImage, Speed, preview_image
 from studio.project import Project
 
 Float = NDArray[np.float64]
@@ -34,6 +35,7 @@ Mask = NDArray[np.bool_]
 FAN_RAYS = 512
 DRAG_SECONDS = 0.014
 """Of work for one camera picture while something is dragged."""
+ALONE = Rig(camera=Camera(width=1, height=1, fx=1.0, fy=1.0, cx=0.0, cy=0.0))
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,17 @@ class Fan:
         return None if count == 0 else 1.0 - float(self.seen.sum()) / count
 
 
+@dataclass(frozen=True)
+class Lit:
+    """The lit curve with what the surface is like at each of its (n,) points."""
+
+    curve: LaserCurve
+    normal: Float
+    """(n, 3) unit facet normal towards the camera, camera frame."""
+    albedo: Float
+    """(n, 3) RGB."""
+
+
 class Preview:
     """Bodies that outlive edits. `load` may run in a thread; the rest belongs to one thread."""
 
@@ -109,7 +122,7 @@ class Preview:
             return
         # the world of this object alone, standing at its own origin
         alone = item.model_copy(update={"T_world_object": Pose()})
-        world = place_meshes(Scene.model_construct(objects=(alone,)), [mesh])
+        world = place_meshes(Scene(rig=ALONE, objects=(alone,)), [mesh])
         with self._lock:
             if shape_key not in self._rays:
                 self._rays[shape_key] = (
@@ -157,17 +170,19 @@ class Look:
     def __init__(self, project: Project, step: int, placed: tuple[Placed, ...], preview: Preview) -> None:
         self.project, self.scene, self.step, self.placed = project, project.scene, step, placed
         self._preview = preview
-        self._curves: dict[int, tuple[LaserCurve, Float]] = {}
+        self._lit: dict[int, Lit] = {}
         self._fans: dict[int, Fan] = {}
         self._images: dict[float, PreviewImage] = {}
 
     def lit_curve(self, laser: int) -> LaserCurve:
         """The exact line of a laser, as `render.curve.laser_curve` of the whole world gives it."""
-        return self._curve(laser)[0]
+        return self.lit(laser).curve
 
-    def curve_albedo(self, laser: int) -> Float:
-        """(n,) reflectance at the laser's wavelength at each point of the lit curve."""
-        return self._curve(laser)[1]
+    def lit(self, laser: int) -> Lit:
+        """The lit curve with normals and albedo."""
+        if laser not in self._lit:
+            self._lit[laser] = self._cut(laser)
+        return self._lit[laser]
 
     def fan(self, laser: int) -> Fan:
         """What each part of the sheet meets first, and whether the camera sees it there."""
@@ -200,12 +215,7 @@ class Look:
             )
         return result
 
-    def _curve(self, i: int) -> tuple[LaserCurve, Float]:
-        if i not in self._curves:
-            self._curves[i] = self._cut(i)
-        return self._curves[i]
-
-    def _cut(self, i: int) -> tuple[LaserCurve, Float]:
+    def _cut(self, i: int) -> Lit:
         scene, laser = self.scene, self.scene.lasers[i]
         T_world_camera, T_world_laser = scene.T_world_camera(self.step), scene.T_world_laser(i, self.step)
         parts = [_cut_body(item, T_world_camera, T_world_laser) for item in self.placed]
@@ -226,16 +236,19 @@ class Look:
             self.clear,
         )
         owner = curve.object_id
-        weights = np.array(reflectance_weights(laser.wavelength_nm))
         points = transform_points(T_world_camera, curve.point)
-        albedo = np.empty(len(owner))
+        albedo = np.empty((len(owner), 3))
         for k, item in enumerate(self.placed):
             mine = place[owner] == k
             local = transform_points(item.T_object_world, points[mine])
-            albedo[mine] = reflectance_at(item.body.surface, triangle[owner[mine]], local) @ weights
+            albedo[mine] = reflectance_at(item.body.surface, triangle[owner[mine]], local)
+        normal = normals[owner] @ T_world_camera[:3, :3]
+        normal /= -np.sign(np.einsum("ij,ij->i", normal, curve.point))[:, None] * np.linalg.norm(
+            normal, axis=1, keepdims=True
+        )
         index = np.array([item.index for item in self.placed], dtype=np.int32)
         objects = index[place[owner]] if len(owner) else np.zeros(0, np.int32)
-        return dataclasses.replace(curve, object_id=objects), albedo
+        return Lit(dataclasses.replace(curve, object_id=objects), normal, albedo)
 
     def _trace_fan(self, i: int) -> Fan:
         scene, laser, T = self.scene, self.scene.lasers[i], self.scene.T_world_laser(i, self.step)

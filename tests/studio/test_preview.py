@@ -12,7 +12,6 @@ from render.curve import laser_curve
 from render.direct import direct_image
 from render.errors import InputError
 from render.laser import LineLaser
-from render.material import reflectance_weights
 from render.motion import LinearStage
 from render.pose import Pose
 from render.scene import SceneObject
@@ -129,14 +128,18 @@ def test_a_move_rebuilds_nothing(crowded: tuple[Project, Path]) -> None:
     assert preview.look(painted, root).placed[1].body.rays is before.placed[1].body.rays
 
 
-def test_the_albedo_along_the_curve_is_the_materials(crowded: tuple[Project, Path]) -> None:
+def test_albedo_and_normals_along_the_curve_are_the_surfaces(crowded: tuple[Project, Path]) -> None:
     project, root = crowded
     project = replaced(project, (*OBJECTS, 2, "material", "albedo"), (0.9, 0.5, 0.1))
-    look = Preview(1).look(project, root)
-    curve, albedo = look.lit_curve(0), look.curve_albedo(0)
-    weights = reflectance_weights(project.scene.lasers[0].wavelength_nm)
-    np.testing.assert_allclose(albedo[curve.object_id == 2], np.dot(weights, (0.9, 0.5, 0.1)))
-    np.testing.assert_allclose(albedo[curve.object_id == 0], 0.5)
+    lit = Preview(1).look(project, root).lit(0)
+    ball, plate = lit.curve.object_id == 2, lit.curve.object_id == 0
+    np.testing.assert_allclose(lit.albedo[ball], np.broadcast_to((0.9, 0.5, 0.1), (ball.sum(), 3)))
+    np.testing.assert_allclose(lit.albedo[plate], 0.5)
+    to_camera = -lit.curve.point / lit.curve.depth_range[:, None]
+    cosine = np.einsum("ij,ij->i", lit.normal, to_camera)
+    np.testing.assert_allclose(np.arccos(cosine), lit.curve.camera_angle, atol=1e-7)
+    T_camera_plate = np.linalg.inv(project.scene.T_world_camera()) @ project.scene.objects[0].T_world_object.matrix
+    np.testing.assert_allclose(np.abs(lit.normal[plate] @ T_camera_plate[:3, 2]), 1.0, atol=1e-12)
 
 
 def test_the_picture_shows_the_surfaces_that_the_truth_names(crowded: tuple[Project, Path]) -> None:
@@ -172,7 +175,7 @@ def test_a_laser_that_only_grazes_the_scene_has_an_empty_curve(crowded: tuple[Pr
     project, root = crowded
     away = LineLaser(T_rig_laser=Pose(rotation=(0, math.pi, 0), translation=(0.2, 0, 0)))
     look = Preview(1).look(replaced(project, (*SCENE, "rig", "lasers"), (away,)), root)
-    assert len(look.lit_curve(0).index) == 0 and len(look.curve_albedo(0)) == 0
+    assert len(look.lit_curve(0).index) == 0 and look.lit(0).albedo.shape == (0, 3)
     fan = look.fan(0)
     assert not np.isfinite(fan.distance).any() and fan.occluded is None
     assert look.image(1 / 16).laser[0].max() == 0.0

@@ -1,0 +1,134 @@
+"""The live preview that panels share: `live(session)` is made once for a session and follows its project.
+
+    look = live(session).look          # curves, fans and pictures of the project as it is now, each made once
+    live(session).changed.connect(...) # another look; at most one for each turn of the event loop
+
+Moves are answered at once; meshes that are not loaded yet are left out of the look until their job has loaded them.
+"""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from render.scene import SceneObject
+from studio.jobs import Cancel, Progress
+from studio.preview import Look, Preview
+from studio.qt.jobs import JobRunner
+from studio.qt.session import Session
+
+LANE = "load meshes"
+
+
+def live(session: Session) -> Live:
+    """The one of this session."""
+    found = session.findChild(Live)
+    return found if found is not None else Live(session)
+
+
+class Live(QObject):
+    """Keeps a `Look` at the session's project."""
+
+    changed = Signal()
+    """`look` is another one."""
+    loading = Signal(bool)
+    """Meshes are being loaded, or have been."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.session = session
+        self.preview = Preview()
+        self.step = 0
+        """Of the motion; what is shown stands where this step puts it."""
+        self._runner = JobRunner(self)
+        self._runner.failed.connect(self._load_failed)
+        self._told: set[str] = set()
+        self._timer = QTimer(self, singleShot=True, interval=0)
+        self._timer.timeout.connect(self.refresh)
+        session.project_changed.connect(self._timer.start)
+        session.document_replaced.connect(self._start_anew)
+        session.drag_changed.connect(self._timer.start)
+        self.look = self._looked()
+        self._load_missing()
+
+    @property
+    def is_loading(self) -> bool:
+        return self._runner.busy
+
+    def show_step(self, step: int) -> None:
+        """Stand where a step of the motion puts things."""
+        step = min(max(step, 0), self.session.project.scene.frame_count - 1)
+        if step != self.step:
+            self.step = step
+            self._timer.start()
+
+    def reload(self) -> None:
+        """Read all meshes anew: their files have changed."""
+        self.preview.forget()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Look now, without waiting for the event loop."""
+        self._timer.stop()
+        scene = self.session.project.scene
+        self.step = min(self.step, scene.frame_count - 1)
+        if self.look.project is not self.session.project or self.look.step != self.step or self._incomplete():
+            self.look = self._looked()
+            self.changed.emit()
+        elif not self.session.dragging:
+            # the drag has ended: panels may want a finer picture of the same look
+            self.changed.emit()
+        self._load_missing()
+
+    def close(self) -> None:
+        """Stop loading, and wait for the thread."""
+        self._timer.stop()
+        self._runner.close()
+
+    def _incomplete(self) -> bool:
+        return len(self.look.placed) < len(self.session.project.scene.visible_objects)
+
+    def _looked(self) -> Look:
+        session = self.session
+        look = self.preview.look(session.project, session.document.root, self.step, wait=False)
+        for name, error in self.preview.errors.items():
+            if str(error) not in self._told:
+                self._told.add(str(error))
+                session.message.emit("error", f"{name}: {error}")
+        return look
+
+    def _load_missing(self) -> None:
+        session, preview = self.session, self.preview
+        root = session.document.root
+        items = preview.missing(session.project, root)
+        if not items or self._runner.busy:
+            return
+        triangles_first = sorted(items, key=lambda item: item.shape.kind == "file")
+
+        def work(progress: Progress, cancelled: Cancel) -> list[SceneObject]:
+            for i, item in enumerate(triangles_first):
+                if cancelled():
+                    break
+                progress(item.name, i / len(triangles_first))
+                preview.load(item, root)
+            return items
+
+        self.loading.emit(True)
+        self._runner.run(LANE, "load meshes", work, self._loaded)
+
+    def _loaded(self, items: list[SceneObject]) -> None:
+        self.loading.emit(False)
+        if not self.session.dragging:
+            self.preview.drop_unused(self.session.project, self.session.document.root)
+        # the job counts as running until its result has been taken
+        self._timer.start()
+
+    def _load_failed(self, job: object) -> None:
+        self.loading.emit(False)
+        problem = getattr(job, "problem", None)
+        self.session.message.emit("error", problem.text if problem is not None else "a mesh could not be loaded")
+
+    def _start_anew(self) -> None:
+        self.preview = Preview()
+        self._told.clear()
+        self.step = 0
+        self._timer.start()
