@@ -62,6 +62,8 @@ class Session(QObject):
     """The shown render has new `images`; the measurements of them follow."""
     measured = Signal()
     """The shown render was developed and measured again (power, exposure, method)."""
+    render_asked = Signal()
+    """A panel other than the render panel asks for a render with the present settings."""
     message = Signal(str, str)
     """level ("info", "warning", "error") and text, for log and status bar."""
     document_replaced = Signal()
