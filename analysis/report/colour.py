@@ -37,8 +37,8 @@ def method_name(method: str) -> str:
 def wavelength_colour(wavelength_nm: float) -> tuple[float, float, float]:
     """sRGB, 0 to 1, of a spectral line; outside the visible range a dark red or violet stands for it.
 
-    CIE 1931 by the fit of Wyman, Sloan & Shirley (2013), JCGT 2(2), eq. 4; then IEC 61966-2-1 with what lies outside
-    the gamut moved towards grey, and scaled so that the largest channel is 1: hue matters here, not brightness.
+    CIE 1931 by the fit of Wyman, Sloan & Shirley (2013), JCGT 2(2), eq. 4; then IEC 61966-2-1, clipped to the gamut
+    and scaled so that the largest channel is 1: hue matters here, not brightness.
     """
     x, y, z = _cie_1931(min(max(wavelength_nm, 405.0), 690.0))
     linear = [
@@ -46,8 +46,7 @@ def wavelength_colour(wavelength_nm: float) -> tuple[float, float, float]:
         -0.9689 * x + 1.8758 * y + 0.0415 * z,
         0.0557 * x - 0.2040 * y + 1.0570 * z,
     ]
-    lift = max(0.0, -min(linear))
-    linear = [value + lift for value in linear]
+    linear = [max(0.0, value) for value in linear]
     largest = max(linear)
     dim = 1.0 if 380.0 <= wavelength_nm <= 750.0 else 0.25
     encoded = [_srgb(dim * value / largest) for value in linear]

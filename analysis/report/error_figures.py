@@ -14,8 +14,12 @@ from analysis.report.style import WIDTH, figure, image_uri, png_uri, short
 
 Float = NDArray[np.float64]
 
+SCENE_ASPECT = 1.55
+"""Width over height of the scene picture, at least."""
 MARGIN = 24
 """px left around a cropped picture."""
+MAP_WIDTH = 4.5
+"""inch, of the cloud beside its histogram."""
 WIDEST = 1400
 """px; pictures are scaled down to this."""
 
@@ -47,39 +51,42 @@ def cropped(path: Path) -> NDArray[np.uint8]:
 
 
 def scene_figure(path: Path) -> str:
-    """The scene picture."""
-    return image_uri(cropped(path))
+    """The scene picture, on a canvas that leaves room for text on its page."""
+    picture = cropped(path)
+    missing = int(SCENE_ASPECT * picture.shape[0]) - picture.shape[1]
+    if missing > 0:
+        sides = (missing // 2, missing - missing // 2)
+        picture = np.pad(picture, ((0, 0), sides, (0, 0)), constant_values=255)
+    return image_uri(picture)
 
 
 def error_map_figure(path: Path, error: Float, limit: float, sigma: float) -> str:
-    """The coloured cloud, and below it the histogram of the same errors, whose bars are the scale of the colours."""
+    """The coloured cloud, and beside it the histogram of the same errors, whose bars are the scale of the colours."""
     import matplotlib
     from matplotlib.colors import Normalize
 
     picture = cropped(path)
     colours, norm = matplotlib.colormaps[DIVERGING], Normalize(-limit * 1e6, limit * 1e6)
-    tall = min(WIDTH * picture.shape[0] / picture.shape[1], 4.6)
-    with figure(tall + 2.0) as made:
-        cloud, histogram = made.subplots(2, 1, height_ratios=(tall, 1.7))
+    tall = float(np.clip(MAP_WIDTH * picture.shape[0] / picture.shape[1], 2.4, 3.6))
+    with figure(tall + 0.3) as made:
+        cloud, histogram = made.subplots(1, 2, width_ratios=(MAP_WIDTH, WIDTH - MAP_WIDTH))
         cloud.imshow(picture, interpolation="antialiased")
         cloud.set_axis_off()
-        cloud.set_title("Measured points on the part, coloured by their distance from it")
+        cloud.set_title("Distance of the points from the part")
         finite = error[np.isfinite(error)] * 1e6
-        edges = np.linspace(-limit * 1.5e6, limit * 1.5e6, 76)
+        edges = np.linspace(-limit * 1.5e6, limit * 1.5e6, 61)
         counts, _ = np.histogram(np.clip(finite, edges[0], edges[-1]), edges)
         middle = (edges[1:] + edges[:-1]) / 2
-        histogram.bar(
-            middle, counts, width=np.diff(edges), color=colours(norm(middle)), edgecolor="#9aa5b0", linewidth=0.3
+        histogram.barh(
+            middle, counts, height=np.diff(edges), color=colours(norm(middle)), edgecolor="#9aa5b0", linewidth=0.3
         )
         if len(finite) and sigma > 0:
             normal = np.exp(-0.5 * ((middle - np.median(finite)) / (sigma * 1e6)) ** 2)
             normal *= len(finite) * (edges[1] - edges[0]) / (sigma * 1e6 * np.sqrt(2 * np.pi))
-            histogram.plot(middle, normal, color=INK, lw=0.9, label="normal distribution of the robust sigma")
-            histogram.legend(loc="upper right")
-        histogram.axvline(0, color=TRUTH, lw=1.2)
-        histogram.set(xlabel="signed distance from the surface (µm), the colours of the picture; + towards the camera")
-        histogram.set(ylabel="points", xlim=(edges[0], edges[-1]))
-        histogram.set_title("Distribution of the errors (the outermost bars hold all that lies beyond)")
+            histogram.plot(normal, middle, color=INK, lw=0.9)
+        histogram.axhline(0, color=TRUTH, lw=1.2)
+        histogram.set(ylabel="signed distance (µm), + towards the camera", xlabel="points", ylim=(edges[0], edges[-1]))
+        histogram.set_title("Distribution and scale")
         return png_uri(made)
 
 
@@ -102,11 +109,9 @@ def steps_figure(report: ReportInput) -> str:
         shown = report.shown_frame().step
         for axes in (error, rows):
             axes.axvline(shown, color=INK, lw=0.6, ls=":")
+        rows.xaxis.get_major_locator().set_params(integer=True)
         error.axhline(0, color=TRUTH, lw=1)
-        error.annotate(
-            "shown in detail", (shown, 1), (3, -2), xycoords=("data", "axes fraction"), textcoords="offset points",
-            fontsize=6.5, color=MUTED, va="top",
-        )  # fmt: skip
+        rows.annotate("shown in detail", (shown, 0), (3, 3), textcoords="offset points", fontsize=6.5, color=MUTED)
         error.set(ylabel="depth error (µm)")
         error.legend(loc="best", ncols=4)
         rows.set(ylabel="complete (%)", xlabel="step", ylim=(0, 104))
@@ -127,6 +132,7 @@ def methods_figure(frame: FrameResult, laser: int) -> str:
         positive = np.concatenate([np.zeros(0), *errors])
         if np.any(positive > 0):
             axes.set_xscale("log")
+            axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
             axes.set_xlim(left=max(1e-4, float(np.percentile(positive[positive > 0], 2))))
         axes.set(xlabel="size of the position error (px)", ylabel="of the points (%)", ylim=(0, 101))
         axes.legend(loc="best")

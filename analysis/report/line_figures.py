@@ -98,12 +98,12 @@ def camera_figure(laser: LaserResult, white: float) -> str:
             axes.spines[:].set_visible(False)
         plain_axes.set_title("As the sensor delivered it")
         marked.set_title("True line, extracted line, enlarged places")
-        _draw_line(marked, laser.curve, 2.2)
+        _draw_line(marked, laser.curve, 2.6)
         pixel = extraction.points.pixel
-        marked.plot(pixel[:, 0], pixel[:, 1], ".", ms=0.9, mew=0, color=method_colour(extraction.line.method))
+        marked.plot(pixel[:, 0], pixel[:, 1], ".", ms=1.4, mew=0, color=method_colour(extraction.line.method))
         for number, place in enumerate(places(extraction), 1):
             u, v = pixel[place.point]
-            marked.plot(u, v, "o", ms=9, mfc="none", mec="white", mew=0.9)
+            marked.plot(u, v, "o", ms=9, mfc="none", mec="white", mew=0.9, clip_on=False)
             marked.annotate(
                 str(number), (u, v), (8, -3), textcoords="offset points", color="white", fontsize=8, weight="bold"
             )
@@ -164,7 +164,7 @@ def three_panel_figure(laser: LaserResult) -> str:
         position, depth, difference = made.subplots(1, 3, sharey=True, width_ratios=(1, 1, 1.25))
         for axes, values, scale in ((position, curve.position, 1.0), (depth, curve.depth_z, 1e3)):
             index, joined_values = joined(curve, values * scale)
-            axes.plot(joined_values, index, color=TRUTH, lw=3.2, alpha=0.55, label="truth", solid_capstyle="butt")
+            axes.plot(joined_values, index, color=TRUTH, lw=4, alpha=0.4, label="truth", solid_capstyle="butt")
         difference.axvline(0, color=TRUTH, lw=1.6, alpha=0.8)
         limit = robust_limit([e.errors.depth * 1e6 for e in laser.extractions])
         for extraction in reversed(laser.extractions):
@@ -172,8 +172,8 @@ def three_panel_figure(laser: LaserResult) -> str:
             index, colour = points.index, method_colour(extraction.line.method)
             along = points.pixel[:, 0 if rows else 1]
             label = method_name(extraction.line.method)
-            position.plot(along, index, ".", ms=1.1, mew=0, color=colour, label=label)
-            depth.plot(points.depth_z * 1e3, index, ".", ms=1.1, mew=0, color=colour)
+            position.plot(along, index, ".", ms=1.7, mew=0, color=colour, label=label)
+            depth.plot(points.depth_z * 1e3, index, ".", ms=1.7, mew=0, color=colour)
             error = errors.depth * 1e6
             if extraction is laser.extractions[0]:
                 down = np.argsort(index, kind="stable")
@@ -195,7 +195,7 @@ def three_panel_figure(laser: LaserResult) -> str:
         difference.set_title("Difference")
         handles, labels = position.get_legend_handles_labels()
         order = [0, *range(len(labels) - 1, 0, -1)]  # the headline's method first
-        position.legend([handles[i] for i in order], [labels[i] for i in order], loc="best", markerscale=6)
+        position.legend([handles[i] for i in order], [labels[i] for i in order], loc="best", markerscale=5)
         difference.legend(loc="lower right", frameon=True, facecolor="white", edgecolor="none", framealpha=0.85)
         return png_uri(made)
 
@@ -210,15 +210,15 @@ def profile_figure(laser: LaserResult, T_camera_laser: Float) -> str:
     every = np.concatenate([true[:, 1:], found[first.points.valid][:, 1:]])
     low, high = (every.min(axis=0), every.max(axis=0)) if len(every) else (np.zeros(2), np.ones(2))
     centre, span = (low + high) / 2, np.maximum(1.06 * (high - low), 1e-3)
-    tall = float(np.clip(AXES_WIDTH * span[1] / span[0], 1.1, 3.3))
+    tall = float(np.clip(AXES_WIDTH * span[1] / span[0], 1.5, 3.3))
     with figure(tall + 1.9) as made:
         profile, error = made.subplots(2, 1, sharex=True, height_ratios=(tall, 1.1))
         _, path = joined(curve, true[:, 1:])
-        profile.plot(path[:, 0], path[:, 1], color=TRUTH, lw=3, alpha=0.55, label="truth", solid_capstyle="butt")
-        profile.plot(found[:, 1], found[:, 2], ".", ms=1.2, mew=0, color=colour, label=method_name(first.line.method))
-        profile.set(ylabel="distance from the laser (mm)")
+        profile.plot(path[:, 0], path[:, 1], color=TRUTH, lw=4, alpha=0.4, label="truth", solid_capstyle="butt")
+        profile.plot(found[:, 1], found[:, 2], ".", ms=1.7, mew=0, color=colour, label=method_name(first.line.method))
+        profile.set(ylabel="from the laser (mm)")
         profile.set_title("Profile in the plane of the laser sheet")
-        profile.legend(loc="best", markerscale=6)
+        profile.legend(loc="best", markerscale=5)
         signed, sigma = first.errors.distance * 1e6, first.errors.sigma_distance * 1e6
         limit = robust_limit([signed])
         order = np.argsort(found[:, 1])

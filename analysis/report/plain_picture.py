@@ -15,6 +15,7 @@ from analysis.report.view import SceneView, View
 Float = NDArray[np.float64]
 
 MOST_TRIANGLES = 6000
+CELLS = 90
 MOST_POINTS = 8000
 
 
@@ -25,7 +26,7 @@ def draw(
     """Draw both pictures, as `picture.start` does; their paths."""
     with figure(5.0, 8.0) as made:
         axes = _axes(made, scene.view)
-        _add_mesh(axes, vertices, triangles, STEEL, 0.35)
+        _add_mesh(axes, vertices, triangles, STEEL, 0.8)
         centre, corners = scene.frustum[0], scene.frustum[1:]
         for corner in corners:
             _add_path(axes, np.stack([centre, corner]), ACCENT, 0.7)
@@ -44,7 +45,7 @@ def draw(
         made.savefig(folder / "scene.png", dpi=200)
     with figure(5.0, 8.0) as made:
         axes = _axes(made, view)
-        _add_mesh(axes, vertices, triangles, SLATE, 0.25)
+        _add_mesh(axes, vertices, triangles, SLATE, 0.9)
         kept = slice(None, None, max(1, len(cloud) // MOST_POINTS))
         x, y, z = cloud[kept].T
         axes.scatter(x, y, z, c=error[kept], cmap=DIVERGING, vmin=-limit, vmax=limit, s=4, lw=0, depthshade=False)
@@ -68,18 +69,26 @@ def _axes(made: Any, view: View) -> Any:
 
 
 def _add_mesh(axes: Any, vertices: Float, triangles: NDArray[np.int32], colour: Any, alpha: float) -> None:
-    """The largest triangles, lit from the upper side; thousands of small ones would take minutes."""
+    """Thousands of triangles at most: matplotlib would take minutes over a whole mesh."""
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    if len(triangles) == 0:
-        return
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    normal = np.cross(b - a, c - a)
-    area = np.linalg.norm(normal, axis=1)
-    kept = np.argsort(area)[-MOST_TRIANGLES:]
-    axes.add_collection3d(
-        Poly3DCollection(vertices[triangles[kept]], facecolors=colour, edgecolors="none", alpha=alpha, zorder=1)
-    )
+    if len(triangles) > MOST_TRIANGLES:
+        vertices, triangles = _simplified(vertices, triangles)
+    if len(triangles):
+        axes.add_collection3d(
+            Poly3DCollection(
+                vertices[triangles], facecolors=colour, edgecolors=colour, lw=0, alpha=alpha, zorder=1, shade=True
+            )
+        )
+
+
+def _simplified(vertices: Float, triangles: NDArray[np.int32]) -> tuple[Float, NDArray[np.int32]]:
+    """Vertices gathered in cells of a grid."""
+    import open3d as o3d
+
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(triangles))
+    simple = mesh.simplify_vertex_clustering(float(np.max(np.ptp(vertices, axis=0))) / CELLS)
+    return np.asarray(simple.vertices), np.asarray(simple.triangles)
 
 
 def _add_path(axes: Any, points: Float, colour: Any, width: float) -> None:

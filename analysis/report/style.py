@@ -67,20 +67,17 @@ def figure(height: float, width: float = WIDTH) -> Iterator[Any]:
 
 def png_uri(made: Any, dpi: int = DPI) -> str:
     """data: URI of a figure."""
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    made.savefig(buffer, format="png", dpi=dpi)
-    return image_uri(np.asarray(Image.open(buffer).convert("RGB")))
+    made.set_dpi(dpi)
+    made.canvas.draw()
+    return image_uri(np.asarray(made.canvas.buffer_rgba())[:, :, :3])
 
 
 def image_uri(pixels: NDArray[np.uint8]) -> str:
-    """data: URI of (h, w, 3) pixels, with a palette: a third of the size, and no difference to be seen in figures."""
+    """data: URI of (h, w, 3) pixels."""
     from PIL import Image
 
     buffer = io.BytesIO()
-    picture = Image.fromarray(np.ascontiguousarray(pixels), "RGB")
-    picture.quantize(256, method=Image.Quantize.MEDIANCUT).save(buffer, "PNG", compress_level=7)
+    Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, "PNG", compress_level=7)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 

@@ -1,4 +1,4 @@
-"""Numbers as people read them: um, mm, deg, mW, ms. The only place where SI leaves the program."""
+"""Numbers as people read them: um, mm, deg, mW, ms, with a no-break space. The only place where SI is left behind."""
 
 from __future__ import annotations
 
@@ -23,17 +23,21 @@ def micrometres(value: float, significant: int = 3) -> str:
     """m -> "21.7 µm", or mm from 10 mm on."""
     if not math.isfinite(value):
         return NONE
-    return f"{digits(value * 1e3, significant)} mm" if abs(value) >= 0.01 else f"{digits(value * 1e6, significant)} µm"
+    return (
+        f"{digits(value * 1e3, significant)}\u00a0mm"
+        if abs(value) >= 0.01
+        else f"{digits(value * 1e6, significant)}\u00a0µm"
+    )
 
 
 def millimetres(value: float, significant: int = 4) -> str:
     """m -> "866 mm"."""
-    return f"{digits(value * 1e3, significant)} mm" if math.isfinite(value) else NONE
+    return f"{digits(value * 1e3, significant)}\u00a0mm" if math.isfinite(value) else NONE
 
 
 def pixels(value: float, significant: int = 3) -> str:
     """px -> "0.0252 px"."""
-    return f"{digits(value, significant)} px" if math.isfinite(value) else NONE
+    return f"{digits(value, significant)}\u00a0px" if math.isfinite(value) else NONE
 
 
 def degrees(value: float, significant: int = 4) -> str:
@@ -43,28 +47,28 @@ def degrees(value: float, significant: int = 4) -> str:
 
 def milliwatts(value: float) -> str:
     """W -> "20 mW"."""
-    return f"{value * 1e3:.4g} mW"
+    return f"{value * 1e3:.4g}\u00a0mW"
 
 
 def milliseconds(value: float) -> str:
     """s -> "3.8 ms"."""
-    return f"{value * 1e3:.4g} ms"
+    return f"{value * 1e3:.4g}\u00a0ms"
 
 
 def seconds(value: float) -> str:
     """s -> "0.07 s", "12.3 s", "3 min 4 s"."""
     if value >= 120:
-        return f"{int(value // 60)} min {value % 60:.0f} s"
-    return f"{value:.2f} s" if value < 10 else f"{value:.1f} s"
+        return f"{int(value // 60)} min {value % 60:.0f}\u00a0s"
+    return f"{value:.2f}\u00a0s" if value < 10 else f"{value:.1f}\u00a0s"
 
 
 def percent(value: float, decimals: int = 1) -> str:
     """Fraction -> "98.2 %"."""
-    return f"{100 * value:.{decimals}f} %" if math.isfinite(value) else NONE
+    return f"{100 * value:.{decimals}f}\u00a0%" if math.isfinite(value) else NONE
 
 
 def count(value: float) -> str:
     """Thousands set apart by thin spaces: "1 820"; from 10 million on "191 million"."""
     if value >= 1e7:
-        return f"{value / 1e6:,.0f} million".replace(",", "\u2009")
+        return f"{value / 1e6:,.0f}\u00a0million".replace(",", "\u2009")
     return f"{value:,.0f}".replace(",", "\u2009")

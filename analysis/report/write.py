@@ -80,8 +80,10 @@ def _content(report: ReportInput) -> dict[str, Any]:
         try:  # the other figures, while VTK draws
             details = [_detail(report, frame, i) for i in range(min(MOST_DETAILS, len(frame.lasers)))]
             steps = steps_figure(report) if len(report.frames) > 1 else None
-        finally:
-            drawn = picture.finish(process, folder)
+        except BaseException:
+            picture.stop(process)
+            raise
+        drawn = picture.finish(process, folder)
         note = "" if drawn is not None else PLAIN_NOTE
         scene_png, cloud_png = drawn if drawn is not None else plain_picture.draw(folder, *drawing)
         pictures = {
