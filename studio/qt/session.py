@@ -52,6 +52,8 @@ class Session(QObject):
     drag_changed = Signal(bool)
     """A drag began or ended: panels that are slow to update wait for its end."""
     selection_changed = Signal()
+    frame_requested = Signal()
+    """The selection is to fill the 3D view."""
     hover_changed = Signal()
     """`hovered` is another scan line."""
     step_changed = Signal()
