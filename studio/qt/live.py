@@ -11,7 +11,8 @@ from __future__ import annotations
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from render.scene import SceneObject
-from studio.jobs import Cancel, Progress
+from render.threads import Cancel
+from studio.jobs import Progress
 from studio.preview import Look, Preview
 from studio.qt.jobs import JobRunner
 from studio.qt.session import Session
