@@ -99,7 +99,7 @@ def steps_figure(report: ReportInput) -> str:
         for i, laser in enumerate(report.scene.lasers):
             results = [frame.lasers[i].extractions[0].errors for frame in report.frames]
             line = ("-", "--", ":", "-.")[i % 4]
-            name = "" if len(report.scene.lasers) == 1 else f", {short(laser.name)}"
+            name = "" if len(report.scene.lasers) == 1 else f", {short(laser.name, 16)}"
             colour = method_colour(report.frames[0].lasers[i].extractions[0].line.method)
             rmse = [result.depth_z.rmse * 1e6 for result in results]
             bias = [result.depth_z.bias * 1e6 for result in results]
@@ -111,9 +111,13 @@ def steps_figure(report: ReportInput) -> str:
             axes.axvline(shown, color=INK, lw=0.6, ls=":")
         rows.xaxis.get_major_locator().set_params(integer=True)
         error.axhline(0, color=TRUTH, lw=1)
-        rows.annotate("shown in detail", (shown, 0), (3, 3), textcoords="offset points", fontsize=6.5, color=MUTED)
+        late = shown > (steps[0] + steps[-1]) / 2
+        rows.annotate(
+            "shown in detail", (shown, 0), (-3 if late else 3, 3), textcoords="offset points",
+            ha="right" if late else "left", fontsize=6.5, color=MUTED,
+        )  # fmt: skip
         error.set(ylabel="depth error (µm)")
-        error.legend(loc="best", ncols=4)
+        error.legend(loc="best", ncols=2).set_in_layout(False)
         rows.set(ylabel="complete (%)", xlabel="step", ylim=(0, 104))
         return png_uri(made)
 

@@ -79,6 +79,7 @@ def _plotter(job: Any, name: str, colour: str, mesh_alpha: float) -> Any:
     eye, target, up, low, high = job[name]
     plotter.camera_position = [eye, target, up]
     plotter.reset_camera(bounds=np.stack([low, high], axis=1).ravel().tolist(), render=False)
+    plotter.camera.zoom(0.9)  # leaves room for labels
     plotter.enable_anti_aliasing("msaa", multi_samples=8)
     return plotter
 

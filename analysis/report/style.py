@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -82,9 +83,8 @@ def image_uri(pixels: NDArray[np.uint8]) -> str:
 
 
 def plain(text: str) -> str:
-    """Text fit for a font: no control characters, no lone surrogates."""
-    text = text.encode("utf-8", "replace").decode("utf-8")
-    return "".join(letter if letter.isprintable() else " " for letter in text)
+    """Text fit for a page and a font: no control or direction characters, no lone surrogates."""
+    return "".join(" " if unicodedata.category(letter) in ("Cc", "Cf", "Cs") else letter for letter in text)
 
 
 def short(text: str, length: int = 28) -> str:

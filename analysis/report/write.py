@@ -55,12 +55,18 @@ def render_page(report: ReportInput) -> str:
 
     here = Path(__file__).parent
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(here), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=False
+        loader=jinja2.FileSystemLoader(here), autoescape=True, undefined=jinja2.StrictUndefined, finalize=_printable
     )
     style = (here / "style.css").read_text(encoding="utf-8")
-    page = environment.get_template("template.html").render(style=Markup(style), **_content(report))
-    # a lone surrogate in a name cannot be encoded
-    return page.encode("utf-8", "replace").decode("utf-8")
+    return environment.get_template("template.html").render(style=Markup(style), **_content(report))
+
+
+def _printable(value: Any) -> Any:
+    """Names come from files: what the template prints is text only. Markup and pictures are ours."""
+    from markupsafe import Markup
+
+    ours = isinstance(value, Markup) or not isinstance(value, str) or value.startswith("data:image/png;base64,")
+    return value if ours else plain(value)
 
 
 def _content(report: ReportInput) -> dict[str, Any]:
@@ -95,7 +101,7 @@ def _content(report: ReportInput) -> dict[str, Any]:
     more = len(frame.lasers) - MOST_DETAILS
     spent, spent_in_all = timing(report)
     return pictures | {
-        "title": plain(report.title) or "untitled",
+        "title": report.title,
         "facts": _facts(report),
         "chips": laser_chips(report),
         "headline": headline(report),
