@@ -25,7 +25,6 @@ from render.pose import Pose
 from render.scene import Scene, SceneObject
 from render.sensor import Sensor, SpectralCurve
 from render.settings import RenderSettings
-from render.shape import MeshFile
 from studio.document import FieldPath, replaced, value_at
 from studio.linked_fields import DERIVED, LINKED
 from studio.project import Project
@@ -177,14 +176,12 @@ def field_path(owner: FieldPath, spec: FieldSpec) -> FieldPath:
     return (*owner, int(spec.name) if spec.name.isdigit() else spec.name)
 
 
-def start_value(alternative: Alternative, before: Any) -> Any:
+def start_value(alternative: Alternative, before: Any, file: str = "") -> Any:
     """What a field holds when this kind is chosen: defaults, with what the former kind has in common kept.
 
-    ValueError: the kind needs a file first.
+    file: of an alternative that needs one, relative to the project.
     """
     kind = alternative.type
-    if alternative.file:
-        raise ValueError("choose a file first")
     if kind is None:
         return None
     if kind is float:
@@ -197,7 +194,18 @@ def start_value(alternative: Alternative, before: Any) -> Any:
             same = type(before).model_fields[name].annotation == kind.model_fields[name].annotation
             if same and type(before).model_fields[name].title == kind.model_fields[name].title:
                 values[name] = getattr(before, name)
+    for name in _files(kind):
+        values[name] = file if name == "path" else {"path": file, "srgb": False}
     return kind(**values)
+
+
+def _files(kind: type[BaseModel]) -> list[str]:
+    """Fields that a person must choose a file for before this kind can be."""
+    return [
+        name
+        for name, field in kind.model_fields.items()
+        if field.is_required() and (name == "path" or field.annotation is Texture)
+    ]
 
 
 def choice_label(value: Any) -> str:
@@ -277,8 +285,7 @@ def _union(common: dict[str, Any], members: list[Any], value: Any) -> FieldSpec:
         if kind is None:
             alternatives.append(Alternative("None", "", None))
         elif is_model:
-            file = kind in (MeshFile, Texture)
-            alternatives.append(Alternative(kind_label(kind), first_sentence(kind), kind, file))
+            alternatives.append(Alternative(kind_label(kind), first_sentence(kind), kind, bool(_files(kind))))
         else:
             alternatives.append(Alternative("One value" if kind is float else "R, G, B", "", kind))
         if value is None if kind is None else isinstance(value, kind):
@@ -308,12 +315,13 @@ def _tuple(owner: type[BaseModel], common: dict[str, Any], args: tuple[Any, ...]
     if element in (float, int):
         length = None if args[-1] is Ellipsis else len(args)
         return FieldSpec(kind="numbers", length=length, **common | _limits(limits))
+    numbered = len(value) > 1
     items = [
-        _spec(owner, str(i), element, limits, item, REQUIRED, f"{common['label']} {i + 1}", "")
+        _spec(owner, str(i), element, limits, item, REQUIRED, f"{common['label']} {i + 1}" if numbered else "Curve", "")
         for i, item in enumerate(value)
     ]
     if common["name"] == "efficiency" and len(items) == 3:
-        items = [_renamed(item, f"{common['label']} {band}") for item, band in zip(items, "RGB", strict=True)]
+        items = [_renamed(item, band) for item, band in zip(items, ("Red", "Green", "Blue"), strict=True)]
     return FieldSpec(kind="list", fields=tuple(items), **common)
 
 

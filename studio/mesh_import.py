@@ -61,7 +61,7 @@ def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
         raise InputError("there is no such file", where=str(file))
     made: list[Path] = []
     try:
-        inside = _copied(file, root, made) if needs_copy(file, root) else file.resolve()
+        inside = _copied(file, root / FOLDER, made) if needs_copy(file, root) else file.resolve()
         return _judged(inside, root, view)
     except BaseException:
         for copy in made:
@@ -97,9 +97,15 @@ def _words_after(file: Path, keyword: str) -> list[str]:
         return []
 
 
-def _copied(file: Path, root: Path, made: list[Path]) -> Path:
-    """The file in the project's mesh folder; the same bytes there are used again, another file of that name is kept."""
-    folder = root / FOLDER
+def copied_beside(file: Path, root: Path, folder: str) -> str:
+    """A file's path relative to the project; one from outside is copied into `folder` of it. InputError: cannot be."""
+    if not needs_copy(file, root):
+        return file.resolve().relative_to(root.resolve()).as_posix()
+    return _copied(file, root / folder, []).relative_to(root.resolve()).as_posix()
+
+
+def _copied(file: Path, folder: Path, made: list[Path]) -> Path:
+    """The file in a folder of the project; the same bytes there are used again, another file of that name is kept."""
     sides = [name for name in side_files(file) if _is_below(file.parent / name, file.parent)]
     target, number = folder / file.name, 1
     while target.exists() and sha256(target) != sha256(file):

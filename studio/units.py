@@ -36,7 +36,10 @@ class Unit:
 
     def format(self, value: float) -> str:
         """A stored value as shown, without the unit: no needless digits, no exponent where a person can do without."""
-        return plain(value * self.factor, 4 if self.stored in FACTORS else 6)
+        measured = self.stored in FACTORS or self.shown in ("deg", "mm")
+        shown = value * self.factor
+        # lengths and angles come out of matrices: what is left of a zero there is a zero
+        return "0" if measured and abs(shown) < 1e-6 else plain(shown, 4 if measured else 6)
 
     def with_unit(self, value: float) -> str:
         return f"{self.format(value)} {self.shown}".rstrip()

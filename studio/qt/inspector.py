@@ -1,0 +1,165 @@
+"""The inspector: the selected item as a form, with its presets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QFont
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QMenu, QScrollArea, QToolButton, QVBoxLayout, QWidget
+
+from render.errors import InputError
+from render.shape import MeshFile
+from studio.document import FieldPath, value_at
+from studio.forms import Alternative, FieldSpec, describe_item, kind_label, start_value
+from studio.mesh_import import ImportedMesh, copied_beside
+from studio.presets import Preset, presets_for, with_preset
+from studio.project import Project
+from studio.qt import mesh_importer
+from studio.qt.form import Form
+from studio.qt.scene_icons import item_icon
+from studio.qt.session import Session
+
+TITLES = {"scene": "Scene", "rig": "Rig", "camera": "Camera", "sensor": "Sensor", "render": "Render settings",
+          "extraction": "Line extraction", "environment": "Environment", "motion": "Motion"}  # fmt: skip
+LIST_HINTS = {
+    "lasers": "The line lasers of the rig.",
+    "objects": "What the scanner looks at. Drop mesh files on the scene to add more.",
+    "lights": "Ambient light besides the environment.",
+}
+IMAGE_FILES = "Images (*.png *.jpg *.jpeg *.tif *.tiff *.bmp);;All files (*)"
+
+
+class Inspector(QWidget):
+    """A form for what is selected in the session."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.setMinimumWidth(280)
+        self.icon = QLabel()
+        self.title = QLabel()
+        font = QFont(self.title.font())
+        font.setPointSizeF(font.pointSizeF() * 1.15)
+        font.setBold(True)
+        self.title.setFont(font)
+        self.kind = QLabel()
+        self.kind.setObjectName("muted")
+        self.presets = QToolButton(text="Presets ▾", toolTip="Cameras, sensors and lasers with their sources")
+        self.presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.presets.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
+        self.presets.setStyleSheet("QToolButton::menu-indicator { image: none; width: 0; }")
+        self.presets.setMenu(QMenu(self.presets, toolTipsVisible=True))
+        head = QHBoxLayout()
+        head.setContentsMargins(0, 0, 0, 0)
+        head.setSpacing(7)
+        for widget in (self.icon, self.title, self.kind):
+            head.addWidget(widget)
+        head.addStretch(1)
+        head.addWidget(self.presets)
+        self.hint = QLabel(wordWrap=True)
+        self.hint.setObjectName("muted")
+        self.form = Form(session, self._choose_file)
+        content = QWidget()
+        column = QVBoxLayout(content)
+        column.setContentsMargins(10, 8, 8, 8)
+        column.setSpacing(6)
+        column.addLayout(head)
+        column.addWidget(self.hint)
+        column.addWidget(self.form)
+        column.addStretch(1)
+        scroll = QScrollArea(widgetResizable=True)
+        scroll.setFrameShape(QFrame.Shape.NoFrame)
+        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        scroll.setWidget(content)
+        outer = QVBoxLayout(self)
+        outer.setContentsMargins(0, 0, 0, 0)
+        outer.addWidget(scroll)
+        self._presets_path: FieldPath | None = None
+        session.selection_changed.connect(self.refresh)
+        session.project_changed.connect(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the selection as it is now; an item that is gone, as nothing selected."""
+        path = self.session.selection
+        try:
+            value = value_at(self.session.project, path)
+        except KeyError:
+            path, value = (), self.session.project
+        is_list = isinstance(value, tuple)
+        spec = FieldSpec("", "", "", "model", value) if is_list else describe_item(self.session.project, path)
+        name = getattr(value, "name", None)
+        self.title.setText(name or TITLES.get(str(path[-1]), str(path[-1]).capitalize()))
+        self.icon.setPixmap(item_icon(self.session.project, path).pixmap(20, 20))
+        self.kind.setText("" if name is None else _kind(self.session.project, path))
+        hint = LIST_HINTS.get(str(path[-1]), "") if is_list else ""
+        if not is_list and spec.kind != "union" and not spec.fields:
+            hint = spec.help
+        self.hint.setText(hint)
+        self.hint.setVisible(bool(hint))
+        self.form.show_item(path, spec)
+        if path != self._presets_path:
+            self._presets_path = path
+            self._fill_presets(() if is_list else presets_for(self.session.project, path))
+
+    def _fill_presets(self, found: tuple[Preset, ...]) -> None:
+        menu = self.presets.menu()
+        menu.clear()
+        for preset in found:
+            action = QAction(preset.name, menu)
+            action.setToolTip(_wrapped(preset.source))
+            action.triggered.connect(lambda _=False, preset=preset: self.apply_preset(preset))
+            menu.addAction(action)
+        self.presets.setVisible(bool(found))
+
+    def apply_preset(self, preset: Preset) -> None:
+        """Give the selection a preset's values, as one edit."""
+        try:
+            project = with_preset(self.session.project, self.session.selection, preset)
+        except InputError as error:
+            self.session.message.emit("error", str(error))
+            return
+        self.session.document.apply(f"preset {preset.name}", project)
+        self.session.message.emit("info", f"{preset.name}. {preset.source}")
+
+    def _choose_file(self, path: FieldPath, kind: Alternative | None) -> None:
+        """For the mesh or image of what is at a path: a dialog, a copy into the project, and the edit."""
+        root = self.session.document.root
+        if path[-1] == "shape":
+            file = mesh_importer.choose_mesh(self)
+            if file is not None:
+                mesh_importer.import_meshes(self.session, [file], self, lambda mesh: self._take_mesh(path, mesh))
+            return
+        file = mesh_importer.choose_file(self, "Image", IMAGE_FILES)
+        if file is None or not mesh_importer.may_copy(self, [file], root):
+            return
+        try:
+            self._take_image(path, kind, copied_beside(file, root, "textures"))
+        except InputError as error:
+            self.session.message.emit("error", str(error))
+
+    def _take_mesh(self, path: FieldPath, mesh: ImportedMesh) -> None:
+        shape = MeshFile(path=mesh.path, unit=mesh.unit)
+        self.session.set(path, shape, f"use {Path(mesh.path).name}")
+
+    def _take_image(self, path: FieldPath, kind: Alternative | None, image: str) -> None:
+        label = f"use {Path(image).name}"
+        if kind is None:
+            self.session.set((*path, "path"), image, label)
+        else:
+            self.session.set(path, start_value(kind, value_at(self.session.project, path), image), label)
+
+
+def _kind(project: Project, path: FieldPath) -> str:
+    value = value_at(project, path)
+    if not path:
+        return "project"
+    if hasattr(value, "shape"):
+        return kind_label(type(value.shape)).lower()
+    return "line laser" if hasattr(value, "wavelength_nm") else f"{kind_label(type(value)).lower()} light"
+
+
+def _wrapped(text: str) -> str:
+    """Rich text, so that Qt breaks its lines."""
+    return f"<p style='white-space:normal'>{text}</p>"
