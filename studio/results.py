@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
@@ -71,7 +71,22 @@ def write_reports(
     """report.html and report.pdf; `world` is that of step 0."""
     from analysis.report.write import write_report
 
-    data = ReportInput(
+    data = report_input(project, world, results, clock.seconds, notes=notes, created=created)
+    with clock.stage("report"):
+        return list(write_report(out, data))
+
+
+def report_input(
+    project: Project,
+    world: World,
+    results: Sequence[FrameResult],
+    seconds: Mapping[str, float],
+    *,
+    notes: Sequence[str],
+    created: str,
+) -> ReportInput:
+    """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage."""
+    return ReportInput(
         title=project.name,
         scene=project.scene,
         frames=tuple(results),
@@ -81,14 +96,12 @@ def write_reports(
         sensor=project.sensor,
         display_max=float(2**project.sensor.bits - 1),
         settings={"Line extraction": settings_table(project.extraction), "Rendering": settings_table(project.render)},
-        seconds={name: value for name, value in clock.seconds.items() if name not in _frame_stages(results)},
+        seconds={name: value for name, value in seconds.items() if name not in _frame_stages(results)},
         seed=project.seed,
         versions=versions(),
         notes=tuple(notes),
         created=created,
     )
-    with clock.stage("report"):
-        return list(write_report(out, data))
 
 
 def settings_table(settings: Model) -> dict[str, str]:

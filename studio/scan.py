@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -58,11 +59,12 @@ def run_scan(
     report: bool = True,
     progress: StageProgress = lambda stage, done: None,
     cancelled: Cancel = never,
+    each: Callable[[FrameResult], None] = lambda frame: None,
 ) -> ScanResult:
     """Scan `project`, whose files are below `root`, into the folder `out`.
 
     steps: only the first so many frames; seed: in place of the project's; measure off: stop after the frames;
-    report off: stop after the points.
+    report off: stop after the points; each: hears of every frame once it is measured.
     InputError: bad project, mesh or texture, nothing to see, `out` not writable. Cancelled: files so far stay, whole.
     """
     began = time.perf_counter()
@@ -98,6 +100,7 @@ def run_scan(
                 names.append(written[-1].name)
             if measure:
                 results.append(measure_frame(project, frame, world, images, clock, threads, keep=step in shown))
+                each(results[-1])
         notes = [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
         result: dict[str, Any] = {
             "name": project.name,

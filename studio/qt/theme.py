@@ -167,7 +167,9 @@ def style_sheet(c: Colours) -> str:
     QTabBar::tab:hover {{ color: {c.text}; }}
     QTabWidget::pane {{ border: none; border-top: 1px solid {c.line}; }}
     QHeaderView::section {{ background: {c.window}; color: {c.muted}; border: none;
-        border-bottom: 1px solid {c.line}; padding: 4px 8px; }}
+        border-bottom: 1px solid {c.line}; padding: 4px 4px; }}
+    QHeaderView::section:vertical {{ border: none; padding: 2px 8px; }}
+    QTableCornerButton::section {{ background: {c.window}; border: none; border-bottom: 1px solid {c.line}; }}
     QTableView {{ gridline-color: {c.line}; border: none; }}
     QProgressBar {{ background: {c.base}; border: 1px solid {c.line}; border-radius: 4px; text-align: center; }}
     QProgressBar::chunk {{ background: {c.accent}; border-radius: 3px; }}
