@@ -56,7 +56,7 @@ class LaserView:
     depth_per_px: float | None
     along_line_per_px: float | None
     width_px: float | None
-    """Gaussian sigma with the same height and area, about."""
+    """Standard deviation of the light across the line, without the pixel's own, about."""
     peak_electrons: float | None
     """Of the brightest pixel of a scan line, about."""
     peak_electrons_most: float | None
@@ -148,14 +148,24 @@ def _between_rays(points: Float, origin: Float) -> float:
 
 
 def _brightness(project: Project, frame: Frame, i: int, hit: NDArray[np.int32]) -> tuple[Float, Float]:
-    """Electrons of the brightest pixel, and the equivalent sigma in px, of each scan line that is hit."""
+    """Electrons of the brightest pixel, and the line's sigma in px, of each scan line that is hit."""
     power = [laser.power if k == i else 0.0 for k, laser in enumerate(project.scene.lasers)]
     electrons = expected_electrons(frame, project.scene, project.sensor, laser_power=power)
     lines = (electrons if frame.curves[i].axis == "rows" else electrons.T)[hit].astype(np.float64)
-    peak = lines.max(axis=1) if len(hit) else np.zeros(0)
+    if len(hit) == 0:
+        return np.zeros(0), np.zeros(0)
+    peak = lines.max(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        width = lines.sum(axis=1) / (peak * math.sqrt(2.0 * math.pi))
-    return peak, np.nan_to_num(width)
+        rough = np.nan_to_num(np.median(lines.sum(axis=1) / (peak * math.sqrt(2.0 * math.pi))))
+    # second moment within a window about the peak, less that of a pixel (Sheppard's correction)
+    reach = np.arange(-math.ceil(6.0 * rough) - 1, math.ceil(6.0 * rough) + 2)
+    near = np.clip(lines.argmax(axis=1)[:, None] + reach, 0, lines.shape[1] - 1)
+    weight = np.take_along_axis(lines, near, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        weight /= weight.sum(axis=1, keepdims=True)
+    mean = weight @ reach
+    variance = np.einsum("ij,ij->i", weight, (reach - mean[:, None]) ** 2) - 1.0 / 12.0
+    return peak, np.sqrt(np.maximum(np.nan_to_num(variance), 0.0))
 
 
 def _lengths(curve: LaserCurve) -> tuple[float, float]:
