@@ -35,6 +35,7 @@ LISTS = (LASERS, OBJECTS, LIGHTS)
 """Where items can be added, removed and put in another order."""
 
 Result = tuple[Project, FieldPath]
+Kind = type[Primitive]
 
 
 def in_list(path: FieldPath) -> bool:

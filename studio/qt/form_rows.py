@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from studio.document import FieldPath
 from studio.euler_angles import euler_angles, rotation_from_euler
 from studio.forms import REQUIRED, FieldSpec, field_path
-from studio.qt.fields import ChoiceField, CurveField, CurvePlot, FlagField, NumbersField, TextField
+from studio.qt.fields import ChoiceField, CurveField, CurvePlot, FlagField, NumbersField, TextField, tool_button
 from studio.qt.number_field import NumberField, VectorField
 from studio.units import Unit
 
@@ -22,6 +23,13 @@ if TYPE_CHECKING:
 LABEL_WIDTH, RESET_WIDTH, SPACING = 100, 20, 5
 AXES = ("x", "y", "z")
 DEGREES = Unit("", "deg", 1.0)
+
+
+Editor = TypeVar("Editor", TextField, NumberField, NumbersField, CurveField, FlagField, ChoiceField)
+
+
+def _itself(value: Any) -> Any:
+    return value
 
 
 class Row(QWidget):
@@ -38,7 +46,7 @@ class Row(QWidget):
         grid.setColumnStretch(1, 1)
         self.label = self._make_label()
         self.editor = self._make_editor()
-        self.reset = QToolButton(text="↺", toolTip="Back to the default")
+        self.reset = tool_button("↺", "Back to the default")
         self.reset.setFixedSize(RESET_WIDTH, RESET_WIDTH)
         self.reset.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         policy = self.reset.sizePolicy()
@@ -158,10 +166,10 @@ class Row(QWidget):
     def _vector(self, specs: list[FieldSpec], whole: Callable[[int, Any], Any]) -> VectorField:
         vector = VectorField(specs)
         for i, field in enumerate(vector.fields):
-            self._connected(field, lambda part, i=i: whole(i, part))
+            self._connected(field, partial(whole, i))
         return vector
 
-    def _connected(self, field: Any, whole: Callable[[Any], Any] = lambda value: value) -> Any:
+    def _connected(self, field: Editor, whole: Callable[[Any], Any] = _itself) -> Editor:
         """Wire an editor of the value, or of a part of it."""
 
         def enter(value: Any) -> None:
@@ -208,7 +216,7 @@ class Row(QWidget):
         line.setContentsMargins(0, 0, 0, 0)
         line.setSpacing(3)
         self.text = self._connected(TextField(self.spec))
-        browse = QToolButton(text="…", toolTip="Choose a file")
+        browse = tool_button("…", "Choose a file")
         browse.clicked.connect(lambda: self.form.choose_file(self.owner, None))
         line.addWidget(self.text)
         line.addWidget(browse)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QFont
+from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QMenu, QScrollArea, QToolButton, QVBoxLayout, QWidget
 
 from render.errors import InputError
@@ -13,9 +13,10 @@ from render.shape import MeshFile
 from studio.document import FieldPath, value_at
 from studio.forms import Alternative, FieldSpec, describe_item, kind_label, start_value
 from studio.mesh_import import ImportedMesh, copied_beside
-from studio.presets import Preset, presets_for, with_preset
+from studio.presets import presets_for
 from studio.project import Project
-from studio.qt import mesh_importer
+from studio.qt import mesh_importer, scene_actions
+from studio.qt.fields import tool_button
 from studio.qt.form import Form
 from studio.qt.scene_icons import item_icon
 from studio.qt.session import Session
@@ -45,11 +46,11 @@ class Inspector(QWidget):
         self.title.setFont(font)
         self.kind = QLabel()
         self.kind.setObjectName("muted")
-        self.presets = QToolButton(text="Presets ▾", toolTip="Cameras, sensors and lasers with their sources")
+        self.presets = tool_button("Presets ▾", "Cameras, sensors and lasers with their sources")
         self.presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self.presets.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self.presets.setStyleSheet("QToolButton::menu-indicator { image: none; width: 0; }")
-        self.presets.setMenu(QMenu(self.presets, toolTipsVisible=True))
+        self.presets.setMenu(QMenu(self.presets))
         head = QHBoxLayout()
         head.setContentsMargins(0, 0, 0, 0)
         head.setSpacing(7)
@@ -101,27 +102,9 @@ class Inspector(QWidget):
         self.form.show_item(path, spec)
         if path != self._presets_path:
             self._presets_path = path
-            self._fill_presets(() if is_list else presets_for(self.session.project, path))
-
-    def _fill_presets(self, found: tuple[Preset, ...]) -> None:
-        menu = self.presets.menu()
-        menu.clear()
-        for preset in found:
-            action = QAction(preset.name, menu)
-            action.setToolTip(_wrapped(preset.source))
-            action.triggered.connect(lambda _=False, preset=preset: self.apply_preset(preset))
-            menu.addAction(action)
-        self.presets.setVisible(bool(found))
-
-    def apply_preset(self, preset: Preset) -> None:
-        """Give the selection a preset's values, as one edit."""
-        try:
-            project = with_preset(self.session.project, self.session.selection, preset)
-        except InputError as error:
-            self.session.message.emit("error", str(error))
-            return
-        self.session.document.apply(f"preset {preset.name}", project)
-        self.session.message.emit("info", f"{preset.name}. {preset.source}")
+            self.presets.menu().clear()
+            scene_actions.fill_presets_menu(self.presets.menu(), self.session)
+            self.presets.setVisible(not is_list and bool(presets_for(self.session.project, path)))
 
     def _choose_file(self, path: FieldPath, kind: Alternative | None) -> None:
         """For the mesh or image of what is at a path: a dialog, a copy into the project, and the edit."""
@@ -158,8 +141,3 @@ def _kind(project: Project, path: FieldPath) -> str:
     if hasattr(value, "shape"):
         return kind_label(type(value.shape)).lower()
     return "line laser" if hasattr(value, "wavelength_nm") else f"{kind_label(type(value)).lower()} light"
-
-
-def _wrapped(text: str) -> str:
-    """Rich text, so that Qt breaks its lines."""
-    return f"<p style='white-space:normal'>{text}</p>"
