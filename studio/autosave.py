@@ -11,6 +11,7 @@ import datetime
 import json
 import os
 import secrets
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -41,8 +42,15 @@ class Recovery:
         document.path = self.path
         return document
 
+    @property
+    def is_draft(self) -> bool:
+        """Its files are in a draft's folder, which goes with it."""
+        return self.root.parent == self.file.parent.absolute()
+
     def discard(self) -> None:
         """It was opened, or is not wanted."""
+        if self.is_draft:
+            shutil.rmtree(self.root, ignore_errors=True)
         for file in (self.file, self.file.with_suffix(".lock")):
             with contextlib.suppress(OSError):
                 file.unlink()
@@ -57,6 +65,7 @@ class Autosave:
         self.file = folder / f"{self._stem}.json"
         self._lock: IO[bytes] | None = None
         self._kept: Project | None = None
+        self._drafts: list[Path] = []
 
     def keep(self, document: Document) -> bool:
         """Write the document if it has changes that neither its file nor the last autosave holds.
@@ -82,6 +91,17 @@ class Autosave:
         self._kept = document.project
         return True
 
+    def draft(self) -> Path:
+        """A new folder for the files of a project that has no folder yet. InputError: cannot be made."""
+        self._hold()
+        folder = self.folder / f"{self._stem}-{len(self._drafts)}"
+        try:
+            folder.mkdir(parents=True)
+        except OSError as error:
+            raise InputError("a new project has no place", where=str(folder), found=error.strerror) from error
+        self._drafts.append(folder)
+        return folder
+
     def forget(self) -> None:
         """The work is saved or given up: drop the file."""
         self._kept = None
@@ -91,6 +111,8 @@ class Autosave:
     def close(self) -> None:
         """The program ends in order."""
         self.forget()
+        for folder in self._drafts:
+            shutil.rmtree(folder, ignore_errors=True)
         if self._lock is not None:
             self._lock.close()
             self._lock = None
@@ -120,13 +142,15 @@ def find(folder: Path) -> list[Recovery]:
 
 
 def sweep(folder: Path) -> None:
-    """Drop what a kill in the middle of writing left of files that never came to be."""
-    for file in (*folder.glob(".[0-9]*.json"), *folder.glob("*.lock")):
-        lock = file if file.suffix == ".lock" else folder / (file.name.split(".")[1] + ".lock")
-        orphan = file.suffix != ".lock" or not file.with_suffix(".json").exists()
-        if orphan and not _held(lock):
-            with contextlib.suppress(OSError):
-                file.unlink()
+    """Drop what crashes left behind beside the work: files half-written, drafts and locks that nothing refers to."""
+    for path in (*folder.glob(".[0-9]*.json"), *folder.glob("[0-9]*-*-*"), *folder.glob("[0-9]*.lock")):
+        stem = "-".join(path.name.lstrip(".").split(".")[0].split("-")[:2])
+        if _held(folder / f"{stem}.lock"):
+            continue
+        if path.name.startswith("."):
+            path.unlink(missing_ok=True)
+        elif not (folder / f"{stem}.json").exists():
+            shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
 
 
 def _read(file: Path) -> Recovery:

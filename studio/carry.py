@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 import shutil
 from pathlib import Path
 
@@ -12,6 +10,7 @@ from render.files import atomic_write, inside, sha256
 from render.material import Texture
 from render.scene import Scene
 from render.shape import MeshFile
+from studio.mesh_import import side_files
 
 
 def named_files(scene: Scene) -> dict[str, str]:
@@ -43,13 +42,15 @@ def missing_files(scene: Scene, root: Path) -> list[tuple[int, Path]]:
 def carry(scene: Scene, root: Path, folder: Path) -> list[Path]:
     """Copy the files the scene names from `root` to the same places below `folder`; returns what was written.
 
-    A file that is missing in `root` is passed over. InputError: another file is in the way, or `folder` is not writable.
+    A file that is missing in `root` is passed over.
+    InputError: another file is in the way, or `folder` is not writable.
     """
     if root.resolve() == folder.resolve():
         return []
     pairs = []
     for relative, where in named_files(scene).items():
-        for each in (relative, *_companions(inside(root, relative, where), relative)):
+        beside = Path(relative).parent
+        for each in (relative, *(str(beside / name) for name in side_files(inside(root, relative, where)))):
             source, target = inside(root, each, where), inside(folder, each, where)
             if not source.is_file():
                 continue
@@ -63,30 +64,3 @@ def carry(scene: Scene, root: Path, folder: Path) -> list[Path]:
         with atomic_write(target) as temporary:
             shutil.copyfile(source, temporary)
     return [target for _, target in pairs]
-
-
-def _companions(file: Path, relative: str) -> list[str]:
-    """Files that a mesh file names, relative to the same root: MTL and textures of OBJ, buffers and images of GLTF."""
-    folder = Path(relative).parent
-    try:
-        if file.suffix.lower() == ".obj":
-            materials = _values(file, r"^mtllib\s+(.+)$")
-            textures = [
-                path for name in materials for path in _values(file.parent / name, r"^\s*(?:map_\w+|norm)\s.*?(\S+)$")
-            ]
-            names = materials + textures
-        elif file.suffix.lower() == ".gltf":
-            data = json.loads(file.read_text(encoding="utf-8"))
-            parts = [*data.get("buffers", []), *data.get("images", [])]
-            names = [part["uri"] for part in parts if not str(part.get("uri", "data:")).startswith("data:")]
-        else:
-            return []
-    except (OSError, ValueError, TypeError, AttributeError):
-        return []
-    return [str(folder / name) for name in names]
-
-
-def _values(file: Path, pattern: str) -> list[str]:
-    if not file.is_file():
-        return []
-    return [found.strip() for found in re.findall(pattern, file.read_text(encoding="utf-8", errors="replace"), re.M)]

@@ -91,7 +91,7 @@ def measures(errors: Errors, kind: ErrorKind) -> Measures:
 
 
 def symmetric_limit(error: Float) -> float:
-    """A limit for an axis or a colour bar centred on zero: five robust sigma about the median, rounded up to 1, 2, 5."""
+    """A limit for an axis or colour bar centred on zero: median and five robust sigma, rounded up to 1, 2, 5."""
     finite = error[np.isfinite(error)]
     if len(finite) == 0:
         return 1.0

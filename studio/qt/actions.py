@@ -1,4 +1,4 @@
-"""Every command of the menus in one table: its text, shortcut, icon and help; menus, toolbar and cheat sheet read it."""
+"""Every command of the menus in one table, with its shortcut, icon and help; toolbar and cheat sheet read it too."""
 
 from __future__ import annotations
 
@@ -60,6 +60,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("measure", "View", "&Measure", "F8", "", "", True),
     "View/-",
     Command("panels", "View", "&Panels"),
+    Command("log", "View", "M&essages", "Ctrl+L", "", "The log of this session"),
     Command("arrange", "View", "Panels as they &were", "", "", "Put the panels of this workspace back in place"),
     "View/-",
     Command("theme_system", "View/Theme", "As the &desktop", "", "", "", True),
@@ -72,6 +73,7 @@ COMMANDS: tuple[Command | str, ...] = (
     "Scene/-",
     Command("add", "Scene", "&Add"),
     Command("presets", "Scene", "&Presets"),
+    Command("motion", "Scene", "M&otion"),
     Command("render", "Render", "&Render", "F5", "render", "Render the frame with the settings of the Render panel"),
     Command("pause", "Render", "&Pause or go on", "F9", "pause"),
     Command("cancel", "Render", "&Cancel", "Esc", "cancel", "Stop what is being computed; what is there stays"),
@@ -82,15 +84,13 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("previous_line", "Measure", "&Previous scan line", "Alt+Up"),
     Command("next_line", "Measure", "&Next scan line", "Alt+Down"),
     Command("worst_line", "Measure", "&Worst scan line", "Alt+W", "", "Where the error is largest"),
-    "Measure/-",
-    Command("log", "Measure", "Messages", "", "", "", True),
     Command("help", "Help", "&Contents", "F1", "help", "The page of the panel that has the focus"),
     Command("shortcuts", "Help", "&Shortcuts", "Ctrl+/"),
     Command("tour", "Help", "&Guided tour"),
     "Help/-",
     Command("about", "Help", "&About Blazer Studio"),
 )
-SUBMENUS = ("recent", "panels", "add", "presets")
+SUBMENUS = ("recent", "panels", "add", "presets", "motion")
 """Commands that are menus, filled by whoever knows what is in them."""
 
 

@@ -69,8 +69,8 @@ def application() -> QApplication:
 
 
 def start(path: Path | None) -> MainWindow:
-    """The window, shown, on a project, recovered work or the sample. A bad project is told in a dialog over the sample."""
-    from studio.preferences import PreferencesFile
+    """The window, shown, on a project, recovered work or the sample. A bad project is told over the sample."""
+    from studio.preferences import PreferencesFile, recovery_folder
     from studio.qt import theme
     from studio.qt.splash import Splash
 
@@ -78,19 +78,21 @@ def start(path: Path | None) -> MainWindow:
     theme.apply(preferences.values.theme)
     splash = Splash()
     splash.show()
-    splash.tell("scene and sample")
+    splash.tell("the sample")
+    from studio.autosave import Autosave
     from studio.qt.faults import catch_faults
     from studio.qt.file_actions import template
     from studio.qt.session import Session
     from studio.qt.window import MainWindow
 
-    session = Session(template(SAMPLE))
-    window = MainWindow(session, preferences, making=splash.tell)
+    autosave = Autosave(recovery_folder())
+    session = Session(template(SAMPLE, autosave))
+    window = MainWindow(session, preferences, autosave, making=splash.tell)
     catch_faults(window, session)
     window.show()
     splash.finish(window)
     if path is not None:
         window.files.open(path, ask=False)
     elif not window.files.recover() and not preferences.values.toured:
-        pass
+        window.start_tour()
     return window

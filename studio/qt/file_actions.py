@@ -25,22 +25,27 @@ AT_LEAST_EVERY = 20.0
 """Seconds, while edits never rest."""
 
 
-def template(key: str) -> Document:
-    """A new document from a project that comes with the program; it has no file yet, its meshes stay where they are."""
-    folder = template_folder(key)
-    return Document(Project.load(folder / "project.json"), None, folder)
+def template(key: str, autosave: Autosave) -> Document:
+    """A new document from a project that comes with the program; it has no file yet, its meshes are in a draft."""
+    source = template_folder(key)
+    project = Project.load(source / "project.json")
+    try:
+        root = autosave.draft()
+        carry(project.scene, source, root)
+    except InputError:  # nothing can be imported into it then, but it can be looked at and saved elsewhere
+        root = source
+    return Document(project, None, root)
 
 
 class FileActions(QObject):
     """Every change of the session's document as a whole goes through here, and asks before work is lost."""
 
     def __init__(
-        self, window: QWidget, session: Session, preferences: PreferencesFile, recovery: Path | None = None
+        self, window: QWidget, session: Session, preferences: PreferencesFile, autosave: Autosave | None = None
     ) -> None:
         super().__init__(window)
         self.window, self.session, self.preferences = window, session, preferences
-        self.recovery = recovery or recovery_folder()
-        self.autosave = Autosave(self.recovery)
+        self.autosave = autosave or Autosave(recovery_folder())
         self._pristine = session.project
         """As it came from a template or a file: closing it unchanged needs no question."""
         self._rest = QTimer(self, singleShot=True, interval=round(1000 * AFTER_A_CHANGE))
@@ -59,7 +64,7 @@ class FileActions(QObject):
         dialog = TemplateDialog(self.window)
         if dialog.exec() != QDialog.DialogCode.Accepted or not dialog.chosen or not self.may_close():
             return False
-        self.replace(template(dialog.chosen))
+        self.replace(template(dialog.chosen, self.autosave))
         return True
 
     def open_dialog(self) -> bool:
@@ -123,14 +128,17 @@ class FileActions(QObject):
 
     def recover(self) -> bool:
         """After a crash: offer what it left behind. True: it was opened."""
-        sweep(self.recovery)
-        left = find(self.recovery)
+        sweep(self.autosave.folder)
+        left = find(self.autosave.folder)
         if not left:
             return False
         if not ask_recovery(self.window, left[0].project.name, left[0].when, len(left)):
             left[0].discard()
             return False
         document = left[0].document()
+        if left[0].is_draft:
+            document.root = self.autosave.draft()
+            carry(document.project.scene, left[0].root, document.root)
         self.replace(document)
         self._pristine = document.project.model_copy(update={"name": ""})  # equal to nothing: it is unsaved work
         self.keep()

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.cloud import Cloud, cloud
+from analysis.cloud import cloud
 from analysis.report.model import FrameResult
 from render.errors import InputError
 from render.motion import LinearStage, NoMotion, Turntable

@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QSizePolicy, QToolBar, QToolButton, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
 
+from studio.autosave import Autosave
+from studio.jobs import Job
+from studio.mesh_import import is_mesh
 from studio.preferences import PreferencesFile
-from studio.qt import theme
+from studio.qt import scene_actions, theme
 from studio.qt.actions import Actions
+from studio.qt.dialogs import about, show_trouble
+from studio.qt.export_actions import ExportActions
 from studio.qt.file_actions import FileActions
+from studio.qt.help import Help, panel_with_focus
 from studio.qt.jobs import JobRunner
+from studio.qt.live import live
+from studio.qt.measure_actions import MeasureActions
+from studio.qt.mesh_importer import choose_meshes, import_meshes
 from studio.qt.panels import PANELS, Making, make_panels
 from studio.qt.session import Session
+from studio.qt.shortcuts import CheatSheet
 from studio.qt.status import StatusBar
+from studio.qt.tour import Step, Tour
 from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, share_out, workspace
+from studio.trouble import trouble
 
 TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
 SWITCH = {"setup": "setup", "render": "render_workspace", "measure": "measure"}
 """Workspace -> command."""
-MESHES = (".ply", ".stl", ".obj", ".glb", ".gltf", ".off")
 
 
 class MainWindow(QMainWindow):
@@ -31,10 +43,10 @@ class MainWindow(QMainWindow):
         self,
         session: Session,
         preferences: PreferencesFile | None = None,
-        recovery: Path | None = None,
+        autosave: Autosave | None = None,
         making: Making = lambda title: None,
     ) -> None:
-        """preferences, recovery: None for those of this person; making hears the title of each panel being made."""
+        """preferences, autosave: None for those of this person; making hears the title of each panel being made."""
         super().__init__()
         self.session = session
         self.preferences = preferences or PreferencesFile()
@@ -49,7 +61,11 @@ class MainWindow(QMainWindow):
         self.docks = self._make_docks()
         self.status = StatusBar(session, self.runner, self)
         self.setStatusBar(self.status)
-        self.files = FileActions(self, session, self.preferences, recovery)
+        self.files = FileActions(self, session, self.preferences, autosave)
+        self.exports = ExportActions(self, session, self.runner, self.preferences, self.commands)
+        self.measuring = MeasureActions(self, session, self.commands)
+        self.help = Help(self)
+        self.tour: Tour | None = None
         self._make_toolbar()
         self._connect()
         self._restore()
@@ -94,7 +110,10 @@ class MainWindow(QMainWindow):
             return
         self._remember_arrangement()
         self.preferences.change(geometry=bytes(self.saveGeometry().toBase64().data()).decode())
+        if self.tour is not None:
+            self.tour.end()
         self.runner.close()
+        live(self.session).close()
         for panel in self.panels.values():
             panel.close()
         self.files.close()
@@ -102,7 +121,7 @@ class MainWindow(QMainWindow):
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802 - Qt's name
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-        if any(path.suffix.lower() in (*MESHES, ".json") or path.is_dir() for path in paths):
+        if any(is_mesh(path) or path.suffix.lower() == ".json" or path.is_dir() for path in paths):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802 - Qt's name
@@ -113,8 +132,11 @@ class MainWindow(QMainWindow):
 
     def take(self, paths: list[Path]) -> None:
         """Files dropped on the window: meshes join the scene, a project is opened."""
+        meshes = [path for path in paths if is_mesh(path)]
+        if meshes:
+            import_meshes(self.session, meshes, self)
         for path in paths:
-            if path.suffix.lower() not in MESHES:
+            if path not in meshes:
                 self.files.open(path)
 
     def _make_docks(self) -> dict[str, QDockWidget]:
@@ -154,32 +176,93 @@ class MainWindow(QMainWindow):
             themes.addAction(self.commands[f"theme_{choice}"])
         self.commands[f"theme_{self.preferences.values.theme}"].setChecked(True)
 
+    def start_tour(self) -> None:
+        """Show the way around, from the start."""
+        if self.tour is None:
+            self.tour = Tour(self, self._place_tour)
+            self.tour.ended.connect(self._end_tour)
+
+    def _place_tour(self, step: Step) -> QWidget | None:
+        if step.workspace != self.workspace:
+            self.switch_to(step.workspace)
+        if step.panel in self.docks:
+            self.show_panel(step.panel)
+            return self.docks[step.panel]
+        return self.panels.get(step.panel)
+
+    def _end_tour(self) -> None:
+        self.tour = None
+        self.preferences.change(toured=True)
+
     def _connect(self) -> None:
-        on, files, session = self.commands.connect, self.files, self.session
-        for key, handler in (
-            ("new", files.new),
-            ("open", files.open_dialog),
-            ("save", files.save),
-            ("save_as", files.save_as),
-            ("quit", self.close),
-            ("undo", lambda: session.document.undo()),
-            ("redo", lambda: session.document.redo()),
-            ("pause", self.status.toggle_pause),
-            ("cancel", self.status.cancel_work),
-            ("arrange", self.rearrange),
-            ("full_screen", lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)),
-            ("log", lambda: self.show_panel("log")),
-        ):
-            on(key, handler)
+        files, session, runner = self.files, self.session, self.runner
+        handlers: dict[str, Callable[[], object]] = {
+            "new": files.new,
+            "open": files.open_dialog,
+            "save": files.save,
+            "save_as": files.save_as,
+            "quit": self.close,
+            "undo": lambda: session.document.undo(),
+            "redo": lambda: session.document.redo(),
+            "duplicate": lambda: scene_actions.duplicate(session),
+            "delete": lambda: scene_actions.remove(session),
+            "rename": self._rename,
+            "hide": lambda: scene_actions.toggle_visible(session),
+            "deselect": lambda: session.select(()),
+            "import_mesh": lambda: choose_meshes(session, self),
+            "arrange": self.rearrange,
+            "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
+            "render": session.render_asked.emit,
+            "pause": self.status.toggle_pause,
+            "cancel": self.status.cancel_work,
+            "scan": self._scan,
+            "log": lambda: self.show_panel("log"),
+            "help": lambda: self.help.open_page(panel_with_focus(self.panels)),
+            "shortcuts": lambda: CheatSheet(self).open(),
+            "tour": self.start_tour,
+            "about": lambda: about(self, version()),
+        }
+        for key, handler in handlers.items():
+            self.commands.connect(key, handler)
         for key, command in SWITCH.items():
-            on(command, lambda key=key: self.switch_to(key))
+            self.commands.connect(command, lambda key=key: self.switch_to(key))
         for choice in theme.CHOICES:
-            on(f"theme_{choice}", lambda choice=choice: self.choose_theme(choice))
-        recent = self.commands.submenus["recent"]
-        recent.aboutToShow.connect(lambda: files.fill_recent(recent))
+            self.commands.connect(f"theme_{choice}", lambda choice=choice: self.choose_theme(choice))
+        menus = self.commands.submenus
+        filled: dict[str, Callable[[QMenu], None]] = {
+            "recent": files.fill_recent,
+            "add": lambda menu: scene_actions.fill_add_menu(menu, session, self),
+            "presets": lambda menu: scene_actions.fill_presets_menu(menu, session),
+            "motion": lambda menu: scene_actions.fill_motion_menu(menu, session),
+        }
+        for key, fill in filled.items():
+            menus[key].aboutToShow.connect(lambda menu=menus[key], fill=fill: (menu.clear(), fill(menu)))
         self.status.log_asked.connect(lambda: self.show_panel("log"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
+        session.selection_changed.connect(self._tell_selection)
+        session.step_changed.connect(lambda: live(session).show_step(session.step))
+        session.render_asked.connect(lambda: self.show_panel("render"))
+        runner.failed.connect(self._tell_failure)
+        self._tell_selection()
+
+    def _rename(self) -> None:
+        self.show_panel("scene")
+        self.panels["scene"].rename_selection()  # type: ignore[attr-defined]
+
+    def _scan(self) -> None:
+        self.show_panel("motion")
+        self.panels["motion"].ask_and_run()  # type: ignore[attr-defined]
+
+    def _tell_selection(self) -> None:
+        for key in ("duplicate", "delete", "rename", "hide"):
+            self.commands[key].setEnabled(scene_actions.can_change(self.session))
+
+    def _tell_failure(self, job: Job[object]) -> None:
+        if job.problem is not None and job.problem.exception is not None:
+            what = trouble(job.problem.exception, f"finish: {job.name}")
+            self.session.message.emit("error", f"{what}\n{what.details}".strip())
+            show_trouble(self, what)
 
     def _restore(self) -> None:
         values = self.preferences.values
@@ -200,6 +283,16 @@ class MainWindow(QMainWindow):
         for key, label in (("undo", document.undo_label), ("redo", document.redo_label)):
             self.commands[key].setEnabled(label is not None)
             self.commands[key].setText(f"&{key.capitalize()} {label or ''}".rstrip())
+
+
+def version() -> str:
+    """Of the program, as it is installed."""
+    from importlib import metadata
+
+    try:
+        return metadata.version("blazer-studio")
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def _spring() -> QWidget:
