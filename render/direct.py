@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from render.beam import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2, fan_density, sheet_sigma
+from render.bsdf import LAMBERTIAN, evaluate
 from render.camera import Camera
 from render.distortion import distort, tilt_matrix, undistort
 from render.embree import CHUNK
@@ -25,7 +27,7 @@ from render.laser import LineLaser
 from render.material import reflectance_weights
 from render.pose import invert
 from render.random import uniform
-from render.surface import Surface, View, reflectance
+from render.surface import Surface, View, has_gloss, lookup, slot_reflectance, to_local
 from render.threads import Cancel, Progress, map_chunks
 from render.world import World
 
@@ -93,125 +95,176 @@ def camera_rays(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def shade_sheet(
-    surface: Surface,
-    view: View,
-    triangle: Int,
-    normalised: Float,
-    offsets: Float32,
-    cells: int,
-    T_laser_world: Float,
-    laser_centre: Float,
-    beam: Float,
-    weights: Float,
-    centre: Float,
-    surface_offset: float,
-    values: Float,
-    origins: Float32,
-    directions: Float32,
-    far: Float32,
-    sample: Int,
-) -> int:
-    """Unoccluded radiance of each ray's cell and whole pixel -> values (n, 2), and the shadow rays that decide them.
+def scattered(
+    surface: Surface, t: int, point: Float, normal: Float, to_camera: Float, to_light: Float, weights: Float
+) -> float:
+    """f of the material at a point for world directions, at one wavelength; a blend by its mask's value. All (3,)."""
+    rgb, f, o, i, frame = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
+    slot, share, total = surface.object_id[t], 1.0, 0.0
+    over = surface.second[slot]
+    if over >= 0:
+        mask = surface.mask_shape
+        lookup(surface, mask[slot, 0], mask[slot, 1], mask[slot, 2], t, point[0], point[1], point[2], rgb)
+        share = 1.0 - rgb[0]
+    for part in range(2 if over >= 0 else 1):
+        if part == 1:
+            slot, share = over, 1.0 - share
+        if share <= 0.0:
+            continue
+        slot_reflectance(surface, slot, t, point[0], point[1], point[2], rgb)
+        rho = weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
+        row = surface.rows[slot]
+        if row[0] == LAMBERTIAN:
+            total += share * rho / math.pi
+            continue
+        to_local(surface, t, row, normal[0], normal[1], normal[2], frame)
+        for axis in range(3):
+            o[axis] = frame[axis, 0] * to_camera[0] + frame[axis, 1] * to_camera[1] + frame[axis, 2] * to_camera[2]
+            i[axis] = frame[axis, 0] * to_light[0] + frame[axis, 1] * to_light[1] + frame[axis, 2] * to_light[2]
+        rgb[0] = rgb[1] = rgb[2] = rho
+        evaluate(row, rgb, o[0], o[1], o[2], i[0], i[1], i[2], f)
+        total += share * f[0]
+    return total
 
-    Returns how many shadow rays were written; `sample` says whose each is.
-    """
-    intrinsics, k, m, w = view.intrinsics, view.distortion, view.T_world_camera, T_laser_world
-    vertices, triangles = surface.vertices, surface.triangles
-    tilt = tilt_matrix(k[12], k[13])
-    distorted = bool(np.any(k))
-    o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
-    emitter, _ = sheet_sigma(0.0, beam)
-    rgb = np.empty(3)
-    count = 0
-    half = 0.5 / cells
-    for r in range(triangle.shape[0]):
-        values[r, 0] = values[r, 1] = 0.0
-        t = triangle[r]
-        x, y = normalised[r, 0], normalised[r, 1]
-        if t < 0 or x != x:
-            continue
-        ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
-        ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
-        ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
-        n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
-        length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-        if length == 0.0:
-            continue
-        n0, n1, n2 = n0 / length, n1 / length, n2 / length
-        height_camera = n0 * (o0 - a0) + n1 * (o1 - a1) + n2 * (o2 - a2)
-        height_laser = n0 * (laser_centre[0] - a0) + n1 * (laser_centre[1] - a1) + n2 * (laser_centre[2] - a2)
-        if not height_camera * height_laser > 0.0:
-            continue
-        side = 1.0 if height_camera > 0.0 else -1.0
-        # the ray d = R (x, y, 1) meets the facet's plane at P = o + s d
-        d0, d1, d2 = (
-            m[0, 0] * x + m[0, 1] * y + m[0, 2],
-            m[1, 0] * x + m[1, 1] * y + m[1, 2],
-            m[2, 0] * x + m[2, 1] * y + m[2, 2],
-        )
-        cosine = n0 * d0 + n1 * d1 + n2 * d2
-        if cosine == 0.0:
-            continue
-        s = -height_camera / cosine
-        p0, p1, p2 = o0 + s * d0, o1 + s * d1, o2 + s * d2
-        # laser coordinates of P
-        lx = w[0, 0] * p0 + w[0, 1] * p1 + w[0, 2] * p2 + w[0, 3]
-        ly = w[1, 0] * p0 + w[1, 1] * p1 + w[1, 2] * p2 + w[1, 3]
-        lz = w[2, 0] * p0 + w[2, 1] * p1 + w[2, 2] * p2 + w[2, 3]
-        if lz <= 1e-9:
-            continue
-        h = fan_density(ly / lz, beam)
-        if h == 0.0:
-            continue
-        sigma, slope = sheet_sigma(lz, beam)
-        # dP/du and dP/dv on the facet
-        xu, xv = 1.0 / intrinsics[0], -intrinsics[4] / (intrinsics[0] * intrinsics[1])
-        yu, yv = 0.0, 1.0 / intrinsics[1]
-        if distorted:
-            _, _, jxx, jxy, jyx, jyy = distort(x, y, k, tilt)
-            det = jxx * jyy - jxy * jyx
-            xu, xv, yu, yv = (
-                jyy * xu / det,
-                (jyy * xv - jxy * yv) / det,
-                -jyx * xu / det,
-                (-jyx * xv + jxx * yv) / det,
+
+def _shade_kernel(glossy: bool) -> Any:
+    """The shading kernel; compiled apart for scenes of diffuse materials alone, where it is much quicker."""
+
+    @numba.njit(nogil=True, cache=True, error_model="numpy")
+    def shade(
+        surface: Surface,
+        view: View,
+        triangle: Int,
+        normalised: Float,
+        offsets: Float32,
+        cells: int,
+        T_laser_world: Float,
+        laser_centre: Float,
+        beam: Float,
+        weights: Float,
+        centre: Float,
+        surface_offset: float,
+        values: Float,
+        origins: Float32,
+        directions: Float32,
+        far: Float32,
+        sample: Int,
+    ) -> int:
+        """Unoccluded radiance of each ray's cell and whole pixel -> values (n, 2), and the shadow rays that decide.
+
+        Returns how many shadow rays were written; `sample` says whose each is.
+        """
+        intrinsics, k, m, w = view.intrinsics, view.distortion, view.T_world_camera, T_laser_world
+        vertices, triangles = surface.vertices, surface.triangles
+        tilt = tilt_matrix(k[12], k[13])
+        distorted = bool(np.any(k))
+        o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
+        emitter, _ = sheet_sigma(0.0, beam)
+        to_light, to_camera, point, normal, rgb = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+        count = 0
+        half = 0.5 / cells
+        for r in range(triangle.shape[0]):
+            values[r, 0] = values[r, 1] = 0.0
+            t = triangle[r]
+            x, y = normalised[r, 0], normalised[r, 1]
+            if t < 0 or x != x:
+                continue
+            ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
+            ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
+            ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
+            n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+            length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+            if length == 0.0:
+                continue
+            n0, n1, n2 = n0 / length, n1 / length, n2 / length
+            height_camera = n0 * (o0 - a0) + n1 * (o1 - a1) + n2 * (o2 - a2)
+            height_laser = n0 * (laser_centre[0] - a0) + n1 * (laser_centre[1] - a1) + n2 * (laser_centre[2] - a2)
+            if not height_camera * height_laser > 0.0:
+                continue
+            side = 1.0 if height_camera > 0.0 else -1.0
+            # the ray d = R (x, y, 1) meets the facet's plane at P = o + s d
+            d0, d1, d2 = (
+                m[0, 0] * x + m[0, 1] * y + m[0, 2],
+                m[1, 0] * x + m[1, 1] * y + m[1, 2],
+                m[2, 0] * x + m[2, 1] * y + m[2, 2],
             )
-        q = lx / sigma
-        qu = _sheet_slope(xu, yu, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
-        qv = _sheet_slope(xv, yv, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
-        du, dv = offsets[r, 0], offsets[r, 1]
-        cell = r % (cells * cells)
-        pixel_u, pixel_v = (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
-        in_cell = _mean_over(q - qu * du - qv * dv, qu * half, qv * half)
-        in_pixel = _mean_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
-        if in_cell == 0.0 and in_pixel == 0.0:
-            continue
-        # irradiance without the Gaussian: P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)|
-        ln0 = w[0, 0] * n0 + w[0, 1] * n1 + w[0, 2] * n2
-        ln1 = w[1, 0] * n0 + w[1, 1] * n1 + w[1, 2] * n2
-        ln2 = w[2, 0] * n0 + w[2, 1] * n1 + w[2, 2] * n2
-        power = beam[0] * h / (lz * sigma) * abs(ln0 * q * slope + ln1 * ly / lz + ln2)
-        reflectance(surface, t, p0, p1, p2, rgb)
-        radiance = power / math.pi * (weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2])
-        if radiance <= 0.0:
-            continue
-        values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
-        # the light comes from the emitting segment at z = 0, of half-width `emitter` for a focused sheet
-        shift = q * emitter
-        t0 = laser_centre[0] + w[0, 0] * shift - p0
-        t1 = laser_centre[1] + w[0, 1] * shift - p1
-        t2 = laser_centre[2] + w[0, 2] * shift - p2
-        distance = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
-        origins[count, 0] = p0 - centre[0] + side * n0 * surface_offset
-        origins[count, 1] = p1 - centre[1] + side * n1 * surface_offset
-        origins[count, 2] = p2 - centre[2] + side * n2 * surface_offset
-        directions[count, 0], directions[count, 1], directions[count, 2] = t0 / distance, t1 / distance, t2 / distance
-        far[count] = distance
-        sample[count] = r
-        count += 1
-    return count
+            cosine = n0 * d0 + n1 * d1 + n2 * d2
+            if cosine == 0.0:
+                continue
+            s = -height_camera / cosine
+            p0, p1, p2 = o0 + s * d0, o1 + s * d1, o2 + s * d2
+            # laser coordinates of P
+            lx = w[0, 0] * p0 + w[0, 1] * p1 + w[0, 2] * p2 + w[0, 3]
+            ly = w[1, 0] * p0 + w[1, 1] * p1 + w[1, 2] * p2 + w[1, 3]
+            lz = w[2, 0] * p0 + w[2, 1] * p1 + w[2, 2] * p2 + w[2, 3]
+            if lz <= 1e-9:
+                continue
+            h = fan_density(ly / lz, beam)
+            if h == 0.0:
+                continue
+            sigma, slope = sheet_sigma(lz, beam)
+            # dP/du and dP/dv on the facet
+            xu, xv = 1.0 / intrinsics[0], -intrinsics[4] / (intrinsics[0] * intrinsics[1])
+            yu, yv = 0.0, 1.0 / intrinsics[1]
+            if distorted:
+                _, _, jxx, jxy, jyx, jyy = distort(x, y, k, tilt)
+                det = jxx * jyy - jxy * jyx
+                xu, xv, yu, yv = (
+                    jyy * xu / det,
+                    (jyy * xv - jxy * yv) / det,
+                    -jyx * xu / det,
+                    (-jyx * xv + jxx * yv) / det,
+                )
+            q = lx / sigma
+            qu = _sheet_slope(xu, yu, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+            qv = _sheet_slope(xv, yv, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+            du, dv = offsets[r, 0], offsets[r, 1]
+            cell = r % (cells * cells)
+            pixel_u, pixel_v = (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
+            in_cell = _mean_over(q - qu * du - qv * dv, qu * half, qv * half)
+            in_pixel = _mean_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
+            if in_cell == 0.0 and in_pixel == 0.0:
+                continue
+            # irradiance without the Gaussian: P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)|
+            ln0 = w[0, 0] * n0 + w[0, 1] * n1 + w[0, 2] * n2
+            ln1 = w[1, 0] * n0 + w[1, 1] * n1 + w[1, 2] * n2
+            ln2 = w[2, 0] * n0 + w[2, 1] * n1 + w[2, 2] * n2
+            power = beam[0] * h / (lz * sigma) * abs(ln0 * q * slope + ln1 * ly / lz + ln2)
+            # the light comes from the emitting segment at z = 0, of half-width `emitter` for a focused sheet
+            shift = q * emitter
+            t0 = laser_centre[0] + w[0, 0] * shift - p0
+            t1 = laser_centre[1] + w[0, 1] * shift - p1
+            t2 = laser_centre[2] + w[0, 2] * shift - p2
+            distance = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+            slot = surface.object_id[t]
+            if not glossy or (surface.rows[slot, 0] == LAMBERTIAN and surface.second[slot] < 0):
+                slot_reflectance(surface, slot, t, p0, p1, p2, rgb)
+                radiance = power / math.pi * (weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2])
+            else:
+                length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+                to_camera[0], to_camera[1], to_camera[2] = -d0 / length, -d1 / length, -d2 / length
+                to_light[0], to_light[1], to_light[2] = t0 / distance, t1 / distance, t2 / distance
+                point[0], point[1], point[2] = p0, p1, p2
+                normal[0], normal[1], normal[2] = side * n0, side * n1, side * n2
+                radiance = power * scattered(surface, t, point, normal, to_camera, to_light, weights)
+            if radiance <= 0.0:
+                continue
+            values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
+            origins[count, 0] = p0 - centre[0] + side * n0 * surface_offset
+            origins[count, 1] = p1 - centre[1] + side * n1 * surface_offset
+            origins[count, 2] = p2 - centre[2] + side * n2 * surface_offset
+            directions[count, 0] = t0 / distance
+            directions[count, 1], directions[count, 2] = t1 / distance, t2 / distance
+            far[count] = distance
+            sample[count] = r
+            count += 1
+        return count
+
+    return shade
+
+
+shade_diffuse, shade_glossy = _shade_kernel(False), _shade_kernel(True)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -316,10 +369,12 @@ def direct_image(
     image = np.zeros(camera.height * camera.width, dtype=np.float32)
     error = np.zeros(len(pixels))
     todo = np.arange(len(pixels))
+    surface = world.surface_at((laser.wavelength_nm,) * 3)
     samples, cells = 0, FIRST_CELLS
     while len(todo):
         mean, spread = np.empty(len(todo)), np.empty(len(todo))
-        task = _Task(world, camera, laser, T_world_camera, T_world_laser, pixels[todo], cells, seed, mean, spread)
+        poses = (T_world_camera, T_world_laser)
+        task = _Task(world, surface, camera, laser, *poses, pixels[todo], cells, seed, mean, spread)
         map_chunks(task.run, len(todo), max(1, CHUNK // cells**2), threads, cancelled, progress)
         image[pixels[todo]] = mean
         error[todo] = spread
@@ -350,6 +405,7 @@ class _Task:
     """One refinement level: `run` does the pixels start..stop, each chunk with its own buffers."""
 
     world: World
+    surface: Surface
     camera: Camera
     laser: LineLaser
     T_world_camera: Float
@@ -363,7 +419,7 @@ class _Task:
     def run(self, start: int, stop: int) -> None:
         rays, n = self.world.rays, self.cells**2
         count = (stop - start) * n
-        view, surface = self.camera.view(self.T_world_camera), self.world.surface
+        view, surface = self.camera.view(self.T_world_camera), self.surface
         normalised, offsets = np.empty((count, 2)), np.empty((count, 2), np.float32)
         directions = np.empty((count, 3), np.float32)
         pixels = self.pixels[start:stop]
@@ -372,7 +428,8 @@ class _Task:
         values = np.empty((count, 2))
         origins, towards = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
         far, sample = np.empty(count, np.float32), np.empty(count, np.int32)
-        shadows = shade_sheet(
+        shade = shade_glossy if has_gloss(surface) else shade_diffuse
+        shadows = shade(
             surface,
             view,
             triangle,

@@ -34,7 +34,62 @@ class Lambertian(Model):
     )
 
 
-Material = Annotated[Lambertian, Field()]
+Metal = Literal[
+    "iron",
+    "steel",
+    "stainless_steel",
+    "aluminium",
+    "copper",
+    "brass",
+    "gold",
+    "silver",
+    "titanium",
+    "chromium",
+    "nickel",
+]
+Roughness = Annotated[float, Field(ge=0.01, le=1.0)]
+
+
+class Conductor(Model):
+    """Metal: rough GGX reflection, both sides, with the metal's own reflectance at each wavelength."""
+
+    kind: Literal["conductor"] = "conductor"
+    metal: Metal = quantity("steel", label="Metal")
+    roughness: Roughness = quantity(0.15, label="Roughness", help="GGX alpha; 0.05 polished, 0.15 ground, 0.4 blasted.")
+    roughness_across: Roughness | None = quantity(
+        None, label="Roughness along v", help="For a grain along u; empty: the same in every direction."
+    )
+    tint: UnitInterval = quantity(1.0, label="Tint", help="Multiplies the reflectance; below 1 for dirt.")
+
+    @property
+    def albedo(self) -> float:
+        return self.tint
+
+
+class Coated(Model):
+    """Paint or plastic: a diffuse base under a clear, rough boundary, both sides."""
+
+    kind: Literal["coated"] = "coated"
+    albedo: UnitInterval | RGBReflectance | Texture | FromMesh = quantity(
+        0.5, label="Albedo of the base", help="One number, three for R, G, B, a texture, or what the mesh file says."
+    )
+    roughness: Roughness = quantity(0.1, label="Roughness", help="GGX alpha of the boundary.")
+    index: float = quantity(1.5, label="Refractive index", help="Of the coat.", ge=1.01, le=3.0)
+
+
+BaseMaterial = Annotated[Lambertian | Conductor | Coated, Field(discriminator="kind")]
+
+
+class Blend(Model):
+    """Two materials side by side: `over` where the mask is white, `base` where it is black, mixed between."""
+
+    kind: Literal["blend"] = "blend"
+    base: BaseMaterial = Lambertian()
+    over: BaseMaterial = Conductor()
+    mask: Texture = quantity(label="Mask", help="Its red values, linear; needs UV.")
+
+
+Material = Annotated[Lambertian | Conductor | Coated | Blend, Field(discriminator="kind")]
 
 # Where the red, green and blue values of an albedo are taken to hold, nm.
 BAND_CENTRES_NM = (610.0, 545.0, 465.0)

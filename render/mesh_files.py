@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from render.errors import InputError
 from render.files import inside, sha256
-from render.material import FromMesh, Texture
+from render.material import Blend, FromMesh, Texture
 from render.mesh import Mesh
 from render.mesh_colour import merged_look, part_look
 from render.mesh_reader import EXTENSIONS, check_triangle_count, read_parts
@@ -45,7 +45,8 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
         if item.scale != 1.0:
             mesh = dataclasses.replace(mesh, vertices=mesh.vertices * item.scale)
         _check_size(mesh.vertices, where)
-    albedo = item.material.albedo
+    material = item.material.base if isinstance(item.material, Blend) else item.material
+    albedo = material.albedo
     if not isinstance(albedo, Texture):
         return mesh
     if mesh.uv is None:
@@ -55,11 +56,17 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
             found=item.shape.path if isinstance(item.shape, MeshFile) else item.shape.kind,
             cure="give the albedo as a number, or unwrap the mesh and export it with UV",
         )
-    field = f"{where}: material.albedo.path"
-    path = inside(root, albedo.path, field)
+    part = ".base" if isinstance(item.material, Blend) else ""
+    field = f"{where}: material{part}.albedo.path"
+    return dataclasses.replace(mesh, texture=object_texture(albedo, Path(root), field))
+
+
+def object_texture(texture: Texture, root: Path, field: str) -> NDArray[np.float32]:
+    """(h, w, 3) linear image of a texture below root; kept until the file changes. InputError: absent or bad."""
+    path = inside(root, texture.path, field)
     state = path.stat() if path.exists() else None
     version = None if state is None else (state.st_mtime_ns, state.st_size)
-    return dataclasses.replace(mesh, texture=_texture(path, albedo.srgb, albedo.scale, field, version))
+    return _texture(path, texture.srgb, texture.scale, field, version)
 
 
 def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
@@ -105,7 +112,8 @@ def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str) -> Me
         what = "the mesh file is empty" if state.st_size == 0 else "the mesh file is too large"
         found = f"{state.st_size} bytes"
         raise InputError(what, where=where, found=found, allowed=f"1 to {MAX_FILE_BYTES} bytes", cure="export it again")
-    colours = isinstance(item.material.albedo, FromMesh)
+    material = item.material.base if isinstance(item.material, Blend) else item.material
+    colours = isinstance(material.albedo, FromMesh)
     factor = UNITS[shape.unit] * item.scale
     mesh = _read(path, Path(root), where, factor, colours, shape.sha256, (state.st_mtime_ns, state.st_size))
     warning = unit_warning(mesh, item)

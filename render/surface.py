@@ -9,13 +9,15 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.bsdf import LAMBERTIAN
+
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 
 
 class Surface(NamedTuple):
-    """The world's triangles; the arrays are described in `render.world.World`."""
+    """The world's triangles and materials; the arrays are described in `render.world.World`."""
 
     vertices: Float
     triangles: Int
@@ -24,6 +26,14 @@ class Surface(NamedTuple):
     albedo: Float
     textures: Float32
     texture_shape: Int
+    rows: Float
+    second: Int
+    mask_shape: Int
+
+
+def has_gloss(surface: Surface) -> bool:
+    """Some material is not Lambertian."""
+    return bool(np.any(surface.rows[:, 0] != LAMBERTIAN))
 
 
 class View(NamedTuple):
@@ -39,14 +49,87 @@ class View(NamedTuple):
     T_world_camera: Float
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, rgb: Float) -> None:
     """Albedo at the point p of triangle t -> rgb (3,): the object's constant colour or its texture."""
-    item = surface.object_id[t]
-    if surface.texture_shape[item, 1] == 0:
+    slot_reflectance(surface, surface.object_id[t], t, p0, p1, p2, rgb)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def scattering(surface: Surface, t: int, p0: float, p1: float, p2: float, choice: float, rgb: Float) -> int:
+    """The material (a row of `surface.rows`) at the point p of triangle t, and its reflectance -> rgb (3,).
+
+    A blend is one of its two materials, the second with the mask's value as its chance; `choice` is uniform in [0, 1).
+    """
+    slot = surface.object_id[t]
+    # one place to look textures up, for the mask first: a second would cost more than the texture itself
+    masked = surface.second[slot] >= 0
+    while True:
+        shape = surface.mask_shape if masked else surface.texture_shape
+        start, rows, columns = shape[slot, 0], shape[slot, 1], shape[slot, 2]
+        if rows > 0:
+            lookup(surface, start, rows, columns, t, p0, p1, p2, rgb)
+        else:
+            for band in range(3):
+                rgb[band] = surface.albedo[slot, band]
+        if not masked:
+            return slot
+        if choice < rgb[0]:
+            slot = surface.second[slot]
+        masked = False
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def slot_reflectance(surface: Surface, slot: int, t: int, p0: float, p1: float, p2: float, rgb: Float) -> None:
+    """Reflectance of one material at the point p of triangle t -> rgb (3,)."""
+    if surface.texture_shape[slot, 1] == 0:
         for band in range(3):
-            rgb[band] = surface.albedo[item, band]
+            rgb[band] = surface.albedo[slot, band]
         return
+    shape = surface.texture_shape
+    lookup(surface, shape[slot, 0], shape[slot, 1], shape[slot, 2], t, p0, p1, p2, rgb)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def to_local(surface: Surface, t: int, row: Float, n0: float, n1: float, n2: float, frame: Float) -> None:
+    """Orthonormal axes (3, 3), one a row, z the normal n; x follows the texture's u where the material has a grain."""
+    x0 = x1 = x2 = 0.0
+    if row[1] != row[2] and surface.uv.shape[0] > 0:
+        a, b, c = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
+        v, uv = surface.vertices, surface.uv
+        # dP/du from the two edges
+        r1, r2 = uv[t, 1, 1] - uv[t, 0, 1], uv[t, 2, 1] - uv[t, 0, 1]
+        x0 = r2 * (v[b, 0] - v[a, 0]) - r1 * (v[c, 0] - v[a, 0])
+        x1 = r2 * (v[b, 1] - v[a, 1]) - r1 * (v[c, 1] - v[a, 1])
+        x2 = r2 * (v[b, 2] - v[a, 2]) - r1 * (v[c, 2] - v[a, 2])
+        along = x0 * n0 + x1 * n1 + x2 * n2
+        x0, x1, x2 = x0 - along * n0, x1 - along * n1, x2 - along * n2
+    length = math.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
+    if length > 0.0:
+        x0, x1, x2 = x0 / length, x1 / length, x2 / length
+    else:
+        # Duff et al. 2017
+        sign = 1.0 if n2 >= 0.0 else -1.0
+        k = -1.0 / (sign + n2)
+        x0, x1, x2 = 1.0 + sign * n0 * n0 * k, sign * n0 * n1 * k, -sign * n0
+    frame[0, 0], frame[0, 1], frame[0, 2] = x0, x1, x2
+    frame[1, 0], frame[1, 1], frame[1, 2] = n1 * x2 - n2 * x1, n2 * x0 - n0 * x2, n0 * x1 - n1 * x0
+    frame[2, 0], frame[2, 1], frame[2, 2] = n0, n1, n2
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def to_world(frame: Float, direction: Float) -> None:
+    """Turn a local direction (3,) into the world, in place."""
+    x, y, z = direction[0], direction[1], direction[2]
+    for axis in range(3):
+        direction[axis] = x * frame[0, axis] + y * frame[1, axis] + z * frame[2, axis]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def lookup(
+    surface: Surface, start: int, rows: int, columns: int, t: int, p0: float, p1: float, p2: float, rgb: Float
+) -> None:
+    """Bilinear value -> rgb (3,) of the texture of rows x columns from `start`, at the point p of triangle t."""
     a, b, c = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
     v, uv = surface.vertices, surface.uv
     ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
@@ -62,16 +145,19 @@ def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, rgb: 
     f, g = (cc * qb - bc * qc) / det, (bb * qc - bc * qb) / det
     s = (1.0 - f - g) * uv[t, 0, 0] + f * uv[t, 1, 0] + g * uv[t, 2, 0]
     r = (1.0 - f - g) * uv[t, 0, 1] + f * uv[t, 1, 1] + g * uv[t, 2, 1]
-    start, rows, columns = surface.texture_shape[item]
     # texel centres at half integers; v points up, rows point down; repeated outside [0, 1]
     x, y = (s - math.floor(s)) * columns - 0.5, (1.0 - (r - math.floor(r))) * rows - 0.5
     i, j = int(math.floor(x)), int(math.floor(y))
     fx, fy = x - i, y - j
     rgb[0] = rgb[1] = rgb[2] = 0.0
     for dj in range(2):
-        row = start + (j + dj) % rows * columns
+        # wrap by comparison: a remainder costs more than the rest of the lookup
+        row = j + dj
+        row = row + rows if row < 0 else (row - rows if row >= rows else row)
         for di in range(2):
-            texel = 3 * (row + (i + di) % columns)
+            column = i + di
+            column = column + columns if column < 0 else (column - columns if column >= columns else column)
+            texel = 3 * (start + row * columns + column)
             weight = (fx if di else 1.0 - fx) * (fy if dj else 1.0 - fy)
             for band in range(3):
                 rgb[band] += weight * surface.textures[texel + band]
