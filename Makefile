@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 INSTALLED_VALIDATION := $(VENV)/.installed-validation
 WORKERS ?= 2
 
-.PHONY: run test lint validate benchmark format clean system system-tests
+.PHONY: run test lint validate benchmark format clean system system-tests system-validation
 
 run: $(INSTALLED)
 	$(BIN)/python main.py
@@ -42,11 +42,14 @@ system:
 system-tests: system
 	@$(PYTHON) studio/system.py --tests
 
+system-validation: system
+	@$(PYTHON) studio/system.py --validation
+
 $(INSTALLED): pyproject.toml $(CONSTRAINTS) | system
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c $(CONSTRAINTS) -e .[test]
 	@touch $@
 
-$(INSTALLED_VALIDATION): $(INSTALLED)
+$(INSTALLED_VALIDATION): $(INSTALLED) | system-validation
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c $(CONSTRAINTS) -e .[validation]
 	@touch $@

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 PYTHON_NEEDED = (3, 11)
 TESTS = "--tests"
 """Argument of this file: check what the tests need as well."""
+VALIDATION = "--validation"
+"""Argument of this file: check what the comparison with another renderer needs as well."""
 FONT_FOLDERS = ("/usr/share/fonts", "/usr/local/share/fonts", "~/.fonts", "~/.local/share/fonts")
 OPENGL_DRIVERS = ("/usr/lib*/dri/*_dri.so", "/usr/lib/*/dri/*_dri.so", "/usr/lib*/libEGL_nvidia.so*")
 
@@ -41,6 +43,7 @@ LIBRARIES = (
     Need("libpangoft2-1.0.so.0", "libpangoft2-1.0-0", "the PDF report (WeasyPrint)"),
     Need("libharfbuzz-subset.so.0", "libharfbuzz-subset0", "the PDF report (WeasyPrint)"),
 )
+VALIDATION_LIBRARIES = (Need("libatomic.so.1", "libatomic1", "the comparison with another renderer (Mitsuba)"),)
 DESKTOP_LIBRARIES = (
     Need("libxcb.so.1", "libxcb1", "the desktop (Qt)"),
     Need("libxcb-cursor.so.0", "libxcb-cursor0", "the desktop (Qt)"),
@@ -62,7 +65,8 @@ def missing_needs() -> list[Need]:
     """What this machine lacks. Empty where it cannot be asked this way (not Linux: wheels bring their own)."""
     if not sys.platform.startswith("linux"):
         return []
-    missing = [need for need in LIBRARIES if not _loads(need.library)]
+    libraries = LIBRARIES + (VALIDATION_LIBRARIES if VALIDATION in sys.argv else ())
+    missing = [need for need in libraries if not _loads(need.library)]
     if not any(glob.glob(pattern) for pattern in OPENGL_DRIVERS):
         missing.append(DRIVER)
     if not any(_has_font(os.path.expanduser(folder)) for folder in FONT_FOLDERS):
