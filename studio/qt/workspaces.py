@@ -44,8 +44,8 @@ WORKSPACES = (
         True,
         (
             Column(LEFT, 0.17, (("scene", 1.0),)),
-            Column(RIGHT, 0.25, (("inspector", 1.0),)),
-            Column(BOTTOM, 0.38, (("camera", 0.6), ("readout", 0.4))),
+            Column(RIGHT, 0.26, (("inspector", 0.58), ("readout", 0.42))),
+            Column(BOTTOM, 0.42, (("camera", 1.0),)),
         ),
         True,
     ),
