@@ -9,13 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.colour import wavelength_colour
-from render.develop import Image
+from render.develop import Image, expected_electrons
 from render.frame import Frame
 from render.scene import Scene
-from studio.tone import Picture, colour, colour_table, grey, mapped, white_level
+from render.tone import Picture, colour, colour_table, grey, mapped, white_level
+from studio.preview_image import PreviewImage
+from studio.project import Project
+from studio.stages import scaled
 
 Float32 = NDArray[np.float32]
 DEPTH_MAP = "viridis"
+SHAPE_BRIGHTNESS = 0.45
+"""Of what a live picture shows beside the line."""
 
 
 @dataclass(frozen=True)
@@ -113,3 +118,19 @@ def at_pixel(scene: Scene, frame: Frame, images: list[Image], row: int, column: 
         else:
             rows.append(("object", "none"))
     return rows
+
+
+def live_picture(project: Project, image: PreviewImage) -> Picture:
+    """(h, w) a preview: grey shape for the eye, and each laser's line as bright as the sensor would see it."""
+    small, sensor = scaled(project, image.scale), project.sensor
+    frame = Frame(0, image.laser, None, (), None, "")
+    full = min(sensor.full_well, (2**sensor.bits - 1 - sensor.black_level) / sensor.dn_per_electron)
+    total = np.sqrt(image.shade) * np.float32(SHAPE_BRIGHTNESS)
+    for i, laser in enumerate(project.scene.lasers):
+        power = [item.power if k == i else 0.0 for k, item in enumerate(project.scene.lasers)]
+        electrons = expected_electrons(frame, small.scene, small.sensor, laser_power=power)
+        line = np.sqrt(np.minimum(electrons / np.float32(full), 1.0))
+        # pure hue hides how bright it is: half of it is white
+        for band, share in enumerate(wavelength_colour(laser.wavelength_nm)):
+            total[..., band] += np.float32(0.5 + 0.5 * share) * line
+    return colour(np.ascontiguousarray(total, np.float32), 1.0)

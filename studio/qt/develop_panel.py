@@ -1,0 +1,287 @@
+"""Exposure, gain, bits, laser power and noise of a render that exists: developed and measured again, never rendered."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QSlider,
+    QVBoxLayout,
+    QWidget,
+)
+
+from analysis.line.settings import Method
+from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
+from render.develop import Image
+from render.threads import Cancel
+from studio.document import FieldPath
+from studio.jobs import Job, Progress
+from studio.qt.jobs import JobRunner
+from studio.qt.line_overlay import swatch
+from studio.qt.session import Render, Session
+from studio.redevelop import Development, develop_again, development, measure_again
+from studio.results import METHODS
+from studio.stages import Measurement
+
+STEPS = 1000
+"""Of a slider."""
+
+
+class LogField(QWidget):
+    """A positive number as a logarithmic slider and a box, in the unit that is shown; `shown = value * factor`."""
+
+    changed = Signal(float, bool)
+    """The value, and whether the slider is held."""
+    released = Signal()
+
+    def __init__(self, low: float, high: float, factor: float, unit: str, decimals: int = 3) -> None:
+        super().__init__()
+        self.low, self.high, self.factor = low, high, factor
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setMaximum(STEPS)
+        self.slider.setMinimumWidth(60)
+        self.box = QDoubleSpinBox(decimals=decimals, minimum=0.0, maximum=high * factor)
+        self.box.setSuffix(f" {unit}")
+        self.box.setKeyboardTracking(False)
+        self.box.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
+        self.box.setMinimumWidth(104)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        self.sign = QLabel()
+        layout.addWidget(self.sign)
+        layout.addWidget(self.slider, 1)
+        layout.addWidget(self.box)
+        self.slider.valueChanged.connect(self._slid)
+        self.slider.sliderReleased.connect(self.released)
+        self.box.valueChanged.connect(lambda shown: self.changed.emit(shown / self.factor, False))
+
+    def set_value(self, value: float) -> None:
+        """Show a value without telling."""
+        for widget in (self.slider, self.box):
+            widget.blockSignals(True)
+        if not self.slider.isSliderDown():
+            share = math.log(min(max(value, self.low), self.high) / self.low) / math.log(self.high / self.low)
+            self.slider.setValue(round(STEPS * share))
+        self.box.setValue(value * self.factor)
+        for widget in (self.slider, self.box):
+            widget.blockSignals(False)
+
+    def _slid(self, position: int) -> None:
+        value = self.low * (self.high / self.low) ** (position / STEPS)
+        # three digits: a slider's value looks like one a person would type
+        self.changed.emit(float(f"{value:.3g}"), self.slider.isSliderDown())
+
+
+class DevelopPanel(QWidget):
+    """Edits the sensor and the lasers' power in the project; follows every change with new images and measures."""
+
+    _images_ready = Signal(object, object, float)
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.runner = JobRunner(self)
+        self.develop_seconds = 0.0
+        self.exposure = LogField(1e-6, 1.0, 1e3, "ms", 4)
+        self.exposure.setToolTip("Exposure time: longer is brighter, until the line saturates.")
+        self.automatic_gain = QCheckBox("full well fills the range")
+        self.gain = LogField(1e-3, 100.0, 1.0, "DN/e-", 4)
+        self.bits = QComboBox()
+        for bits in (8, 10, 12, 16):
+            self.bits.addItem(f"{bits} bit", bits)
+        self.noise = QCheckBox("shot, dark, read, pixels")
+        self.noise.setChecked(True)
+        self.noise.setToolTip("Off: the mean image, still saturated and quantised. A look only, the project keeps it.")
+        self.powers: list[LogField] = []
+        self.methods = {method: self._method_box(method) for method in METHODS}
+        self.told = QLabel(wordWrap=True)
+        self.told.setObjectName("muted")
+        self.table = QLabel(textFormat=Qt.TextFormat.RichText)
+        self._form = QFormLayout()
+        self._power_rows = QVBoxLayout()
+        self._lay_out()
+        self._connect()
+        self._follow_project()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        self.runner.close()
+        super().closeEvent(event)
+
+    def chosen(self) -> tuple[Method, ...]:
+        """The methods to measure by; the project's own first."""
+        own = self.session.project.extraction.method
+        return (own, *(m for m in METHODS if m != own and self.methods[m].isChecked()))
+
+    def _lay_out(self) -> None:
+        form = self._form
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
+        form.addRow("Exposure", self.exposure)
+        form.addRow("Gain", self.automatic_gain)
+        form.addRow("", self.gain)
+        form.addRow("Bit depth", self.bits)
+        form.addRow("Laser power", self._power_rows)
+        form.addRow("Noise", self.noise)
+        methods = QVBoxLayout()
+        methods.setSpacing(2)
+        for box in self.methods.values():
+            methods.addWidget(box)
+        form.addRow("Measure by", methods)
+        layout = QVBoxLayout(self)
+        layout.addLayout(form)
+        layout.addWidget(self.told)
+        layout.addWidget(self.table)
+        layout.addStretch(1)
+
+    def _method_box(self, method: Method) -> QCheckBox:
+        box = QCheckBox(method_name(method))
+        box.setIcon(swatch(method_colour(method)))
+        box.setChecked(True)
+        return box
+
+    def _connect(self) -> None:
+        session = self.session
+        session.project_changed.connect(self._project_changed)
+        session.renders_changed.connect(self.refresh)
+        self.exposure.changed.connect(self._setter(("sensor", "exposure_time"), "exposure"))
+        self.gain.changed.connect(self._setter(("sensor", "gain"), "gain"))
+        for field in (self.exposure, self.gain):
+            field.released.connect(self._end_merge)
+        self.automatic_gain.clicked.connect(self._choose_gain)
+        self.bits.activated.connect(lambda i: session.set(("sensor", "bits"), self.bits.itemData(i), "bit depth"))
+        self.noise.toggled.connect(self.refresh)
+        for box in self.methods.values():
+            box.toggled.connect(self.refresh)
+        self._images_ready.connect(self._take_images)
+        self.runner.failed.connect(self._tell_failure)
+
+    def _setter(self, path: FieldPath, label: str) -> Callable[[float, bool], None]:
+        def set_value(value: float, held: bool) -> None:
+            self.session.set(path, value, f"change {label}", f"develop {label}" if held else "")
+
+        return set_value
+
+    def _end_merge(self) -> None:
+        self.session.document.end_merge()
+
+    def _choose_gain(self, automatic: bool) -> None:
+        sensor = self.session.project.sensor
+        self.session.set(("sensor", "gain"), None if automatic else float(f"{sensor.dn_per_electron:.4g}"), "gain")
+
+    def _project_changed(self) -> None:
+        self._follow_project()
+        self.refresh()
+
+    def _follow_project(self) -> None:
+        project = self.session.project
+        sensor, lasers = project.sensor, project.scene.lasers
+        self.exposure.set_value(sensor.exposure_time)
+        self.automatic_gain.setChecked(sensor.gain is None)
+        self.gain.setEnabled(sensor.gain is not None)
+        self.gain.set_value(sensor.dn_per_electron)
+        self.bits.setCurrentIndex(self.bits.findData(sensor.bits))
+        if len(self.powers) != len(lasers):
+            self._make_powers(len(lasers))
+        for field, laser in zip(self.powers, lasers, strict=True):
+            field.set_value(laser.power)
+            field.setToolTip(f"{laser.name}, {laser.wavelength_nm:g} nm")
+            colour = hex_colour(wavelength_colour(laser.wavelength_nm))
+            field.sign.setPixmap(swatch(colour).pixmap(10, 10))
+        for method, box in self.methods.items():
+            own = method == project.extraction.method
+            box.setEnabled(not own)
+            box.setToolTip("The project's own method: always measured." if own else "")
+            if own and not box.isChecked():
+                box.setChecked(True)
+
+    def _make_powers(self, count: int) -> None:
+        for field in self.powers:
+            self._power_rows.removeWidget(field)
+            field.deleteLater()
+        self.powers = [LogField(1e-5, 10.0, 1e3, "mW") for _ in range(count)]
+        for i, field in enumerate(self.powers):
+            field.changed.connect(self._setter(("scene", "rig", "lasers", i, "power"), f"power of laser {i + 1}"))
+            field.released.connect(self._end_merge)
+            self._power_rows.addWidget(field)
+
+    def refresh(self) -> None:
+        """Develop and measure the shown render; what is asked for meanwhile is done once, with the latest values."""
+        render = self.session.shown
+        if render is None:
+            self.runner.cancel("develop")
+            self.runner.cancel("measure")
+            self.told.setText("Render the scene, then change these as often as you like.")
+            self.table.clear()
+            return
+        frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()
+        how = development(render.project, self.session.project, render.image_scale)
+
+        def work(progress: Progress, cancelled: Cancel) -> list[Image]:
+            start = time.perf_counter()
+            images = develop_again(frame, how, noise=noise, cancelled=cancelled)
+            self._images_ready.emit(render, images, time.perf_counter() - start)
+            return images
+
+        def then(images: list[Image]) -> None:
+            self._measure(render, how, images, methods)
+
+        self.runner.run("develop", "developing", work, then)
+
+    def _take_images(self, render: Render, images: list[Image], seconds: float) -> None:
+        render.images = images
+        self.develop_seconds = seconds
+        if render is self.session.shown:
+            self._tell_images(render)
+            self.session.developed.emit()
+
+    def _measure(self, render: Render, how: Development, images: list[Image], methods: tuple[Method, ...]) -> None:
+        frame, world = render.frame, render.world
+
+        def work(progress: Progress, cancelled: Cancel) -> dict[str, list[Measurement]]:
+            return measure_again(frame, world, how, images, methods, cancelled=cancelled)
+
+        def then(found: dict[str, list[Measurement]]) -> None:
+            render.measurements = found
+            if render is self.session.shown:
+                self._tell_measures(found)
+                self.session.measured.emit()
+
+        self.runner.run("measure", "measuring", work, then, interrupt=True)
+
+    def _tell_images(self, render: Render) -> None:
+        top = [int(image.pixels.max()) for image in render.images]
+        full = [float(np.mean(image.pixels >= image.saturation)) for image in render.images]
+        lines = []
+        for i, image in enumerate(render.images):
+            name = f"{render.project.scene.lasers[i].name}: " if len(top) > 1 else ""
+            saturated = f", {full[i]:.2%} of the pixels saturated" if full[i] > 0 else ""
+            lines.append(f"{name}brightest {top[i]} DN, {top[i] / image.saturation:.0%} of full{saturated}")
+        self.told.setText("\n".join(lines))
+
+    def _tell_measures(self, found: dict[str, list[Measurement]]) -> None:
+        rows = ["<tr><th align='left'>RMSE&nbsp;</th><th>px</th><th>depth</th><th>rows</th></tr>"]
+        for method, by_laser in found.items():
+            for item in by_laser:
+                name = method_name(method) + (f", {item.laser + 1}" if len(by_laser) > 1 else "")
+                u, depth = item.errors.u.rmse, item.errors.depth_z.rmse
+                rows.append(
+                    f"<tr><td><span style='color:{method_colour(method)}'>&#9632;</span> {name}&nbsp;&nbsp;</td>"
+                    f"<td align='right'>{u:.3f}&nbsp;&nbsp;</td><td align='right'>{1e6 * depth:.1f} µm&nbsp;&nbsp;</td>"
+                    f"<td align='right'>{item.errors.completeness:.1%}</td></tr>"
+                )
+        self.table.setText(f"<table cellspacing='2'>{''.join(rows)}</table>")
+
+    def _tell_failure(self, job: Job[object]) -> None:
+        if job.problem is not None:
+            self.session.message.emit("error", job.problem.text)

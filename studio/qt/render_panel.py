@@ -1,0 +1,334 @@
+"""The final render: what will be computed and why, how well, how far it is, and the renders made so far."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from render.frame import Frame
+from render.refine import AMBIENT_ERROR, AMBIENT_SAMPLES, plan, refine
+from render.threads import Cancel
+from render.world import World, build_world
+from studio.jobs import Job, Progress, State
+from studio.project import Project
+from studio.qt.history import History
+from studio.qt.jobs import RENDER, JobRunner
+from studio.qt.session import Render, Session
+from studio.qt.status import time_left
+from studio.stages import scaled
+
+SCALES = (0.125, 0.25, 0.5, 1.0)
+
+
+class RenderPanel(QWidget):
+    """Starts, holds and stops the render; its frames join the session's history as they get better."""
+
+    _refined = Signal(object, object)
+
+    def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session, self.runner = session, runner
+        self._job: Job[None] | None = None
+        self._render: Render | None = None
+        self._before: Render | None = None
+        self._keep = False
+        self.plan = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
+        self.plan.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.laser_error = QDoubleSpinBox(decimals=2, minimum=0.01, maximum=100.0)
+        self.laser_error.setSuffix(" %")
+        self.laser_error.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
+        self.laser_error.setToolTip("Relative RMS error of the laser light over the lit pixels.")
+        self.samples = QSpinBox(minimum=1, maximum=65536)
+        self.samples.setStepType(QSpinBox.StepType.AdaptiveDecimalStepType)
+        self.samples.setToolTip("Samples of the ambient light on each pixel; four times as many halve the noise.")
+        self.limit = QSpinBox(minimum=0, maximum=86400)
+        self.limit.setSuffix(" s")
+        self.limit.setSpecialValueText("none")
+        self.limit.setToolTip("The best frame so far is kept when the time is over.")
+        for box in (self.laser_error, self.samples, self.limit):
+            box.setKeyboardTracking(False)
+        self.scale = QComboBox()
+        self.start_button = QPushButton("Render")
+        self.start_button.setObjectName("primary")
+        self.pause_button = QPushButton("Pause")
+        self.keep_button = QPushButton("Keep")
+        self.keep_button.setToolTip("Stop here and keep the image as it is")
+        self.cancel_button = QPushButton("Cancel")
+        self.cancel_button.setToolTip("Stop and forget this render")
+        self.bar = QProgressBar(maximum=1000, textVisible=False)
+        self.bar.setMaximumHeight(10)
+        self.stage = QLabel()
+        self.errors = QLabel(textFormat=Qt.TextFormat.RichText)
+        self.history = History(session)
+        self._lay_out()
+        self._connect()
+        self._follow_project()
+        self._show_state()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+        self.cancel()
+        super().closeEvent(event)
+
+    # what a person does
+
+    def start(self, image_scale: float | None = None) -> None:
+        """Render the project as it is now; one render at a time."""
+        if self._job is not None:
+            return
+        session = self.session
+        source, root, step = session.project, session.document.root, session.step
+        if image_scale is not None and self.scale.findData(image_scale) >= 0:
+            self.scale.setCurrentIndex(self.scale.findData(image_scale))
+        image_scale = self.scale.currentData() if image_scale is None else image_scale
+        project = scaled(source, image_scale)
+        world = self._same_world(project, step)
+        self._render, self._before, self._keep = None, session.shown, False
+        refined = self._refined
+
+        def work(progress: Progress, cancelled: Cancel) -> None:
+            render_frames(project, root, step, world, progress, cancelled, refined.emit)
+
+        number = max([render.number for render in session.renders], default=0) + 1
+        self._template = (number, project, source, image_scale)
+        self.errors.clear()
+        self._job = self.runner.run(RENDER, "render", work)
+        self._show_state()
+
+    def pause(self) -> None:
+        """Hold the render, or let it go on."""
+        if self._job is None:
+            return
+        if self._job.state is State.PAUSED:
+            self._job.resume()
+        else:
+            self._job.pause()
+        self._show_state()
+
+    def keep(self) -> None:
+        """Stop here; the frame so far stays."""
+        if self._job is not None:
+            self._keep = True
+            self._job.cancel()
+            self._show_state()
+
+    def cancel(self) -> None:
+        """Stop and forget."""
+        if self._job is not None:
+            self._keep = False
+            self._job.cancel()
+            self._show_state()
+
+    # what follows
+
+    def _lay_out(self) -> None:
+        form = QFormLayout()
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.addRow("Laser error", self.laser_error)
+        form.addRow("Ambient samples", self.samples)
+        form.addRow("Time limit", self.limit)
+        form.addRow("Image", self.scale)
+        buttons = QHBoxLayout()
+        for button in (self.start_button, self.pause_button, self.keep_button, self.cancel_button):
+            buttons.addWidget(button)
+        for label in (self.stage, self.errors):
+            label.setObjectName("muted")
+        self.stage.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        layout = QVBoxLayout(self)
+        layout.addLayout(form)
+        layout.addLayout(buttons)
+        layout.addWidget(self.bar)
+        layout.addWidget(self.stage)
+        layout.addWidget(self.errors)
+        layout.addWidget(self.plan)
+        layout.addWidget(self.history, 1)
+
+    def _connect(self) -> None:
+        session, runner = self.session, self.runner
+        session.project_changed.connect(self._follow_project)
+        session.document_replaced.connect(self._document_replaced)
+        session.render_asked.connect(self.start)
+        runner.progress.connect(self._tell_progress)
+        runner.finished.connect(self._ended)
+        runner.failed.connect(self._ended)
+        runner.cancelled.connect(self._ended)
+        self._refined.connect(self._take_frame)
+        self.laser_error.valueChanged.connect(
+            lambda percent: session.set(("render", "laser_error"), round(percent / 100, 8), "laser error")
+        )
+        self.samples.valueChanged.connect(
+            lambda count: session.set(("render", "ambient_samples"), count, "ambient samples")
+        )
+        self.scale.currentIndexChanged.connect(lambda index: self._show_plan())
+        self.start_button.clicked.connect(lambda: self.start())
+        self.pause_button.clicked.connect(self.pause)
+        self.keep_button.clicked.connect(self.keep)
+        self.cancel_button.clicked.connect(self.cancel)
+
+    def _follow_project(self) -> None:
+        project = self.session.project
+        for box in (self.laser_error, self.samples):
+            box.blockSignals(True)
+        self.laser_error.setValue(100 * project.render.laser_error)
+        self.samples.setValue(project.render.ambient_samples)
+        for box in (self.laser_error, self.samples):
+            box.blockSignals(False)
+        camera, chosen = project.scene.camera, max(0, self.scale.currentIndex())
+        if self.scale.count() == 0:
+            chosen = len(SCALES) - 1
+        sizes = []
+        for scale in SCALES:
+            small = camera.scaled(scale)
+            sizes.append(f"{small.width} x {small.height} px" + ("" if scale == 1.0 else f" ({scale:.3g} x)"))
+        if sizes != [self.scale.itemText(i) for i in range(self.scale.count())]:
+            self.scale.clear()
+            for text, scale in zip(sizes, SCALES, strict=True):
+                self.scale.addItem(text, scale)
+            self.scale.setCurrentIndex(chosen)
+        self._show_plan()
+
+    def _show_plan(self) -> None:
+        project = self.session.project
+        scale = self.scale.currentData()
+        self.plan.setText(plan_text(plan(project.scene.scaled(scale if scale is not None else 1.0), project.render)))
+
+    def _document_replaced(self) -> None:
+        self._render, self._before = None, None
+        self.cancel()
+
+    def _same_world(self, project: Project, step: int) -> World | None:
+        """The world of an earlier render in which every object stands where it stands now."""
+        for render in reversed(self.session.renders):
+            scene, now = render.project.scene, project.scene
+            if (scene.objects, scene.motion, render.frame.step) == (now.objects, now.motion, step):
+                return render.world
+        return None
+
+    def _take_frame(self, world: World, frame: Frame) -> None:
+        if self._job is None or (self._job.cancel_asked and not self._keep):
+            return
+        if self._render is None:
+            number, project, source, image_scale = self._template
+            self._render = Render(
+                number,
+                project,
+                world,
+                frame,
+                final=False,
+                created=time.strftime("%H:%M:%S"),
+                image_scale=image_scale,
+                source=source,
+            )
+            self.session.add_render(self._render)
+        else:
+            self._render.frame = frame
+            self.session.renders_changed.emit()
+        self.errors.setText(error_text(self._render))
+
+    def _tell_progress(self, job: Job[None]) -> None:
+        if job is self._job:
+            self.bar.setValue(round(1000 * job.done))
+            left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
+            self.stage.setText(f"{job.stage}   {left}")
+            limit = self.limit.value()
+            if limit and job.seconds > limit and self._render is not None and not job.cancel_asked:
+                self.keep()
+
+    def _ended(self, job: Job[None]) -> None:
+        if job is not self._job:
+            return
+        render, self._job = self._render, None
+        session = self.session
+        if job.state is State.DONE and render is not None:
+            render.final = True
+            session.renders_changed.emit()
+        elif render is not None and not (self._keep and job.state is State.CANCELLED):
+            session.renders = [other for other in session.renders if other is not render]
+            session.show(self._before if session.shown is render else session.shown)
+        elif render is not None:
+            session.renders_changed.emit()
+        if job.state is State.FAILED and job.problem is not None:
+            session.message.emit("error", job.problem.text)
+        self._show_state()
+
+    def _show_state(self) -> None:
+        job = self._job
+        running = job is not None
+        self.start_button.setVisible(not running)
+        for button in (self.pause_button, self.keep_button, self.cancel_button):
+            button.setVisible(running)
+            button.setEnabled(job is not None and not job.cancel_asked)
+        self.pause_button.setText("Go on" if job is not None and job.state is State.PAUSED else "Pause")
+        self.bar.setVisible(running)
+        self.stage.setVisible(running)
+        self.errors.setVisible(running or bool(self.errors.text()))
+        if not running:
+            self.bar.setValue(0)
+            self.stage.clear()
+
+
+def render_frames(
+    project: Project,
+    root: Path,
+    step: int,
+    world: World | None,
+    progress: Progress,
+    cancelled: Cancel,
+    take: Callable[[World, Frame], None],
+) -> None:
+    """Load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled."""
+    if world is None:
+        progress("loading meshes", 0.0)
+        world = build_world(project.scene, root, step)
+    for frame in refine(
+        world,
+        project.scene,
+        settings=project.render,
+        step=step,
+        axis=project.extraction.axis,
+        seed=project.seed,
+        progress=progress,
+        cancelled=cancelled,
+    ):
+        take(world, frame)
+
+
+def plan_text(lines: tuple[str, ...]) -> str:
+    """Rich text: the first word of each line stands out."""
+    parts = [line.partition(":") for line in lines]
+    return "".join(
+        f"<p style='margin: 3px 0'><b>{escape(head)}</b>{colon}{escape(rest)}</p>" for head, colon, rest in parts
+    )
+
+
+def error_text(render: Render) -> str:
+    """Error so far of every light group, and what it is to become."""
+    target, counts = render.project.render.laser_error, render.frame.counts
+    rows = []
+    for laser in render.project.scene.lasers:
+        error = counts.get(f"relative error, {laser.name}")
+        if error is not None:
+            rows.append(f"{escape(laser.name)}: error {error:.2%} of {target:.2%}")
+    if render.frame.ambient is not None:
+        so_far, wanted = counts.get(AMBIENT_SAMPLES, 0.0), render.project.render.ambient_samples
+        error = counts.get(AMBIENT_ERROR)
+        known = f", error below about {error:.1%}" if error is not None else ""
+        rows.append(f"ambient: {so_far:.0f} of {wanted} samples{known}")
+    return "<br>".join(rows)

@@ -1,0 +1,38 @@
+"""A session on a small sphere, and a render of it, for the tests of the panels."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from render.frame import Frame
+from render.render import render_world
+from render.world import World, build_world
+from studio.document import Document
+from studio.project import Project
+from studio.qt.session import Render, Session
+from studio.stages import scaled
+from studio.templates import template_folder
+
+FOLDER = template_folder("sphere")
+
+
+@lru_cache(maxsize=1)
+def small_project() -> Project:
+    """The sphere at 306 x 256 px, so that everything takes milliseconds."""
+    return scaled(Project.load(FOLDER / "project.json"), 0.125)
+
+
+@lru_cache(maxsize=1)
+def small_render() -> tuple[World, Frame]:
+    project = small_project()
+    world = build_world(project.scene, FOLDER)
+    settings = project.render.model_copy(update={"ambient_samples": 4})
+    return world, render_world(world, project.scene, settings=settings, axis=project.extraction.axis)
+
+
+def small_session(rendered: bool = False) -> Session:
+    session = Session(Document(small_project(), root=FOLDER))
+    if rendered:
+        world, frame = small_render()
+        session.add_render(Render(1, small_project(), world, frame))
+    return session
