@@ -218,6 +218,8 @@ class CurvePlot(QWidget):
 
 
 class FlagField(QCheckBox):
+    """Yes or no."""
+
     entered = Signal(object)
 
     def __init__(self, spec: FieldSpec, parent: QWidget | None = None) -> None:
@@ -227,7 +229,12 @@ class FlagField(QCheckBox):
         self.clicked.connect(lambda checked: self.entered.emit(checked))
 
     def show_value(self, value: Any) -> None:
-        self.setChecked(bool(value))
+        self._shown = bool(value)
+        self.setChecked(self._shown)
+
+    def reject(self) -> None:
+        """The value was refused: the old one stays."""
+        self.setChecked(self._shown)
 
 
 class ChoiceField(QComboBox):
@@ -255,7 +262,12 @@ class ChoiceField(QComboBox):
         return field
 
     def show_value(self, value: Any) -> None:
-        self.setCurrentIndex(self.values.index(value))
+        self._shown = self.values.index(value)
+        self.setCurrentIndex(self._shown)
+
+    def reject(self) -> None:
+        """The value was refused: the old one stays."""
+        self.setCurrentIndex(self._shown)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()

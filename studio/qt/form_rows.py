@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
@@ -23,9 +23,6 @@ if TYPE_CHECKING:
 LABEL_WIDTH, RESET_WIDTH, SPACING = 100, 20, 5
 AXES = ("x", "y", "z")
 DEGREES = Unit("", "deg", 1.0)
-
-
-Editor = TypeVar("Editor", TextField, NumberField, NumbersField, CurveField, FlagField, ChoiceField)
 
 
 def _itself(value: Any) -> Any:
@@ -132,21 +129,23 @@ class Row(QWidget):
 
     def _make_editor(self) -> QWidget:
         spec = self.spec
-        if spec.kind == "flag":
-            return self._connected(FlagField(spec))
-        if spec.kind == "choice":
-            return self._connected(ChoiceField.of(spec))
-        if spec.kind in ("number", "integer"):
-            return self._connected(NumberField(spec))
-        if spec.kind == "numbers" and spec.length is not None:
-            return self._vector([replace(spec, kind="number", value=value) for value in spec.value], self._with_part)
-        if spec.kind == "numbers":
-            return self._connected(NumbersField(spec))
         if spec.kind == "curve":
             return self._curve()
         if spec.kind == "file":
             return self._file()
-        return self._connected(TextField(spec))
+        if spec.kind == "numbers" and spec.length is not None:
+            return self._vector([replace(spec, kind="number", value=value) for value in spec.value], self._with_part)
+        editor: FlagField | ChoiceField | TextField
+        if spec.kind == "flag":
+            editor = FlagField(spec)
+        elif spec.kind == "choice":
+            editor = ChoiceField.of(spec)
+        elif spec.kind in ("number", "integer"):
+            editor = NumberField(spec)
+        else:
+            editor = (NumbersField if spec.kind == "numbers" else TextField)(spec)
+        self._connect(editor)
+        return editor
 
     def _parts(self) -> list[tuple[Any, Any]]:
         """The editors and what each shows."""
@@ -166,19 +165,17 @@ class Row(QWidget):
     def _vector(self, specs: list[FieldSpec], whole: Callable[[int, Any], Any]) -> VectorField:
         vector = VectorField(specs)
         for i, field in enumerate(vector.fields):
-            self._connected(field, partial(whole, i))
+            self._connect(field, partial(whole, i))
         return vector
 
-    def _connected(self, field: Editor, whole: Callable[[Any], Any] = _itself) -> Editor:
-        """Wire an editor of the value, or of a part of it."""
+    def _connect(self, field: FlagField | ChoiceField | TextField, whole: Callable[[Any], Any] = _itself) -> None:
+        """Wire an editor of the value, or of a part of it that `whole` completes."""
 
         def enter(value: Any) -> None:
             if self.change(whole(value)):
                 self.refresh(self.spec)  # as it is written here: 20 for 20.0
-            elif isinstance(field, TextField):
-                field.reject()
             else:
-                field.show_value(self._value())
+                field.reject()
 
         field.entered.connect(enter)
         if isinstance(field, TextField):
@@ -188,7 +185,6 @@ class Row(QWidget):
             field.drag_began.connect(self.form.session.begin_drag)
             field.dragged.connect(lambda value: self.change(whole(value), merge=merge))
             field.drag_ended.connect(self._end_drag)
-        return field
 
     def _end_drag(self, keep: bool) -> None:
         changed = self.form.session.document.undo_label is not None and self.form.dragged
@@ -205,7 +201,8 @@ class Row(QWidget):
         column.setSpacing(3)
         self.plot = CurvePlot()
         self.plot.show_curve(self.spec.value)
-        self.text = self._connected(CurveField(self.spec))
+        self.text: TextField = CurveField(self.spec)
+        self._connect(self.text)
         column.addWidget(self.plot)
         column.addWidget(self.text)
         return holder
@@ -215,7 +212,8 @@ class Row(QWidget):
         line = QHBoxLayout(holder)
         line.setContentsMargins(0, 0, 0, 0)
         line.setSpacing(3)
-        self.text = self._connected(TextField(self.spec))
+        self.text = TextField(self.spec)
+        self._connect(self.text)
         browse = tool_button("…", "Choose a file")
         browse.clicked.connect(lambda: self.form.choose_file(self.owner, None))
         line.addWidget(self.text)
