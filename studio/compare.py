@@ -80,7 +80,7 @@ def _array(quantity: Quantity, frame: Frame, images: list[Image]) -> Float32 | N
     if quantity == "image":
         return sum_of([electrons(image) for image in images])
     if quantity == "laser":
-        return sum_of(list(frame.laser_direct))
+        return sum_of([frame.laser(i) for i in range(len(frame.laser_direct))])
     return None if frame.ambient is None else frame.ambient.mean(axis=2)
 
 

@@ -27,7 +27,7 @@ SHAPE_BRIGHTNESS = 0.45
 class View:
     """One way to look at a render."""
 
-    kind: Literal["image", "laser", "light", "ambient", "depth"]
+    kind: Literal["image", "laser", "reflected", "light", "ambient", "depth"]
     laser: int
     label: str
     unit: str
@@ -40,6 +40,8 @@ def views(scene: Scene, frame: Frame) -> list[View]:
     found = found or [View("image", 0, "Image", "DN")]
     for i, item in enumerate(scene.lasers):
         found.append(View("laser", i, f"Light of {item.name}", "W/(m² sr)"))
+        if frame.laser_indirect:
+            found.append(View("reflected", i, f"Light of {item.name}, reflected on", "W/(m² sr)"))
     if frame.ambient is not None:
         found.append(View("ambient", 0, "Ambient light", "W/(m² sr)"))
         found.append(View("light", 0, "All light, in colour", "W/(m² sr)"))
@@ -55,7 +57,9 @@ def numbers(view: View, frame: Frame, images: list[Image]) -> NDArray[Any] | Non
     if view.kind == "image":
         return images[view.laser].pixels if view.laser < len(images) else None
     if view.kind == "laser":
-        return frame.laser_direct[view.laser]
+        return frame.laser(view.laser)
+    if view.kind == "reflected":
+        return frame.laser_indirect[view.laser]
     if view.kind == "ambient":
         return frame.ambient
     if view.kind == "depth" and frame.truth is not None:
@@ -87,7 +91,8 @@ def all_light(scene: Scene, frame: Frame) -> Float32:
     """(h, w, 3) every group in its colour: ambient bands, and each laser in the colour of its wavelength."""
     height, width = frame.shape
     total = np.zeros((height, width, 3), np.float32) if frame.ambient is None else frame.ambient.copy()
-    for laser, light in zip(scene.lasers, frame.laser_direct, strict=True):
+    for i, laser in enumerate(scene.lasers):
+        light = frame.laser(i)
         for band, share in enumerate(wavelength_colour(laser.wavelength_nm)):
             if share > 0.0:
                 total[..., band] += np.float32(share) * light
@@ -106,8 +111,10 @@ def at_pixel(scene: Scene, frame: Frame, images: list[Image], row: int, column: 
         name = f"DN {scene.lasers[i].name}" if len(images) > 1 else "DN"
         full = ", saturated" if number >= image.saturation else f" ({electrons:,.0f} e-)"
         rows.append((name, f"{number}{full}"))
-    for laser, light in zip(scene.lasers, frame.laser_direct, strict=True):
-        rows.append((laser.name, f"{light[row, column]:.3g} W/(m² sr)"))
+    for i, laser in enumerate(scene.lasers):
+        direct = float(frame.laser_direct[i][row, column])
+        further = f" + {float(frame.laser_indirect[i][row, column]):.3g} reflected" if frame.laser_indirect else ""
+        rows.append((laser.name, f"{direct:.3g}{further} W/(m² sr)"))
     if frame.ambient is not None:
         rows.append(("ambient", f"{float(frame.ambient[row, column].mean()):.3g} W/(m² sr)"))
     if frame.truth is not None:

@@ -66,15 +66,15 @@ class CameraView(QWidget):
         self._connect()
         self._renders_changed()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         self.runner.close()
         super().closeEvent(event)
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.refresh()
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+    def changeEvent(self, event: QEvent) -> None:
         if event.type() == QEvent.Type.PaletteChange and hasattr(self, "badge"):
             self._colour()
         super().changeEvent(event)
@@ -102,8 +102,7 @@ class CameraView(QWidget):
         bar.addWidget(self.choice)
         bar.addWidget(self.bright)
         bar.addSpacing(8)
-        for box in self.overlay.boxes:
-            bar.addWidget(box)
+        bar.addLayout(self.overlay.bar)
         bar.addStretch(1)
         for text, tip, action in (
             ("Fit", "The whole image (F)", self.view.fit),

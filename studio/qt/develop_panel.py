@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from typing import get_args
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -16,7 +17,10 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
     QLabel,
+    QMenu,
+    QSizePolicy,
     QSlider,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -104,7 +108,12 @@ class DevelopPanel(QWidget):
         self.noise.setChecked(True)
         self.noise.setToolTip("Off: the mean image, still saturated and quantised. A look only, the project keeps it.")
         self.powers: list[LogField] = []
-        self.methods = {method: self._method_box(method) for method in METHODS}
+        self.methods_button = QToolButton()
+        self.methods_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.methods_button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.methods_menu = QMenu(self.methods_button)
+        self.methods_button.setMenu(self.methods_menu)
+        self.methods = {method: self._method_action(method) for method in get_args(Method) if method != "auto"}
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
         self.table = QLabel(textFormat=Qt.TextFormat.RichText)
@@ -114,14 +123,14 @@ class DevelopPanel(QWidget):
         self._connect()
         self._follow_project()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         self.runner.close()
         super().closeEvent(event)
 
     def chosen(self) -> tuple[Method, ...]:
         """The methods to measure by; the project's own first."""
         own = self.session.project.extraction.method
-        return (own, *(m for m in METHODS if m != own and self.methods[m].isChecked()))
+        return (own, *(m for m, action in self.methods.items() if m != own and action.isChecked()))
 
     def _lay_out(self) -> None:
         form = self._form
@@ -133,22 +142,19 @@ class DevelopPanel(QWidget):
         form.addRow("Bit depth", self.bits)
         form.addRow("Laser power", self._power_rows)
         form.addRow("Noise", self.noise)
-        methods = QVBoxLayout()
-        methods.setSpacing(2)
-        for box in self.methods.values():
-            methods.addWidget(box)
-        form.addRow("Measure by", methods)
+        form.addRow("Measure by", self.methods_button)
         layout = QVBoxLayout(self)
         layout.addLayout(form)
         layout.addWidget(self.told)
         layout.addWidget(self.table)
         layout.addStretch(1)
 
-    def _method_box(self, method: Method) -> QCheckBox:
-        box = QCheckBox(method_name(method))
-        box.setIcon(swatch(method_colour(method)))
-        box.setChecked(True)
-        return box
+    def _method_action(self, method: Method) -> QAction:
+        action = QAction(swatch(method_colour(method)), method_name(method), self)
+        action.setCheckable(True)
+        action.setChecked(method in METHODS)
+        self.methods_menu.addAction(action)
+        return action
 
     def _connect(self) -> None:
         session = self.session
@@ -161,14 +167,15 @@ class DevelopPanel(QWidget):
         self.automatic_gain.clicked.connect(self._choose_gain)
         self.bits.activated.connect(lambda i: session.set(("sensor", "bits"), self.bits.itemData(i), "bit depth"))
         self.noise.toggled.connect(self.refresh)
-        for box in self.methods.values():
-            box.toggled.connect(self.refresh)
+        for action in self.methods.values():
+            action.toggled.connect(self._methods_changed)
         self._images_ready.connect(self._take_images)
         self.runner.failed.connect(self._tell_failure)
 
     def _setter(self, path: FieldPath, label: str) -> Callable[[float, bool], None]:
         def set_value(value: float, held: bool) -> None:
-            self.session.set(path, value, f"change {label}", f"develop {label}" if held else "")
+            if not self.session.set(path, value, f"change {label}", f"develop {label}" if held else ""):
+                self._follow_project()
 
         return set_value
 
@@ -178,6 +185,10 @@ class DevelopPanel(QWidget):
     def _choose_gain(self, automatic: bool) -> None:
         sensor = self.session.project.sensor
         self.session.set(("sensor", "gain"), None if automatic else float(f"{sensor.dn_per_electron:.4g}"), "gain")
+
+    def _methods_changed(self) -> None:
+        self._tell_methods()
+        self.refresh()
 
     def _project_changed(self) -> None:
         self._follow_project()
@@ -198,12 +209,15 @@ class DevelopPanel(QWidget):
             field.setToolTip(f"{laser.name}, {laser.wavelength_nm:g} nm")
             colour = hex_colour(wavelength_colour(laser.wavelength_nm))
             field.sign.setPixmap(swatch(colour).pixmap(10, 10))
-        for method, box in self.methods.items():
-            own = method == project.extraction.method
-            box.setEnabled(not own)
-            box.setToolTip("The project's own method: always measured." if own else "")
-            if own and not box.isChecked():
-                box.setChecked(True)
+        for method, action in self.methods.items():
+            # the project's own method is always measured
+            action.setEnabled(method != project.extraction.method)
+        self._tell_methods()
+
+    def _tell_methods(self) -> None:
+        chosen = self.chosen()
+        more = f" and {len(chosen) - 1} more" if len(chosen) > 1 else ""
+        self.methods_button.setText(f"{method_name(chosen[0])}{more}")
 
     def _make_powers(self, count: int) -> None:
         for field in self.powers:

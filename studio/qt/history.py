@@ -64,7 +64,7 @@ def thumbnail(render: Render) -> Picture | None:
 class _TwoLines(QStyledItemDelegate):
     """The description below the name, which alone is edited."""
 
-    def initStyleOption(self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex) -> None:  # noqa: N802
+    def initStyleOption(self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex) -> None:
         super().initStyleOption(option, index)
         render: Render = index.data(Qt.ItemDataRole.UserRole)
         option.text = f"{title(render)}\n{describe(render)}"

@@ -52,7 +52,7 @@ class PictureItem(pg.GraphicsObject):  # type: ignore[misc]
         self._clip = column
         self.update()
 
-    def boundingRect(self) -> QRectF:  # noqa: N802 - Qt's name
+    def boundingRect(self) -> QRectF:
         return self._rect
 
     def paint(self, painter: QPainter, option: QStyleOptionGraphicsItem, widget: QWidget | None = None) -> None:

@@ -1,4 +1,4 @@
-"""Lines over an image: the true one, and the one that each method extracted; each is switched by its own box."""
+"""Lines over an image: the true one, and the one of each method that measured; each is switched by its own box."""
 
 from __future__ import annotations
 
@@ -8,20 +8,18 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtGui import QColor, QIcon, QPixmap
-from PySide6.QtWidgets import QCheckBox
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout
 
 from analysis.line.result import Line
 from analysis.report.colour import TRUTH, method_colour, method_name
 from render.frame import LaserCurve
 from studio.qt import theme
-from studio.results import METHODS
 
 Float = NDArray[np.float64]
 SYMBOLS_FROM = 6.0
 """Screen pixels a pixel from which single positions are marked."""
 JUMP_PX = 4.0
 """Positions of neighbouring scan lines that are further apart are not joined."""
-SHORT = {"likelihood": "Likelihood", "gaussian": "Gaussian", "centre_of_mass": "Centre of mass"}
 
 
 def swatch(colour: str, size: int = 10) -> QIcon:
@@ -34,24 +32,20 @@ def swatch(colour: str, size: int = 10) -> QIcon:
 
 
 class LineOverlay:
-    """Items in a view box, in pixel coordinates; `boxes` are for a toolbar."""
+    """Items in a view box, in pixel coordinates; `bar` holds a box for each line. The first method starts visible."""
 
     def __init__(self, box: pg.ViewBox) -> None:
         self.box = box
+        self.bar = QHBoxLayout()
+        self.bar.setSpacing(8)
         self.truth = self._item(TRUTH, 2.0, 10, 13)
-        self.methods = {
-            method: self._item(method_colour(method), 1.2, 11 + i, 7 + 2 * i) for i, method in enumerate(METHODS)
-        }
+        self.methods: dict[str, pg.PlotDataItem] = {}
+        self.method_boxes: dict[str, QCheckBox] = {}
         self.hover = pg.InfiniteLine(angle=0, pen=pg.mkPen(theme.colours().accent, width=1))
         self.hover.setZValue(9)
         self.hover.hide()
         box.addItem(self.hover, ignoreBounds=True)
-        self.truth_box = self._box("True line", TRUTH, "The exact line", True)
-        self.method_boxes = {
-            method: self._box(SHORT[method], method_colour(method), f"Extracted by {method_name(method)}", i == 0)
-            for i, method in enumerate(METHODS)
-        }
-        self.boxes = [self.truth_box, *self.method_boxes.values()]
+        self.truth_box = self._box("true line", TRUTH, "The exact line", True)
         box.sigRangeChanged.connect(lambda *changed: self._zoomed())
         self._switch()
 
@@ -60,15 +54,29 @@ class LineOverlay:
         self._set(self.truth, parts)
 
     def show_methods(self, lines: Sequence[Line]) -> None:
-        """The lines of all methods and lasers; a method without one is cleared."""
+        """The lines of all methods and lasers; a method without one is cleared, its box hidden."""
+        by_method: dict[str, list[Line]] = {}
+        for line in lines:
+            by_method.setdefault(line.method, []).append(line)
+        for method in by_method:
+            if method not in self.methods:
+                self._add_method(method)
         for method, item in self.methods.items():
+            self.method_boxes[method].setVisible(method in by_method)
             parts = []
-            for line in lines:
-                if line.method == method:
-                    for rank in range(line.u.shape[1]):
-                        index = np.flatnonzero(line.valid[:, rank])
-                        parts.append(_joined(line.axis, index.astype(np.float64), line.u[index, rank]))
+            for line in by_method.get(method, []):
+                for rank in range(line.u.shape[1]):
+                    index = np.flatnonzero(line.valid[:, rank])
+                    parts.append(_joined(line.axis, index.astype(np.float64), line.u[index, rank]))
             self._set(item, parts)
+
+    def _add_method(self, method: str) -> None:
+        first, colour, count = not self.methods, method_colour(method), len(self.methods)
+        self.methods[method] = self._item(colour, 1.2, 11 + count, 7 + 2 * min(count, 4))
+        name = method_name(method)
+        self.method_boxes[method] = self._box(name, colour, f"The line extracted by {name}", first)
+        self._switch()
+        self._zoomed()
 
     def show_hover(self, index: int | None, axis: str) -> None:
         """Mark a scan line; None: none."""
@@ -91,6 +99,7 @@ class LineOverlay:
         box.setToolTip(tip)
         box.setChecked(on)
         box.toggled.connect(lambda checked: self._switch())
+        self.bar.addWidget(box)
         return box
 
     def _switch(self) -> None:

@@ -83,7 +83,7 @@ class RenderPanel(QWidget):
         self._follow_project()
         self._show_state()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         self.cancel()
         super().closeEvent(event)
 
@@ -241,6 +241,7 @@ class RenderPanel(QWidget):
             self._render.frame = frame
             self.session.renders_changed.emit()
         self.errors.setText(error_text(self._render))
+        self.plan.setText(plan_text(tuple(frame.plan.splitlines())))
 
     def _tell_progress(self, job: Job[None]) -> None:
         if job is self._job:
@@ -325,7 +326,10 @@ def error_text(render: Render) -> str:
     for laser in render.project.scene.lasers:
         error = counts.get(f"relative error, {laser.name}")
         if error is not None:
-            rows.append(f"{escape(laser.name)}: error {error:.2%} of {target:.2%}")
+            rows.append(f"{escape(laser.name)}: error {error:.2%}, target {target:.2%}")
+        error = counts.get(f"relative error of reflections, {laser.name}")
+        if error is not None:
+            rows.append(f"{escape(laser.name)}, reflected on: error {error:.1%}")
     if render.frame.ambient is not None:
         so_far, wanted = counts.get(AMBIENT_SAMPLES, 0.0), render.project.render.ambient_samples
         error = counts.get(AMBIENT_ERROR)
