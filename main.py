@@ -141,13 +141,16 @@ def why_no_studio() -> str | None:
     """The reason why no window can open, or None."""
     from importlib.util import find_spec
 
-    if find_spec("studio.qt") is None or find_spec("studio.qt.app") is None:
-        return "this version has no desktop yet"
     if find_spec("PySide6") is None:
         return "the Qt library (PySide6) is not installed"
-    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        return "there is no display"
-    return None
+    from studio.display import why_no_display
+
+    reason = why_no_display()
+    if reason is not None:
+        return reason
+    from studio.qt.app import why_not
+
+    return why_not()
 
 
 @cli.command()
