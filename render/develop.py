@@ -141,7 +141,7 @@ class _Exposure:
         if len(frame.laser_direct) != len(lasers):
             found = f"{len(frame.laser_direct)} laser images"
             raise InputError("the frame is not of this scene", where="frame", found=found, allowed=f"{len(lasers)}")
-        groups = [*frame.laser_direct, *([] if frame.ambient is None else [frame.ambient])]
+        groups = [*frame.laser_direct, *frame.laser_indirect, *([] if frame.ambient is None else [frame.ambient])]
         for image in groups:
             if image.shape[:2] != self.shape:
                 found, allowed = f"{image.shape[1]} x {image.shape[0]} px", f"{camera.width} x {camera.height} px"
@@ -150,7 +150,7 @@ class _Exposure:
         scales = _power_scales(scene, laser_power)
         self.lasers = [
             (np.ascontiguousarray(image, dtype=np.float32), scale * joule * laser_response(sensor, laser.wavelength_nm))
-            for image, laser, scale in zip(frame.laser_direct, lasers, scales, strict=True)
+            for image, laser, scale in zip(map(frame.laser, range(len(lasers))), lasers, scales, strict=True)
         ]
         self.ambient = None if frame.ambient is None else np.ascontiguousarray(frame.ambient, dtype=np.float32)
         self.bands = joule * band_response(sensor)

@@ -64,6 +64,8 @@ class Frame:
     step: int
     laser_direct: tuple[Float32, ...]
     """For each laser (h, w) radiance at its wavelength, W/(m^2 sr), light that met one surface only."""
+    laser_indirect: tuple[Float32, ...] = field(default=(), kw_only=True)
+    """For each laser (h, w) radiance of its light that met two or more surfaces; empty: left out."""
     ambient: Float32 | None
     """(h, w, 3) radiance of ambient light in the bands R, G, B, W/(m^2 sr); None: the scene has no ambient light."""
     curves: tuple[LaserCurve, ...]
@@ -75,6 +77,11 @@ class Frame:
     """Wall time by stage."""
     counts: dict[str, float] = field(default_factory=dict)
     """Rays, samples, lit pixels, seconds inside embree, estimated relative error."""
+
+    def laser(self, index: int) -> Float32:
+        """(h, w) radiance of one laser's group: direct and indirect."""
+        direct = self.laser_direct[index]
+        return direct + self.laser_indirect[index] if self.laser_indirect else direct
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -28,6 +28,7 @@ from render.sidecar import (
     Record,
     curves_from,
     from_text,
+    indirect_layer,
     laser_layer,
     numbers_from,
     safe_name,
@@ -99,6 +100,9 @@ def _layers(frame: Frame, scene: Scene) -> Layers:
         found = f"{len(frame.laser_direct)} laser images, {len(frame.curves)} curves"
         raise InputError("the frame is not of this scene", where="frame", found=found, allowed=f"{len(scene.lasers)}")
     layers = {laser_layer(laser.name): light for laser, light in zip(scene.lasers, frame.laser_direct, strict=True)}
+    if frame.laser_indirect:
+        pairs = zip(scene.lasers, frame.laser_indirect, strict=True)
+        layers |= {indirect_layer(laser_layer(laser.name)): light for laser, light in pairs}
     if frame.ambient is not None:
         layers |= {layer: frame.ambient[..., i] for i, layer in enumerate(AMBIENT_LAYERS)}
     if frame.truth is not None:
@@ -116,7 +120,7 @@ def _layers(frame: Frame, scene: Scene) -> Layers:
 
 
 def _frame(record: Record, layers: Layers) -> Frame:
-    lasers = tuple(layers[laser["layer"]] for laser in record["lasers"])
+    names = [laser["layer"] for laser in record["lasers"]]
     truth = None
     if record["truth"]:
         parts = {name: [layers[layer] for layer in names] for name, names in TRUTH_LAYERS.items()}
@@ -124,7 +128,8 @@ def _frame(record: Record, layers: Layers) -> Frame:
         truth = Truth(**arrays, object_id=layers[OBJECT_LAYER].view(np.int32))
     return Frame(
         step=int(record["step"]),
-        laser_direct=lasers,
+        laser_direct=tuple(layers[name] for name in names),
+        laser_indirect=tuple(layers[indirect_layer(name)] for name in names if indirect_layer(name) in layers),
         ambient=np.stack([layers[layer] for layer in AMBIENT_LAYERS], axis=-1) if record["ambient"] else None,
         curves=curves_from(record),
         truth=truth,

@@ -74,7 +74,7 @@ class IndirectImage:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def normal_quantile(share: float) -> float:
-    """Inverse of the normal distribution function in (0, 1): Giles (2010), erfinv single precision, then a Newton step."""
+    """Inverse of the normal distribution function: Giles (2010), erfinv in single precision, and a Newton step."""
     x = 2.0 * share - 1.0
     w = -math.log((1.0 - x) * (1.0 + x))
     if w < 5.0:
@@ -323,7 +323,7 @@ def indirect_image(
     T_world_laser: Float,
     *,
     target: float = 0.1,
-    most_paths: int = 1 << 26,
+    most_paths: int = 1 << 23,
     seed: int = 0,
     threads: int | None = None,
     cancelled: Cancel | None = None,
@@ -361,9 +361,35 @@ def indirect_image(
     return IndirectImage(image, error, passes * PASS_PATHS)
 
 
+def indirect_flux(
+    world: World,
+    camera: Camera,
+    laser: LineLaser,
+    T_world_camera: Float,
+    T_world_laser: Float,
+    *,
+    passes: int = 4,
+    paths: int = 1 << 13,
+    seed: int = 0,
+    cancelled: Cancel | None = None,
+) -> tuple[float, float]:
+    """Sum over the image of the indirect radiance, and its standard error: a pilot of a few short passes."""
+    low, high, reach = fan_span(world, laser, T_world_laser)
+    if high <= low:
+        return 0.0, 0.0
+    surface = world.surface_at((laser.wavelength_nm,) * 3)
+    task = _Task(world, surface, camera, laser, T_world_camera, T_world_laser, (low, high, reach), seed)
+    sums = []
+    for number in range(passes):
+        image = np.zeros(camera.width * camera.height)
+        task.run(number, image, cancelled, paths)
+        sums.append(float(image.sum()) / paths)
+    return float(np.mean(sums)), float(np.std(sums, ddof=1) / math.sqrt(passes))
+
+
 @dataclass(frozen=True)
 class _Task:
-    """Traces one pass: PASS_PATHS photons in chunks, one after the other, into one image."""
+    """Traces one pass: its photons in chunks, one after the other, into one image."""
 
     world: World
     surface: Surface
@@ -374,7 +400,7 @@ class _Task:
     span: tuple[float, float, float]
     seed: int
 
-    def run(self, number: int, image: Float, cancelled: Cancel | None) -> None:
+    def run(self, number: int, image: Float, cancelled: Cancel | None, count: int = PASS_PATHS) -> None:
         from render.errors import Cancelled
         from render.material import reflectance_weights
 
@@ -383,10 +409,10 @@ class _Task:
         weights = np.array(reflectance_weights(self.laser.wavelength_nm))
         seed = self.seed * 1_000_003 + number
         start = np.array([uniform(seed, 0, dimension, 99) for dimension in range(5)])
-        for first in range(0, PASS_PATHS, CHUNK):
+        for first in range(0, count, CHUNK):
             if cancelled is not None and cancelled():
                 raise Cancelled
-            paths = _empty(CHUNK)
+            paths = _empty(min(CHUNK, count - first))
             emit(first, seed, start, low, high, reach, self.laser.packed(), self.T_world_laser, paths)
             depth = 0
             while len(paths.number):

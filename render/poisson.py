@@ -1,8 +1,8 @@
 """Exact Poisson samples for kernels: the photons and dark electrons that a pixel counts.
 
-    mean < 10     inversion by sequential search; a mean near zero is answered without an exponential
-    mean >= 10    transformed rejection, PTRS (Hoermann 1993, "The transformed rejection method for generating Poisson
-                  random variables", Insurance: Mathematics and Economics 12)
+mean < 10     inversion by sequential search; a mean near zero is answered without an exponential
+mean >= 10    transformed rejection, PTRS (Hoermann 1993, "The transformed rejection method for generating Poisson
+              random variables", Insurance: Mathematics and Economics 12)
 """
 
 from __future__ import annotations

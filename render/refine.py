@@ -20,7 +20,7 @@ from render.checks import check_placement
 from render.curve import laser_curve
 from render.direct import direct_image
 from render.frame import Axis, Frame, LaserCurve
-from render.render import PLAN
+from render.plan import DIRECT, INDIRECT, indirect_light
 from render.scene import Scene
 from render.settings import RenderSettings
 from render.threads import Cancel
@@ -47,7 +47,13 @@ def has_ambient(scene: Scene) -> bool:
 def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
     """What will be computed, what is left out, and why; one line each."""
     camera = scene.camera
-    lines = [*PLAN]
+    lines = [DIRECT]
+    if settings.transport == "direct":
+        lines.append(f"left out: {INDIRECT} - switched off")
+    elif settings.transport == "interreflection":
+        lines.append(f"interreflection: {INDIRECT} - asked for")
+    else:
+        lines.append(f"{INDIRECT}: a pilot decides, it is left out below {settings.negligible:.2%} of the light")
     if has_ambient(scene):
         lines.append(
             f"ambient: lamps and surroundings by way of one surface, {_rounded(settings.ambient_samples)} samples on "
@@ -95,7 +101,7 @@ def refine(
         check_placement(world, scene, step)
         rays = world.rays
     ray_start, embree_start = rays.rays, rays.seconds
-    frame = Frame(step, (), None, (), None, "\n".join(PLAN))
+    frame = Frame(step, (), None, (), None, "\n".join(plan(scene, settings)))
 
     def told(frame: Frame, **counts: float) -> Frame:
         so_far = {"rays": rays.rays - ray_start, "seconds in embree, all threads": rays.seconds - embree_start}
@@ -109,6 +115,13 @@ def refine(
         with clock.stage("laser light", _laser_work(pixels, scene, target)) as report:
             images, counts = _lasers(world, scene, step, target, seed, threads, report, cancelled)
         frame = told(replace(frame, laser_direct=images, curves=curves), **counts)
+        yield frame
+    with clock.stage("reflected laser light", pixels):
+        chosen, indirect, counts = indirect_light(
+            world, scene, settings, images, step=step, seed=seed, threads=threads, cancelled=cancelled
+        )
+    frame = told(replace(frame, laser_indirect=indirect, plan=chosen.text), **counts)
+    if indirect:
         yield frame
     if settings.truth_images:
         with clock.stage("truth images", pixels) as report:
@@ -212,6 +225,7 @@ def _workload(world: World, scene: Scene, settings: RenderSettings) -> float:
     pixels = scene.camera.width * scene.camera.height
     total = len(world.triangles) * 10 + _laser_work(pixels, scene, settings.laser_error)
     total += _laser_work(pixels, scene, QUICK_ERROR) if settings.laser_error < QUICK_ERROR else 0.0
+    total += pixels
     total += pixels if settings.truth_images else 0.0
     if has_ambient(scene):
         total += sum(_ambient_work(pixels, scene, samples) for samples in ambient_passes(settings.ambient_samples))

@@ -12,6 +12,7 @@ from render.checks import check_placement
 from render.curve import laser_curve
 from render.direct import direct_image
 from render.frame import Axis, Frame
+from render.plan import indirect_light
 from render.scene import Scene
 from render.settings import RenderSettings
 from render.threads import Cancel
@@ -19,12 +20,6 @@ from render.truth import truth_images
 from render.world import World, build_world
 
 StageProgress = Callable[[str, float], None]
-
-PLAN = (
-    "direct: light of each laser that meets one surface, exact across the sheet, sampled across edges and shadows",
-    "left out: light of the lasers that meets two or more surfaces (interreflection) - all materials are diffuse, "
-    "so it is a faint, broad glow without a second line",
-)
 
 
 def render(
@@ -108,6 +103,11 @@ def render_world(
         counts[f"relative error, {laser.name}"] = image.error
         counts[f"lit pixels, {laser.name}"] = image.pixels
         counts[f"samples, {laser.name}"] = image.samples
+    with stage("reflected laser light"):
+        plan, indirect, tallies = indirect_light(
+            world, scene, settings, tuple(direct), step=step, seed=seed, threads=threads, cancelled=cancelled
+        )
+    counts |= tallies
     truth = ambient = None
     if settings.truth_images:
         with stage("truth images") as report:
@@ -133,7 +133,8 @@ def render_world(
         ambient=ambient,
         curves=tuple(curves),
         truth=truth,
-        plan="\n".join(PLAN),
+        laser_indirect=indirect,
+        plan=plan.text,
         seconds=seconds,
         counts=counts,
     )

@@ -1,4 +1,4 @@
-"""The sensor, after EMVA 1288: photons -> electrons -> shot, dark and read noise -> saturation -> gain -> quantisation."""
+"""The sensor, after EMVA 1288: photons, electrons, shot, dark and read noise, saturation, gain, quantisation."""
 
 from __future__ import annotations
 

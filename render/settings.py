@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from render.model import Model, quantity
 
 
@@ -10,6 +12,25 @@ class RenderSettings(Model):
 
     laser_error: float = quantity(
         0.003, label="Laser error", help="Target relative RMS error over the lit pixels.", gt=1e-6, le=1
+    )
+    transport: Literal["auto", "direct", "interreflection"] = quantity(
+        "auto",
+        label="Light transport",
+        help="auto: a short pilot decides. direct: the lasers' light by way of one surface. interreflection: also "
+        "by way of two and more, which shiny and concave parts need.",
+    )
+    negligible: float = quantity(
+        0.02, label="Negligible share", help="auto leaves out what adds less than this share of the light.", ge=0, le=1
+    )
+    indirect_error: float = quantity(
+        0.1, label="Reflection error", help="Target relative RMS error of the reflected light.", gt=1e-4, le=1
+    )
+    light_paths: int = quantity(
+        1 << 23,
+        label="Most light paths",
+        help="For each laser; ends the reflections in any case.",
+        ge=1 << 20,
+        le=1 << 40,
     )
     ambient_samples: int = quantity(16, label="Ambient samples", help="Per pixel.", ge=1, le=65536)
     truth_images: bool = quantity(True, label="Per-pixel truth", help="Depth, position, normal and object images.")

@@ -54,6 +54,11 @@ def laser_layer(name: str) -> str:
     return f"laser.{safe_name(name)}.direct.Y"
 
 
+def indirect_layer(layer: str) -> str:
+    """EXR channel of the same laser's indirect light."""
+    return layer.removesuffix("direct.Y") + "indirect.Y"
+
+
 def sidecar_record(frame: Frame, image: Image | None, scene: Scene, sensor: Sensor | None) -> Record:
     """Everything about a frame but its pixels."""
     camera, step = scene.camera, frame.step

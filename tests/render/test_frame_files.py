@@ -39,9 +39,7 @@ def scene_of(names: tuple[str, ...] = NAMES) -> Scene:
         for i, name in enumerate(names)
     )
     motion = LinearStage(step=(0, 0.01, 0), steps=10)
-    return Scene(
-        rig=Rig(camera=camera, lasers=lasers), objects=(SceneObject(name="box", shape=Box()),), motion=motion
-    )
+    return Scene(rig=Rig(camera=camera, lasers=lasers), objects=(SceneObject(name="box", shape=Box()),), motion=motion)
 
 
 def curve_of(n: int, axis: str, rng: np.random.Generator) -> LaserCurve:

@@ -22,7 +22,7 @@ from tests.render.scenes import moved, paper_camera, paper_laser, plane_mesh, sc
 
 SKY = Environment(radiance=(0.2, 0.3, 0.4))
 LAMP = PointLight(intensity=(1.0, 1.0, 1.0), T_world_light=Pose(translation=(0.3, 0.1, 0.1)))
-SETTINGS = RenderSettings(laser_error=0.01, ambient_samples=16)
+SETTINGS = RenderSettings(transport="direct", laser_error=0.01, ambient_samples=16)
 
 
 def box_on_a_wall(**parts):

@@ -1,0 +1,171 @@
+import math
+
+import numpy as np
+import pytest
+
+from render.direct import direct_image
+from render.laser import LineLaser
+from render.light_path import fan_integral, fan_quantile, indirect_flux, indirect_image, normal_quantile
+from render.material import Coated, Conductor, Lambertian
+from render.mesh import Mesh
+from render.plan import choose_plan
+from render.primitives import primitive_mesh
+from render.render import render_world
+from render.settings import RenderSettings
+from render.shape import Sphere, VGroove
+from tests.render.scenes import moved, paper_camera, paper_laser, plane_mesh, scene_of, world_of
+
+
+def setting(meshes, materials, camera=None, laser=None):
+    scene = scene_of(camera or paper_camera(0.1), laser or paper_laser(), objects=len(meshes))
+    items = tuple(
+        item.model_copy(update={"material": material}) for item, material in zip(scene.objects, materials, strict=True)
+    )
+    scene = scene.model_copy(update={"objects": items})
+    world = world_of(scene, *meshes)
+    return scene, (world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0))
+
+
+def turned_groove(angle=90):
+    mesh = primitive_mesh(VGroove(angle=math.radians(angle), depth=0.03, width=0.2, length=0.2, thickness=0.04))
+    turned = Mesh(mesh.vertices[:, [1, 0, 2]] * (1, 1, -1), mesh.triangles, mesh.uv)
+    return moved(turned, (0.0, 0.0, 0.85))
+
+
+@pytest.mark.parametrize("profile", ["uniform", "gaussian", "constant"])
+def test_photons_leave_the_laser_as_its_fan_says(profile):
+    beam = LineLaser(fan_profile=profile, fan_angle=1.2).packed()
+    shares = np.linspace(0.001, 0.999, 41)
+    y = np.array([fan_quantile(share, beam) for share in shares])
+    assert np.array([fan_integral(v, beam) for v in y]) == pytest.approx(shares, abs=1e-9)
+    # the density is the derivative
+    from render.beam import fan_density
+
+    slope = np.array([(fan_integral(v + 1e-6, beam) - fan_integral(v - 1e-6, beam)) / 2e-6 for v in y])
+    assert slope == pytest.approx([fan_density(v, beam) for v in y], rel=1e-6)
+
+
+def test_the_normal_quantile_inverts_the_distribution():
+    from scipy.stats import norm
+
+    shares = np.array([1e-7, 1e-4, 0.1, 0.5, 0.73, 0.999, 1 - 1e-7])
+    assert [normal_quantile(share) for share in shares] == pytest.approx(norm.ppf(shares), abs=1e-9)
+
+
+def test_a_lone_convex_body_or_plane_has_no_indirect_light():
+    for mesh in (plane_mesh((0, 0, 1), 0.9), moved(primitive_mesh(Sphere(radius=0.1)), (0, 0, 0.9))):
+        _, parts = setting([mesh], [Lambertian(albedo=0.9)])
+        assert indirect_flux(*parts) == (0.0, 0.0)
+
+
+def test_light_and_camera_paths_agree_on_the_light_in_a_groove():
+    _, parts = setting([turned_groove()], [Lambertian(albedo=0.8)])
+    image = indirect_image(*parts, target=0.02, most_paths=1 << 23)
+    direct = direct_image(*parts, target=1e-3).radiance.astype(np.float64)
+    share = image.radiance.sum(dtype=np.float64) / direct.sum()
+    expected = independent_share(0.8)
+    assert share == pytest.approx(expected, rel=0.03)
+
+
+def independent_share(albedo, count=3_000_000):
+    """Indirect over direct radiance to the camera of the groove, by plain path tracing from the camera in NumPy."""
+    rng = np.random.default_rng(11)
+    scene, (world, camera, laser, _, _) = setting([turned_groove()], [Lambertian(albedo=albedo)])
+    from render.beam import irradiance_at
+    from render.pose import invert
+
+    T_laser = invert(scene.T_world_laser(0))
+    corners = world.corners
+    facets = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facets /= np.linalg.norm(facets, axis=1, keepdims=True)
+
+    # a wider sheet with the same fan, so that camera paths meet it; much narrower than the groove is long
+    def lit(points, normals):
+        local = points @ T_laser[:3, :3].T + T_laser[:3, 3]
+        towards = scene.T_world_laser(0)[:3, 3] - points
+        distance = np.linalg.norm(towards, axis=1)
+        facing = np.einsum("ij,ij->i", normals, towards) > 0
+        origin = (points - world.rays.centre + normals * world.rays.surface_offset).astype(np.float32)
+        blocked = world.rays.occluded(
+            origin, (towards / distance[:, None]).astype(np.float32), distance.astype(np.float32)
+        )
+        values = irradiance_at(np.ascontiguousarray(local), np.ascontiguousarray(normals @ T_laser[:3, :3].T), wide)
+        return np.where(facing & ~blocked, values, 0.0)
+
+    from render.laser import Divergence
+
+    wide = laser.model_copy(update={"sheet": Divergence(full_angle=0.03)}).packed()
+    pixels = rng.uniform((-0.5, -0.5), (camera.width - 0.5, camera.height - 0.5), (count, 2))
+    rays, _ = camera.rays(pixels)
+    weight, origin, direction = np.ones(count), np.zeros((count, 3)), rays
+    # radiance summed over pixels weighs each sample alike
+    first = rest = 0.0
+    alive = np.arange(count)
+    for depth in range(12):
+        start = (origin - world.rays.centre).astype(np.float32)
+        triangle, _ = world.rays.intersect(start, direction.astype(np.float32))
+        hit = triangle >= 0
+        alive, origin, direction, triangle = alive[hit], origin[hit], direction[hit], triangle[hit]
+        n, a = facets[triangle], corners[triangle, 0]
+        t = np.einsum("ij,ij->i", n, a - origin) / np.einsum("ij,ij->i", n, direction)
+        points = origin + t[:, None] * direction
+        n = n * -np.sign(np.einsum("ij,ij->i", n, direction))[:, None]
+        light = np.sum(weight[alive] * albedo / math.pi * lit(points, n))
+        first, rest = (first + light, rest) if depth == 0 else (first, rest + light)
+        weight[alive] *= albedo
+        u, v = rng.random((2, len(alive)))
+        z, radius, phi = np.sqrt(u), np.sqrt(1 - u), 2 * np.pi * v
+        x_axis = np.cross(n, np.where(np.abs(n[:, :1]) > 0.9, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
+        x_axis /= np.linalg.norm(x_axis, axis=1, keepdims=True)
+        y_axis = np.cross(n, x_axis)
+        direction = (radius * np.cos(phi))[:, None] * x_axis + (radius * np.sin(phi))[:, None] * y_axis + z[:, None] * n
+        origin = points + n * world.rays.surface_offset
+    return rest / first
+
+
+def test_the_error_estimate_is_that_of_the_image():
+    _, parts = setting([turned_groove()], [Conductor(roughness=0.2)])
+    reference = indirect_image(*parts, target=1e-4, most_paths=1 << 22, seed=5).radiance.astype(np.float64)
+    found = [indirect_image(*parts, target=0.1, seed=seed) for seed in (1, 2, 3)]
+    errors = [math.sqrt(np.sum((image.radiance - reference) ** 2) / np.sum(reference**2)) for image in found]
+    assert np.mean(errors) == pytest.approx(np.mean([image.error for image in found]), rel=0.3)
+    assert max(errors) < 0.15
+
+
+def test_reflections_are_the_same_for_any_number_of_threads():
+    _, parts = setting([turned_groove()], [Coated(albedo=0.6)])
+    one, four = (indirect_image(*parts, target=0.2, threads=threads).radiance for threads in (1, 4))
+    assert np.array_equal(one, four) and one.max() > 0
+
+
+def test_the_plan_follows_what_the_pilot_measures():
+    def plan(meshes, materials, **settings):
+        scene, parts = setting(meshes, materials)
+        direct = (direct_image(*parts).radiance,)
+        return choose_plan(parts[0], scene, RenderSettings(**settings), direct)
+
+    flat = plan([plane_mesh((0, 0, 1), 0.9)], [Conductor()])
+    assert not flat.indirect and "left out: light of the lasers" in flat.text and "0.00%" in flat.text
+    deep = plan([turned_groove()], [Conductor()])
+    assert deep.indirect and "a pilot puts it at" in deep.text
+    # a dark groove would look the same, but there is nothing worth computing
+    dark = plan([turned_groove()], [Lambertian(albedo=0.01)])
+    assert not dark.indirect
+    assert not plan([turned_groove()], [Conductor()], transport="direct").indirect
+    assert plan([plane_mesh((0, 0, 1), 0.9)], [Lambertian()], transport="interreflection").indirect
+
+
+def test_a_frame_keeps_direct_and_reflected_light_apart():
+    scene, parts = setting([turned_groove()], [Conductor(roughness=0.1)])
+    frame = render_world(parts[0], scene)
+    assert len(frame.laser_indirect) == 1
+    assert frame.laser(0) == pytest.approx(frame.laser_direct[0] + frame.laser_indirect[0])
+    assert frame.laser_indirect[0].sum() > 0.05 * frame.laser_direct[0].sum()
+
+
+def test_metal_at_an_unknown_wavelength_is_named():
+    from render.errors import InputError
+
+    with pytest.raises(InputError, match="not known at this wavelength"):
+        setting_parts = setting([turned_groove()], [Conductor(metal="gold")], laser=paper_laser(wavelength_nm=1550.0))
+        direct_image(*setting_parts[1])
