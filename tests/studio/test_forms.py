@@ -61,8 +61,8 @@ class TestDescription:
         assert power.unit.with_unit(power.value) == "20 mW"
 
     def test_every_quantity_has_the_unit_that_people_use_for_it(self, project: Project) -> None:
-        shown = {field.name: field.unit.with_unit(field.value) for _, field in leaves(describe(project.scene.camera), ())
-                 if field.kind == "number" and field.value is not None}  # fmt: skip
+        fields = [field for field in describe(project.scene.camera) if field.kind == "number"]
+        shown = {field.name: field.unit.with_unit(field.value) for field in fields}
         assert shown["pixel_pitch"] == "3.45 um"
         assert shown["focal_length"] == "12 mm"
         assert spec(Divergence(), "full_angle").unit.with_unit(1.15e-3) == "1.15 mrad"

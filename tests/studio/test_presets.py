@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 
 from render.response import laser_response
-from studio.document import Document, value_at
+from studio.document import Document, replaced, value_at
 from studio.presets import Preset, PresetKind, presets, presets_for, with_preset
 from studio.project import Project
 from studio.templates import template_folder
@@ -78,8 +78,8 @@ def test_another_sensor_keeps_the_lens(project: Project) -> None:
 
 
 def test_a_lens_preset_clears_the_distortion_of_the_lens_before(project: Project) -> None:
-    bent = project.model_copy(update={"scene": project.scene.model_copy(update={"rig": project.scene.rig.model_copy(
-        update={"camera": project.scene.camera.model_copy(update={"distortion": (-0.1, 0.0, 0.0, 0.0), "cx": 1202.3})})})})  # fmt: skip
+    bent = replaced(project, (*CAMERA, "distortion"), (-0.1, 0.0, 0.0, 0.0))
+    bent = replaced(bent, (*CAMERA, "cx"), 1202.3)
     camera = with_preset(bent, CAMERA, named("cameras", "16 mm")).scene.camera
     assert camera.distortion == ()
     assert camera.cx == 1223.5

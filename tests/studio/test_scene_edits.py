@@ -74,7 +74,7 @@ class TestPlacement:
     def test_new_lasers_cross_the_axis_at_the_working_distance_and_keep_apart(self, project: Project) -> None:
         distance = working_distance(project.scene)
         for _ in range(9):
-            project, path = scene_edits.add_laser(project)
+            project, _ = scene_edits.add_laser(project)
         scene = project.scene
         origins = [scene.T_camera_laser(i)[:3, 3] for i in range(len(scene.lasers))]
         for i in range(1, len(scene.lasers)):
