@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from render.bsdf import LAMBERTIAN, evaluate, sample
 from render.camera import Camera
-from render.direct import camera_rays
+from render.camera_rays import camera_rays
 from render.embree import CHUNK
 from render.lights import PointLight
 from render.random import uniform

@@ -17,16 +17,17 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.beam import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2, fan_density, sheet_sigma
+from render.beam import fan_density, sheet_sigma
 from render.bsdf import LAMBERTIAN, evaluate
 from render.camera import Camera
-from render.distortion import distort, tilt_matrix, undistort
+from render.camera_rays import camera_rays
+from render.distortion import distort, tilt_matrix
 from render.embree import CHUNK
 from render.footprint import reachable_pixels
 from render.laser import LineLaser
 from render.material import reflectance_weights
 from render.pose import invert
-from render.random import uniform
+from render.sheet_integral import mean_over, sheet_slope
 from render.surface import Surface, View, has_gloss, lookup, slot_reflectance, to_local
 from render.threads import Cancel, Progress, map_chunks
 from render.world import World
@@ -47,51 +48,6 @@ class DirectImage:
     error: float
     pixels: int
     samples: int
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def camera_rays(
-    view: View,
-    pixels: Int,
-    cells: int,
-    seed: int,
-    jittered: bool,
-    normalised: Float,
-    offsets: Float32,
-    directions: Float32,
-) -> None:
-    """One ray through a jittered point of each of cells x cells cells of (n,) pixels.
-
-    Fills normalised (n cells^2, 2) undistorted image coordinates (NaN: no ray), offsets (.., 2) of the sample from its
-    cell's centre in px, and directions (.., 3), world.
-    """
-    intrinsics, k, rotation = view.intrinsics, view.distortion, view.T_world_camera
-    tilt = tilt_matrix(k[12], k[13])
-    distorted = bool(np.any(k))
-    tolerance = 1e-10 / max(intrinsics[0], intrinsics[1])
-    size = 1.0 / cells
-    for i in range(pixels.shape[0]):
-        column, row = pixels[i] % view.width, pixels[i] // view.width
-        for cell in range(cells * cells):
-            r = i * cells * cells + cell
-            du = dv = 0.0
-            if jittered:
-                du = (uniform(seed, pixels[i], cell, 2 * cells) - 0.5) * size
-                dv = (uniform(seed, pixels[i], cell, 2 * cells + 1) - 0.5) * size
-            u = column - 0.5 + (cell % cells + 0.5) * size + du
-            v = row - 0.5 + (cell // cells + 0.5) * size + dv
-            y = (v - intrinsics[3]) / intrinsics[1]
-            x = (u - intrinsics[2] - intrinsics[4] * y) / intrinsics[0]
-            ok = True
-            if distorted:
-                x, y, ok = undistort(x, y, k, tilt, view.folds, tolerance)
-            if not ok:
-                x = y = np.nan
-            normalised[r, 0], normalised[r, 1] = x, y
-            offsets[r, 0], offsets[r, 1] = du, dv
-            for axis in range(3):
-                d = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2]
-                directions[r, axis] = d if ok else 0.0
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -217,13 +173,13 @@ def _shade_kernel(glossy: bool) -> Any:
                     (-jyx * xv + jxx * yv) / det,
                 )
             q = lx / sigma
-            qu = _sheet_slope(xu, yu, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
-            qv = _sheet_slope(xv, yv, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+            qu = sheet_slope(xu, yu, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+            qv = sheet_slope(xv, yv, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
             du, dv = offsets[r, 0], offsets[r, 1]
             cell = r % (cells * cells)
             pixel_u, pixel_v = (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
-            in_cell = _mean_over(q - qu * du - qv * dv, qu * half, qv * half)
-            in_pixel = _mean_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
+            in_cell = mean_over(q - qu * du - qv * dv, qu * half, qv * half)
+            in_pixel = mean_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
             if in_cell == 0.0 and in_pixel == 0.0:
                 continue
             # irradiance without the Gaussian: P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)|
@@ -265,69 +221,6 @@ def _shade_kernel(glossy: bool) -> Any:
 
 
 shade_diffuse, shade_glossy = _shade_kernel(False), _shade_kernel(True)
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def _sheet_slope(
-    xs: float,
-    ys: float,
-    m: Float,
-    w: Float,
-    n0: float,
-    n1: float,
-    n2: float,
-    d0: float,
-    d1: float,
-    d2: float,
-    s: float,
-    cosine: float,
-    q: float,
-    sigma: float,
-    slope: float,
-) -> float:
-    """Change of q = x / sigma(z) with a pixel coordinate along which the ray's (x, y) changes by (xs, ys)."""
-    e0, e1, e2 = (
-        m[0, 0] * xs + m[0, 1] * ys,
-        m[1, 0] * xs + m[1, 1] * ys,
-        m[2, 0] * xs + m[2, 1] * ys,
-    )
-    f = (n0 * e0 + n1 * e1 + n2 * e2) / cosine
-    g0, g1, g2 = s * (e0 - f * d0), s * (e1 - f * d1), s * (e2 - f * d2)
-    dx = w[0, 0] * g0 + w[0, 1] * g1 + w[0, 2] * g2
-    dz = w[2, 0] * g0 + w[2, 1] * g1 + w[2, 2] * g2
-    return (dx - q * slope * dz) / sigma
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def _mean_gaussian(q: float, half: float) -> float:
-    """Mean of the unit Gaussian over [q - half, q + half]; 0 beyond the sheet's end."""
-    half = abs(half)
-    if abs(q) - half > SHEET_SIGMAS:
-        return 0.0
-    if half < 1e-3:
-        return math.exp(-0.5 * q * q) * INV_SQRT_2PI
-    # erfc on the positive side keeps the tail's digits
-    p = abs(q)
-    return 0.25 * (math.erfc((p - half) / SQRT2) - math.erfc((p + half) / SQRT2)) / half
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def _mean_over(q: float, half_u: float, half_v: float) -> float:
-    """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v."""
-    half_v = abs(half_v)
-    if half_v < 0.02:
-        return _mean_gaussian(q, half_u)
-    if half_v < 0.5:
-        offset = half_v * 0.5773502691896257
-        return 0.5 * (_mean_gaussian(q - offset, half_u) + _mean_gaussian(q + offset, half_u))
-    nodes = 2 * int(min(16.0, math.ceil(2.0 * half_v)))
-    total = 0.0
-    for i in range(nodes):
-        # two Gauss-Legendre nodes in each of nodes / 2 pieces
-        centre = (2.0 * (i // 2) + 1.0) / (nodes // 2) - 1.0
-        offset = (0.5773502691896257 if i % 2 else -0.5773502691896257) / (nodes // 2)
-        total += _mean_gaussian(q + half_v * (centre + offset), half_u)
-    return total / nodes
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.camera import Camera
-from render.direct import camera_rays
+from render.camera_rays import camera_rays
 from render.embree import CHUNK
 from render.frame import Truth
 from render.surface import Surface

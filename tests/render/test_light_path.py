@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from render.direct import direct_image
+from render.emission import fan_integral, fan_quantile, normal_quantile
 from render.laser import LineLaser
-from render.light_path import fan_integral, fan_quantile, indirect_flux, indirect_image, normal_quantile
+from render.light_path import indirect_flux, indirect_image
 from render.material import Coated, Conductor, Lambertian
 from render.mesh import Mesh
 from render.plan import choose_plan

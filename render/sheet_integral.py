@@ -1,0 +1,80 @@
+"""The Gaussian across the sheet, averaged over a cell of a pixel in closed form.
+
+On a facet the sheet's coordinate q = x / sigma(z) is linear over a pixel, so along one side of a cell its mean is a
+difference of error functions; along the other a few Gauss-Legendre nodes do.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.beam import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2
+
+Float = NDArray[np.float64]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def sheet_slope(
+    xs: float,
+    ys: float,
+    m: Float,
+    w: Float,
+    n0: float,
+    n1: float,
+    n2: float,
+    d0: float,
+    d1: float,
+    d2: float,
+    s: float,
+    cosine: float,
+    q: float,
+    sigma: float,
+    slope: float,
+) -> float:
+    """Change of q = x / sigma(z) with a pixel coordinate along which the ray's (x, y) changes by (xs, ys)."""
+    e0, e1, e2 = (
+        m[0, 0] * xs + m[0, 1] * ys,
+        m[1, 0] * xs + m[1, 1] * ys,
+        m[2, 0] * xs + m[2, 1] * ys,
+    )
+    f = (n0 * e0 + n1 * e1 + n2 * e2) / cosine
+    g0, g1, g2 = s * (e0 - f * d0), s * (e1 - f * d1), s * (e2 - f * d2)
+    dx = w[0, 0] * g0 + w[0, 1] * g1 + w[0, 2] * g2
+    dz = w[2, 0] * g0 + w[2, 1] * g1 + w[2, 2] * g2
+    return (dx - q * slope * dz) / sigma
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _mean_gaussian(q: float, half: float) -> float:
+    """Mean of the unit Gaussian over [q - half, q + half]; 0 beyond the sheet's end."""
+    half = abs(half)
+    if abs(q) - half > SHEET_SIGMAS:
+        return 0.0
+    if half < 1e-3:
+        return math.exp(-0.5 * q * q) * INV_SQRT_2PI
+    # erfc on the positive side keeps the tail's digits
+    p = abs(q)
+    return 0.25 * (math.erfc((p - half) / SQRT2) - math.erfc((p + half) / SQRT2)) / half
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def mean_over(q: float, half_u: float, half_v: float) -> float:
+    """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v."""
+    half_v = abs(half_v)
+    if half_v < 0.02:
+        return _mean_gaussian(q, half_u)
+    if half_v < 0.5:
+        offset = half_v * 0.5773502691896257
+        return 0.5 * (_mean_gaussian(q - offset, half_u) + _mean_gaussian(q + offset, half_u))
+    nodes = 2 * int(min(16.0, math.ceil(2.0 * half_v)))
+    total = 0.0
+    for i in range(nodes):
+        # two Gauss-Legendre nodes in each of nodes / 2 pieces
+        centre = (2.0 * (i // 2) + 1.0) / (nodes // 2) - 1.0
+        offset = (0.5773502691896257 if i % 2 else -0.5773502691896257) / (nodes // 2)
+        total += _mean_gaussian(q + half_v * (centre + offset), half_u)
+    return total / nodes
