@@ -21,8 +21,8 @@ Kind = Literal["axis", "plane", "ring"]
 
 ARM_PX, RING_PX, PLANE_PX = 92.0, 74.0, 26.0
 """Lengths of the handles on the screen."""
-REACH_PX = 8.0
-"""How near the mouse must be."""
+REACH_PX, TOUCH_PX = 8.0, 3.0
+"""How near the mouse must be; nearer than the second, a line goes before a square."""
 EDGE_ON = 0.12
 """A plane or ring seen at less than this sine is not offered: the mouse could not say how far."""
 
@@ -74,15 +74,15 @@ def offered(frame: Frame, eye: Eye, handle: Handle) -> bool:
 
 
 def handle_at(frame: Frame, eye: Eye, x: float, y: float, size: tuple[int, int]) -> Handle | None:
-    """The handle under the mouse; of several the nearest, planes before what runs across them."""
+    """The handle under the mouse: a line that it touches, else the square it is in, else the nearest line in reach."""
     mouse = np.array([x, y])
-    best, found = REACH_PX, None
+    best, line, square = REACH_PX, None, None
     for handle in HANDLES:
         if not offered(frame, eye, handle):
             continue
         if handle.kind == "plane":
-            if _inside(eye.project(plane_corners(frame, handle.axis), size), mouse):
-                return handle
+            if square is None and _inside(eye.project(plane_corners(frame, handle.axis), size), mouse):
+                square = handle
             continue
         if handle.kind == "axis":
             # not from the very centre, where all three begin
@@ -91,8 +91,8 @@ def handle_at(frame: Frame, eye: Eye, x: float, y: float, size: tuple[int, int])
         else:
             distance = _to_line(eye.project(ring_points(frame, handle.axis), size), mouse)
         if distance < best:
-            best, found = distance, handle
-    return found
+            best, line = distance, handle
+    return line if line is not None and (best <= TOUCH_PX or square is None) else square
 
 
 class Drag:

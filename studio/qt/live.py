@@ -53,7 +53,8 @@ class Live(QObject):
 
     @property
     def is_loading(self) -> bool:
-        return self._runner.busy
+        """Some of the project's meshes are not in the look yet, but will be."""
+        return bool(self.preview.missing(self.session.project, self.session.document.root))
 
     def show_step(self, step: int) -> None:
         """Stand where a step of the motion puts things."""

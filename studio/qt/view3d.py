@@ -89,15 +89,16 @@ class View3D(QtInteractor):  # type: ignore[misc]
         """PyVista's own calls draw no sooner either."""
         self.update()
 
-    def paintGL(self) -> None:  # noqa: N802 - Qt's name
+    def paintGL(self) -> None:
         if self._closed or self._RenderWindow is None:
             return
         self.paints += 1
-        self._aim()
+        self.aim()
         self.before_paint()
         super().paintGL()
 
-    def _aim(self) -> None:
+    def aim(self) -> None:
+        """Give the eye to VTK, which picks and draws with its own camera."""
         eye, camera = self.eye, self.renderer.GetActiveCamera()
         camera.SetPosition(*eye.position)
         camera.SetFocalPoint(*eye.centre)
@@ -110,7 +111,7 @@ class View3D(QtInteractor):  # type: ignore[misc]
         # the handles stand at the centre of things, but may be larger than these
         camera.SetClippingRange(min(near, 0.2 * eye.distance), max(far, 3.0 * eye.distance))
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if self._grip:
             return
         at, button = event.position(), event.button()
@@ -122,7 +123,7 @@ class View3D(QtInteractor):  # type: ignore[misc]
         elif button in (Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton, Qt.MouseButton.RightButton):
             self._grip = "pan"
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         at = event.position()
         step = at - self._last
         self._last = at
@@ -141,7 +142,7 @@ class View3D(QtInteractor):  # type: ignore[misc]
             if not over:
                 self.hovered.emit(at.x(), at.y())
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.buttons() & (Qt.MouseButton.LeftButton | Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton):
             return
         grip, self._grip = self._grip, ""
@@ -150,20 +151,20 @@ class View3D(QtInteractor):  # type: ignore[misc]
         elif grip == "click":
             self.clicked.emit(event.position().x(), event.position().y())
 
-    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self.double_clicked.emit(event.position().x(), event.position().y())
 
-    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 - Qt's name
+    def wheelEvent(self, event: QWheelEvent) -> None:
         notches = event.angleDelta().y() / NOTCH
         at = event.position()
         self._navigate(self._plain().zoom(ZOOM_PER_NOTCH**notches, at.x(), at.y(), self.pixels))
         event.accept()
 
-    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802 - Qt's name
+    def enterEvent(self, event: QEnterEvent) -> None:
         event.accept()
 
-    def leaveEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+    def leaveEvent(self, event: Any) -> None:
         if self.tool is not None and not self._grip:
             self.tool.hover(-1.0, -1.0)
         self.left.emit()
@@ -177,17 +178,17 @@ class View3D(QtInteractor):  # type: ignore[misc]
                 return True
         return bool(super().event(event))
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape and self._grip == "tool" and self.tool is not None:
             self.tool.cancel()
             return
         # VTK's own keys would quit, show wires, and more
         event.ignore()
 
-    def keyReleaseEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
+    def keyReleaseEvent(self, event: QKeyEvent) -> None:
         event.ignore()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         self.before_paint = lambda: None
         self.tool = None
         super().closeEvent(event)

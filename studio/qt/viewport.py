@@ -113,7 +113,7 @@ class Viewport(QWidget):
         self.scene.show(what, on)
         self.view.redraw()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         self._hover.stop()
         self.live.close()
         self.view.close()
@@ -226,6 +226,7 @@ class Viewport(QWidget):
         return found, nearest
 
     def _pick(self, actors: list[vtkActor], x: float, y: float) -> FieldPath | None:
+        self.view.aim()
         self._picker.InitializePickList()
         for actor in actors:
             self._picker.AddPickList(actor)
