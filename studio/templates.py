@@ -10,6 +10,7 @@ from render.files import atomic_write
 
 DESCRIPTIONS = {
     "weld_seam": "the founding paper's rig over a single-bevel tee joint",
+    "shiny_weld_seam": "the same joint with its seam ground to bright steel: reflections between the plates",
     "plane": "a tilted plane: the simplest thing with a closed form",
     "sphere": "a sphere on a table: every slope at once",
     "step_block": "five steps of 10 mm: depth linearity",
