@@ -56,7 +56,7 @@ class Row(QWidget):
         grid.addWidget(self.label, 0, 0, Qt.AlignmentFlag.AlignTop)
         grid.addWidget(self.editor, 0, 1)
         grid.addWidget(self.reset, 0, 2, Qt.AlignmentFlag.AlignTop)
-        grid.addWidget(self.reason, 1, 0, 1, 3)
+        grid.addWidget(self.reason, 1, 1, 1, 2)
         self.label.setMinimumHeight(self.editor.sizeHint().height() if spec.kind != "curve" else 0)
         self.setToolTip(self._help())
         self.refresh(spec)

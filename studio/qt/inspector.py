@@ -47,17 +47,18 @@ class Inspector(QWidget):
         self.kind = QLabel()
         self.kind.setObjectName("muted")
         self.presets = tool_button("Presets ▾", "Cameras, sensors and lasers with their sources")
-        self.presets.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self.presets.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
-        self.presets.setStyleSheet("QToolButton::menu-indicator { image: none; width: 0; }")
-        self.presets.setMenu(QMenu(self.presets))
+        self.add = tool_button("Add ▾", "Add to the scene")
         head = QHBoxLayout()
         head.setContentsMargins(0, 0, 0, 0)
         head.setSpacing(7)
         for widget in (self.icon, self.title, self.kind):
             head.addWidget(widget)
         head.addStretch(1)
-        head.addWidget(self.presets)
+        for button in (self.presets, self.add):
+            button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+            button.setStyleSheet("QToolButton::menu-indicator { image: none; width: 0; }")
+            button.setMenu(QMenu(button))
+            head.addWidget(button)
         self.hint = QLabel(wordWrap=True)
         self.hint.setObjectName("muted")
         self.form = Form(session, self._choose_file)
@@ -76,7 +77,7 @@ class Inspector(QWidget):
         outer = QVBoxLayout(self)
         outer.setContentsMargins(0, 0, 0, 0)
         outer.addWidget(scroll)
-        self._presets_path: FieldPath | None = None
+        self._menus_path: FieldPath | None = None
         session.selection_changed.connect(self.refresh)
         session.project_changed.connect(self.refresh)
         self.refresh()
@@ -100,11 +101,18 @@ class Inspector(QWidget):
         self.hint.setText(hint)
         self.hint.setVisible(bool(hint))
         self.form.show_item(path, spec)
-        if path != self._presets_path:
-            self._presets_path = path
-            self.presets.menu().clear()
-            scene_actions.fill_presets_menu(self.presets.menu(), self.session)
-            self.presets.setVisible(not is_list and bool(presets_for(self.session.project, path)))
+        if path != self._menus_path:
+            self._menus_path = path
+            self._fill_menus(path, is_list)
+
+    def _fill_menus(self, path: FieldPath, is_list: bool) -> None:
+        self.presets.menu().clear()
+        scene_actions.fill_presets_menu(self.presets.menu(), self.session)
+        self.presets.setVisible(not is_list and bool(presets_for(self.session.project, path)))
+        self.add.menu().clear()
+        if is_list:
+            scene_actions.fill_add_menu(self.add.menu(), self.session, self, str(path[-1]))
+        self.add.setVisible(is_list)
 
     def _choose_file(self, path: FieldPath, kind: Alternative | None) -> None:
         """For the mesh or image of what is at a path: a dialog, a copy into the project, and the edit."""

@@ -411,7 +411,15 @@ class TestKinds:
         assert session.project.scene.objects[1].material.albedo == Texture(path="wood.png")
 
 
-class TestPresets:
+class TestMenus:
+    def test_a_list_offers_to_add_to_it(self, session: Session, inspector: Inspector) -> None:
+        session.select(("scene", "lights"))
+        entries = {action.text(): action for action in inspector.add.menu().actions()}
+        assert inspector.add.isVisible() and list(entries) == ["Point light", "Panel light"]
+        entries["Point light"].trigger()
+        assert session.selection == ("scene", "lights", 1)
+        assert inspector.title.text() == "lamp"
+
     def test_a_preset_is_one_edit_and_tells_its_source(
         self, qtbot: QtBot, session: Session, inspector: Inspector
     ) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import trimesh
-from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QMessageBox
 from pytestqt.qtbot import QtBot
@@ -242,6 +242,7 @@ class TestMenus:
         assert [action.isEnabled() for action in menu.actions()] == [False]
 
 
+@pytest.mark.filterwarnings("ignore:.*QDragEnterEvent:DeprecationWarning")  # takes QPointF only from Qt 6.12 on
 class TestDropping:
     @pytest.fixture
     def outside(self, tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -254,7 +255,7 @@ class TestDropping:
         data = QMimeData()
         data.setUrls([QUrl.fromLocalFile(str(file)) for file in files])
         actions, left, none = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
-        enter = QDragEnterEvent(QPointF(20, 20), actions, data, left, none)
+        enter = QDragEnterEvent(QPoint(20, 20), actions, data, left, none)
         enter.ignore()
         QApplication.sendEvent(tree.viewport(), enter)
         if not enter.isAccepted():
