@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.error import Errors
-from analysis.measures import Measures, robust_sigma
+from analysis.measures import Measures
 from render.frame import LaserCurve
 from render.pose import invert, transform_points
 from render.scene import Scene
@@ -90,17 +90,14 @@ def measures(errors: Errors, kind: ErrorKind) -> Measures:
     return {"depth": errors.depth_z, "surface": errors.surface, "position": errors.u}[kind]
 
 
-def symmetric_limit(error: Float) -> float:
-    """A limit for an axis or colour bar centred on zero: median and five robust sigma, rounded up to 1, 2, 5."""
-    finite = error[np.isfinite(error)]
-    if len(finite) == 0:
+def symmetric_limit(error: Float, share: float = 98.0) -> float:
+    """A round limit for an axis or colour bar centred on zero that holds so many percent of the errors."""
+    size = np.abs(error[np.isfinite(error)])
+    top = float(np.percentile(size, share)) if len(size) else 0.0
+    if not top > 0.0:
         return 1.0
-    spread = abs(float(np.median(finite))) + 5.0 * robust_sigma(finite)
-    spread = min(spread, float(np.abs(finite).max())) if spread > 0.0 else float(np.abs(finite).max())
-    if not spread > 0.0:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(spread))
-    return float(next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= spread * (1.0 - 1e-9)))
+    power = 10.0 ** math.floor(math.log10(top))
+    return float(next(step * power for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0) if step * power >= top * (1 - 1e-9)))
 
 
 def histogram(error: Float, limit: float) -> tuple[Float, Float]:

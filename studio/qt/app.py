@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 SAMPLE = "weld_seam"
 BAD_INPUT = 2
+FIRST_LOOK_MS = 500
 
 
 def why_not() -> str | None:
@@ -70,6 +71,8 @@ def application() -> QApplication:
 
 def start(path: Path | None) -> MainWindow:
     """The window, shown, on a project, recovered work or the sample. A bad project is told over the sample."""
+    from PySide6.QtCore import QTimer
+
     from studio.preferences import PreferencesFile, recovery_folder
     from studio.qt import theme
     from studio.qt.splash import Splash
@@ -93,6 +96,9 @@ def start(path: Path | None) -> MainWindow:
     splash.finish(window)
     if path is not None:
         window.files.open(path, ask=False)
-    elif not window.files.recover() and not preferences.values.toured:
-        window.start_tour()
+    elif not window.files.recover():
+        # the first screen shows at once what the program is for: the sample with its errors
+        QTimer.singleShot(FIRST_LOOK_MS, window, window.render_small)
+        if not preferences.values.toured:
+            window.start_tour()
     return window

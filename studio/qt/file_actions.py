@@ -116,6 +116,10 @@ class FileActions(QObject):
         answer = ask_unsaved(self.window, self.session.project.name)
         return answer == "discard" or (answer == "save" and self.save())
 
+    def give_up(self) -> None:
+        """What is unsaved is not wanted."""
+        self._pristine = self.session.project
+
     def keep(self) -> None:
         """Autosave, but not in the middle of a drag."""
         if self.session.dragging or not self.unsaved:

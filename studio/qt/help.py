@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QUrl
+from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication, QDialog, QHBoxLayout, QListWidget, QTextBrowser, QWidget
 
 from studio.qt import theme
@@ -47,7 +48,7 @@ class Help(QDialog):
         layout.addWidget(self.list)
         layout.addWidget(self.text, 1)
         self.list.currentRowChanged.connect(self._show_row)
-        theme.notice.changed.connect(lambda: self._show_row(self.list.currentRow()))
+        theme.notice.changed.connect(self._repaint)
         self.resize(820, 600)
 
     def open_page(self, key: str) -> None:
@@ -65,6 +66,9 @@ class Help(QDialog):
         if row >= 0:
             self.text.setMarkdown((FOLDER / f"{list(PAGES)[row]}.md").read_text(encoding="utf-8"))
 
+    def _repaint(self) -> None:
+        self._show_row(self.list.currentRow())
+
     def _follow(self, url: QUrl) -> None:
         """Links between pages: [Render](render.md)."""
         self.open_page(url.fileName().removesuffix(".md"))
@@ -72,21 +76,10 @@ class Help(QDialog):
 
 def panel_with_focus(panels: dict[str, QWidget]) -> str:
     """The panel that has the focus, or else the one under the mouse."""
-    for widget in (QApplication.focusWidget(), QApplication.widgetAt(_cursor())):
+    for widget in (QApplication.focusWidget(), QApplication.widgetAt(QCursor.pos())):
         while widget is not None:
             for key, panel in panels.items():
                 if widget is panel:
                     return key
             widget = widget.parentWidget()
     return "start"
-
-
-def _cursor() -> object:
-    from PySide6.QtGui import QCursor
-
-    return QCursor.pos()
-
-
-def flag_window(dialog: QDialog) -> None:
-    """A dialog that a person keeps open behaves as a window."""
-    dialog.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint, True)

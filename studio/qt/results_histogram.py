@@ -10,6 +10,9 @@ from analysis.report.colour import method_colour
 from studio.qt import plots, theme
 from studio.result_series import ErrorView, Float, histogram, symmetric_limit
 
+PLOTTED = 99.5
+"""Percent of the errors within the axis."""
+
 
 class ErrorHistogram(pg.GraphicsLayoutWidget):
     """Counts of points over their signed error."""
@@ -32,7 +35,7 @@ class ErrorHistogram(pg.GraphicsLayoutWidget):
             self.plot.removeItem(item)
         self._outlines = []
         self.plot.setLabel("bottom", f"{view.title} / {view.unit}")
-        limit = max([symmetric_limit(error) for error in measured.values()], default=1.0)
+        limit = max([symmetric_limit(error, PLOTTED) for error in measured.values()], default=1.0)
         for method, error in measured.items():
             edges, counts = histogram(error, limit)
             colour = pg.mkColor(method_colour(method))

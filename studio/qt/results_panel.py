@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -38,6 +38,9 @@ NOTHING = "Nothing is measured yet. Render the frame (F5): its line, points and 
 class ResultsPanel(QWidget):
     """Follows `session.shown`; hovering any plot hovers the scan line everywhere, a click keeps it."""
 
+    view_changed = Signal(object)
+    """Another `ErrorView` was chosen."""
+
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.session = session
@@ -57,6 +60,7 @@ class ResultsPanel(QWidget):
         self._lay_out()
         self.laser.currentIndexChanged.connect(self.refresh)
         self.error.currentIndexChanged.connect(self.refresh)
+        self.error.currentIndexChanged.connect(lambda _: self.view_changed.emit(self.view))
         for plot in (self.rows, self.profile):
             plot.hovered.connect(self._hover)
             plot.chosen.connect(self._pin)

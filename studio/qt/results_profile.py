@@ -74,7 +74,7 @@ class ProfilePlot(pg.GraphicsLayoutWidget):
         plots.paint(self.plot)
         self.ring.setPen(pg.mkPen(c.text, width=1.5))
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+    def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
         self.hovered.emit(None)
 

@@ -12,6 +12,9 @@ from analysis.report.colour import TRUTH, method_colour
 from studio.qt import plots, theme
 from studio.result_series import ErrorView, Float, Series, symmetric_limit
 
+PLOTTED = 99.5
+"""Percent of the errors within the axis."""
+
 
 class RowPlots(pg.GraphicsLayoutWidget):
     """Stacked plots with one scan-line axis. `hovered` tells the scan line under the mouse, None when it leaves."""
@@ -64,7 +67,7 @@ class RowPlots(pg.GraphicsLayoutWidget):
             for plot, values in ((self.position, truth.position), (self.depth, truth.depth)):
                 self._add(plot, plots.curve(TRUTH)).setData(truth.index, values)
         errors = [error for _, error in measured.values()]
-        limit = max([symmetric_limit(error) for error in errors], default=1.0)
+        limit = max([symmetric_limit(error, PLOTTED) for error in errors], default=1.0)
         for plot in self.plots:
             plot.enableAutoRange()
         self.error.setYRange(-limit, limit, padding=0.02)
@@ -97,7 +100,7 @@ class RowPlots(pg.GraphicsLayoutWidget):
             ring.setPen(pg.mkPen(c.text, width=1.5))
         self.zero.setPen(pg.mkPen(c.muted, width=1))
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
+    def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
         self.hovered.emit(None)
 

@@ -111,7 +111,7 @@ class StatusBar(QStatusBar):
 class _Message(QLabel):
     clicked = Signal()
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 - Qt's name
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         self.clicked.emit()
 
 

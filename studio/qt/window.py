@@ -16,6 +16,7 @@ from studio.preferences import PreferencesFile
 from studio.qt import scene_actions, theme
 from studio.qt.actions import Actions
 from studio.qt.dialogs import about, show_trouble
+from studio.qt.error_cloud import ErrorCloud
 from studio.qt.export_actions import ExportActions
 from studio.qt.file_actions import FileActions
 from studio.qt.help import Help, panel_with_focus
@@ -32,6 +33,8 @@ from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, share
 from studio.trouble import trouble
 
 TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
+SMALL = 0.25
+"""Image scale of the first look."""
 SWITCH = {"setup": "setup", "render": "render_workspace", "measure": "measure"}
 """Workspace -> command."""
 
@@ -66,6 +69,7 @@ class MainWindow(QMainWindow):
         self.measuring = MeasureActions(self, session, self.commands)
         self.help = Help(self)
         self.tour: Tour | None = None
+        self.cloud = self._make_cloud()
         self._make_toolbar()
         self._connect()
         self._restore()
@@ -83,6 +87,7 @@ class MainWindow(QMainWindow):
         else:
             QTimer.singleShot(0, self, lambda: share_out(self, self.docks, wanted))
         self.commands[SWITCH[wanted.key]].setChecked(True)
+        self.cloud.pin(wanted.key == "measure")
         self.preferences.change(workspace=wanted.key)
 
     def rearrange(self) -> None:
@@ -94,17 +99,34 @@ class MainWindow(QMainWindow):
         self.docks[key].show()
         self.docks[key].raise_()
 
+    def render_small(self) -> None:
+        """A quick render of what is open, for a first look."""
+        if self.session.renders or self.runner.busy:
+            return
+        panel, session = self.panels["render"], self.session
+
+        def enough() -> None:
+            shown = session.shown
+            if shown is None or shown.image_scale != SMALL or shown.final:
+                session.measured.disconnect(enough)
+            elif shown.frame.ambient is not None:
+                session.measured.disconnect(enough)
+                panel.keep()  # type: ignore[attr-defined]
+
+        session.measured.connect(enough)
+        panel.start(SMALL)  # type: ignore[attr-defined]
+
     def choose_theme(self, choice: theme.Choice) -> None:
         theme.apply(choice)
         self.preferences.change(theme=choice)
         self.commands[f"theme_{choice}"].setChecked(True)
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 - Qt's name
+    def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if not event.spontaneous() and self.workspace not in self.preferences.values.arrangements:
             QTimer.singleShot(0, self, lambda: share_out(self, self.docks, workspace(self.workspace)))
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802 - Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         if not self.files.may_close():
             event.ignore()
             return
@@ -119,12 +141,12 @@ class MainWindow(QMainWindow):
         self.files.close()
         event.accept()
 
-    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802 - Qt's name
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         if any(is_mesh(path) or path.suffix.lower() == ".json" or path.is_dir() for path in paths):
             event.acceptProposedAction()
 
-    def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802 - Qt's name
+    def dropEvent(self, event: QDropEvent) -> None:
         paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
         event.acceptProposedAction()
         # after the drop has ended: a dialog inside it would hold up the program that the file comes from
@@ -176,6 +198,15 @@ class MainWindow(QMainWindow):
             themes.addAction(self.commands[f"theme_{choice}"])
         self.commands[f"theme_{self.preferences.values.theme}"].setChecked(True)
 
+    def _make_cloud(self) -> ErrorCloud:
+        """The points in the 3D view: of the shown render as the results show them, or of a running scan."""
+        made = ErrorCloud(self.session, self.panels["viewport"].view)  # type: ignore[attr-defined]
+        results, motion = self.panels["results"], self.panels["motion"]
+        results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
+        motion.began.connect(made.clear)  # type: ignore[attr-defined]
+        motion.grew.connect(made.grow)  # type: ignore[attr-defined]
+        return made
+
     def start_tour(self) -> None:
         """Show the way around, from the start."""
         if self.tour is None:
@@ -214,8 +245,9 @@ class MainWindow(QMainWindow):
             "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
             "render": session.render_asked.emit,
             "pause": self.status.toggle_pause,
-            "cancel": self.status.cancel_work,
+            "cancel": self._escape,
             "scan": self._scan,
+            "frame_points": self.cloud.frame,
             "log": lambda: self.show_panel("log"),
             "help": lambda: self.help.open_page(panel_with_focus(self.panels)),
             "shortcuts": lambda: CheatSheet(self).open(),
@@ -245,6 +277,12 @@ class MainWindow(QMainWindow):
         session.render_asked.connect(lambda: self.show_panel("render"))
         runner.failed.connect(self._tell_failure)
         self._tell_selection()
+
+    def _escape(self) -> None:
+        if self.tour is not None:
+            self.tour.end()
+        else:
+            self.status.cancel_work()
 
     def _rename(self) -> None:
         self.show_panel("scene")

@@ -6,10 +6,17 @@ import os
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from studio.display import why_no_display
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+    from pytestqt.qtbot import QtBot
+
+    from studio.qt.window import MainWindow
 
 os.environ.setdefault("QT_API", "pyside6")
 os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
@@ -42,3 +49,90 @@ def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     for thread in left:
         thread.join(2.0)
     assert not [thread.name for thread in left if thread.is_alive()]
+
+
+@pytest.fixture
+def small_project(tmp_path: Path) -> Path:
+    """A file with the step block, seen in 244 x 204 px, so that a render takes a fraction of a second."""
+    from studio.project import Project
+    from studio.stages import scaled
+    from studio.templates import template_folder
+
+    project = scaled(Project.load(template_folder("step_block") / "project.json"), 0.1)
+    settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05})
+    path = tmp_path / "project" / "steps.json"
+    project.model_copy(update={"render": settings}).save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def one_window(qapp: QApplication, tmp_path_factory: pytest.TempPathFactory) -> Iterator[MainWindow]:
+    """Making a window takes a second: tests share one, and get it as if it were new."""
+    made = new_window(tmp_path_factory.mktemp("desktop"), "plane")
+    yield made
+    made.files.give_up()
+    made.close()
+    made.deleteLater()
+
+
+def new_window(folder: Path, template: str) -> MainWindow:
+    """A window with preferences and recovery files of its own."""
+    from studio.autosave import Autosave
+    from studio.document import Document
+    from studio.preferences import PreferencesFile
+    from studio.project import Project
+    from studio.qt.session import Session
+    from studio.qt.window import MainWindow
+    from studio.templates import template_folder
+
+    file = template_folder(template) / "project.json"
+    session = Session(Document(Project.load(file), None, file.parent))
+    return MainWindow(session, PreferencesFile(folder / "config"), Autosave(folder / "state"))
+
+
+@pytest.fixture
+def window(qtbot: QtBot, one_window: MainWindow, small_project: Path, tmp_path: Path) -> Iterator[MainWindow]:
+    """The whole desktop on the small project, on the screen, nothing remembered, nothing running."""
+    from PySide6.QtWidgets import QApplication, QDialog
+
+    from studio.document import Document
+    from studio.preferences import Preferences
+    from studio.project import Project
+    from studio.qt import theme
+    from studio.qt.live import live
+
+    if theme.colours() != theme.LIGHT:
+        theme.apply("light")
+    preferences = one_window.preferences
+    preferences.path, preferences.values = tmp_path / "config" / "preferences.json", Preferences()
+    one_window.files.replace(Document(Project.load(small_project), small_project))
+    one_window.resize(1440, 900)
+    one_window.show()
+    with qtbot.waitActive(one_window):
+        one_window.activateWindow()  # there is no window manager to do it
+    if one_window.workspace != "setup":
+        one_window.switch_to("setup")
+    elif not one_window.docks["readout"].isVisible():
+        one_window.rearrange()
+    qtbot.waitUntil(lambda: not live(one_window.session).is_loading)
+    yield one_window
+    for lane in ("render", "export"):
+        one_window.runner.cancel(lane)
+    qtbot.waitUntil(lambda: not one_window.runner.busy)
+    for dialog in QApplication.topLevelWidgets():
+        if isinstance(dialog, QDialog):
+            dialog.close()
+    one_window.files.give_up()
+    one_window.files.autosave.forget()
+
+
+@pytest.fixture
+def own_window(qtbot: QtBot, tmp_path: Path) -> Iterator[MainWindow]:
+    """One to be closed by the test."""
+    made = new_window(tmp_path, "plane")
+    made.show()
+    qtbot.waitExposed(made)
+    yield made
+    made.files.give_up()
+    made.close()
+    made.deleteLater()
