@@ -268,7 +268,9 @@ def direct_image(
         mean, spread = np.empty(len(todo)), np.empty(len(todo))
         poses = (T_world_camera, T_world_laser)
         task = _Task(world, surface, camera, laser, *poses, pixels[todo], cells, seed, mean, spread)
-        map_chunks(task.run, len(todo), max(1, CHUNK // cells**2), threads, cancelled, progress)
+        # several chunks a worker, so that none waits for the last one
+        chunk = min(CHUNK // cells**2, max(256, math.ceil(len(todo) / 24)))
+        map_chunks(task.run, len(todo), chunk, threads, cancelled, progress)
         image[pixels[todo]] = mean
         error[todo] = spread
         samples += len(todo) * cells**2
