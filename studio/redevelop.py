@@ -31,16 +31,16 @@ class Development:
 
 def is_stale(rendered: Project, now: Project) -> bool:
     """Another render would show something that developing again cannot. Both projects at full scale."""
-    if rendered is now:
-        return False
-    same_axis = rendered.extraction.axis == now.extraction.axis
-    same_lasers = len(rendered.scene.lasers) == len(now.scene.lasers)
-    if not (same_axis and same_lasers):
+    if rendered.extraction.axis != now.extraction.axis:
         return True
-    lit = any(
-        a.power == 0.0 < b.power for a, b in zip(rendered.scene.lasers, now.scene.lasers, strict=True)
-    )  # nothing to scale up
-    return lit or _light_path(rendered.scene) != _light_path(now.scene)
+    before, scene = rendered.scene, now.scene
+    if before is scene:
+        return False
+    if len(before.lasers) != len(scene.lasers):
+        return True
+    # a laser that was off left no light to scale
+    lit = any(a.power == 0.0 < b.power for a, b in zip(before.lasers, scene.lasers, strict=True))
+    return lit or _light_path(before) != _light_path(scene)
 
 
 def _light_path(scene: Scene) -> Scene:

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from render.threads import Cancel
 from render.tone import Picture, pyramid
 from studio.jobs import Progress
+from studio.project import Project
 from studio.qt import theme
 from studio.qt.image_item import PictureView
 from studio.qt.jobs import JobRunner
@@ -57,6 +58,8 @@ class CameraView(QWidget):
         self.badge_text = QLabel()
         self.render_button = QPushButton("Render")
         self.is_live = True
+        self._judged: tuple[Render, Project, int, bool] | None = None
+        self._ground = ""
         self._chosen = 0
         self._last_shown: Render | None = None
         self._size = (0, 0)
@@ -82,10 +85,15 @@ class CameraView(QWidget):
     @property
     def stale(self) -> bool:
         """The scene has changed since the shown render, in a way that developing cannot follow."""
-        shown = self.session.shown
+        shown, project, step = self.session.shown, self.session.project, self.session.step
         if shown is None:
             return False
-        return shown.frame.step != self.session.step or is_stale(shown.source or shown.project, self.session.project)
+        before = self._judged
+        if before is None or before[0] is not shown or before[1] is not project or before[2] != step:
+            changed = shown.frame.step != step or is_stale(shown.source or shown.project, project)
+            self._judged = (shown, project, step, changed)
+            return changed
+        return before[3]
 
     def refresh(self) -> None:
         """Draw what is chosen."""
@@ -156,8 +164,14 @@ class CameraView(QWidget):
     def _colour(self) -> None:
         colours = theme.colours()
         self.view.setBackground(colours.base)
+        self._colour_badge()
+
+    def _colour_badge(self) -> None:
+        colours = theme.colours()
         ground = theme.mixed(colours.warning, colours.window, 0.3) if self.stale else colours.raised
-        self.badge.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
+        if ground != self._ground:  # a style sheet paints everything anew
+            self._ground = ground
+            self.badge.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
 
     # what is shown
 
@@ -220,7 +234,7 @@ class CameraView(QWidget):
             text = "Still refining." if self.session.dragging else ""
         else:
             text = ""
-        self._colour()
+        self._colour_badge()
         self.badge_text.setText(text)
         self.render_button.setVisible(shown is None or self.stale)
         self.badge.setVisible(bool(text))

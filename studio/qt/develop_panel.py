@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from typing import get_args
 
 import numpy as np
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QCloseEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QDoubleSpinBox,
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QMenu,
     QSizePolicy,
-    QSlider,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -33,70 +29,31 @@ from studio.document import FieldPath
 from studio.jobs import Job, Progress
 from studio.qt.jobs import JobRunner
 from studio.qt.line_overlay import swatch
+from studio.qt.log_field import LogField
 from studio.qt.session import Render, Session
 from studio.redevelop import Development, develop_again, development, measure_again
 from studio.results import METHODS
 from studio.stages import Measurement
 
-STEPS = 1000
-"""Of a slider."""
-
-
-class LogField(QWidget):
-    """A positive number as a logarithmic slider and a box, in the unit that is shown; `shown = value * factor`."""
-
-    changed = Signal(float, bool)
-    """The value, and whether the slider is held."""
-    released = Signal()
-
-    def __init__(self, low: float, high: float, factor: float, unit: str, decimals: int = 3) -> None:
-        super().__init__()
-        self.low, self.high, self.factor = low, high, factor
-        self.slider = QSlider(Qt.Orientation.Horizontal)
-        self.slider.setMaximum(STEPS)
-        self.slider.setMinimumWidth(60)
-        self.box = QDoubleSpinBox(decimals=decimals, minimum=0.0, maximum=high * factor)
-        self.box.setSuffix(f" {unit}")
-        self.box.setKeyboardTracking(False)
-        self.box.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
-        self.box.setMinimumWidth(104)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        self.sign = QLabel()
-        layout.addWidget(self.sign)
-        layout.addWidget(self.slider, 1)
-        layout.addWidget(self.box)
-        self.slider.valueChanged.connect(self._slid)
-        self.slider.sliderReleased.connect(self.released)
-        self.box.valueChanged.connect(lambda shown: self.changed.emit(shown / self.factor, False))
-
-    def set_value(self, value: float) -> None:
-        """Show a value without telling."""
-        for widget in (self.slider, self.box):
-            widget.blockSignals(True)
-        if not self.slider.isSliderDown():
-            share = math.log(min(max(value, self.low), self.high) / self.low) / math.log(self.high / self.low)
-            self.slider.setValue(round(STEPS * share))
-        self.box.setValue(value * self.factor)
-        for widget in (self.slider, self.box):
-            widget.blockSignals(False)
-
-    def _slid(self, position: int) -> None:
-        value = self.low * (self.high / self.low) ** (position / STEPS)
-        # three digits: a slider's value looks like one a person would type
-        self.changed.emit(float(f"{value:.3g}"), self.slider.isSliderDown())
+REST_MS = 120
+"""Without a change before the lines are measured: while something is dragged, new images come first."""
 
 
 class DevelopPanel(QWidget):
     """Edits the sensor and the lasers' power in the project; follows every change with new images and measures."""
 
-    _images_ready = Signal(object, object, float)
+    _images_ready = Signal(object, object, float, str)
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.session = session
         self.runner = JobRunner(self)
         self.develop_seconds = 0.0
+        self._to_measure: tuple[Render, Development, list[Image], tuple[Method, ...]] | None = None
+        self._rest = QTimer(self)
+        self._rest.setSingleShot(True)
+        self._rest.setInterval(REST_MS)
+        self._rest.timeout.connect(self._measure)
         self.exposure = LogField(1e-6, 1.0, 1e3, "ms", 4)
         self.exposure.setToolTip("Exposure time: longer is brighter, until the line saturates.")
         self.automatic_gain = QCheckBox("full well fills the range")
@@ -124,8 +81,14 @@ class DevelopPanel(QWidget):
         self._follow_project()
 
     def closeEvent(self, event: QCloseEvent) -> None:
+        self._rest.stop()
         self.runner.close()
         super().closeEvent(event)
+
+    @property
+    def busy(self) -> bool:
+        """What was asked for is not all done yet."""
+        return self.runner.busy or self._rest.isActive()
 
     def chosen(self) -> tuple[Method, ...]:
         """The methods to measure by; the project's own first."""
@@ -233,6 +196,7 @@ class DevelopPanel(QWidget):
         """Develop and measure the shown render; what is asked for meanwhile is done once, with the latest values."""
         render = self.session.shown
         if render is None:
+            self._rest.stop()
             self.runner.cancel("develop")
             self.runner.cancel("measure")
             self.told.setText("Render the scene, then change these as often as you like.")
@@ -240,26 +204,35 @@ class DevelopPanel(QWidget):
             return
         frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()
         how = development(render.project, self.session.project, render.image_scale)
+        names = [laser.name for laser in render.project.scene.lasers]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Image]:
             start = time.perf_counter()
             images = develop_again(frame, how, noise=noise, cancelled=cancelled)
-            self._images_ready.emit(render, images, time.perf_counter() - start)
+            seconds = time.perf_counter() - start
+            self._images_ready.emit(render, images, seconds, brightness(images, names))
             return images
 
         def then(images: list[Image]) -> None:
-            self._measure(render, how, images, methods)
+            self._to_measure = (render, how, images, methods)
+            self._rest.start()
 
+        self._rest.stop()
+        self.runner.cancel("measure")
         self.runner.run("develop", "developing", work, then)
 
-    def _take_images(self, render: Render, images: list[Image], seconds: float) -> None:
+    def _take_images(self, render: Render, images: list[Image], seconds: float, told: str) -> None:
         render.images = images
         self.develop_seconds = seconds
         if render is self.session.shown:
-            self._tell_images(render)
+            self.told.setText(told)
             self.session.developed.emit()
 
-    def _measure(self, render: Render, how: Development, images: list[Image], methods: tuple[Method, ...]) -> None:
+    def _measure(self) -> None:
+        if self._to_measure is None or self.runner.job("develop") is not None:
+            return
+        render, how, images, methods = self._to_measure
+        self._to_measure = None
         frame, world = render.frame, render.world
 
         def work(progress: Progress, cancelled: Cancel) -> dict[str, list[Measurement]]:
@@ -272,16 +245,6 @@ class DevelopPanel(QWidget):
                 self.session.measured.emit()
 
         self.runner.run("measure", "measuring", work, then, interrupt=True)
-
-    def _tell_images(self, render: Render) -> None:
-        top = [int(image.pixels.max()) for image in render.images]
-        full = [float(np.mean(image.pixels >= image.saturation)) for image in render.images]
-        lines = []
-        for i, image in enumerate(render.images):
-            name = f"{render.project.scene.lasers[i].name}: " if len(top) > 1 else ""
-            saturated = f", {full[i]:.2%} of the pixels saturated" if full[i] > 0 else ""
-            lines.append(f"{name}brightest {top[i]} DN, {top[i] / image.saturation:.0%} of full{saturated}")
-        self.told.setText("\n".join(lines))
 
     def _tell_measures(self, found: dict[str, list[Measurement]]) -> None:
         rows = ["<tr><th align='left'>RMSE&nbsp;</th><th>px</th><th>depth</th><th>rows</th></tr>"]
@@ -299,3 +262,14 @@ class DevelopPanel(QWidget):
     def _tell_failure(self, job: Job[object]) -> None:
         if job.problem is not None:
             self.session.message.emit("error", job.problem.text)
+
+
+def brightness(images: list[Image], names: list[str]) -> str:
+    """The brightest number of each image, and how much of it is saturated."""
+    lines = []
+    for image, name in zip(images, names or [""], strict=True):
+        top, full = int(image.pixels.max()), float(np.mean(image.pixels >= image.saturation))
+        saturated = f", {full:.2%} of the pixels saturated" if full > 0.0 else ""
+        prefix = f"{name}: " if len(images) > 1 else ""
+        lines.append(f"{prefix}brightest {top} DN, {top / image.saturation:.0%} of full{saturated}")
+    return "\n".join(lines)

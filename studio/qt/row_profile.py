@@ -194,9 +194,7 @@ class RowProfile(QWidget):
             for y in fitted_profile(line, index, image, x, integrated)[:1]:
                 self._add(pg.PlotCurveItem(x, y, pen=pg.mkPen(colour, width=1.6)))
                 self._top = max(self._top, float(y.max()))
-        error = (
-            f" {u - true[np.argmin(np.abs(true - u))]:+.3f} px" if len(true) else ": a line where none is to be seen"
-        )
+        error = f" {u - true[np.argmin(np.abs(true - u))]:+.3f} px" if len(true) else ": no line is seen here"
         return f"<span style='color:{colour}'>{method_name(method)}{error}</span>"
 
     def _mark(self, position: float, colour: str, width: float, dashed: bool = False) -> None:
