@@ -32,6 +32,12 @@ ISSUE_HINT = "this is a fault of Blazer Studio, please report it; --debug shows 
 class Commands(click.Group):
     """Turns every way a command can end into one message and an exit code."""
 
+    def resolve_command(self, context: click.Context, args: list[str]) -> Any:
+        """A path in place of a command is a project to open."""
+        if args and args[0] not in self.commands and (args[0].lower().endswith(".json") or os.path.exists(args[0])):
+            args = ["open", *args]
+        return super().resolve_command(context, args)
+
     def invoke(self, context: click.Context) -> Any:
         try:
             result = super().invoke(context)
@@ -135,6 +141,17 @@ def cli(context: click.Context) -> None:
         context.exit(open_studio())
     click.echo(f"The studio does not open here: {reason}. Running the sample scan without it.", err=True)
     context.invoke(run)
+
+
+@cli.command("open")
+@PROJECT
+@common
+@click.pass_context
+def open_project(context: click.Context, project: Path | None, **_: Any) -> None:
+    """Open the studio on a project, as `main.py PROJECT` does."""
+    from studio.qt.app import open_studio
+
+    context.exit(open_studio(project))
 
 
 def why_no_studio() -> str | None:
