@@ -25,7 +25,7 @@ from render.emission import SEQUENCE, Paths, emit, fan_span
 from render.laser import LineLaser
 from render.random import uniform
 from render.surface import Surface, View, scattering, to_local, to_world
-from render.threads import Cancel, map_chunks, thread_count
+from render.threads import Cancel, Progress, map_chunks, thread_count
 from render.world import World
 
 Float = NDArray[np.float64]
@@ -203,6 +203,7 @@ def indirect_image(
     seed: int = 0,
     threads: int | None = None,
     cancelled: Cancel | None = None,
+    progress: Progress | None = None,
 ) -> IndirectImage:
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
@@ -233,6 +234,10 @@ def indirect_image(
             error = math.sqrt(variance / mean_square) if first > 0.0 else 0.0
             if error <= target:
                 break
+        if progress is not None:
+            # the error falls with the root of the passes, at least
+            wanted = passes * (error / target) ** 2 if math.isfinite(error) else math.inf
+            progress(min(0.99, passes / min(wanted, most_paths / PASS_PATHS)))
     image = (total / passes).astype(np.float32).reshape(camera.height, camera.width)
     return IndirectImage(image, error, passes * PASS_PATHS)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from render.light_path import indirect_flux, indirect_image
 from render.scene import Scene
 from render.settings import RenderSettings
-from render.threads import Cancel
+from render.threads import Cancel, Progress
 from render.world import World
 
 Float32 = NDArray[np.float32]
@@ -70,6 +71,7 @@ def indirect_light(
     seed: int = 0,
     threads: int | None = None,
     cancelled: Cancel | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Plan, tuple[Float32, ...], dict[str, float]]:
     """The plan, the indirect radiance of each laser as it says (none: empty), and what it took. Raises Cancelled."""
     plan = choose_plan(world, scene, settings, direct, step=step, seed=seed, cancelled=cancelled)
@@ -86,11 +88,16 @@ def indirect_light(
             seed=seed + i,
             threads=threads,
             cancelled=cancelled,
+            progress=None if progress is None else partial(_share, progress, i, len(scene.lasers)),
         )
         images.append(image.radiance)
         counts[f"relative error of reflections, {laser.name}"] = image.error
         counts[f"light paths, {laser.name}"] = image.paths
     return plan, tuple(images), counts
+
+
+def _share(progress: Progress, index: int, count: int, done: float) -> None:
+    progress((index + done) / count)
 
 
 def pilot_share(

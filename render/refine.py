@@ -116,9 +116,17 @@ def refine(
             images, counts = _lasers(world, scene, step, target, seed, threads, report, cancelled)
         frame = told(replace(frame, laser_direct=images, curves=curves), **counts)
         yield frame
-    with clock.stage("reflected laser light", pixels):
+    with clock.stage("reflected laser light", pixels) as report:
         chosen, indirect, counts = indirect_light(
-            world, scene, settings, images, step=step, seed=seed, threads=threads, cancelled=cancelled
+            world,
+            scene,
+            settings,
+            images,
+            step=step,
+            seed=seed,
+            threads=threads,
+            cancelled=cancelled,
+            progress=report,
         )
     frame = told(replace(frame, laser_indirect=indirect, plan=chosen.text), **counts)
     if indirect:

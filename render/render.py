@@ -103,9 +103,17 @@ def render_world(
         counts[f"relative error, {laser.name}"] = image.error
         counts[f"lit pixels, {laser.name}"] = image.pixels
         counts[f"samples, {laser.name}"] = image.samples
-    with stage("reflected laser light"):
+    with stage("reflected laser light") as report:
         plan, indirect, tallies = indirect_light(
-            world, scene, settings, tuple(direct), step=step, seed=seed, threads=threads, cancelled=cancelled
+            world,
+            scene,
+            settings,
+            tuple(direct),
+            step=step,
+            seed=seed,
+            threads=threads,
+            cancelled=cancelled,
+            progress=report,
         )
     counts |= tallies
     truth = ambient = None
