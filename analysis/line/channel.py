@@ -34,6 +34,8 @@ class Lines:
     pattern: str | None
     noise: NoiseModel
     smoothing: float = 0.0
+    variance: NDArray[Any] | None = None
+    """(h, w) e-^2, scan axis last, in place of the noise model's: for images combined from several."""
 
     @property
     def count(self) -> int:
@@ -65,6 +67,8 @@ class Lines:
             signal, mask = self._electrons(chunk)
             if self.pattern is not None:
                 mask |= self._other_colours(start, stop, chunk.shape[1])
+            if self.variance is not None:
+                return signal, mask, np.ascontiguousarray(self.variance[start:stop] - signal, dtype=np.float32)
             return signal, mask, np.full((len(signal), 1), self.noise.floor, np.float32)
         if self.channel == "mono":
             signal, mask = self._electrons(chunk.mean(axis=2, dtype=np.float32))
@@ -119,7 +123,9 @@ def smoothing_correlation(smoothing: float) -> NDArray[np.float64]:
     return np.asarray(along * along[0])
 
 
-def scan_lines(image: NDArray[Any], settings: ExtractionSettings, noise: NoiseModel) -> Lines:
+def scan_lines(
+    image: NDArray[Any], settings: ExtractionSettings, noise: NoiseModel, variance: NDArray[Any] | None = None
+) -> Lines:
     """Check an image (h, w) or (h, w, 3) of uint8, uint16, float32 or float64 and choose the laser's channel.
 
     "auto" takes the colour that stands out most over the other two; mono where no colour does.
@@ -128,6 +134,13 @@ def scan_lines(image: NDArray[Any], settings: ExtractionSettings, noise: NoiseMo
     image = check_image(image)
     channel, smoothing = settings.channel, settings.smoothing
     pattern: str | None = settings.pattern
+    if variance is not None:
+        if image.ndim != 2 or variance.shape != image.shape:
+            found = f"{variance.shape} for an image {image.shape}"
+            raise InputError(
+                "the variance is not of the image's shape", where="variance", found=found, allowed="(h, w)"
+            )
+        variance = variance.swapaxes(0, 1) if settings.axis == "columns" else variance
     if settings.axis == "columns":
         image = image.swapaxes(0, 1)
         pattern = None if pattern is None else "".join(pattern[k] for k in (0, 2, 1, 3))
@@ -138,10 +151,10 @@ def scan_lines(image: NDArray[Any], settings: ExtractionSettings, noise: NoiseMo
             raise InputError(
                 "the image has no such channel", where="channel", found=channel, allowed="auto or mono on a mono image"
             )
-        return Lines(image, "mono", None, noise, smoothing)
+        return Lines(image, "mono", None, noise, smoothing, variance)
     if channel == "auto":
         channel = _strongest_bayer(image, pattern) if pattern is not None else _strongest_colour(image)
-    return Lines(image, channel, pattern, noise, smoothing)
+    return Lines(image, channel, pattern, noise, smoothing, variance)
 
 
 def check_image(image: object) -> NDArray[Any]:

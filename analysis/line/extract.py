@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from analysis.line.channel import check_image, scan_lines
+from analysis.line.choose import choose_method
+from analysis.line.continuity import follow, pick
 from analysis.line.estimate import estimate_noise
+from analysis.line.geometry import WorkingVolume, consistent
 from analysis.line.measure import measure
 from analysis.line.noise import NoiseModel
 from analysis.line.result import Axis, Line
-from analysis.line.settings import ExtractionSettings, Method
+from analysis.line.settings import ExtractionSettings, Method, Select
 from render.errors import InputError
+
+CANDIDATES = 5
+"""Peaks that one is selected from, unless the settings ask for more."""
 
 
 def extract(
@@ -24,12 +32,16 @@ def extract(
     peaks: int | None = None,
     settings: ExtractionSettings | None = None,
     noise: NoiseModel | None = None,
+    variance: NDArray[Any] | None = None,
+    volume: WorkingVolume | None = None,
     threads: int | None = None,
 ) -> Line:
     """Image (h, w) or (h, w, 3), uint8, uint16, float32 or float64 -> Line with arrays (n, peaks).
 
     method, axis and peaks override `settings`. noise turns DN into electrons; without it, it is estimated from the
-    image (`estimate_noise`). Scan lines without a position carry a flag that says why.
+    image (`estimate_noise`). variance (h, w) e-^2 replaces that of the noise model, for images that were combined from
+    others. With a selection other than "strongest", or a working volume, one peak of several candidates is taken:
+    arrays (n, 1), `candidates` holds the rest. Scan lines without a position carry a flag that says why.
     Raises InputError: an image of the wrong type, shape or size, without a finite pixel, a channel it does not have,
     settings out of range.
     """
@@ -37,10 +49,31 @@ def extract(
     array = check_image(image)
     if noise is None:
         noise = estimate_noise(array, chosen)
+    lines = scan_lines(array, chosen, noise, variance)
+    note = ""
+    if chosen.method == "auto":
+        picked, note = choose_method(lines, chosen, threads)
+        chosen = chosen.model_copy(update={"method": picked})
     if chosen.method == "likelihood":
         chosen = chosen.model_copy(update={"smoothing": 0.0})
-    lines = scan_lines(array, chosen, noise)
-    return measure(lines, chosen, threads)
+    lines = replace(lines, smoothing=chosen.smoothing)
+    alone = chosen.select == "strongest" and volume is None
+    wanted = chosen if alone else chosen.model_copy(update={"peaks": max(chosen.peaks, CANDIDATES)})
+    line = replace(measure(lines, wanted, threads), note=note)
+    return line if alone else select(line, chosen.select, volume)
+
+
+def select(candidates: Line, how: Select, volume: WorkingVolume | None = None) -> Line:
+    """Peaks (n, k) -> Line (n, 1): one peak of each scan line, of those that the working volume allows, or none."""
+    usable = candidates.valid if volume is None else candidates.valid & consistent(candidates, volume)
+    if how == "continuous":
+        return follow(candidates, usable)
+    if how == "strongest":
+        order = np.broadcast_to(np.arange(usable.shape[1], dtype=np.float64), usable.shape)
+    else:
+        order = candidates.u if how == "first" else -candidates.u
+    rank = np.argmin(np.where(usable, order, np.inf), axis=1)
+    return pick(candidates, np.where(usable.any(axis=1), rank, -1))
 
 
 def _settings(settings: ExtractionSettings | None, **given: Any) -> ExtractionSettings:

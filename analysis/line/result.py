@@ -32,6 +32,12 @@ class Flag(IntEnum):
     """Wider than a line can be."""
     NO_PIXELS = 8
     """The scan line holds no usable pixel: none of the laser's colour, or none that is a number."""
+    NOT_POSITIVE = 9
+    """A pixel that the method takes the logarithm of, or the sum that it divides by, is not above the background."""
+    ALONG_SCAN_LINE = 10
+    """The line runs along the scan line, so that it has no crossing with it."""
+    REJECTED = 11
+    """There are peaks, but none that continuity and geometry allow."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +45,9 @@ class Line:
     """Peaks by scan line: arrays (n, k), n image rows (axis "rows") or columns, k peaks, strongest first.
 
     `u` is the sub-pixel position along the scan line in px (the column on axis "rows"), NaN where the flag gives a
-    reason, `sigma_u` its standard deviation, `width` the Gaussian sigma of the line, both px; `amplitude` and
-    `background` in electrons (DN / gain); `chi2` the reduced chi-square of the fit, NaN for methods without one.
+    reason, `sigma_u` its standard deviation, NaN where a method cannot say, `width` the line's Gaussian sigma, both
+    px; `amplitude` and `background` in electrons (DN / gain); `chi2` the reduced chi-square of the fit, NaN for methods
+    without one. `note` tells what "auto" picked and why; `candidates` are the peaks that one was selected from.
     """
 
     axis: Axis
@@ -52,6 +59,13 @@ class Line:
     background: Float
     chi2: Float
     flag: NDArray[np.uint8]
+    note: str = ""
+    candidates: Line | None = None
+
+    @property
+    def v(self) -> Float:
+        """(n, k): the scan line itself, px, the other coordinate of `u`."""
+        return np.broadcast_to(np.arange(len(self.u), dtype=np.float64)[:, None], self.u.shape)
 
     @property
     def valid(self) -> NDArray[np.bool_]:

@@ -8,9 +8,34 @@ from pydantic import model_validator
 
 from render.model import Model, quantity
 
-Method = Literal["gaussian", "centre_of_mass", "likelihood"]
+Method = Literal[
+    "auto",
+    "likelihood",
+    "gaussian",
+    "phase",
+    "centre_of_mass",
+    "centre_of_mass_threshold",
+    "centre_of_mass_subtracted",
+    "centre_of_mass_normal",
+    "half_energy",
+    "row_maximum",
+    "linear",
+    "parabola",
+    "gauss_3",
+    "caruana",
+    "guo",
+    "blais_rioux_2",
+    "blais_rioux_4",
+    "blais_rioux_8",
+    "derivative_of_gaussian",
+    "steger",
+    "steger_2d",
+]
 Channel = Literal["auto", "mono", "red", "green", "blue"]
 Pattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
+
+
+Select = Literal["strongest", "first", "last", "continuous"]
 
 
 class ExtractionSettings(Model):
@@ -21,6 +46,12 @@ class ExtractionSettings(Model):
         "rows", label="Scan axis", help="Rows: one line position per image row, for a baseline along x."
     )
     peaks: int = quantity(1, label="Peaks", help="Strongest peaks kept on each scan line.", ge=1, le=16)
+    select: Select = quantity(
+        "strongest",
+        label="Selection",
+        help="Strongest: all peaks, strongest first. Others give one peak of each scan line's candidates: the first, "
+        "the last, or the one on the smoothest chain of peaks, which may also be none.",
+    )
     channel: Channel = quantity(
         "auto", label="Laser channel", help="On colour images the mean of the other two channels is subtracted."
     )
@@ -45,6 +76,14 @@ class ExtractionSettings(Model):
     )
     profile: Literal["integrated", "point"] = quantity(
         "integrated", label="Profile", help="Gaussian integrated over each pixel, or taken at its centre."
+    )
+
+    filter_scale: float = quantity(
+        1.5,
+        label="Filter width",
+        help="Of derivative_of_gaussian and steger: filter sigma over line sigma.",
+        ge=0.5,
+        le=4,
     )
 
     @model_validator(mode="after")

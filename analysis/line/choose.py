@@ -1,0 +1,69 @@
+"""The method an image needs and no more: the phase where it is as good as maximum likelihood, which else is taken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.line.channel import Lines
+from analysis.line.measure import measure
+from analysis.line.result import Flag, Line
+from analysis.line.settings import ExtractionSettings, Method
+
+LINES = 256
+"""Scan lines looked at."""
+FEWEST = 8
+SATURATED_SHARE = 0.01
+NARROWEST = 0.6
+"""px; narrower lines need the profile integrated over the pixel."""
+FAINTEST = 30.0
+"""Peak over the noise of its background; below it the far wings carry only noise, and weights pay."""
+LOSS = 1.05
+"""Standard deviation of the phase over that of the likelihood that is not worth the time."""
+AGREEMENT = 0.3
+"""Standard deviations that the two may differ by beyond what noise explains: neighbours, slopes and tails."""
+
+
+def choose_method(lines: Lines, settings: ExtractionSettings, threads: int | None) -> tuple[Method, str]:
+    """Either "phase" or "likelihood", and why, from up to 256 scan lines."""
+    stride = max(1, lines.count // LINES) | 1  # odd: keeps the rows of a Bayer pattern alternating
+    variance = None if lines.variance is None else lines.variance[::stride]
+    sample = replace(lines, image=lines.image[::stride], variance=variance)
+    update = {"peaks": 1, "select": "strongest", "smoothing": 0.0}
+    exact = measure(sample, settings.model_copy(update={**update, "method": "likelihood"}), threads)
+    valid = exact.valid[:, 0]
+    if valid.sum() < FEWEST:
+        return "likelihood", f"likelihood: a line on {int(valid.sum())} of {sample.count} scan lines looked at"
+    saturated = float(np.mean(exact.flag[valid, 0] == Flag.SATURATED))
+    if saturated > SATURATED_SHARE:
+        return "likelihood", f"likelihood: saturated on {saturated:.0%} of the scan lines, measured from its wings"
+    width = float(np.median(exact.width[valid, 0]))
+    if width < NARROWEST:
+        return "likelihood", f"likelihood: {width:.2f} px narrow, integrated over each pixel"
+    dark = np.maximum(exact.background[valid, 0], 0.0) + lines.noise.floor
+    contrast = float(np.median(exact.amplitude[valid, 0] / np.sqrt(dark)))
+    if contrast < FAINTEST:
+        return "likelihood", f"likelihood: faint, its peak {contrast:.0f} times the noise"
+    quick = measure(sample, settings.model_copy(update={**update, "method": "phase"}), threads)
+    loss = _loss(quick, exact)
+    if loss is not None:
+        return "likelihood", f"likelihood: {loss}"
+    return "phase", f"phase: {width:.2f} px wide, {contrast:.0f} times the noise, unsaturated, as good as likelihood"
+
+
+def _loss(quick: Line, exact: Line) -> str | None:
+    """What the quick method loses against the exact one, None where it is as good."""
+    both = (quick.valid & exact.valid)[:, 0] & np.isfinite(quick.sigma_u[:, 0])
+    if both.sum() < 0.9 * exact.valid.sum() or both.sum() < FEWEST:
+        return "the phase has no answer or no sigma on some scan lines"
+    ratio = float(np.median(quick.sigma_u[both, 0] / exact.sigma_u[both, 0]))
+    if ratio > LOSS:
+        return f"the phase would be {ratio - 1:.0%} noisier"
+    variance = np.median(exact.sigma_u[both, 0] ** 2)
+    # the likelihood is efficient, so that what the phase adds is independent of it (Lehmann and Casella, 2.1.7)
+    allowed = max(ratio**2 - 1.0, 0.02) + AGREEMENT**2
+    apart = np.median(np.abs(quick.u[both, 0] - exact.u[both, 0])) * 1.4826
+    if apart**2 > allowed * variance:
+        return f"the phase is {apart:.3f} px apart from it, by neighbours, a slope or tails"
+    return None
