@@ -15,8 +15,7 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QLabel,
     QMenu,
-    QSizePolicy,
-    QToolButton,
+    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -65,9 +64,8 @@ class DevelopPanel(QWidget):
         self.noise.setChecked(True)
         self.noise.setToolTip("Off: the mean image, still saturated and quantised. A look only, the project keeps it.")
         self.powers: list[LogField] = []
-        self.methods_button = QToolButton()
-        self.methods_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        self.methods_button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.methods_button = QPushButton()
+        self.methods_button.setToolTip("Every chosen method measures the same image")
         self.methods_menu = QMenu(self.methods_button)
         self.methods_button.setMenu(self.methods_menu)
         self.methods = {method: self._method_action(method) for method in get_args(Method) if method != "auto"}

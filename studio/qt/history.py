@@ -25,6 +25,8 @@ from studio.qt.compare_view import CompareView
 from studio.qt.session import Render, Session
 
 THUMBNAIL = QSize(64, 54)
+NEW_LINE = "\u2028"
+"""Qt breaks an item's text only here."""
 SAMPLED = 512
 """Pixels a side that a thumbnail looks at."""
 
@@ -38,11 +40,13 @@ def describe(render: Render) -> str:
     """Size, quality and time, in one line."""
     height, width = render.frame.shape
     parts = [f"{width} x {height} px"]
-    errors = [v for k, v in render.frame.counts.items() if k.startswith("relative error") and "ambient" not in k]
-    if errors:
-        parts.append(f"laser {max(errors):.2%}")
-    if render.frame.ambient is not None:
-        parts.append(f"ambient {render.frame.counts.get(AMBIENT_SAMPLES, 0):.0f}")
+    counts = render.frame.counts
+    errors = [counts.get(f"relative error, {laser.name}") for laser in render.project.scene.lasers]
+    known = [error for error in errors if error is not None]
+    if known:
+        parts.append(f"laser {max(known):.2%}")
+    if AMBIENT_SAMPLES in counts:
+        parts.append(f"ambient {counts[AMBIENT_SAMPLES]:.0f}")
     parts.append(f"{sum(render.frame.seconds.values()):.1f} s")
     return ", ".join(parts) + ("" if render.final else ", not finished")
 
@@ -67,7 +71,7 @@ class _TwoLines(QStyledItemDelegate):
     def initStyleOption(self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex) -> None:
         super().initStyleOption(option, index)
         render: Render = index.data(Qt.ItemDataRole.UserRole)
-        option.text = f"{title(render)}\n{describe(render)}"
+        option.text = f"{title(render)}{NEW_LINE}{describe(render)}"
 
 
 class History(QWidget):

@@ -36,6 +36,12 @@ from studio.qt.status import time_left
 from studio.stages import scaled
 
 SCALES = (0.125, 0.25, 0.5, 1.0)
+LONGEST_HEAD = 20
+TRANSPORT = {
+    "auto": "as much as matters",
+    "direct": "by way of one surface",
+    "interreflection": "reflected on as well",
+}
 
 
 class RenderPanel(QWidget):
@@ -65,6 +71,10 @@ class RenderPanel(QWidget):
         self.limit.setToolTip("The best frame so far is kept when the time is over.")
         for box in (self.laser_error, self.samples, self.limit):
             box.setKeyboardTracking(False)
+        self.transport = QComboBox()
+        for value, text in TRANSPORT.items():
+            self.transport.addItem(text, value)
+        self.transport.setToolTip("A short pilot finds out what the reflections add, unless you decide.")
         self.scale = QComboBox()
         self.start_button = QPushButton("Render")
         self.start_button.setObjectName("primary")
@@ -141,6 +151,7 @@ class RenderPanel(QWidget):
     def _lay_out(self) -> None:
         form = QFormLayout()
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.addRow("Laser light", self.transport)
         form.addRow("Laser error", self.laser_error)
         form.addRow("Ambient samples", self.samples)
         form.addRow("Time limit", self.limit)
@@ -177,6 +188,9 @@ class RenderPanel(QWidget):
             lambda count: session.set(("render", "ambient_samples"), count, "ambient samples")
         )
         self.scale.currentIndexChanged.connect(lambda index: self._show_plan())
+        self.transport.activated.connect(
+            lambda i: session.set(("render", "transport"), self.transport.itemData(i), "laser light")
+        )
         self.start_button.clicked.connect(lambda: self.start())
         self.pause_button.clicked.connect(self.pause)
         self.keep_button.clicked.connect(self.keep)
@@ -188,6 +202,7 @@ class RenderPanel(QWidget):
             box.blockSignals(True)
         self.laser_error.setValue(100 * project.render.laser_error)
         self.samples.setValue(project.render.ambient_samples)
+        self.transport.setCurrentIndex(self.transport.findData(project.render.transport))
         for box in (self.laser_error, self.samples):
             box.blockSignals(False)
         camera, chosen = project.scene.camera, max(0, self.scale.currentIndex())
@@ -312,11 +327,13 @@ def render_frames(
 
 
 def plan_text(lines: tuple[str, ...]) -> str:
-    """Rich text: the first word of each line stands out."""
-    parts = [line.partition(":") for line in lines]
-    return "".join(
-        f"<p style='margin: 3px 0'><b>{escape(head)}</b>{colon}{escape(rest)}</p>" for head, colon, rest in parts
-    )
+    """Rich text: what a line is about stands out."""
+    shown = []
+    for line in lines:
+        head, colon, rest = line.partition(":")
+        bold = f"<b>{escape(head)}</b>" if len(head) <= LONGEST_HEAD else escape(head)
+        shown.append(f"<p style='margin: 3px 0'>{bold}{colon}{escape(rest)}</p>")
+    return "".join(shown)
 
 
 def error_text(render: Render) -> str:
