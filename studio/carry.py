@@ -5,6 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from pydantic import BaseModel
+
 from render.errors import InputError
 from render.files import atomic_write, inside, sha256
 from render.material import Texture
@@ -13,27 +15,26 @@ from render.shape import MeshFile
 from studio.mesh_import import side_files
 
 
-def named_files(scene: Scene) -> dict[str, str]:
-    """Relative path -> the field that names it: meshes and textures."""
+def named_files(item: BaseModel, where: str) -> dict[str, str]:
+    """Relative path -> the field that names it, of every mesh and texture in a model, however deep."""
+    if isinstance(item, MeshFile | Texture):
+        return {item.path: f"{where}.path"}
     found: dict[str, str] = {}
-    for i, item in enumerate(scene.objects):
-        if isinstance(item.shape, MeshFile):
-            found.setdefault(item.shape.path, f"scene.objects[{i}].shape.path")
-        albedo = item.material.albedo
-        if isinstance(albedo, Texture):
-            found.setdefault(albedo.path, f"scene.objects[{i}].material.albedo.path")
+    for name in type(item).model_fields:
+        value = getattr(item, name)
+        for i, each in enumerate(value if isinstance(value, tuple) else (value,)):
+            if isinstance(each, BaseModel):
+                place = f"{where}.{name}[{i}]" if isinstance(value, tuple) else f"{where}.{name}"
+                found = named_files(each, place) | found
     return found
 
 
 def missing_files(scene: Scene, root: Path) -> list[tuple[int, Path]]:
-    """Objects whose mesh or texture is not there: index and file. InputError: a path that leaves the folder."""
+    """Visible objects whose mesh or texture is not there: index and file. InputError: a path that leaves the folder."""
     found = []
     for i, item in enumerate(scene.objects):
-        albedo = item.material.albedo
-        paths = [item.shape.path] if isinstance(item.shape, MeshFile) else []
-        paths += [albedo.path] if isinstance(albedo, Texture) else []
-        for path in paths:
-            file = inside(root, path, f"scene.objects[{i}]")
+        for path, where in named_files(item, f"scene.objects[{i}]").items():
+            file = inside(root, path, where)
             if item.visible and not file.is_file():
                 found.append((i, file))
     return found
@@ -48,7 +49,7 @@ def carry(scene: Scene, root: Path, folder: Path) -> list[Path]:
     if root.resolve() == folder.resolve():
         return []
     pairs = []
-    for relative, where in named_files(scene).items():
+    for relative, where in named_files(scene, "scene").items():
         beside = Path(relative).parent
         for each in (relative, *(str(beside / name) for name in side_files(inside(root, relative, where)))):
             source, target = inside(root, each, where), inside(folder, each, where)

@@ -85,7 +85,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("next_line", "Measure", "&Next scan line", "Alt+Down"),
     Command("worst_line", "Measure", "&Worst scan line", "Alt+W", "", "Where the error is largest"),
     "Measure/-",
-    Command("frame_points", "Measure", "Points in &view", "Alt+P", "", "The measured points in the middle of the 3D view"),
+    Command("frame_points", "Measure", "Points in &view", "Alt+P", "", "The measured points in the middle of the view"),
     Command("help", "Help", "&Contents", "F1", "help", "The page of the panel that has the focus"),
     Command("shortcuts", "Help", "&Shortcuts", "Ctrl+/"),
     Command("tour", "Help", "&Guided tour"),

@@ -191,8 +191,8 @@ class ColourBar(QWidget):
             painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, f"{text} {self.unit}")
 
     def _place(self) -> None:
-        parent = self.parentWidget()
-        self.move(parent.width() - self.width() - 12, parent.height() - self.height() - 12)
+        if (view := self.parentWidget()) is not None:
+            self.move(view.width() - self.width() - 12, view.height() - self.height() - 12)
 
 
 def _point_actor(size: float) -> tuple[pv.PolyData, vtkActor]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QObject
@@ -40,7 +41,7 @@ class ExportActions(QObject):
         self.window, self.session, self.runner, self.preferences = window, session, runner, preferences
         self.actions = actions
         for key in KINDS:
-            actions.connect(key, lambda key=key: self.ask(key))
+            actions.connect(key, partial(self.ask, key))
         actions.connect("screenshot", self.screenshot)
         for signal in (session.renders_changed, session.measured, session.developed):
             signal.connect(self.refresh)

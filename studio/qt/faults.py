@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import traceback
+from collections.abc import Callable
 from types import TracebackType
 
 from PySide6.QtCore import QMessageLogContext, QObject, Qt, QtMsgType, Signal, qInstallMessageHandler
@@ -62,7 +63,7 @@ def catch_faults(window: QWidget, session: Session) -> Faults:
     return faults
 
 
-def _log_of(session: Session) -> object:
+def _log_of(session: Session) -> Callable[[QtMsgType, QMessageLogContext, str], None]:
     def log(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
         if kind == QtMsgType.QtDebugMsg or any(part in text for part in HARMLESS):
             return

@@ -102,7 +102,7 @@ class MotionPanel(QWidget):
         if chosen:
             self.run_into(Path(chosen))
 
-    def run_into(self, folder: Path) -> Job[ScanResult] | None:
+    def run_into(self, folder: Path, report: bool = True) -> Job[ScanResult] | None:
         """Run the scan into a folder; None: something else is being rendered."""
         session = self.session
         if self.runner.job(RENDER) is not None:
@@ -127,7 +127,16 @@ class MotionPanel(QWidget):
                 if stage != "frames":
                     progress(stage, at)
 
-            return run_scan(project, root, out=folder, image_scale=scale, progress=tell, cancelled=cancelled, each=each)
+            return run_scan(
+                project,
+                root,
+                out=folder,
+                image_scale=scale,
+                progress=tell,
+                cancelled=cancelled,
+                each=each,
+                report=report,
+            )
 
         self.open.hide()
         self.began.emit()
@@ -165,7 +174,9 @@ class MotionPanel(QWidget):
         self.session.select(path)
 
     def _button(self, name: str, tip: str, handler: object) -> QToolButton:
-        button = QToolButton(icon=icon(name), toolTip=tip)
+        button = QToolButton()
+        button.setIcon(icon(name))
+        button.setToolTip(tip)
         button.clicked.connect(handler)
         return button
 

@@ -42,7 +42,7 @@ PANELS = (
 
 def make_panels(session: Session, runner: object, making: Making = lambda title: None) -> dict[str, QWidget]:
     """Every panel by its key; `making` hears the title of each before it is made."""
-    made = {}
+    made: dict[str, QWidget] = {}
     for panel in PANELS:
         making(panel.title)
         if find_spec(panel.module) is None:

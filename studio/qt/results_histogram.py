@@ -14,7 +14,7 @@ PLOTTED = 99.5
 """Percent of the errors within the axis."""
 
 
-class ErrorHistogram(pg.GraphicsLayoutWidget):
+class ErrorHistogram(pg.GraphicsLayoutWidget):  # type: ignore[misc]
     """Counts of points over their signed error."""
 
     def __init__(self) -> None:

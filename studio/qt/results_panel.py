@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
@@ -120,8 +121,7 @@ class ResultsPanel(QWidget):
         self.profile.mark(scan_line)
         parts, first = [], None
         for method, one in shown.items():
-            here = np.flatnonzero(one.points.index == scan_line) if scan_line is not None else []
-            for i in here[:1]:
+            for i in np.flatnonzero(one.points.index == (-1 if scan_line is None else scan_line))[:1]:
                 error = float(error_values(one.errors, view)[i])
                 depth = 1e3 * float(one.points.depth_z[i])
                 said = f"{error:+.3g} {view.unit}" if math.isfinite(error) else "no truth here"
@@ -146,19 +146,24 @@ class ResultsPanel(QWidget):
         """One button for each method of the render, in its colour."""
         render = self.session.shown
         wanted = [] if render is None else list(render.measurements)
-        there = [self.switches.itemAt(i).widget().objectName() for i in range(self.switches.count())]
-        if wanted == there:
+        there = [item.widget() for i in range(self.switches.count()) if (item := self.switches.itemAt(i)) is not None]
+        buttons = [button for button in there if button is not None]
+        if wanted == [button.objectName() for button in buttons]:
             return
-        while self.switches.count():
-            self.switches.takeAt(0).widget().deleteLater()
+        for button in buttons:
+            self.switches.removeWidget(button)
+            button.deleteLater()
         for method in wanted:
-            button = QToolButton(objectName=method, checkable=True, checked=method not in self.hidden)
-            button.setText(method_name(method))
-            button.setIcon(_dot(method_colour(method)))
-            button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-            button.setToolTip("Show or hide this method")
-            button.toggled.connect(lambda on, method=method: self._switch(method, on))
-            self.switches.addWidget(button)
+            switch = QToolButton()
+            switch.setObjectName(method)
+            switch.setCheckable(True)
+            switch.setChecked(method not in self.hidden)
+            switch.setText(method_name(method))
+            switch.setIcon(_dot(method_colour(method)))
+            switch.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+            switch.setToolTip("Show or hide this method")
+            switch.toggled.connect(partial(self._switch, method))
+            self.switches.addWidget(switch)
 
     def _switch(self, method: str, on: bool) -> None:
         self.hidden.discard(method) if on else self.hidden.add(method)
@@ -182,9 +187,10 @@ class ResultsPanel(QWidget):
         tabs.addTab(self.histogram, "Histogram")
         self.tabs = tabs
         across = QSplitter(Qt.Orientation.Horizontal)
-        for widget, stretch in ((self.rows, 5), (tabs, 4), (self.table, 3)):
-            across.addWidget(widget)
-            across.setStretchFactor(across.indexOf(widget), stretch)
+        parts: list[tuple[QWidget, int]] = [(self.rows, 5), (tabs, 4), (self.table, 3)]
+        for i, (part, stretch) in enumerate(parts):
+            across.addWidget(part)
+            across.setStretchFactor(i, stretch)
         across.setSizes([480, 380, 360])
         content = QWidget()
         inside = QVBoxLayout(content)

@@ -16,7 +16,7 @@ NEAR = 30.0
 """px; the mouse hovers a sample that is no farther than this."""
 
 
-class ProfilePlot(pg.GraphicsLayoutWidget):
+class ProfilePlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
     """Distance from the laser over the place along its fan, both mm. Nearer is up."""
 
     hovered = Signal(object)

@@ -16,7 +16,7 @@ PLOTTED = 99.5
 """Percent of the errors within the axis."""
 
 
-class RowPlots(pg.GraphicsLayoutWidget):
+class RowPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
     """Stacked plots with one scan-line axis. `hovered` tells the scan line under the mouse, None when it leaves."""
 
     hovered = Signal(object)

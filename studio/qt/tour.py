@@ -84,6 +84,7 @@ class Tour(QWidget):
     def __init__(self, window: QWidget, place: Callable[[Step], QWidget | None]) -> None:
         """place: brings a step's panel to the front and returns it."""
         super().__init__(window)
+        self.window_under = window
         self.setObjectName("tour")
         self.place, self.index = place, 0
         self.target: QWidget | None = None
@@ -135,7 +136,7 @@ class Tour(QWidget):
 
     def end(self) -> None:
         """Finished or skipped."""
-        self.parentWidget().removeEventFilter(self)
+        self.window_under.removeEventFilter(self)
         self.hide()
         self.ended.emit()
         self.deleteLater()
@@ -144,7 +145,7 @@ class Tour(QWidget):
         """Where the panel of the step is, in the window."""
         if self.target is None or not self.target.isVisible():
             return QRect()
-        corner = self.target.mapTo(self.parentWidget(), QPoint(0, 0))
+        corner = self.target.mapTo(self.window_under, QPoint(0, 0))
         return QRect(corner, self.target.size()).intersected(self.rect())
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -178,7 +179,7 @@ class Tour(QWidget):
 
     def _fit(self) -> None:
         """Cover the window; the card beside the panel, where there is room."""
-        self.setGeometry(self.parentWidget().rect())
+        self.setGeometry(self.window_under.rect())
         self.card.adjustSize()
         size, hole, room = self.card.size(), self.hole(), self.rect().adjusted(MARGIN, MARGIN, -MARGIN, -MARGIN)
         place = QRect(QPoint(0, 0), size)

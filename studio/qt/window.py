@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, Qt, QTimer
@@ -83,7 +84,7 @@ class MainWindow(QMainWindow):
         self.workspace = wanted.key
         arrange(self, self.docks, wanted)
         if restore(self, self.preferences.values.arrangements.get(wanted.key, "")):
-            self.centralWidget().setVisible(wanted.viewport)
+            self.panels["viewport"].setVisible(wanted.viewport)
         else:
             QTimer.singleShot(0, self, lambda: share_out(self, self.docks, wanted))
         self.commands[SWITCH[wanted.key]].setChecked(True)
@@ -186,7 +187,8 @@ class MainWindow(QMainWindow):
             action = self.commands[SWITCH[each.key]]
             group.addAction(action)
             action.setToolTip(f"{each.tip} ({action.shortcut().toString()})")
-            button = QToolButton(objectName="workspace")
+            button = QToolButton()
+            button.setObjectName("workspace")
             button.setDefaultAction(action)
             button.setText(each.title)
             bar.addWidget(button)
@@ -257,9 +259,9 @@ class MainWindow(QMainWindow):
         for key, handler in handlers.items():
             self.commands.connect(key, handler)
         for key, command in SWITCH.items():
-            self.commands.connect(command, lambda key=key: self.switch_to(key))
+            self.commands.connect(command, partial(self.switch_to, key))
         for choice in theme.CHOICES:
-            self.commands.connect(f"theme_{choice}", lambda choice=choice: self.choose_theme(choice))
+            self.commands.connect(f"theme_{choice}", partial(self.choose_theme, choice))
         menus = self.commands.submenus
         filled: dict[str, Callable[[QMenu], None]] = {
             "recent": files.fill_recent,

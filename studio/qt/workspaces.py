@@ -102,7 +102,8 @@ def arrange(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspac
                 window.splitDockWidget(before, docks[name], beside)
             before = docks[name]
             docks[name].show()
-    window.centralWidget().setVisible(wanted.viewport)
+    if (middle := window.centralWidget()) is not None:
+        middle.setVisible(wanted.viewport)
     share_out(window, docks, wanted)
 
 
