@@ -11,8 +11,10 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 from render.errors import InputError
 from studio.mesh_import import ImportedMesh, import_mesh, needs_copy
 from studio.placement import field_of_view
+from studio.qt.dialogs import show_trouble
 from studio.qt.session import Session
 from studio.scene_edits import add_mesh
+from studio.trouble import trouble
 
 MESH_FILES = "Meshes (*.stl *.ply *.obj *.glb *.gltf *.off);;All files (*)"
 Take = Callable[[ImportedMesh], None]
@@ -22,7 +24,8 @@ class ImportThread(QThread):
     """Reads one file after the other."""
 
     imported = Signal(object)
-    failed = Signal(str)
+    failed = Signal(object, object)
+    """The file and the exception."""
 
     def __init__(self, files: list[Path], root: Path, view: float) -> None:
         super().__init__()
@@ -34,10 +37,8 @@ class ImportThread(QThread):
                 return
             try:
                 self.imported.emit(import_mesh(file, self.root, self.view))
-            except InputError as error:
-                self.failed.emit(str(error))
-            except MemoryError:
-                self.failed.emit(f"{file}: the mesh does not fit into memory; reduce its triangles")
+            except (InputError, OSError, MemoryError) as error:
+                self.failed.emit(file, error)
 
 
 _running: set[ImportThread] = set()
@@ -77,7 +78,8 @@ def may_copy(parent: QWidget, files: list[Path], root: Path) -> bool:
 def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Take | None = None) -> None:
     """Import files, each as a new object (or as `take` says); the person is asked before anything is copied."""
     document = session.document
-    if not files or not may_copy(parent, files, document.root):
+    # a project that was never saved has no folder of the person's yet
+    if not files or (document.path is not None and not may_copy(parent, files, document.root)):
         return
 
     def done(mesh: ImportedMesh) -> None:
@@ -88,9 +90,14 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
         text = f"{Path(mesh.path).name}: {size} mm, {mesh.triangles} triangles, read as {mesh.unit}"
         session.message.emit("info", text)
 
+    def failed(file: Path, error: BaseException) -> None:
+        what = trouble(error, f"import {file.name}")
+        session.message.emit("error", f"{file.name}: {error}")
+        show_trouble(parent, what)
+
     thread = ImportThread(files, document.root, field_of_view(session.project.scene))
     thread.imported.connect(done)
-    thread.failed.connect(lambda text: session.message.emit("error", text))
+    thread.failed.connect(failed)
     thread.finished.connect(lambda: _running.discard(thread))
     _running.add(thread)
     application = QCoreApplication.instance()

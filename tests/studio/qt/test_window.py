@@ -294,6 +294,13 @@ class TestBadInput:
         assert Project.load(broken).scene.objects[-1].visible, "the file stays as it is until it is saved"
         window.session.replace_document(before)
 
+    def test_a_mesh_that_is_none(self, window: MainWindow, qtbot: QtBot, small_project: Path) -> None:
+        file = small_project.parent / "broken.stl"
+        file.write_bytes(b"solid nothing\nfacet")
+        window.take([file])
+        qtbot.waitUntil(lambda: any(each.objectName() == "trouble" for each in QApplication.topLevelWidgets()))
+        self.told("Could not import broken.stl", "broken.stl")
+
     def test_a_render_that_runs_out_of_memory(self, window: MainWindow, qtbot: QtBot) -> None:
         def work(progress: object, cancelled: object) -> None:
             raise MemoryError
