@@ -39,7 +39,7 @@ def title(render: Render) -> str:
 def describe(render: Render) -> str:
     """Size, quality and time, in one line."""
     height, width = render.frame.shape
-    parts = [f"{width} x {height} px"]
+    parts = [f"{width} x {height}"]
     counts = render.frame.counts
     errors = [counts.get(f"relative error, {laser.name}") for laser in render.project.scene.lasers]
     known = [error for error in errors if error is not None]

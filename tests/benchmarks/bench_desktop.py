@@ -147,13 +147,15 @@ def main() -> None:
 
     # development
     how, seconds = development(shown.project, project), []
+    busy = time.process_time()
     for _ in range(12):
         start = time.perf_counter()
         images = develop_again(shown.frame, how)
         seconds.append(time.perf_counter() - start)
+    busy = (time.process_time() - busy) / len(seconds)
     row(
         "development of the frame",
-        f"least {1e3 * min(seconds):.0f} ms, median {1e3 * np.median(seconds):.0f} ms",
+        f"least {1e3 * min(seconds):.0f} ms, of all processors {1e3 * busy:.0f} ms",
         "150 ms",
     )
     start = time.perf_counter()
