@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
 
+PIECE = 1 << 13
 CHUNK = 1 << 16
 """Rays a call: long enough to hide Python's share, short enough to share work and to cancel."""
 
@@ -26,8 +27,12 @@ CHUNK = 1 << 16
 class RayScene:
     """A committed triangle scene. Methods release the GIL: call them in chunks from threads."""
 
-    def __init__(self, vertices: NDArray[np.float64], triangles: Int32) -> None:
-        """vertices (v, 3) float64 world m, triangles (t, 3) int32, at least one."""
+    def __init__(self, vertices: NDArray[np.float64], triangles: Int32, *, gently: bool = False) -> None:
+        """vertices (v, 3) float64 world m, triangles (t, 3) int32, at least one.
+
+        gently: hand the triangles over piece by piece (each call of embreex holds the interpreter, a second for a
+        million), so that a window stays alive meanwhile; the same hits, a little more memory.
+        """
         self.centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2 if len(vertices) else np.zeros(3)
         shifted = np.ascontiguousarray(vertices - self.centre, dtype=np.float32)
         extent = float(np.abs(shifted).max()) if len(shifted) else 0.0
@@ -35,7 +40,10 @@ class RayScene:
         self.surface_offset = 16.0 * 2.0**-24 * extent
         # robust traversal: no ray slips between two triangles that share an edge
         self._scene = EmbreeScene(robust=True)
-        self._mesh = TriangleMesh(self._scene, shifted, np.ascontiguousarray(triangles, dtype=np.int32))
+        triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+        pieces = range(0, len(triangles), PIECE if gently else max(len(triangles), 1))
+        self._meshes = [self._add(shifted, triangles, start, len(pieces) == 1, pieces.step) for start in pieces]
+        self._starts = np.array(pieces, dtype=np.int32)
         self._lock = threading.Lock()
         self.seconds = 0.0
         self.rays = 0
@@ -47,7 +55,11 @@ class RayScene:
         _check(origins, directions, far)
         with self._timed(len(origins)):
             hit = self._scene.run(origins, directions, dists=far, output=True)
-        return hit["primID"], hit["tfar"]
+        triangle = hit["primID"]
+        if len(self._meshes) > 1:
+            found = triangle >= 0
+            triangle[found] += self._starts[hit["geomID"][found]]
+        return triangle, hit["tfar"]
 
     def from_point(self, origin: NDArray[np.float64], directions: Float32) -> Int32:
         """World origin (3,), (n, 3) directions -> (n,) first triangle or -1."""
@@ -60,6 +72,13 @@ class RayScene:
         with self._timed(len(origins)):
             hit = self._scene.run(origins, directions, dists=far, query="OCCLUDED")
         return np.asarray(hit == 0)
+
+    def _add(self, vertices: Float32, triangles: Int32, start: int, whole: bool, count: int) -> TriangleMesh:
+        if whole:
+            return TriangleMesh(self._scene, vertices, triangles)
+        used, index = np.unique(triangles[start : start + count], return_inverse=True)
+        time.sleep(0.001)
+        return TriangleMesh(self._scene, vertices[used], index.reshape(-1, 3).astype(np.int32))
 
     @contextmanager
     def _timed(self, rays: int) -> Iterator[None]:

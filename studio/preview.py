@@ -19,7 +19,7 @@ from render.camera import Camera
 from render.curve import curve_of_cut, cut_triangles, visible
 from render.embree import RayScene
 from render.errors import InputError
-from render.frame import LaserCurve
+from render.frame import Axis, LaserCurve
 from render.mesh_files import load_mesh
 from render.pose import Pose, invert, transform_points
 from render.quick import reflectance_at
@@ -33,7 +33,7 @@ Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FAN_RAYS = 512
-DRAG_SECONDS = 0.014
+DRAG_SECONDS = 0.01
 """Of work for one camera picture while something is dragged."""
 ALONE = Rig(camera=Camera(width=1, height=1, fx=1.0, fy=1.0, cx=0.0, cy=0.0))
 
@@ -216,12 +216,14 @@ class Look:
         return result
 
     def _cut(self, i: int) -> Lit:
+        if not self.placed:
+            return Lit(_no_curve(self.project.extraction.axis), np.zeros((0, 3)), np.zeros((0, 3)))
         scene, laser = self.scene, self.scene.lasers[i]
         T_world_camera, T_world_laser = scene.T_world_camera(self.step), scene.T_world_laser(i, self.step)
         parts = [_cut_body(item, T_world_camera, T_world_laser) for item in self.placed]
-        segments = np.concatenate([part[0] for part in parts] or [np.zeros((0, 2, 3))])
-        normals = np.concatenate([part[1] for part in parts] or [np.zeros((0, 3))])
-        triangle = np.concatenate([part[2] for part in parts] or [np.zeros(0, np.int32)])
+        segments = np.concatenate([part[0] for part in parts])
+        normals = np.concatenate([part[1] for part in parts])
+        triangle = np.concatenate([part[2] for part in parts])
         place = np.repeat(np.arange(len(parts), dtype=np.int32), [len(part[2]) for part in parts])
         # the segment's own number stands in for the object, so that the triangle of each point is known as well
         curve = curve_of_cut(
@@ -273,6 +275,9 @@ class Look:
             facet = facet[nearer] * -np.sign(facing[nearer])[:, None]
             normal[chosen] = facet / np.linalg.norm(facet, axis=1, keepdims=True) @ item.T_world_object[:3, :3].T
         hits = np.flatnonzero(np.isfinite(distance))
+        in_image, seen = np.zeros(FAN_RAYS, np.bool_), np.zeros(FAN_RAYS, np.bool_)
+        if len(hits) == 0:
+            return Fan(origin, direction, distance, in_image, seen)
         points = origin + distance[hits, None] * direction[hits]
         T_world_camera, camera = scene.T_world_camera(self.step), scene.camera
         pixels, valid = camera.project(transform_points(invert(T_world_camera), points))
@@ -281,7 +286,6 @@ class Look:
         to_camera = T_world_camera[:3, 3] - points
         facing = np.einsum("ij,ij->i", normal[hits], to_camera) > 0.0
         look = np.flatnonzero(valid & facing)
-        in_image, seen = np.zeros(FAN_RAYS, np.bool_), np.zeros(FAN_RAYS, np.bool_)
         in_image[hits] = valid
         seen[hits[look]] = self.clear(points[look], normal[hits[look]], to_camera[look])
         return Fan(origin, direction, distance, in_image, seen)
@@ -299,6 +303,11 @@ def _cut_body(item: Placed, T_world_camera: Float, T_world_laser: Float) -> tupl
     corners = vertices[triangles[owner]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return transform_points(item.T_world_object, segments), normals @ item.T_world_object[:3, :3].T, owner
+
+
+def _no_curve(axis: Axis) -> LaserCurve:
+    none, integers, points = np.zeros(0), np.zeros(0, np.int32), np.zeros((0, 3))
+    return LaserCurve(axis, integers, none, points, none, none, integers, none, none, none, np.zeros((0, 2, 3)))
 
 
 def _arrays(surface: Surface) -> tuple[Float, NDArray[np.int32]]:

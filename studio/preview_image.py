@@ -84,7 +84,7 @@ def preview_image(
     start_time = time.perf_counter()
     camera = scene.camera.scaled(scale)
     n = camera.width * camera.height
-    normalised = pixel_rays(camera.width, camera.height, *_optics(camera))
+    normalised = pixel_rays(camera.width, camera.height, *_optics(camera)) if placed else np.zeros((n, 2))
     shade, far = np.zeros((n, 3), np.float32), np.full(n, np.inf, np.float32)
     triangle, owner = np.full(n, -1, np.int32), np.full(n, -1, np.int32)
     light = np.zeros((len(scene.lasers), n), np.float32)
@@ -115,13 +115,15 @@ def preview_image(
                 )
                 light[:, mine] += part
 
-    map_chunks(work, n, max(4096, -(-n // (2 * thread_count(threads)))), threads)
+    if placed:
+        map_chunks(work, n, max(4096, -(-n // (2 * thread_count(threads)))), threads)
     for i in range(len(scene.lasers)):
         _shadow(light[i], views, normalised, triangle, owner, scene.T_world_laser(i, step)[:3, 3], clear)
     depth = np.where(owner >= 0, far, np.float32(np.nan))
     index = np.array([*(item.index for item in placed), -1], dtype=np.int32)
     seconds = time.perf_counter() - start_time
-    speed.learn(n, seconds)
+    if placed:
+        speed.learn(n, seconds)
     shape = (camera.height, camera.width)
     return PreviewImage(
         scale,

@@ -8,14 +8,24 @@ Moves are answered at once; meshes that are not loaded yet are left out of the l
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from render.scene import SceneObject
+from render.camera import Camera
+from render.laser import LineLaser
+from render.pose import Pose
+from render.scene import Rig, Scene, SceneObject
+from render.sensor import Sensor, SpectralCurve
+from render.shape import Plane
 from render.threads import Cancel
+from studio import sketch
 from studio.jobs import Progress
 from studio.preview import Look, Preview
+from studio.project import Project
 from studio.qt.jobs import JobRunner
 from studio.qt.session import Session
+from studio.readouts import readouts
 
 LANE = "load meshes"
 
@@ -38,30 +48,33 @@ class Live(QObject):
         super().__init__(session)
         self.session = session
         self.preview = Preview()
-        self.step = 0
-        """Of the motion; what is shown stands where this step puts it."""
         self._runner = JobRunner(self)
         self._runner.failed.connect(self._load_failed)
         self._told: set[str] = set()
+        self.ready = False
+        """The kernels are compiled. Until then looks are empty, so that the window never waits for a compiler."""
         self._timer = QTimer(self, singleShot=True, interval=0)
         self._timer.timeout.connect(self.refresh)
         session.project_changed.connect(self._timer.start)
         session.document_replaced.connect(self._start_anew)
         session.drag_changed.connect(self._timer.start)
+        session.step_changed.connect(self._timer.start)
         self.look = self._looked()
         self._load_missing()
 
     @property
     def is_loading(self) -> bool:
         """Some of the project's meshes are not in the look yet, but will be."""
-        return bool(self.preview.missing(self.session.project, self.session.document.root))
+        return not self.ready or bool(self.preview.missing(self.session.project, self.session.document.root))
+
+    @property
+    def step(self) -> int:
+        """Of the motion; what is shown stands where this step puts it."""
+        return min(self.session.step, self.session.project.scene.frame_count - 1)
 
     def show_step(self, step: int) -> None:
         """Stand where a step of the motion puts things."""
-        step = min(max(step, 0), self.session.project.scene.frame_count - 1)
-        if step != self.step:
-            self.step = step
-            self._timer.start()
+        self.session.look_at_step(step)
 
     def reload(self) -> None:
         """Read all meshes anew: their files have changed."""
@@ -71,8 +84,6 @@ class Live(QObject):
     def refresh(self) -> None:
         """Look now, without waiting for the event loop."""
         self._timer.stop()
-        scene = self.session.project.scene
-        self.step = min(self.step, scene.frame_count - 1)
         if self.look.project is not self.session.project or self.look.step != self.step or self._incomplete():
             self.look = self._looked()
             self.changed.emit()
@@ -91,6 +102,8 @@ class Live(QObject):
 
     def _looked(self) -> Look:
         session = self.session
+        if not self.ready:
+            return Look(session.project, self.step, (), self.preview)
         look = self.preview.look(session.project, session.document.root, self.step, wait=False)
         for name, error in self.preview.errors.items():
             if str(error) not in self._told:
@@ -99,10 +112,10 @@ class Live(QObject):
         return look
 
     def _load_missing(self) -> None:
-        session, preview = self.session, self.preview
+        session, preview, ready = self.session, self.preview, self.ready
         root = session.document.root
         items = preview.missing(session.project, root)
-        if not items or self._runner.busy:
+        if (ready and not items) or self._runner.busy:
             return
         triangles_first = sorted(items, key=lambda item: item.shape.kind == "file")
 
@@ -112,12 +125,15 @@ class Live(QObject):
                     break
                 progress(item.name, i / len(triangles_first))
                 preview.load(item, root)
+            if not ready:
+                warm_up()
             return items
 
         self.loading.emit(True)
         self._runner.run(LANE, "load meshes", work, self._loaded)
 
     def _loaded(self, items: list[SceneObject]) -> None:
+        self.ready = True
         self.loading.emit(False)
         if not self.session.dragging:
             self.preview.drop_unused(self.session.project, self.session.document.root)
@@ -132,5 +148,17 @@ class Live(QObject):
     def _start_anew(self) -> None:
         self.preview = Preview()
         self._told.clear()
-        self.step = 0
         self._timer.start()
+
+
+def warm_up() -> None:
+    """Ask all that panels ask of a look, of a tiny scene, so that the kernels are compiled or read from their cache."""
+    laser = LineLaser(T_rig_laser=Pose(translation=(0.1, 0.0, 0.0), rotation=(0.0, -0.2, 0.0)))
+    camera = Camera(width=64, height=48, fx=100.0, fy=100.0, cx=31.5, cy=23.5)
+    plate = SceneObject(name="plate", shape=Plane(), T_world_object=Pose(translation=(0.0, 0.0, 0.5)))
+    sensor = Sensor(efficiency=(SpectralCurve(wavelength_nm=(400.0, 700.0), value=(0.5, 0.5)),))
+    scene = Scene(rig=Rig(camera=camera, lasers=(laser,)), objects=(plate,))
+    look = Preview(1).look(Project(scene=scene, sensor=sensor), Path())
+    readouts(look, 0)
+    look.image(1.0)
+    sketch.frustum(scene)

@@ -20,7 +20,8 @@ class ReadoutPanel(QWidget):
         self._session, self._live = session, live(session)
         self.laser = 0
         """Index of the laser that is read out."""
-        self._lasers = QComboBox(toolTip="The laser that the read-outs are of")
+        self._lasers = QComboBox()
+        self._lasers.setToolTip("The laser that the read-outs are of")
         self._lasers.activated.connect(self._choose)
         self._hint = QLabel("Add a laser to the rig to see what it measures.", wordWrap=True)
         self._hint.setObjectName("muted")
@@ -74,7 +75,7 @@ class ReadoutPanel(QWidget):
         self._lasers.setVisible(len(names) > 1)
         self._hint.setVisible(not names)
         self._area.setVisible(bool(names))
-        shown = rows(readouts(look, self.laser)) if names else ()
+        shown = rows(readouts(look, self.laser)) if names and self._live.ready else ()
         if shown != self._rows:
             self._rows = shown
             self._paint()
@@ -87,10 +88,14 @@ class ReadoutPanel(QWidget):
             name.setText(row.label)
             value.setText(row.value)
             note.setText(row.note)
-            name.setStyleSheet(f"color: {colours.muted}")
-            value.setStyleSheet(f"color: {tints[row.level]}; font-weight: 600")
-            note.setStyleSheet(f"color: {colours.muted}")
-            for label in (name, value, note):
+            for label, style in (
+                (name, f"color: {colours.muted}"),
+                (value, f"color: {tints[row.level]}; font-weight: 600"),
+                (note, f"color: {colours.muted}"),
+            ):
+                # a style sheet costs more to set than all the numbers to compute
+                if label.styleSheet() != style:
+                    label.setStyleSheet(style)
                 label.setToolTip(f"<p>{row.help}</p>")
 
     def _add(self, key: str) -> tuple[QLabel, QLabel, QLabel]:

@@ -125,6 +125,7 @@ class Viewport(QWidget):
         self.live.loading.connect(self.bar.tell_loading)
         session.selection_changed.connect(self._highlight)
         session.document_replaced.connect(self._start_anew)
+        session.frame_requested.connect(lambda: self.frame(session.selection))
         theme.notice.changed.connect(self._paint)
         view.clicked.connect(lambda x, y: session.select(self.path_at(x, y)))
         view.double_clicked.connect(self._frame_at)
@@ -149,6 +150,8 @@ class Viewport(QWidget):
             shortcut.activated.connect(handler)
 
     def _draw(self) -> None:
+        if not self.live.ready:
+            return
         look = self.live.look
         settled = not self.session.dragging
         self.scene.draw(look, self.session.selection, settled=settled)
@@ -162,7 +165,8 @@ class Viewport(QWidget):
         self.view.redraw()
 
     def _highlight(self) -> None:
-        self.scene.highlight(self.live.look, self.session.selection)
+        if self.live.ready:
+            self.scene.highlight(self.live.look, self.session.selection)
         self.view.redraw()
 
     def _paint(self) -> None:

@@ -145,9 +145,12 @@ class ViewportScene:
         return sketch.bounds_of(np.concatenate(corners))
 
     def solids(self) -> list[vtkActor]:
-        """What a click gets hold of besides meshes: bodies, lamps and lines."""
-        lasers = [lines.actor for actors in self._lasers for lines in (actors.body, actors.curve, actors.hidden)]
-        return [*lasers, self._camera.actor, *(lamp.actor for lamp in self._lamps)]
+        """What a click gets hold of besides meshes. A line on a mesh is not among it: a click there means the mesh."""
+        return [
+            *(actors.body.actor for actors in self._lasers),
+            self._camera.actor,
+            *(lamp.actor for lamp in self._lamps),
+        ]
 
     def veils(self) -> list[vtkActor]:
         """What it gets hold of where there is nothing else."""

@@ -22,6 +22,20 @@ def test_no_ray_slips_through_a_closed_surface():
     assert reach.min() > 0.0995 and reach.max() < 0.1001
 
 
+def test_a_mesh_handed_over_in_pieces_is_hit_in_the_same_triangles():
+    mesh = primitive_mesh(Sphere(radius=0.1, segments=256))
+    # in no order, so that every piece has vertices from everywhere
+    triangles = np.random.default_rng(1).permutation(mesh.triangles)
+    whole, pieces = RayScene(mesh.vertices, triangles), RayScene(mesh.vertices, triangles, gently=True)
+    directions = np.random.default_rng(2).normal(size=(20_000, 3)).astype(np.float32)
+    origins = np.zeros_like(directions)
+    origins[::2] = (0.3, 0.0, 0.0)
+    first, second = whole.intersect(origins, directions), pieces.intersect(origins, directions)
+    assert np.mean(first[0] == second[0]) > 0.999  # a ray through an edge may name either side
+    assert ((first[0] >= 0) == (second[0] >= 0)).all() and len(np.unique(second[0])) > 5_000
+    np.testing.assert_allclose(first[1], second[1], rtol=1e-5)
+
+
 def test_occlusion_ends_at_the_target():
     scene = ball()
     origins, directions = np.zeros((2, 3), np.float32), np.array([[1, 0, 0], [1, 0, 0]], np.float32)
