@@ -15,7 +15,7 @@ from studio.forms import Alternative, FieldSpec, describe_item, kind_label, star
 from studio.mesh_import import ImportedMesh, copied_beside
 from studio.presets import presets_for
 from studio.project import Project
-from studio.qt import mesh_importer, scene_actions
+from studio.qt import mesh_importer, scene_actions, theme
 from studio.qt.fields import tool_button
 from studio.qt.form import Form
 from studio.qt.scene_icons import item_icon
@@ -80,6 +80,7 @@ class Inspector(QWidget):
         self._menus_path: FieldPath | None = None
         session.selection_changed.connect(self.refresh)
         session.project_changed.connect(self.refresh)
+        theme.notice.changed.connect(self.refresh)
         self.refresh()
 
     def refresh(self) -> None:

@@ -161,6 +161,7 @@ class SceneTree(QTreeWidget):
         self._filling = False
         session.project_changed.connect(self.refresh)
         session.selection_changed.connect(self._follow_selection)
+        theme.notice.changed.connect(self._repaint)
         session.document_replaced.connect(self.expandAll)
         self.itemSelectionChanged.connect(self._selected)
         self.itemChanged.connect(self._renamed)
@@ -185,6 +186,13 @@ class SceneTree(QTreeWidget):
         self._filling = False
         self._keep_selection()
         self._follow_selection()
+
+    def _repaint(self) -> None:
+        """Another theme holds: what was given a colour of its own takes the new one."""
+        self._filling = True
+        for node in self._nodes:
+            self._fill(self._items[node.path], node)
+        self._filling = False
 
     def rename_selection(self) -> None:
         """Edit the selected item's name in place."""
@@ -216,7 +224,8 @@ class SceneTree(QTreeWidget):
             item.setIcon(EYE, scene_icon("eye" if node.visible else "hidden"))
             item.setToolTip(EYE, "Hide" if node.visible else "Show")
         shown = node.visible is not False
-        item.setForeground(NAME, self.palette().text() if shown else QColor(theme.colours().muted))
+        # nothing for a shown one: the palette of whatever theme holds
+        item.setData(NAME, Qt.ItemDataRole.ForegroundRole, None if shown else QColor(theme.colours().muted))
 
     def _keep_selection(self) -> None:
         """A selected item that is gone (an undo) hands its place to the next above that is there."""
