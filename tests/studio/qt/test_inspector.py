@@ -163,11 +163,11 @@ class TestTyping:
         qtbot.mouseClick(vignetting, Qt.MouseButton.LeftButton, pos=QPoint(8, vignetting.height() // 2))
         assert not session.project.scene.camera.lens.vignetting
         focus = field(inspector, *CAMERA, "lens", "focus_distance")
-        assert (focus.text(), focus.placeholderText()) == ("", "far away")
-        type_into(qtbot, focus, "800")
-        assert session.project.scene.camera.lens.focus_distance == pytest.approx(0.8)
+        type_into(qtbot, focus, "900")
+        assert session.project.scene.camera.lens.focus_distance == pytest.approx(0.9)
         qtbot.mouseClick(row(inspector, *CAMERA, "lens", "focus_distance").reset, Qt.MouseButton.LeftButton)
         assert session.project.scene.camera.lens.focus_distance is None
+        assert (focus.text(), focus.placeholderText()) == ("", "far away")
 
     def test_distortion_is_a_list_of_numbers(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
         session.select(CAMERA)
