@@ -19,7 +19,7 @@ def rendered():
     project = Project.load(template_folder("weld_seam") / "project.json")
     small = scaled(project, 0.1)
     world = build_world(small.scene, template_folder("weld_seam"))
-    settings = small.render.model_copy(update={"ambient_samples": 1})
+    settings = small.render.model_copy(update={"ambient_samples": 1, "transport": "interreflection"})
     frame = render_world(world, small.scene, settings=settings)
     return small, frame, develop_again(frame, development(small, project, 0.1))
 
@@ -27,7 +27,7 @@ def rendered():
 def test_every_view_of_a_render_has_a_picture(rendered):
     project, frame, images = rendered
     found = views(project.scene, frame)
-    assert [view.kind for view in found] == ["image", "laser", "ambient", "light", "depth"]
+    assert [view.kind for view in found] == ["image", "laser", "reflected", "ambient", "light", "depth"]
     for view in found:
         drawn = picture(view, project.scene, frame, images, bright=True)
         assert drawn is not None and drawn.shape == frame.shape and len(np.unique(drawn)) > 3
