@@ -56,15 +56,29 @@ def check_placement(world: World, scene: Scene, step: int = 0) -> None:
 
 def _object_around(world: World, point: np.ndarray) -> int | None:
     """The object whose closed surface encloses the point, by its winding number (Van Oosterom and Strackee 1983)."""
-    a, b, c = np.moveaxis(world.corners - point, 1, 0)
+    # only objects whose box holds the point can enclose it
+    boxed = [item for item in range(int(world.object_id[-1]) + 1) if _in_box(world, item, point)]
+    if not boxed:
+        return None
+    mine = np.isin(world.object_id, boxed)
+    a, b, c = np.moveaxis(world.vertices[world.triangles[mine]] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
     triple = np.einsum("ij,ij->i", a, np.cross(b, c))
     dots = np.einsum("ij,ij->i", a, b) * lc + np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb
     angle = 2.0 * np.arctan2(triple, la * lb * lc + dots)
-    winding = np.bincount(world.object_id, angle) / (4.0 * math.pi)
+    winding = np.bincount(world.object_id[mine], angle) / (4.0 * math.pi)
     # open surfaces give fractions; a closed one gives a whole number
     around = np.flatnonzero(np.abs(winding) > 0.9)
     return int(around[0]) if len(around) else None
+
+
+def _in_box(world: World, item: int, point: np.ndarray) -> bool:
+    used = world.triangles[world.object_id == item]
+    if len(used) == 0:
+        return False
+    # an object's vertices stand together
+    points = world.vertices[used.min() : used.max() + 1]
+    return bool(np.all(points.min(axis=0) <= point) and np.all(points.max(axis=0) >= point))
 
 
 def _in_view(world: World, scene: Scene, step: int) -> bool:
@@ -87,6 +101,8 @@ def _in_view(world: World, scene: Scene, step: int) -> bool:
     low, high = border.min(axis=0), border.max(axis=0)
     x, y, z = points[:, 0], points[:, 1], points[:, 2]
     outside = np.stack([z <= 0.0, x < low[0] * z, x > high[0] * z, y < low[1] * z, y > high[1] * z])
+    if not np.all(np.any(outside, axis=0)):
+        return True
     return bool(np.any(~np.any(np.all(outside[:, world.triangles], axis=2), axis=0)))
 
 

@@ -1,5 +1,7 @@
 """From radiance to digital numbers, after EMVA 1288; the last step of a frame, milliseconds, never a new render.
 
+    optics      each light group through defocus and the lens's point spread, each laser's through its speckle: all off
+                unless the sensor's switches say so
     signal      mu    = sum over light groups of radiance x response, x the pixel's own gain (PRNU)
     charge      e     ~ Poisson(mu + dark current x exposure)
     read-out    e    += the pixel's own offset (DSNU) + Gaussian read noise;  e <= full well
@@ -20,6 +22,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.blur import defocus, disc_diameter, point_spread
 from render.errors import InputError
 from render.frame import Frame
 from render.poisson import poisson
@@ -27,6 +30,7 @@ from render.random import normal
 from render.response import band_response, joules_per_radiance, laser_response, relative_illumination
 from render.scene import Scene
 from render.sensor import Sensor
+from render.speckle import Speckle, scintillate, speckle
 from render.threads import map_chunks
 
 Float = NDArray[np.float64]
@@ -70,11 +74,11 @@ def develop(
 ) -> Image:
     """The (h, w) image that the sensor takes of a frame; the same for any number of threads.
 
-    laser_power: W for each laser in place of the scene's. noise off: the mean, without PRNU and DSNU, but saturated and
-    quantised. Raises InputError: the frame is not of this scene, or a power cannot be had from it.
+    laser_power: W for each laser in place of the scene's. noise off: the mean, without PRNU, DSNU and speckle, but
+    saturated and quantised. Raises InputError: the frame is not of this scene, or a power cannot be had from it.
     Source: EMVA 1288 release 4, section 2 (linear model) and 4 (spatial non-uniformity).
     """
-    exposure = _Exposure(frame, scene, sensor, laser_power, threads)
+    exposure = _Exposure(frame, scene, sensor, laser_power, threads, seed if noise else None)
     height, width = exposure.shape
     top = float(2**sensor.bits - 1)
     gain = sensor.dn_per_electron
@@ -135,6 +139,7 @@ class _Exposure:
         sensor: Sensor,
         laser_power: Sequence[float] | None,
         threads: int | None,
+        seed: int | None = None,
     ) -> None:
         camera, lasers = scene.camera, scene.lasers
         self.shape = (camera.height, camera.width)
@@ -147,24 +152,62 @@ class _Exposure:
                 found, allowed = f"{image.shape[1]} x {image.shape[0]} px", f"{camera.width} x {camera.height} px"
                 raise InputError("the frame is not of this scene", where="frame", found=found, allowed=allowed)
         joule = joules_per_radiance(camera, sensor)
+        optics = _Optics(frame, scene, sensor, threads)
         scales = _power_scales(scene, laser_power)
         self.lasers = [
-            (np.ascontiguousarray(image, dtype=np.float32), scale * joule * laser_response(sensor, laser.wavelength_nm))
+            (optics(image), scale * joule * laser_response(sensor, laser.wavelength_nm))
             for image, laser, scale in zip(map(frame.laser, range(len(lasers))), lasers, scales, strict=True)
         ]
-        self.ambient = None if frame.ambient is None else np.ascontiguousarray(frame.ambient, dtype=np.float32)
+        self.ambient = None if frame.ambient is None else optics(frame.ambient)
+        self.speckles: list[Speckle | None] = [None] * len(lasers)
+        self.seed, self.step = seed, frame.step
+        if sensor.speckle != "off" and seed is not None:
+            pupil = (camera.working_f_number, camera.pixel_pitch, sensor.speckle == "depolarised")
+            self.speckles = [speckle(laser.wavelength_nm, *pupil) for laser in lasers]
         self.bands = joule * band_response(sensor)
         self.illumination = relative_illumination(camera, threads)
 
     def signal(self, start: int, stop: int) -> Float:
         """(stop - start, w) mean photo-electrons of rows start..stop."""
         mean = np.zeros((stop - start, self.shape[1]))
-        for image, response in self.lasers:
-            _add_laser(mean, image[start:stop], response, start)
+        for i, ((image, response), field) in enumerate(zip(self.lasers, self.speckles, strict=True)):
+            rows = image[start:stop]
+            if field is not None and self.seed is not None:
+                rows = scintillate(image, start, stop, field, self.seed, self.step, i)
+            _add_laser(mean, rows, response, start)
         if self.ambient is not None:
             _add_ambient(mean, self.ambient[start:stop], self.bands, start)
         mean *= self.illumination[start:stop]
         return mean
+
+
+class _Optics:
+    """The sensor's switches for lens blur and defocus, applied to one light group's image after the other."""
+
+    def __init__(self, frame: Frame, scene: Scene, sensor: Sensor, threads: int | None) -> None:
+        self.camera, self.sensor, self.threads = scene.camera, sensor, threads
+        self.diameter = None
+        if sensor.defocus:
+            if frame.truth is None:
+                cure = "render the frame with its truth, or switch defocus off"
+                raise InputError(
+                    "the frame does not hold the depth that defocus needs", where="sensor.defocus", cure=cure
+                )
+            self.diameter = disc_diameter(scene.camera, frame.truth.depth_z)
+
+    def __call__(self, image: Float32) -> Float32:
+        """(h, w) or (h, w, 3) radiance, as the lens throws it on the sensor."""
+        if image.ndim == 3 and not (self.sensor.defocus or self.sensor.blur_sigma or self.sensor.halo):
+            return np.ascontiguousarray(image, dtype=np.float32)
+        if image.ndim == 3:
+            return np.stack([self(image[..., channel]) for channel in range(3)], axis=2)
+        image = np.ascontiguousarray(image, dtype=np.float32)
+        if self.diameter is not None:
+            image = defocus(image, self.diameter, self.threads)
+        sigma, wide = self.sensor.blur_sigma / self.camera.pixel_pitch, self.sensor.halo_sigma / self.camera.pixel_pitch
+        if sigma > 0.0 or self.sensor.halo > 0.0:
+            image = point_spread(image, sigma, self.sensor.halo, wide)
+        return image
 
 
 def _power_scales(scene: Scene, laser_power: Sequence[float] | None) -> list[float]:

@@ -54,6 +54,30 @@ class Sensor(Model):
         None, unit="DN/e-", label="Gain", help="Empty: full well maps to the highest number.", gt=0, le=1e6
     )
     black_level: float = quantity(0.0, unit="DN", label="Black level", ge=0, le=65535)
+    speckle: Literal["off", "polarised", "depolarised"] = quantity(
+        "off",
+        label="Laser speckle",
+        help="Of a rough surface, by wavelength, f-number and pixel; depolarised on paint and paper, polarised on "
+        "metal. Takes about 10 ms for a line, 1 s where reflected light fills the image.",
+    )
+    blur_sigma: float = quantity(
+        0.0,
+        unit="m",
+        label="Lens blur",
+        help="Sigma of the lens's point spread on the sensor. Takes about 0.1 s for each light in focus.",
+        ge=0,
+        le=1e-3,
+    )
+    halo: UnitInterval = quantity(
+        0.0, label="Halo", help="Share of the light in a wide halo. Takes about 0.3 s a light."
+    )
+    halo_sigma: float = quantity(30e-6, unit="m", label="Halo width", help="Sigma on the sensor.", gt=0, le=1e-2)
+    defocus: bool = quantity(
+        False,
+        label="Defocus",
+        help="Blur by each pixel's depth, after focus distance and f-number; edges of depth are not mixed. "
+        "Takes about 0.1 s for a line, seconds where light fills an image far out of focus.",
+    )
 
     @model_validator(mode="after")
     def _curves_match_colour(self) -> Sensor:

@@ -75,11 +75,6 @@ class World:
             self.mask_shape,
         )
 
-    @cached_property
-    def corners(self) -> Float:
-        """(t, 3, 3) triangle corners, contiguous for the kernels."""
-        return np.ascontiguousarray(self.vertices[self.triangles])
-
 
 def build_world(scene: Scene, root: Path, step: int = 0) -> World:
     """Load the visible objects' meshes and place them for a step. Raises InputError for a bad mesh or texture."""

@@ -76,7 +76,7 @@ def independent_share(albedo, count=3_000_000):
     from render.pose import invert
 
     T_laser = invert(scene.T_world_laser(0))
-    corners = world.corners
+    corners = world.vertices[world.triangles]
     facets = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     facets /= np.linalg.norm(facets, axis=1, keepdims=True)
 
