@@ -93,7 +93,8 @@ def start(path: Path | None) -> MainWindow:
     window = MainWindow(session, preferences, autosave, making=splash.tell)
     catch_faults(window, session)
     window.show()
-    splash.finish(window)
+    splash.close()
+    splash.deleteLater()
     if path is not None:
         window.files.open(path, ask=False)
     elif not window.files.recover():

@@ -3,27 +3,36 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPen, QPixmap, QPolygonF
-from PySide6.QtWidgets import QApplication, QSplashScreen
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent, QPen, QPixmap, QPolygonF
+from PySide6.QtWidgets import QApplication, QWidget
 
 from studio.qt import theme
 
 WIDTH, HEIGHT = 460, 220
 
 
-class Splash(QSplashScreen):
-    """Shown until the window is."""
+class Splash(QWidget):
+    """Shown until the window is. Not a QSplashScreen, which may hold the start up for a second until it is exposed."""
 
     def __init__(self) -> None:
-        super().__init__(picture(QApplication.primaryScreen().devicePixelRatio()))
+        super().__init__(None, Qt.WindowType.SplashScreen | Qt.WindowType.FramelessWindowHint)
+        screen = QApplication.primaryScreen()
+        self.picture = picture(screen.devicePixelRatio())
+        self.text = ""
+        self.setFixedSize(WIDTH, HEIGHT)
+        self.move(screen.availableGeometry().center() - self.rect().center())
 
     def tell(self, what: str) -> None:
         """What is loading now."""
-        colour = QColor(theme.colours().muted)
-        self.showMessage(
-            f"  Loading: {what.lower()}", Qt.AlignmentFlag.AlignBottom | Qt.AlignmentFlag.AlignLeft, colour
-        )
+        self.text = f"Loading: {what.lower()}"
+        self.repaint()
         QApplication.processEvents()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self.picture)
+        painter.setPen(QColor(theme.colours().muted))
+        painter.drawText(self.rect().adjusted(28, 0, 0, -14), Qt.AlignmentFlag.AlignBottom, self.text)
 
 
 def picture(ratio: float) -> QPixmap:
