@@ -80,17 +80,21 @@ def shade_pixels(
         cosine = abs(facing) / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
         for band in range(3):
             shade[i, band] = cosine * rgb[band]
+        # more than a pixel can cover on the facet
+        reach = s * max(pixel[0], pixel[1]) * (1.0 + 1.0 / max(cosine, 1e-6))
         for k in range(beams.shape[0]):
             w, beam = T_laser_object[k], beams[k]
             z = w[2, 0] * p0 + w[2, 1] * p1 + w[2, 2] * p2 + w[2, 3]
             if z <= 1e-9:
                 continue
             x = w[0, 0] * p0 + w[0, 1] * p1 + w[0, 2] * p2 + w[0, 3]
+            sigma, slope = sheet_sigma(z, beam)
+            if abs(x) > SHEET_SIGMAS * sigma + 2.2 * reach:
+                continue
             y = w[1, 0] * p0 + w[1, 1] * p1 + w[1, 2] * p2 + w[1, 3]
             h = fan_density(y / z, beam)
             if h == 0.0:
                 continue
-            sigma, slope = sheet_sigma(z, beam)
             q = x / sigma
             # from one pixel to the next the point moves on the facet by s (e - (n e) / (n d) d)
             for axis in range(2):

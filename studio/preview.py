@@ -126,8 +126,8 @@ class Preview:
         with self._lock:
             if shape_key not in self._rays:
                 self._rays[shape_key] = (
-                    RayScene(world.vertices, world.triangles),
-                    block_boxes(*_arrays(world.surface)),
+                    RayScene(world.vertices, world.triangles, gently=True),
+                    block_boxes(world.vertices, world.triangles),
                 )
             rays, boxes = self._rays[shape_key]
         bounds = np.stack([world.vertices.min(axis=0), world.vertices.max(axis=0)])

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from render.shape import Sphere
-from studio.document import replaced
+from studio.document import replaced, value_at
 from studio.preview import Preview
 from studio.project import Project
+from studio.readouts import readouts
 
 PROJECT = Path(__file__).parents[2] / "assets/projects/sphere/project.json"
 BAR_MS = 33.0
@@ -42,10 +43,10 @@ def main() -> None:
     look = preview.look(project, root)
     triangles = sum(len(item.body.surface.triangles) for item in look.placed)
     print(f"{triangles} triangles in {len(look.placed)} objects, loaded in {time.perf_counter() - start:.2f} s")
-    look.lit_curve(0), look.fan(0), look.image()
+    readouts(look, 0), look.image()
     for what, path in DRAGGED.items():
-        before = np.array(_value(project, path))
-        seconds = np.empty((options.steps, 3))
+        before = np.array(value_at(project, path))
+        seconds = np.empty((options.steps, 4))
         for step in range(options.steps):
             moved = replaced(project, path, tuple((before + 1e-4 * step * np.array([1.0, 0.5, 0.2])).tolist()))
             times = [time.perf_counter()]
@@ -53,23 +54,18 @@ def main() -> None:
             for part in (look.lit_curve, look.fan):
                 part(0)
                 times.append(time.perf_counter())
+            readouts(look, 0)
+            times.append(time.perf_counter())
             image = look.image()
             times.append(time.perf_counter())
             seconds[step] = np.diff(times)
         total = 1e3 * np.append(seconds, seconds.sum(axis=1, keepdims=True), axis=1)
         median, slow = np.median(total, axis=0), np.percentile(total, 95, axis=0)
         print(
-            f"drag the {what:<7} curve {median[0]:5.1f}  fan {median[1]:5.1f}  picture {median[2]:5.1f} "
-            f"({image.camera.width} x {image.camera.height})  all {median[3]:5.1f} ms, 95 % {slow[3]:5.1f}   "
+            f"drag the {what:<7} curve {median[0]:5.1f}  fan {median[1]:4.1f}  read-outs {median[2]:4.1f}  picture {median[3]:5.1f} "
+            f"({image.camera.width} x {image.camera.height})  all {median[4]:5.1f} ms, 95 % {slow[4]:5.1f}   "
             f"bar {BAR_MS:.0f} ms   {len(look.lit_curve(0).index)} points"
         )
-
-
-def _value(project: Project, path: tuple[str | int, ...]) -> tuple[float, float, float]:
-    from studio.document import value_at
-
-    value: tuple[float, float, float] = value_at(project, path)
-    return value
 
 
 if __name__ == "__main__":
