@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numba
 import numpy as np
@@ -96,9 +97,12 @@ def develop(
         ]
     )
 
+    fixed = fixed_pattern(height, width, threads)
+
     def rows(start: int, stop: int) -> None:
         numbers = np.empty((stop - start, width), dtype=np.uint16)
-        _read_out(exposure.signal(start, stop), start, int(seed) % 2**63, frame.step, chain, noise, numbers)
+        light = exposure.signal(start, stop)
+        _read_out(light, fixed[start:stop], start, int(seed) % 2**63, frame.step, chain, noise, numbers)
         pixels[start:stop] = numbers
 
     map_chunks(rows, height, ROWS, threads)
@@ -248,11 +252,44 @@ def _add_ambient(mean: Float, radiance: Float32, response: Float, first_row: int
                 mean[i, j] += electrons
 
 
+@lru_cache(maxsize=2)
+def fixed_pattern(height: int, width: int, threads: int | None = None) -> Float32:
+    """(h, w, 2) standard normal numbers that belong to the sensor's pixels: for their gain and their offset."""
+    pattern = np.empty((height, width, 2), dtype=np.float32)
+
+    def rows(start: int, stop: int) -> None:
+        _fill_pattern(pattern[start:stop], start)
+
+    map_chunks(rows, height, ROWS, threads)
+    pattern.flags.writeable = False
+    return pattern
+
+
+@numba.njit(nogil=True, cache=True)
+def _fill_pattern(pattern: Float32, first_row: int) -> None:
+    width = pattern.shape[1]
+    for i in range(pattern.shape[0]):
+        for j in range(width):
+            index = (first_row + i) * width + j
+            pattern[i, j, 0] = normal(PATTERN_SEED, index, 0, _PRNU)
+            pattern[i, j, 1] = normal(PATTERN_SEED, index, 0, _DSNU)
+
+
 @numba.njit(nogil=True, cache=True)
 def _read_out(
-    mean: Float, first_row: int, seed: int, step: int, chain: Float, noise: bool, numbers: NDArray[np.uint16]
+    mean: Float,
+    fixed: Float32,
+    first_row: int,
+    seed: int,
+    step: int,
+    chain: Float,
+    noise: bool,
+    numbers: NDArray[np.uint16],
 ) -> None:
-    """(n, w) mean photo-electrons -> (n, w) DN: the chain on top of this file, pixel by pixel."""
+    """(n, w) mean photo-electrons -> (n, w) DN: the chain on top of this file, pixel by pixel.
+
+    fixed (n, w, 2): each pixel's own gain and offset, in standard deviations.
+    """
     dark, prnu, dsnu, read, full_well, gain, black, top = chain
     width = mean.shape[1]
     for i in range(mean.shape[0]):
@@ -262,11 +299,9 @@ def _read_out(
             if not noise:
                 charge += dark
             else:
-                if prnu > 0.0 and charge > 0.0:
-                    charge *= max(0.0, 1.0 + prnu * normal(PATTERN_SEED, index, 0, _PRNU))
+                charge *= max(0.0, 1.0 + prnu * fixed[i, j, 0])
                 charge = poisson(charge + dark, seed, index, step, _SHOT)
-                if dsnu > 0.0:
-                    charge += dsnu * normal(PATTERN_SEED, index, 0, _DSNU)
+                charge += dsnu * fixed[i, j, 1]
                 if read > 0.0:
                     charge += read * normal(seed, index, step, _READ)
             number = math.floor(gain * min(charge, full_well) + black + 0.5)
