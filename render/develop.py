@@ -232,7 +232,7 @@ def _power_scales(scene: Scene, laser_power: Sequence[float] | None) -> list[flo
     return scales
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _add_laser(mean: Float, radiance: Float32, response: Float, first_row: int) -> None:
     """Add one laser's electrons to (n, w); response (2, 2) by parity of row and column."""
     for i in range(mean.shape[0]):
@@ -241,7 +241,7 @@ def _add_laser(mean: Float, radiance: Float32, response: Float, first_row: int) 
                 mean[i, j] += response[(first_row + i) & 1, j & 1] * radiance[i, j]
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _add_ambient(mean: Float, radiance: Float32, response: Float, first_row: int) -> None:
     """Add the ambient bands' electrons to (n, w); response (2, 2, 3)."""
     for i in range(mean.shape[0]):
@@ -265,7 +265,7 @@ def fixed_pattern(height: int, width: int, threads: int | None = None) -> Float3
     return pattern
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _fill_pattern(pattern: Float32, first_row: int) -> None:
     width = pattern.shape[1]
     for i in range(pattern.shape[0]):
@@ -275,7 +275,7 @@ def _fill_pattern(pattern: Float32, first_row: int) -> None:
             pattern[i, j, 1] = normal(PATTERN_SEED, index, 0, _DSNU)
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _read_out(
     mean: Float,
     fixed: Float32,

@@ -18,7 +18,7 @@ LARGEST_MEAN = 1e12
 """Means are cut here: a thousand times the largest full well, and still exact in float64."""
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def poisson(mean: float, seed: int, index: int, sample: int, dimension: int) -> float:
     """A count from the Poisson distribution. Takes the numbers of `dimension` and, by rejection, of those above it.
 
@@ -34,7 +34,7 @@ def poisson(mean: float, seed: int, index: int, sample: int, dimension: int) -> 
     return _by_rejection(min(mean, LARGEST_MEAN), seed, index, sample, dimension)
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _by_inversion(mean: float, u: float) -> float:
     """The smallest k whose distribution function exceeds u in [0, 1)."""
     term = math.exp(-mean)
@@ -46,7 +46,7 @@ def _by_inversion(mean: float, u: float) -> float:
     return k
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _by_rejection(mean: float, seed: int, index: int, sample: int, dimension: int) -> float:
     """Hoermann's PTRS, steps 0 to 3; two numbers a trial, about 1.1 trials."""
     b = 0.931 + 2.53 * math.sqrt(mean)
