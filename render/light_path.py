@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from render.bsdf import evaluate, sample
 from render.camera import Camera
 from render.distortion import distort, fold_radius_at, tilt_matrix
-from render.embree import CHUNK
 from render.emission import SEQUENCE, Paths, emit, fan_span
 from render.laser import LineLaser
 from render.random import uniform
@@ -33,6 +32,8 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 
 PASS_PATHS = 1 << 18
+PATHS_A_CHUNK = 1 << 15
+"""Short enough to be cancelled within a tenth of a second."""
 FEWEST_PASSES = 4
 MOST_BOUNCES = 64
 ROULETTE_AFTER = 3
@@ -290,10 +291,10 @@ class _Task:
         weights = np.array(reflectance_weights(self.laser.wavelength_nm))
         seed = self.seed * 1_000_003 + number
         start = np.array([uniform(seed, 0, dimension, 99) for dimension in range(5)])
-        for first in range(0, count, CHUNK):
+        for first in range(0, count, PATHS_A_CHUNK):
             if cancelled is not None and cancelled():
                 raise Cancelled
-            paths = _empty(min(CHUNK, count - first))
+            paths = _empty(min(PATHS_A_CHUNK, count - first))
             emit(first, seed, start, low, high, reach, self.laser.packed(), self.T_world_laser, paths)
             depth = 0
             while len(paths.number):
