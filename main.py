@@ -209,6 +209,31 @@ def reconstruct(source: Path, **options: Any) -> None:
 
 
 @cli.command()
+@click.argument("images", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--method", default="likelihood", show_default=True, help="How; auto picks, an unknown name lists all.")
+@click.option(
+    "--laser", type=click.Choice(["auto", "mono", "red", "green", "blue"]), default="auto", help="Its colour."
+)
+@click.option("--axis", type=click.Choice(["rows", "columns"]), default="rows", show_default=True, help="Scan lines.")
+@click.option("--off", type=click.Path(path_type=Path), help="Image with the laser off, to subtract.")
+@click.option("--pattern", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"]), help="Bayer pattern of raw images.")
+@click.option("--peaks", type=int, default=1, show_default=True, help="Peaks kept on each scan line.")
+@click.option(
+    "--select", type=click.Choice(["strongest", "first", "last", "continuous"]), default="strongest", help="Which peak."
+)
+@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside each image].")
+@THREADS
+@common
+def extract(images: tuple[Path, ...], **options: Any) -> None:
+    """The laser line in image files of a real scanner (PNG, TIFF, EXR, JPEG, BMP), as a table for each."""
+    _require_system()
+    from studio.commands import extract_images
+
+    if extract_images(images, **options):
+        click.get_current_context().exit(BAD_INPUT)
+
+
+@cli.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @THREADS
 @common

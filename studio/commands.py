@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -140,6 +141,74 @@ def reconstruct_source(
         with stage_progress(quiet) as progress:
             result = reconstruct_image(source, chosen, laser, folder, Clock(progress, never), threads)
     _print_reconstruction(result, as_json)
+
+
+def extract_images(
+    images: tuple[Path, ...],
+    *,
+    method: str,
+    laser: str,
+    axis: str,
+    off: Path | None,
+    pattern: str | None,
+    peaks: int,
+    select: str,
+    out: Path | None,
+    threads: int | None,
+    quiet: bool,
+    as_json: bool,
+) -> int:
+    """`extract`: a table for each image. A bad image is told and left out; returns how many there were."""
+    from analysis.line.extract import settings_of
+    from studio.photographs import extract_photograph, load_photograph, summary, table_path, write_line
+
+    settings = settings_of(None, method=method, channel=laser, axis=axis, pattern=pattern, peaks=peaks, select=select)
+    dark = None if off is None else load_photograph(off)
+    if out is not None:
+        check_output(out)
+    done: list[dict[str, Any]] = []
+    failed: list[dict[str, Any]] = []
+    taken: set[Path] = set()
+    with stage_progress(quiet or as_json or len(images) < 2) as progress:
+        for number, path in enumerate(images):
+            progress("images", number / len(images))
+            try:
+                line = extract_photograph(path, settings, dark, threads)
+                table = table_path(path, out, taken)
+                write_line(table, line)
+                done.append(summary(path, line, table))
+            except InputError as error:
+                failed.append({"image": str(path), "message": str(error)})
+        progress("images", 1.0)
+    if as_json:
+        print_json({"ok": not failed, "images": done, "errors": failed})
+    else:
+        _print_lines(done)
+    for failure in failed:
+        print(f"error: {failure['message']}", file=sys.stderr)
+    return len(failed)
+
+
+def _print_lines(done: list[dict[str, Any]]) -> None:
+    def number(value: float | None, form: str) -> str:
+        return "-" if value is None else form.format(value)
+
+    header = ("Line", "found", "sigma_u px", "width px", "peak e-", "method")
+    rows = [
+        (
+            Path(row["image"]).name,
+            f"{row['found']} of {row['scan_lines']} {row['axis']}",
+            number(row["sigma_u_px"], "{:.4f}"),
+            number(row["width_px"], "{:.2f}"),
+            number(row["amplitude_e"], "{:.0f}"),
+            row["note"] or row["method"],
+        )
+        for row in done
+    ]
+    if rows:
+        print_table("Laser line", rows, header=header)
+    for row in done:
+        print(f"wrote {row['file']}")
 
 
 def rebuild_report(folder: Path, *, threads: int | None, quiet: bool, as_json: bool) -> None:

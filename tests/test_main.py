@@ -43,7 +43,7 @@ class TestHelp:
             assert process.returncode == 0 and "reconstruct" in text
         assert min(seconds) < HELP_SECONDS
 
-    @pytest.mark.parametrize("command", ["run", "render", "reconstruct", "report", "inspect", "new"])
+    @pytest.mark.parametrize("command", ["run", "render", "reconstruct", "extract", "report", "inspect", "new"])
     def test_every_command_explains_itself(self, command: str) -> None:
         done = call(command, "--help")
         assert done.exit_code == 0 and "--json" in done.stdout

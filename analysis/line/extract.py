@@ -45,7 +45,7 @@ def extract(
     Raises InputError: an image of the wrong type, shape or size, without a finite pixel, a channel it does not have,
     settings out of range.
     """
-    chosen = _settings(settings, method=method, axis=axis, peaks=peaks)
+    chosen = settings_of(settings, method=method, axis=axis, peaks=peaks)
     array = check_image(image)
     if noise is None:
         noise = estimate_noise(array, chosen)
@@ -76,7 +76,8 @@ def select(candidates: Line, how: Select, volume: WorkingVolume | None = None) -
     return pick(candidates, np.where(usable.any(axis=1), rank, -1))
 
 
-def _settings(settings: ExtractionSettings | None, **given: Any) -> ExtractionSettings:
+def settings_of(settings: ExtractionSettings | None, **given: Any) -> ExtractionSettings:
+    """Settings with some values replaced where they are not None. InputError names a value that is not allowed."""
     values = {} if settings is None else settings.model_dump()
     values.update({name: value for name, value in given.items() if value is not None})
     try:
