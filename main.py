@@ -147,7 +147,7 @@ def cli(context: click.Context) -> None:
 @PROJECT
 @common
 @click.pass_context
-def open_project(context: click.Context, project: Path | None, **_: Any) -> None:
+def open_project(context: click.Context, /, project: Path | None, **_: Any) -> None:
     """Open the studio on a project, as `main.py PROJECT` does."""
     from studio.qt.app import open_studio
 

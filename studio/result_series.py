@@ -97,7 +97,9 @@ def symmetric_limit(error: Float, share: float = 98.0) -> float:
     if not top > 0.0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(top))
-    return float(next(step * power for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0) if step * power >= top * (1 - 1e-9)))
+    return float(
+        next(step * power for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0) if step * power >= top * (1 - 1e-9))
+    )
 
 
 def histogram(error: Float, limit: float) -> tuple[Float, Float]:

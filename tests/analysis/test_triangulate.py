@@ -1,4 +1,4 @@
-"""Triangulation against closed forms (laser 0.2 m beside the camera, turned in by 13 degrees) and finite differences."""
+"""Triangulation against closed forms (laser 0.2 m beside the camera, turned by 13 degrees) and finite differences."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """One 2448 x 2048 frame of the weld joint, stage by stage, beside the bars of the founding issue.
 
-Prints seconds (the least of several runs: these machines are shared), the speed-up of two threads over one, the share of
+Prints seconds (the least of several runs: machines are shared), the speed-up of two threads over one, the share of
 time inside embree, and the peak memory. Nothing here passes or fails.
 """
 
@@ -10,6 +10,7 @@ import argparse
 import resource
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +51,8 @@ def main() -> None:
 
     for target in (0.01, 0.001):
         image = direct_image(*parts, target=target)
-        one = best(lambda: direct_image(*parts, target=target, threads=1))
-        many = best(lambda: direct_image(*parts, target=target, threads=threads))
+        one = best(partial(direct_image, *parts, target=target, threads=1))
+        many = best(partial(direct_image, *parts, target=target, threads=threads))
         row(
             f"laser light to {target:.1%}",
             many,
