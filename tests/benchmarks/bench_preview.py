@@ -63,7 +63,8 @@ def main() -> None:
         median, slow = np.median(total, axis=0), np.percentile(total, 95, axis=0)
         print(
             f"drag the {what:<7} curve {median[0]:5.1f}  fan {median[1]:4.1f}  read-outs {median[2]:4.1f}  "
-            f"picture {median[3]:5.1f} ({image.camera.width} x {image.camera.height})  all {median[4]:5.1f} ms, 95 % {slow[4]:5.1f}   "
+            f"picture {median[3]:5.1f} ({image.camera.width} x {image.camera.height})  "
+            f"all {median[4]:5.1f} ms, 95 % {slow[4]:5.1f}   "
             f"bar {BAR_MS:.0f} ms   {len(look.lit_curve(0).index)} points"
         )
 
