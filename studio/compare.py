@@ -14,8 +14,8 @@ from render.frame import Frame
 from render.tone import Picture, colour_table, grey, mapped, white_level
 
 Float32 = NDArray[np.float32]
-Quantity = Literal["image", "laser", "ambient"]
-UNITS = {"image": "e-", "laser": "W/(m² sr)", "ambient": "W/(m² sr)"}
+Quantity = Literal["image", "laser", "reflected", "ambient"]
+UNITS = {"image": "e-", "laser": "W/(m² sr)", "reflected": "W/(m² sr)", "ambient": "W/(m² sr)"}
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ def quantities(frame: Frame) -> list[Quantity]:
     found: list[Quantity] = ["image"]
     if frame.laser_direct:
         found.append("laser")
+    if frame.laser_indirect:
+        found.append("reflected")
     if frame.ambient is not None:
         found.append("ambient")
     return found
@@ -81,6 +83,8 @@ def _array(quantity: Quantity, frame: Frame, images: list[Image]) -> Float32 | N
         return sum_of([electrons(image) for image in images])
     if quantity == "laser":
         return sum_of([frame.laser(i) for i in range(len(frame.laser_direct))])
+    if quantity == "reflected":
+        return sum_of(list(frame.laser_indirect))
     return None if frame.ambient is None else frame.ambient.mean(axis=2)
 
 

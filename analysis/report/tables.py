@@ -23,6 +23,7 @@ from analysis.report.units import (
     seconds,
 )
 from render.laser import Divergence
+from render.material import Blend, Coated, Conductor, FromMesh, Lambertian, Material, Texture
 from render.shape import MeshFile
 
 MOST_STEPS = 24
@@ -123,7 +124,7 @@ def scene_tables(report: ReportInput) -> Tables:
     for i, item in enumerate(scene.visible_objects):
         what = item.shape.path if isinstance(item.shape, MeshFile) else item.shape.kind.replace("_", " ")
         number = f", {count(float(triangles[i]))} triangles"
-        things[item.name] = f"{what}{number}, {item.material.kind}"
+        things[item.name] = f"{what}{number}, {_material(item.material)}"
     tables["Objects"] = things or {"Objects": "none"}
     bands = ", ".join(f"{value:g}" for value in scene.environment.radiance)
     tables["Light and motion"] = {
@@ -144,6 +145,27 @@ def scene_tables(report: ReportInput) -> Tables:
             else f"{sensor.band_pass.centre_nm:g} nm, {sensor.band_pass.width_nm:g} nm wide",
         }
     return tables | report.settings
+
+
+def _material(material: Material) -> str:
+    """In words, with the numbers that decide how it shines."""
+    if isinstance(material, Blend):
+        return f"{_material(material.base)}; where {material.mask.path} is white, {_material(material.over)}"
+    if isinstance(material, Conductor):
+        across = "" if material.roughness_across is None else f" along u, {material.roughness_across:g} along v"
+        return f"{material.metal.replace('_', ' ')}, roughness {material.roughness:g}{across}"
+    if isinstance(material, Coated):
+        return f"{_albedo(material)} under a coat of index {material.index:g}, roughness {material.roughness:g}"
+    return f"diffuse, {_albedo(material)}"
+
+
+def _albedo(material: Lambertian | Coated) -> str:
+    if isinstance(material.albedo, Texture):
+        return f"albedo of {material.albedo.path}"
+    if isinstance(material.albedo, FromMesh):
+        return "albedo of the mesh file"
+    bands = material.albedo if isinstance(material.albedo, tuple) else (material.albedo,)
+    return "albedo " + ", ".join(f"{value:g}" for value in bands)
 
 
 def _motion(report: ReportInput) -> str:

@@ -18,7 +18,12 @@ from studio.qt.image_item import PictureItem, PictureView
 from studio.qt.jobs import JobRunner
 from studio.qt.session import Render
 
-LABELS: dict[Quantity, str] = {"image": "Image", "laser": "Laser light", "ambient": "Ambient light"}
+LABELS: dict[Quantity, str] = {
+    "image": "Image",
+    "laser": "Laser light",
+    "reflected": "Laser light, reflected on",
+    "ambient": "Ambient light",
+}
 WIPE, DIFFERENCE = "Wipe", "Difference"
 Drawn = tuple[Comparison, list[Picture], list[Picture], list[Picture], float]
 

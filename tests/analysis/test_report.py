@@ -20,12 +20,14 @@ from analysis.report.error_figures import nice_limit
 from analysis.report.line_figures import block_maximum, places
 from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
 from analysis.report.summary import chosen, headline, remarks, total
+from analysis.report.tables import scene_tables
 from analysis.report.units import digits, micrometres
 from analysis.report.write import PLAIN_NOTE, render_page, write_report
 from analysis.triangulate import triangulate
 from render.camera import Camera
 from render.frame import LaserCurve
 from render.laser import LineLaser
+from render.material import Blend, Coated, Conductor, Lambertian, Texture
 from render.motion import LinearStage
 from render.pose import Pose
 from render.scene import Rig, Scene, SceneObject
@@ -293,3 +295,26 @@ def test_colour_limits_are_round_and_hold_nearly_all_errors():
     assert limit == pytest.approx(1e-4)
     assert nice_limit(np.array([np.nan])) == 1e-6
     assert nice_limit(np.array([1.9e-5])) == pytest.approx(2e-5)
+
+
+@pytest.mark.parametrize(
+    ("material", "told"),
+    [
+        (Lambertian(albedo=(0.1, 0.2, 0.3)), "diffuse, albedo 0.1, 0.2, 0.3"),
+        (
+            Conductor(metal="stainless_steel", roughness_across=0.4),
+            "stainless steel, roughness 0.15 along u, 0.4 along v",
+        ),
+        (Coated(index=1.4), "albedo 0.5 under a coat of index 1.4, roughness 0.1"),
+        (
+            Blend(base=Lambertian(albedo=Texture(path="rust.png")), mask=Texture(path="ground.png")),
+            "diffuse, albedo of rust.png; where ground.png is white, steel, roughness 0.15",
+        ),
+    ],
+)
+def test_materials_are_told_with_what_decides_how_they_shine(material, told):
+    report = make_report()
+    (wall,) = report.scene.objects
+    shown = report.scene.model_copy(update={"objects": (wall.model_copy(update={"material": material}),)})
+    (line,) = scene_tables(dataclasses.replace(report, scene=shown))["Objects"].values()
+    assert line == f"plane, 2 triangles, {told}"
