@@ -162,15 +162,15 @@ def _saturation(r: Readouts) -> Row:
         return Row("saturated", "Saturated", NOTHING, "", "", help)
     level: Level = "error" if r.saturated > 0.2 else "warning" if r.saturated > 0.01 else ""
     full = r.peak_electrons.high / r.full_well
-    return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"peak {full:.0%} of full well", level, help)
+    return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"{full:.0%} of full well", level, help)
 
 
 def _focus(r: Readouts) -> Row:
-    far = "∞" if math.isinf(r.sharp_farthest) else f"{_digits(1e3 * r.sharp_farthest)} mm"
+    far = "∞" if math.isinf(r.sharp_farthest) else _digits(1e3 * r.sharp_farthest)
     help = (
         f"Diameter of the blur disc along the line (thin lens). At most {SHARP_PX:g} px, which counts as sharp, from "
-        f"{_digits(1e3 * r.sharp_nearest)} mm to {far}. Set the focus distance to that of the line, or close the "
-        "aperture. Renders are sharp everywhere."
+        f"{_digits(1e3 * r.sharp_nearest)} to {far} mm. Set the focus distance to that of the line, or close the "
+        "aperture. Images show it where the sensor's defocus is switched on."
     )
     note = f"sharp {_digits(1e3 * r.sharp_nearest)} to {far}"
     if r.blur_px is None:
@@ -183,11 +183,13 @@ def _focus(r: Readouts) -> Row:
 def _sigma(r: Readouts) -> Row:
     help = (
         "Expected standard deviation of depth for the best possible extraction: Cramer-Rao bound of photon and read "
-        "noise, and speckle (laser light on a rough surface, fully developed). Renders have no speckle."
+        "noise, and speckle (laser light on a rough surface, fully developed). Images show speckle where the sensor's is switched on."
     )
     if r.photon_sigma is None or r.speckle_sigma is None or r.depth_sigma is None:
         return Row("sigma", "Depth noise, sigma", NOTHING, "", "", help)
-    note = f"photons {_micrometres(r.photon_sigma)}, speckle {_micrometres(r.speckle_sigma)}"
+    photon, speckle = _micrometres(r.photon_sigma), _micrometres(r.speckle_sigma)
+    help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
+    note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
     return Row("sigma", "Depth noise, sigma", f"{_micrometres(r.depth_sigma)} µm", note, "", help)
 
 

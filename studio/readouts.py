@@ -65,7 +65,7 @@ class Readouts:
     photon_sigma: float | None = None
     """Expected standard deviation of depth_z from photon and read noise (Cramer-Rao bound), median."""
     speckle_sigma: float | None = None
-    """The same from speckle, fully developed and polarised."""
+    """The same from fully developed speckle, whether or not the sensor shows it."""
 
     @property
     def depth_sigma(self) -> float | None:
@@ -109,6 +109,8 @@ def readouts(look: Look, laser: int) -> Readouts:
     amplitude = estimates.line_electrons(camera, source, sensor, lit, pixels)
     peak = amplitude * estimates.pixel_share(curve.position, width) + ambient
     bound = estimates.centre_bound_px(amplitude, width, ambient, estimates.read_variance(sensor))
+    # two independent patterns, of which a depolarising surface makes the sum, vary less by the root of two
+    contrast = math.sqrt(0.5) if sensor.speckle == "depolarised" else 1.0
     return replace(
         known,
         triangulation_angle=_range(estimates.triangulation_angles(curve.point, T_camera_laser[:3, 3])),
@@ -121,7 +123,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         ambient_electrons=float(np.median(ambient)),
         blur_px=_range(estimates.blur_px(camera, curve.depth_z)),
         photon_sigma=_median(bound * depth),
-        speckle_sigma=_median(estimates.speckle_px(camera, source.wavelength_nm, width) * depth),
+        speckle_sigma=_median(contrast * estimates.speckle_px(camera, source.wavelength_nm, width) * depth),
     )
 
 

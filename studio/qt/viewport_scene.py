@@ -48,6 +48,7 @@ class Lines:
         self.look.SetLineWidth(width)
         self.look.SetOpacity(opacity)
         self.look.SetLighting(lit)
+        self.look.SetAmbient(0.35)
         if opacity < 1.0:
             self.actor.ForceTranslucentOn()
 
@@ -210,8 +211,9 @@ class ViewportScene:
         for i, actors in enumerate(self._lasers):
             own = path == (*LASERS, i)
             actors.body.actor.SetVisibility(not own)
-            actors.sheet.actor.SetVisibility(self.shown["sheets"] and not own)
-            actors.volume.actor.SetVisibility(self.shown["volume"] and not own)
+            # from the camera, sheets would veil what it sees
+            actors.sheet.actor.SetVisibility(self.shown["sheets"] and not own and not camera)
+            actors.volume.actor.SetVisibility(self.shown["volume"] and not own and not camera)
 
     def _draw_meshes(self, look: Look) -> None:
         seen: dict[int, int] = {}
