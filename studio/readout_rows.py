@@ -183,7 +183,8 @@ def _focus(r: Readouts) -> Row:
 def _sigma(r: Readouts) -> Row:
     help = (
         "Expected standard deviation of depth for the best possible extraction: Cramer-Rao bound of photon and read "
-        "noise, and speckle (laser light on a rough surface, fully developed). Images show speckle where the sensor's is switched on."
+        "noise, and speckle (laser light on a rough surface, fully developed). Images show "
+        "speckle where the sensor's is switched on."
     )
     if r.photon_sigma is None or r.speckle_sigma is None or r.depth_sigma is None:
         return Row("sigma", "Depth noise, sigma", NOTHING, "", "", help)
