@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 SAMPLE = "weld_seam"
 BAD_INPUT = 2
 FIRST_LOOK_MS = 500
+FIRST_SELECTION = ("scene", "rig", "lasers", 0)
+"""So that the first screen shows handles to drag and a form to type into."""
 
 
 def why_not() -> str | None:
@@ -92,6 +94,7 @@ def start(path: Path | None) -> MainWindow:
     session = Session(template(SAMPLE, autosave))
     window = MainWindow(session, preferences, autosave, making=splash.tell)
     catch_faults(window, session)
+    session.select(FIRST_SELECTION)
     window.show()
     splash.close()
     splash.deleteLater()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Qt
-from PySide6.QtGui import QCloseEvent, QShowEvent
+from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QSizePolicy,
     QSplitter,
     QToolButton,
     QVBoxLayout,
@@ -35,6 +36,10 @@ from studio.views import at_pixel, live_picture, picture, views
 DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 """Of work for a live picture: while something is dragged, and when it has come to rest."""
 HOVER_HZ = 30
+LOW = 400
+"""px of height, for picture and profile together."""
+NARROW = 760
+"""px of width, for the names of the lines."""
 LIVE = "Live estimate"
 
 
@@ -73,6 +78,12 @@ class CameraView(QWidget):
         self.runner.close()
         super().closeEvent(event)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        # a low panel shows the picture alone rather than two strips
+        self.profile.setVisible(self.height() >= LOW)
+        self.overlay.show_names(self.width() >= NARROW)
+
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.refresh()
@@ -110,8 +121,13 @@ class CameraView(QWidget):
         bar.addWidget(self.choice)
         bar.addWidget(self.bright)
         bar.addSpacing(8)
-        bar.addLayout(self.overlay.bar)
-        bar.addStretch(1)
+        lines = QWidget()
+        lines.setLayout(self.overlay.bar)
+        self.overlay.bar.setContentsMargins(0, 0, 0, 0)
+        self.overlay.bar.addStretch(1)
+        # many methods must not make the panel, and so the window, wider
+        lines.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        bar.addWidget(lines, 1)
         for text, tip, action in (
             ("Fit", "The whole image (F)", self.view.fit),
             ("1:1", "One screen pixel a pixel", self.view.one_to_one),

@@ -36,6 +36,7 @@ class LineOverlay:
 
     def __init__(self, box: pg.ViewBox) -> None:
         self.box = box
+        self._named = True
         self.bar = QHBoxLayout()
         self.bar.setSpacing(8)
         self.truth = self._item(TRUTH, 2.0, 10, 13)
@@ -78,6 +79,12 @@ class LineOverlay:
         self._switch()
         self._zoomed()
 
+    def show_names(self, on: bool) -> None:
+        """The boxes with their names, or with their colours alone."""
+        self._named = on
+        for box in (self.truth_box, *self.method_boxes.values()):
+            box.setText(str(box.property("name")) if on else "")
+
     def show_hover(self, index: int | None, axis: str) -> None:
         """Mark a scan line; None: none."""
         self.hover.setVisible(index is not None)
@@ -94,12 +101,13 @@ class LineOverlay:
         return item
 
     def _box(self, text: str, colour: str, tip: str, on: bool) -> QCheckBox:
-        box = QCheckBox(text)
+        box = QCheckBox(text if self._named else "")
+        box.setProperty("name", text)
         box.setIcon(swatch(colour))
         box.setToolTip(tip)
         box.setChecked(on)
         box.toggled.connect(lambda checked: self._switch())
-        self.bar.addWidget(box)
+        self.bar.insertWidget(self.bar.count() - (self.bar.count() > 1), box)
         return box
 
     def _switch(self) -> None:

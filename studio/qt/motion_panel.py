@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QPushButton,
+    QSizePolicy,
     QSlider,
     QStackedLayout,
     QToolButton,
@@ -52,6 +53,7 @@ class MotionPanel(QWidget):
         self.slider.valueChanged.connect(session.look_at_step)
         self.play = self._button("play", "Play the motion", self.toggle_play)
         self.told = QLabel()
+        self.told.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.scale = QComboBox()
         self.scale.addItems(list(SCALES))
         self.scale.setCurrentIndex(1)
@@ -200,8 +202,7 @@ class MotionPanel(QWidget):
         top.addWidget(self._button("next", "Step on", lambda: look(self.session.step + 1)))
         top.addWidget(self._button("last", "Last step", lambda: look(self.slider.maximum())))
         top.addWidget(self.slider, 1)
-        bottom.addWidget(self.told)
-        bottom.addStretch(1)
+        bottom.addWidget(self.told, 1)
         for widget in (self.open, self.scale, self.run):
             bottom.addWidget(widget)
         inside.addLayout(top)

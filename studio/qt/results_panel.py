@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QHeaderView,
     QLabel,
+    QSizePolicy,
     QSplitter,
     QStackedLayout,
     QTableWidget,
@@ -56,6 +57,7 @@ class ResultsPanel(QWidget):
         self.switches.setSpacing(2)
         self.reading = QLabel()
         self.reading.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.reading.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.rows, self.profile, self.histogram = RowPlots(), ProfilePlot(), ErrorHistogram()
         self.table = _measures_table()
         self._lay_out()

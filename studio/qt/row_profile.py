@@ -80,6 +80,7 @@ class RowProfile(QWidget):
         self.follow.setToolTip("Keep the line in the middle; off: keep what is zoomed to.")
         self.follow.setChecked(True)
         self.text = QLabel()
+        self.text.setMinimumWidth(1)
         self.text.setObjectName("muted")
         bar = QHBoxLayout()
         bar.setContentsMargins(6, 2, 6, 0)

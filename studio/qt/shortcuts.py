@@ -20,7 +20,7 @@ MOUSE = (
     ("Hover", "the same scan line in every view"),
     ("Drag on a number", "change it"),
 )
-COLUMNS = 3
+COLUMNS = (("File", "Render"), ("Edit", "Scene", "Help"), ("View", "Measure"), ("Mouse",))
 
 
 class CheatSheet(QDialog):
@@ -47,13 +47,10 @@ def page() -> str:
             text = command.text.replace("&", "").rstrip("…")
             groups.setdefault(command.menu.split("/")[0], []).append((keys, text))
     groups["Mouse"] = list(MOUSE)
-    columns: list[list[str]] = [[] for _ in range(COLUMNS)]
-    heights = [0] * COLUMNS
-    for name, rows in groups.items():
-        at = heights.index(min(heights))
-        columns[at].append(_group(name, rows))
-        heights[at] += len(rows) + 3
-    cells = "".join(f"<td style='padding-right: 28px'>{''.join(column)}</td>" for column in columns)
+    cells = "".join(
+        f"<td style='padding-right: 28px'>{''.join(_group(name, groups[name]) for name in column)}</td>"
+        for column in COLUMNS
+    )
     return f"<table><tr>{cells}</tr></table>"
 
 

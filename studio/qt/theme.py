@@ -151,6 +151,8 @@ def style_sheet(c: Colours) -> str:
         background: {c.raised}; border: 1px solid {c.line}; }}
     QToolButton#workspace:hover {{ background: {mixed(c.accent, c.raised, 0.15)}; }}
     QToolButton#workspace:checked {{ background: {c.accent}; color: {c.on_accent}; border-color: {c.accent}; }}
+    QToolButton[popupMode="2"] {{ padding-right: 17px; }}
+    QToolButton::menu-indicator {{ subcontrol-origin: padding; subcontrol-position: center right; right: 3px; }}
     QMenuBar {{ background: {c.window}; }}
     QMenuBar::item {{ padding: 4px 9px; background: transparent; border-radius: 4px; }}
     QMenuBar::item:selected {{ background: {mixed(c.text, c.window, 0.10)}; }}

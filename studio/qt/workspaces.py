@@ -9,6 +9,8 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow
 
 Area = Qt.DockWidgetArea
 LEFT, RIGHT, BOTTOM = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
+WIDE = ("motion", "log")
+"""Panels of no workspace that share a place below when they are called for."""
 VERSION = 1
 """Of the arrangement; a remembered one of another version is dropped."""
 
@@ -56,7 +58,7 @@ WORKSPACES = (
         False,
         (
             Column(LEFT, 0.74, (("camera", 1.0),)),
-            Column(RIGHT, 0.26, (("render", 0.5), ("develop", 0.5))),
+            Column(RIGHT, 0.26, (("render", 0.6), ("develop", 0.4))),
         ),
         True,
     ),
@@ -90,8 +92,12 @@ def arrange(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspac
         dock.setFloating(False)
         window.removeDockWidget(dock)
         if name not in shown:
-            window.addDockWidget(BOTTOM if name in ("log", "motion") else RIGHT, dock)
+            window.addDockWidget(BOTTOM if name in WIDE else RIGHT, dock)
             dock.hide()
+    window.tabifyDockWidget(docks[WIDE[0]], docks[WIDE[1]])
+    # before the panels come: all together they may need more room than the window has, and it would grow
+    if (middle := window.centralWidget()) is not None:
+        middle.setVisible(wanted.viewport)
     for column in wanted.columns:
         beside = Qt.Orientation.Horizontal if column.area == BOTTOM else Qt.Orientation.Vertical
         before: QDockWidget | None = None
@@ -102,22 +108,23 @@ def arrange(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspac
                 window.splitDockWidget(before, docks[name], beside)
             before = docks[name]
             docks[name].show()
-    if (middle := window.centralWidget()) is not None:
-        middle.setVisible(wanted.viewport)
     share_out(window, docks, wanted)
 
 
 def share_out(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspace) -> None:
     """Give the docks their shares of the window's present size."""
+    size = window.size()
     for column in wanted.columns:
         across = Qt.Orientation.Vertical if column.area == BOTTOM else Qt.Orientation.Horizontal
         along = Qt.Orientation.Horizontal if column.area == BOTTOM else Qt.Orientation.Vertical
-        extent = window.height() if column.area == BOTTOM else window.width()
+        extent = size.height() if column.area == BOTTOM else size.width()
         first = docks[column.docks[0][0]]
         window.resizeDocks([first], [round(column.share * extent)], across)
         if len(column.docks) > 1:
             sizes = [round(1000 * share) for _, share in column.docks]
             window.resizeDocks([docks[name] for name, _ in column.docks], sizes, along)
+    if window.size() != size:  # shares that do not fit beside what is least let the window grow
+        window.resize(size)
 
 
 def remembered(window: QMainWindow) -> str:

@@ -1,0 +1,155 @@
+"""Pictures of the desktop's main states, for people to look at, and a few for the README.
+
+    python tests/screenshots.py FOLDER [--readme]
+
+Drives the real program on the sample; --readme writes the README's pictures into assets/screenshots as well. Without a
+display a virtual one is used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+if TYPE_CHECKING:
+    from studio.qt.window import MainWindow
+
+SIZE = (1440, 900)
+README = {"setup_dark": "setup.png", "render_dark": "render.png", "measure_light": "measure.png"}
+README_WIDTH = 1120
+LASER, OBJECT = ("scene", "rig", "lasers", 0), ("scene", "objects", 0)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--readme", action="store_true")
+    parser.add_argument("--scale", type=float, default=0.5, help="image scale of the render")
+    options = parser.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    display = virtual_display()
+    with tempfile.TemporaryDirectory() as home:
+        os.environ.update(XDG_CONFIG_HOME=f"{home}/config", XDG_STATE_HOME=f"{home}/state")
+        take(options.folder, options.scale, options.readme)
+    if display is not None:
+        display.stop()
+    return 0
+
+
+def take(folder: Path, scale: float, readme: bool) -> None:
+    from studio.qt import app as desktop
+    from studio.qt.app import application, start
+    from studio.qt.shortcuts import CheatSheet
+
+    app = application()
+    desktop.FIRST_LOOK_MS = 10**8  # the render below takes its place
+    window = start(None)
+    window.resize(*SIZE)
+
+    def wait(done: Callable[[], bool], seconds: float = 600.0) -> None:
+        until = time.monotonic() + seconds
+        while not done():
+            app.processEvents()
+            time.sleep(0.005)
+            if time.monotonic() > until:
+                raise TimeoutError("a picture's state never came")
+
+    def settle(seconds: float = 0.6) -> None:
+        end = time.monotonic() + seconds
+        wait(lambda: time.monotonic() > end)
+
+    def shoot(name: str) -> None:
+        settle()
+        picture = window.grab()
+        picture.save(str(folder / f"{name}.png"))
+        print(folder / f"{name}.png", flush=True)
+        if readme and name in README:
+            write_small(folder / f"{name}.png", ROOT / "assets" / "screenshots" / README[name])
+
+    window.choose_theme("dark")
+    settle(2.0)
+    shoot("tour")
+    if window.tour is not None:
+        window.tour.end()
+    session = window.session
+    window.switch_to("setup")
+    session.select(LASER)
+    settle()
+    for theme in ("dark", "light"):
+        window.choose_theme(theme)
+        shoot(f"setup_{theme}_before_render")
+    window.panels["render"].start(scale)  # type: ignore[attr-defined]
+    window.switch_to("render")
+    wait(lambda: session.shown is not None)
+    shoot("rendering")
+    wait(lambda: not window.runner.busy and session.shown is not None and len(session.shown.measurements) == 3)
+    settle(2.0)
+    session.hover(worst_row(window))
+    for theme in ("dark", "light"):
+        window.choose_theme(theme)
+        for key in ("setup", "render", "measure"):
+            window.switch_to(key)
+            if key == "measure":
+                settle(0.2)
+                window.cloud.frame()
+            shoot(f"{key}_{theme}")
+    window.panels["results"].tabs.setCurrentIndex(1)  # type: ignore[attr-defined]
+    shoot("measure_histogram")
+    window.switch_to("setup")
+    session.select(OBJECT)
+    window.panels["viewport"].frame(OBJECT)  # type: ignore[attr-defined]
+    shoot("setup_object")
+    window.show_panel("log")
+    window.show_panel("motion")
+    shoot("setup_all_panels")
+    window.rearrange()
+    for name, dialog in (("help", window.help), ("shortcuts", CheatSheet(window))):
+        window.help.open_page("results") if name == "help" else dialog.show()
+        settle()
+        dialog.grab().save(str(folder / f"{name}.png"))
+        dialog.close()
+    window.files.give_up()
+    window.close()
+    app.processEvents()
+
+
+def worst_row(window: MainWindow) -> int | None:
+    window.measuring.worst()
+    return window.session.hovered
+
+
+def write_small(source: Path, target: Path) -> None:
+    """As the README shows it: smaller, with a palette, so that the repository stays small."""
+    from PIL import Image
+
+    from render.files import atomic_write
+
+    with Image.open(source) as image:
+        height = round(image.height * README_WIDTH / image.width)
+        small = image.convert("RGB").resize((README_WIDTH, height), Image.Resampling.LANCZOS)
+        with atomic_write(target) as temporary:
+            small.quantize(192, dither=Image.Dither.NONE).save(temporary, optimize=True)
+
+
+def virtual_display() -> object | None:
+    """Started where there is no display."""
+    if os.environ.get("DISPLAY"):
+        return None
+    from pyvirtualdisplay import Display
+
+    made = Display(visible=False, size=(1920, 1200), color_depth=24)
+    made.start()
+    return made
+
+
+if __name__ == "__main__":
+    sys.exit(main())
