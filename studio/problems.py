@@ -65,6 +65,8 @@ def _resolve(location: Location, data: Any, kind: str) -> tuple[Location, tuple[
     path: list[int | str] = []
     branch: tuple[int, str] | None = None
     for i, part in enumerate(location):
+        if isinstance(data, dict) and data.get("kind") == part:
+            continue  # the file itself says which branch is meant
         here, data = _child(data, part)
         if not here and not (kind == "missing" and i == len(location) - 1):
             branch = branch or (len(path), str(part))

@@ -11,6 +11,7 @@ import pytest
 from pydantic import BaseModel
 from scipy.spatial.transform import Rotation
 
+from render.camera import Lens
 from render.errors import InputError
 from render.laser import Divergence, Waist
 from render.lights import PointLight, RectangleLight
@@ -101,7 +102,7 @@ class TestDescription:
         assert [field.name for field in describe(project.scene.rig)] == ["T_world_rig"]
 
     def test_optional_numbers_may_be_empty_and_optional_models_have_a_kind_none(self, project: Project) -> None:
-        focus = next(f for f in spec(project.scene.camera, "lens").fields if f.name == "focus_distance")
+        focus = spec(Lens(), "focus_distance")
         assert focus.optional and focus.value is None
         band_pass = spec(project.sensor, "band_pass")
         assert [kind.label for kind in band_pass.alternatives] == ["None", "Band pass"]
