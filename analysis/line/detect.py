@@ -34,7 +34,7 @@ CENTRE, WIDTH, AMPLITUDE, BACKGROUND, REACH, PLATEAU = range(6)
 SEED_COLUMNS = 6
 
 NEIGHBOUR = 0.05
-"""Fraction of a peak's response from which another peak limits its window."""
+"""Fraction of a peak's response from which another peak limits its window of pixels."""
 NARROWEST = 0.4
 """px; a narrower line cannot be told from this one before it is fitted."""
 
