@@ -81,6 +81,20 @@ def test_a_peak_outside_the_fan_or_behind_is_not_the_line():
         WorkingVolume(camera, laser, pose, nearest=2.0, farthest=1.0)
 
 
+def test_a_glow_wider_than_the_sheet_can_be_is_not_the_line():
+    camera, laser, pose = rig()
+    plane = laser_plane(pose)
+    centre = np.full(40, 300.0)
+    image = exposed(expected(WIDTH, centre, 800, 9.0, 10.0), 3, np.random.default_rng(4)).astype(np.float32)
+    glow = extract(image, noise=electrons(3))
+    assert glow.valid.all() and np.median(glow.width) == pytest.approx(9.0, abs=0.3)
+    assert not consistent(glow, WorkingVolume(camera, laser, pose)).any()
+    depth = -plane[3] / (np.array([(300.0 - camera.cx) / camera.fx, 0.0, 1.0]) @ plane[:3])
+    sheet = float(laser.sigma(depth)) * camera.fx / depth  # px, across the beam
+    slanted = exposed(expected(WIDTH, centre, 800, 3.0 * sheet, 10.0), 3, np.random.default_rng(5)).astype(np.float32)
+    assert consistent(extract(slanted, noise=electrons(3)), WorkingVolume(camera, laser, pose)).mean() > 0.9
+
+
 def test_continuity_bridges_gaps_and_leaves_empty_rows_empty():
     centre, _, image = groove(brighter=0.0)
     rng = np.random.default_rng(3)
