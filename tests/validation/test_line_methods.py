@@ -19,9 +19,8 @@ pytestmark = pytest.mark.validation
 ROWS = 8000
 BETTER = {
     "centre_of_mass": "the window is put back on its result",
-    "phase": "the window is put back on its result",
     "guo": "the iteration runs until it rests",
-    "caruana": "saturated and negative pixels are left out",
+    "caruana": "only the run of pixels around the peak counts",
     "likelihood": "its efficiency is 1 within the noise",
     "gaussian": "narrow lines keep their width from below",
 }
