@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from pytestqt.qtbot import QtBot
 
 from studio.display import why_no_display
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
-    from pytestqt.qtbot import QtBot
 
     from studio.qt.window import MainWindow
 
 os.environ.setdefault("QT_API", "pyside6")
 os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
 HERE = Path(__file__).parent
+PATIENCE_MS = 30_000
+"""A wait ends when its condition holds; the machine may be shared, and kernels may have to be compiled."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -30,6 +32,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for item in items:
             if HERE in item.path.parents:
                 item.add_marker(pytest.mark.skip(reason=f"{reason}; install xvfb"))
+
+
+class PatientBot(QtBot):
+    def waitUntil(self, callback: Callable[[], bool | None], *, timeout: int = PATIENCE_MS) -> None:
+        super().waitUntil(callback, timeout=timeout)
+
+
+@pytest.fixture
+def qtbot(qapp: QApplication, request: pytest.FixtureRequest) -> QtBot:
+    return PatientBot(request)
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +59,7 @@ def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     yield
     left = [thread for thread in set(threading.enumerate()) - before if thread.name.startswith("job ")]
     for thread in left:
-        thread.join(2.0)
+        thread.join(10.0)
     assert not [thread.name for thread in left if thread.is_alive()]
 
 
