@@ -112,6 +112,7 @@ def window(qtbot: QtBot, one_window: MainWindow, small_project: Path, tmp_path: 
     from studio.project import Project
     from studio.qt import theme
     from studio.qt.live import live
+    from studio.qt.workspaces import workspace
 
     if theme.colours() != theme.LIGHT:
         theme.apply("light")
@@ -124,7 +125,9 @@ def window(qtbot: QtBot, one_window: MainWindow, small_project: Path, tmp_path: 
         one_window.activateWindow()  # there is no window manager to do it
     if one_window.workspace != "setup":
         one_window.switch_to("setup")
-    elif not one_window.docks["readout"].isVisible():
+        preferences.values = Preferences()  # leaving a workspace remembers how it stood
+    usual = {name for column in workspace("setup").columns for name, _ in column.docks}
+    if usual != {name for name, dock in one_window.docks.items() if dock.isVisible()}:
         one_window.rearrange()
     qtbot.waitUntil(lambda: not live(one_window.session).is_loading)
     yield one_window
