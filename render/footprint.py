@@ -157,10 +157,11 @@ def mark_triangles(
 def marked_pixels(mask: NDArray[np.uint8]) -> Int:
     """(n,) flags -> ascending indices of the set ones; eight at a time, since nearly all are clear."""
     words = mask[: len(mask) // 8 * 8].view(np.uint64)
-    count = 0
-    for i in range(len(mask)):
-        count += mask[i]
-    out = np.empty(count, dtype=np.int32)
+    most = 8
+    for i in range(len(words)):
+        if words[i] != 0:
+            most += 8
+    out = np.empty(most, dtype=np.int32)
     k = 0
     for i in range(len(words)):
         if words[i] != 0:
@@ -172,7 +173,7 @@ def marked_pixels(mask: NDArray[np.uint8]) -> Int:
         if mask[j]:
             out[k] = j
             k += 1
-    return out
+    return out[:k].copy()
 
 
 def reachable_pixels(
