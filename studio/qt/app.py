@@ -56,9 +56,12 @@ def application() -> QApplication:
     from PySide6.QtGui import QGuiApplication, QSurfaceFormat
     from PySide6.QtWidgets import QApplication
 
+    from studio.qt.memory import return_large_blocks
+
     there = QApplication.instance()
     if isinstance(there, QApplication):
         return there
+    return_large_blocks()
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     surface = QSurfaceFormat.defaultFormat()
     surface.setVersion(3, 2)

@@ -24,6 +24,7 @@ from studio.qt.help import Help, panel_with_focus
 from studio.qt.jobs import JobRunner
 from studio.qt.live import live
 from studio.qt.measure_actions import MeasureActions
+from studio.qt.memory import return_what_is_free
 from studio.qt.mesh_importer import choose_meshes, import_meshes
 from studio.qt.panels import PANELS, Making, make_panels
 from studio.qt.session import Session
@@ -34,6 +35,8 @@ from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, share
 from studio.trouble import trouble
 
 TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
+TRIM_MS = 1000
+"""From opening another project until the memory of the former one is given back."""
 SMALL = 0.25
 """Image scale of the first look."""
 SWITCH = {"setup": "setup", "render": "render_workspace", "measure": "measure"}
@@ -274,6 +277,7 @@ class MainWindow(QMainWindow):
         self.status.log_asked.connect(lambda: self.show_panel("log"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
+        session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))
         session.selection_changed.connect(self._tell_selection)
         session.step_changed.connect(lambda: live(session).show_step(session.step))
         session.render_asked.connect(lambda: self.show_panel("render"))
