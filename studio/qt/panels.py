@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.util import find_spec
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
 from studio.qt.session import Session
 
@@ -17,7 +15,7 @@ Making = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Panel:
-    """A panel: its key, the title of its dock, what the splash says, where its class is."""
+    """A panel: its key, the title of its dock, which the splash says as well, and where its class is."""
 
     key: str
     title: str
@@ -45,11 +43,6 @@ def make_panels(session: Session, runner: object, making: Making = lambda title:
     made: dict[str, QWidget] = {}
     for panel in PANELS:
         making(panel.title)
-        if find_spec(panel.module) is None:
-            label = QLabel(panel.title, alignment=Qt.AlignmentFlag.AlignCenter)
-            label.setObjectName("muted")
-            made[panel.key] = label
-            continue
         kind = getattr(import_module(panel.module), panel.name)
         made[panel.key] = kind(session, runner) if panel.takes_runner else kind(session)
     return made

@@ -348,6 +348,21 @@ def test_without_a_display_the_reason_and_the_way_out_are_told(
     assert ":98765 does not answer" in capsys.readouterr().err
 
 
+def test_a_bad_project_on_the_command_line_is_told_over_the_sample(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from studio.qt import app, faults
+
+    monkeypatch.setattr(faults, "catch_faults", lambda *_: None)  # it would take the place of the test's own
+    window = app.start(tmp_path / "gone.json")
+    qtbot.waitExposed(window)
+    assert window.session.project.name == "Weld seam"
+    assert "gone.json" in dialog("trouble").text()
+    dialog("trouble").close()
+    window.close()
+    window.deleteLater()
+
+
 def drop(window: QWidget, path: Path) -> None:
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(path))])
