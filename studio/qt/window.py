@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QByteArray, Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QSizePolicy, QToolBar, QToolButton, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QScrollArea, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from studio.autosave import Autosave
 from studio.jobs import Job
@@ -35,6 +35,8 @@ from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, share
 from studio.trouble import trouble
 
 TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
+TALL = ("render", "develop")
+"""Panels that scroll."""
 TRIM_MS = 1000
 """From opening another project until the memory of the former one is given back."""
 SMALL = 0.25
@@ -173,7 +175,7 @@ class MainWindow(QMainWindow):
                 continue
             dock = QDockWidget(panel.title, self)
             dock.setObjectName(panel.key)
-            dock.setWidget(self.panels[panel.key])
+            dock.setWidget(_scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
             self.commands.submenus["panels"].addAction(dock.toggleViewAction())
             docks[panel.key] = dock
         return docks
@@ -337,6 +339,17 @@ def version() -> str:
         return metadata.version("blazer-studio")
     except metadata.PackageNotFoundError:
         return ""
+
+
+def _scrolled(panel: QWidget) -> QScrollArea:
+    """So that a low screen shows a part of a panel, and the window does not outgrow the screen."""
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setFrameShape(QScrollArea.Shape.NoFrame)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setMinimumWidth(panel.minimumSizeHint().width())
+    area.setWidget(panel)
+    return area
 
 
 def _spring() -> QWidget:
