@@ -168,7 +168,7 @@ def test_an_internal_error_keeps_its_traceback_for_the_log() -> None:
     assert "Traceback" not in job.problem.text and "test_jobs" in job.problem.details
 
 
-def test_a_render_in_a_job_is_cancelled_within_a_tenth_of_a_second() -> None:
+def test_a_render_in_a_job_is_cancelled_in_the_middle_of_a_pass() -> None:
     from render.refine import refine
     from render.world import build_world
     from studio.templates import template_folder
@@ -185,9 +185,8 @@ def test_a_render_in_a_job_is_cancelled_within_a_tenth_of_a_second() -> None:
 
     job = started(work)
     until(lambda: len(frames) >= 4, 60)
-    begin = time.perf_counter()
     job.cancel()
+    seen = len(frames)
     assert job.join(30)
-    # the chunk under way ends first; other load on the machine stretches it
-    assert time.perf_counter() - begin < 0.4
-    assert job.state is State.CANCELLED and frames[-1].ambient is not None
+    # a pass of thousands of samples would take minutes; how soon it ends is measured in bench_desktop.py
+    assert job.state is State.CANCELLED and len(frames) <= seen + 1 and frames[-1].ambient is not None
