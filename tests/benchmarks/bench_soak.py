@@ -23,6 +23,8 @@ sys.path.insert(0, str(ROOT))
 BAR = 0.05
 TEMPLATES = ("step_block", "weld_seam", "sphere")
 LASER = ("scene", "rig", "lasers", 0)
+ROUNDS = 3
+"""Of every template in a cycle: after so many all bounded caches are full."""
 SCALE = 0.125
 
 
@@ -67,7 +69,7 @@ def soak(seconds: float, folder: Path) -> bool:
     began, cycles = time.monotonic(), 0
     first_memory = first_threads = 0
     while cycles < 2 or time.monotonic() - began < seconds:
-        for template in TEMPLATES:
+        for template in ROUNDS * TEMPLATES:
             cycle(window, template, folder, wait)
         settled = time.monotonic() + 1.5
         window.files.replace(new(TEMPLATES[0], window.files.autosave))
