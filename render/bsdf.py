@@ -4,10 +4,14 @@ Local frame: z is the normal. `o` is the direction light is followed back along 
 both point away from the surface. A material is one row of numbers, the reflectance at the point comes with it:
 
     row   0 kind   1 alpha x   2 alpha y   3 index of refraction   4.. n of each band   7.. k of each band
-          10 internal diffuse reflectance of a coat
+          10 internal diffuse reflectance of a coat   11 anisotropy g of a medium   12.. extinction of each band, 1/m
+          15.. single-scattering albedo of each band   18.. emitted radiance, RGB whatever the bands, W/(m^2 sr)
     rgb   reflectance of the diffuse part, or the tint of the specular one, for each band
 
-Every material but glass is two-sided: light on either side is treated alike, and none passes.
+Two-sided are LAMBERTIAN, CONDUCTOR, COATED and EMITTER: light on either side is treated alike and none passes; an
+EMITTER shines to z > 0 only. One-sided are the boundaries, DIELECTRIC and SUBSURFACE: z points out of the substance,
+so the frame must be built on the mesh's own normal, not on the one turned towards the ray. SUBSURFACE scatters at its
+boundary as rough DIELECTRIC; what happens between two boundaries is the integrator's.
 """
 
 from __future__ import annotations
@@ -23,10 +27,23 @@ from render.microfacet import density, sample_normal, smith_lambda, visible_dens
 
 Array = NDArray[np.float64]
 
-LAMBERTIAN, CONDUCTOR, DIELECTRIC, COATED = 0.0, 1.0, 2.0, 3.0
-ROW = 12
+LAMBERTIAN, CONDUCTOR, DIELECTRIC, COATED, SUBSURFACE, EMITTER = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+ANISOTROPY, EXTINCTION, SCATTERED, EMITTED = 11, 12, 15, 18
+ROW = 21
 SMOOTH = 1e-4
 """Below this roughness a boundary is a mirror: its density is a delta function."""
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def is_diffuse(row: Array) -> bool:
+    """The material scatters as Lambert says."""
+    return row[0] == LAMBERTIAN or row[0] == EMITTER
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def is_boundary(row: Array) -> bool:
+    """Light passes through; z must point out of the substance."""
+    return row[0] == DIELECTRIC or row[0] == SUBSURFACE
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -47,21 +64,21 @@ def specular_share(row: Array, rgb: Array, cosine: float) -> float:
 def evaluate(
     row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, f: Array
 ) -> None:
-    """f(o, i) in 1/sr for each band -> f (3,), without the cosine; 0 for the delta parts."""
-    f[0] = f[1] = f[2] = 0.0
+    """f(o, i) in 1/sr, without the cosine -> f (3,) for each band, or (1,) for the first; 0 for the delta parts."""
+    f[:] = 0.0
     if oz == 0.0 or iz == 0.0 or is_smooth(row):
         return
-    if row[0] == DIELECTRIC:
+    if is_boundary(row):
         value = rough_dielectric(row, ox, oy, oz, ix, iy, iz)
-        for band in range(3):
+        for band in range(f.shape[0]):
             f[band] = value * rgb[band]
         return
     if oz * iz < 0.0:
         return
     if oz < 0.0:
         oz, iz = -oz, -iz
-    if row[0] == LAMBERTIAN:
-        for band in range(3):
+    if is_diffuse(row):
+        for band in range(f.shape[0]):
             f[band] = rgb[band] / math.pi
         return
     ax, ay = row[1], row[2]
@@ -72,7 +89,7 @@ def evaluate(
     shadowed = 1.0 + smith_lambda(ox, oy, oz, ax, ay) + smith_lambda(ix, iy, iz, ax, ay)
     facets = density(hx, hy, hz, ax, ay) / (4.0 * oz * iz * shadowed)
     if row[0] == CONDUCTOR:
-        for band in range(3):
+        for band in range(f.shape[0]):
             f[band] = rgb[band] * facets * conductor(cosine, row[4 + band], row[7 + band])
         return
     # coat: its own reflection, and the base seen through it twice, with the light that the coat sends back to the base
@@ -80,7 +97,7 @@ def evaluate(
     enters, _ = dielectric(iz, row[3])
     leaves, _ = dielectric(oz, row[3])
     through = (1.0 - enters) * (1.0 - leaves) / (row[3] * row[3])
-    for band in range(3):
+    for band in range(f.shape[0]):
         base = rgb[band] * through / (math.pi * (1.0 - rgb[band] * row[10]))
         f[band] = coat * facets + base
 
@@ -125,7 +142,7 @@ def pdf(row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: 
     if oz == 0.0 or iz == 0.0 or is_smooth(row):
         return 0.0
     ax, ay = row[1], row[2]
-    if row[0] == DIELECTRIC:
+    if is_boundary(row):
         eta = row[3] if oz > 0.0 else 1.0 / row[3]
         if oz < 0.0:
             oz, iz = -oz, -iz
@@ -151,7 +168,7 @@ def pdf(row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: 
         return 0.0
     if oz < 0.0:
         oz, iz = -oz, -iz
-    if row[0] == LAMBERTIAN:
+    if is_diffuse(row):
         return iz / math.pi
     hx, hy, hz = ox + ix, oy + iy, oz + iz
     length = math.sqrt(hx * hx + hy * hy + hz * hz)
@@ -177,17 +194,17 @@ def sample(
     direction: Array,
     weight: Array,
 ) -> float:
-    """Draw i given o -> direction (3,), weight (3,) = f |cos i| / density for each band.
+    """Draw i given o -> direction (3,), weight (3,) or (1,) = f |cos i| / density for each band.
 
     Returns the density, 1/sr; -1 for a delta part (its weight then holds its share), 0 when nothing is scattered.
     """
-    weight[0] = weight[1] = weight[2] = 0.0
+    weight[:] = 0.0
     if oz == 0.0:
         return 0.0
     side = 1.0 if oz > 0.0 else -1.0
     ax, ay = row[1], row[2]
     smooth = is_smooth(row)
-    if row[0] == DIELECTRIC:
+    if is_boundary(row):
         eta = row[3] if oz > 0.0 else 1.0 / row[3]
         z = abs(oz)
         hx = hy = 0.0
@@ -207,12 +224,12 @@ def sample(
                 return 0.0
         direction[0], direction[1], direction[2] = x, y, side * w
         if smooth:
-            for band in range(3):
+            for band in range(weight.shape[0]):
                 weight[band] = rgb[band]
             return -1.0
         shadow_o, shadow_i = smith_lambda(ox, oy, z, ax, ay), smith_lambda(x, y, abs(w), ax, ay)
         ratio = (1.0 + shadow_o) / (1.0 + shadow_o + shadow_i) if w > 0.0 else 1.0 / (1.0 + shadow_i)
-        for band in range(3):
+        for band in range(weight.shape[0]):
             weight[band] = rgb[band] * ratio
         return pdf(row, rgb, ox, oy, oz, x, y, side * w)
     z = abs(oz)
@@ -230,7 +247,7 @@ def sample(
         if not smooth:
             shadow_o, shadow_i = smith_lambda(ox, oy, z, ax, ay), smith_lambda(x, y, w, ax, ay)
             ratio = (1.0 + shadow_o) / (1.0 + shadow_o + shadow_i)
-        for band in range(3):
+        for band in range(weight.shape[0]):
             weight[band] = rgb[band] * ratio * conductor(oh, row[4 + band], row[7 + band])
         return -1.0 if smooth else pdf(row, rgb, ox, oy, z, x, y, w)
     if row[0] == COATED and choice < specular_share(row, rgb, z):
@@ -243,14 +260,14 @@ def sample(
     if w <= 0.0:
         return 0.0
     direction[0], direction[1], direction[2] = x, y, side * w
-    if row[0] == LAMBERTIAN:
-        for band in range(3):
+    if is_diffuse(row):
+        for band in range(weight.shape[0]):
             weight[band] = rgb[band]
         return w / math.pi
     chance = pdf(row, rgb, ox, oy, z, x, y, w)
     if chance <= 0.0:
         return 0.0
     evaluate(row, rgb, ox, oy, z, x, y, w, weight)
-    for band in range(3):
+    for band in range(weight.shape[0]):
         weight[band] *= w / chance
     return chance

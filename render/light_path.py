@@ -17,7 +17,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bsdf import evaluate, sample
+from render.bsdf import evaluate, is_boundary, sample
 from render.camera import Camera
 from render.distortion import distort, fold_radius_at, tilt_matrix
 from render.emission import SEQUENCE, Paths, emit, fan_span
@@ -148,6 +148,9 @@ def bounce(
             choice = uniform(seed, number, depth, 0)
             r1, r2 = uniform(seed, number, depth, 1), uniform(seed, number, depth, 2)
         if sample(row, rgb, o[0], o[1], o[2], choice, r1, r2, i, f) == 0.0:
+            continue
+        # what enters a substance is not followed here
+        if is_boundary(row) and i[2] < 0.0:
             continue
         power = paths.power[r] * f[0]
         if depth >= ROULETTE_AFTER:

@@ -48,10 +48,13 @@ Metal = Literal[
     "nickel",
 ]
 Roughness = Annotated[float, Field(ge=0.01, le=1.0)]
+Radiance = Annotated[float, Field(ge=0.0, le=1e9)]
+ScatteringAlbedo = Annotated[float, Field(ge=0.0, le=0.99999)]
+MeanFreePath = Annotated[float, Field(ge=1e-6, le=10.0)]
 
 
 class Conductor(Model):
-    """Metal: rough GGX reflection, both sides, with the metal's own reflectance at each wavelength."""
+    """Metal: GGX reflection, both sides, with the metal's own reflectance at each wavelength."""
 
     kind: Literal["conductor"] = "conductor"
     metal: Metal = quantity("steel", label="Metal")
@@ -77,22 +80,97 @@ class Coated(Model):
     index: float = quantity(1.5, label="Refractive index", help="Of the coat.", ge=1.01, le=3.0)
 
 
-BaseMaterial = Annotated[Lambertian | Conductor | Coated, Field(discriminator="kind")]
+Substance = Literal["BK7", "fused_silica", "SF11", "sapphire", "acrylic", "polycarbonate", "polystyrene", "water"]
+
+
+class Glass(Model):
+    """Glass, clear plastic or liquid: reflects and refracts. The mesh is closed; what it encloses is filled.
+
+    One-sided: the normals point out of the substance, into air. Bodies that touch need a gap of air between them.
+    """
+
+    kind: Literal["glass"] = "glass"
+    substance: Substance = quantity("BK7", label="Substance", help="Its refractive index follows the wavelength.")
+    index: float | None = quantity(
+        None, label="Refractive index", help="In place of the substance's, at every wavelength.", ge=1.01, le=3.0
+    )
+    roughness: float = quantity(
+        0.0, label="Roughness", help="GGX alpha; 0 polished, 0.1 satin, 0.4 frosted. Below 0.005: polished.", ge=0, le=1
+    )
+    tint: UnitInterval | RGBReflectance = quantity(
+        1.0, label="Tint", help="What is left of light at each surface; one number, or R, G, B."
+    )
+
+    @property
+    def albedo(self) -> float | RGBReflectance:
+        return self.tint
+
+
+class Subsurface(Model):
+    """Wax, marble, nylon, skin: light wanders below a rough boundary and leaves elsewhere. The mesh is closed.
+
+    One-sided as glass is. The boundary is never polished: light from inside could then not be connected to a camera
+    or a lamp outside, and would be found by chance alone.
+    """
+
+    kind: Literal["subsurface"] = "subsurface"
+    index: float = quantity(1.5, label="Refractive index", ge=1.01, le=3.0)
+    roughness: float = quantity(0.3, label="Roughness", help="GGX alpha of the boundary.", ge=0.05, le=1.0)
+    mean_free_path: MeanFreePath | tuple[MeanFreePath, MeanFreePath, MeanFreePath] = quantity(
+        0.0005, unit="m", label="Mean free path", help="From one scattering to the next; one number, or R, G, B."
+    )
+    scattering_albedo: ScatteringAlbedo | tuple[ScatteringAlbedo, ScatteringAlbedo, ScatteringAlbedo] = quantity(
+        0.99, label="Scattering albedo", help="Share of light that one scattering leaves; one number, or R, G, B."
+    )
+    anisotropy: float = quantity(
+        0.0, label="Anisotropy", help="Mean cosine g of scattering: 0 even, towards 1 forward.", ge=-0.98, le=0.98
+    )
+
+    @property
+    def albedo(self) -> float:
+        return 1.0
+
+
+class Emitter(Model):
+    """A surface that shines evenly to its front, and reflects diffusely on both sides. Ambient light, not laser light.
+
+    The front is where the normals point.
+    """
+
+    kind: Literal["emitter"] = "emitter"
+    radiance: tuple[Radiance, Radiance, Radiance] = quantity(
+        (1.0, 1.0, 1.0), unit="W/(m^2 sr)", label="Radiance", help="Of the red, green and blue band."
+    )
+    albedo: UnitInterval | RGBReflectance | Texture | FromMesh = quantity(
+        0.5, label="Albedo", help="One number, three for R, G, B, a texture, or what the mesh file says."
+    )
+
+
+BaseMaterial = Annotated[Lambertian | Conductor | Coated | Glass | Subsurface | Emitter, Field(discriminator="kind")]
+"""What a surface is made of at one point."""
+OpaqueMaterial = Annotated[Lambertian | Conductor | Coated, Field(discriminator="kind")]
 
 
 class Blend(Model):
     """Two materials side by side: `over` where the mask is white, `base` where it is black, mixed between."""
 
     kind: Literal["blend"] = "blend"
-    base: BaseMaterial = Lambertian()
-    over: BaseMaterial = Conductor()
+    base: OpaqueMaterial = Lambertian()
+    over: OpaqueMaterial = Conductor()
     mask: Texture = quantity(label="Mask", help="Its red values, linear; needs UV.")
 
 
-Material = Annotated[Lambertian | Conductor | Coated | Blend, Field(discriminator="kind")]
+Material = Annotated[
+    Lambertian | Conductor | Coated | Blend | Glass | Subsurface | Emitter, Field(discriminator="kind")
+]
 
 # Where the red, green and blue values of an albedo are taken to hold, nm.
 BAND_CENTRES_NM = (610.0, 545.0, 465.0)
+
+
+def at_wavelength(rgb: tuple[float, float, float], wavelength_nm: float) -> float:
+    """An RGB value interpolated at one wavelength."""
+    return sum(weight * value for weight, value in zip(reflectance_weights(wavelength_nm), rgb, strict=True))
 
 
 def reflectance_weights(wavelength_nm: float) -> tuple[float, float, float]:

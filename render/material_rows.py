@@ -10,20 +10,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bsdf import COATED, CONDUCTOR, LAMBERTIAN, ROW
+from render.bsdf import (
+    ANISOTROPY,
+    COATED,
+    CONDUCTOR,
+    DIELECTRIC,
+    EMITTED,
+    EMITTER,
+    EXTINCTION,
+    LAMBERTIAN,
+    ROW,
+    SCATTERED,
+    SUBSURFACE,
+)
 from render.errors import InputError
 from render.fresnel import diffuse_reflectance
-from render.material import BaseMaterial, Coated, Conductor
+from render.material import BaseMaterial, Coated, Conductor, Emitter, Glass, Subsurface, at_wavelength
 
 Float = NDArray[np.float64]
 
-TABLE = Path(__file__).parents[1] / "assets" / "metals.json"
+ASSETS = Path(__file__).parents[1] / "assets"
+POLISHED = 0.005
+"""A GGX alpha below this is taken for a perfectly smooth surface."""
 
 
 @lru_cache(maxsize=1)
 def metals() -> dict[str, dict[str, Any]]:
     """label, source, wavelength_nm, n and k of each metal."""
-    return dict(json.loads(TABLE.read_text(encoding="utf-8")))
+    return dict(json.loads((ASSETS / "metals.json").read_text(encoding="utf-8")))
 
 
 def complex_index(metal: str, wavelength_nm: float) -> tuple[float, float]:
@@ -41,16 +55,62 @@ def complex_index(metal: str, wavelength_nm: float) -> tuple[float, float]:
     return float(np.interp(wavelength_nm, known, entry["n"])), float(np.interp(wavelength_nm, known, entry["k"]))
 
 
+@lru_cache(maxsize=1)
+def substances() -> dict[str, dict[str, Any]]:
+    """label, source, range_nm and Sellmeier coefficients b, c_um2 of each transparent substance."""
+    return dict(json.loads((ASSETS / "substances.json").read_text(encoding="utf-8")))
+
+
+def substance_index(substance: str, wavelength_nm: float) -> float:
+    """n by Sellmeier's equation, n^2 = 1 + sum b l^2 / (l^2 - c). InputError: beyond the range it was measured in."""
+    entry = substances()[substance]
+    shortest, longest = entry["range_nm"]
+    if not shortest <= wavelength_nm <= longest:
+        raise InputError(
+            f"the refractive index of {entry['label']} is not known at this wavelength",
+            where="material.substance",
+            found=f"{wavelength_nm:g} nm",
+            allowed=f"{shortest:g} to {longest:g} nm",
+            cure="give the index as a number, or choose another substance or laser",
+        )
+    square_um = (wavelength_nm / 1000.0) ** 2
+    terms = zip(entry["b"], entry["c_um2"], strict=True)
+    return float(np.sqrt(1.0 + sum(b * square_um / (square_um - c) for b, c in terms)))
+
+
+def glass_index(glass: Glass, wavelength_nm: float) -> float:
+    """The index that is given, or that of the substance. InputError: not known at this wavelength."""
+    return glass.index if glass.index is not None else substance_index(glass.substance, wavelength_nm)
+
+
 def material_row(material: BaseMaterial, bands_nm: tuple[float, float, float]) -> Float:
     """(ROW,) parameters at three wavelengths; the layout is in `render.bsdf`."""
     row = np.zeros(ROW)
     row[0] = LAMBERTIAN
-    if isinstance(material, Conductor):
-        across = material.roughness if material.roughness_across is None else material.roughness_across
-        row[0], row[1], row[2] = CONDUCTOR, material.roughness, across
-        for band, wavelength_nm in enumerate(bands_nm):
-            row[4 + band], row[7 + band] = complex_index(material.metal, wavelength_nm)
-    elif isinstance(material, Coated):
-        row[0], row[1], row[2], row[3] = COATED, material.roughness, material.roughness, material.index
-        row[10] = diffuse_reflectance(1.0 / material.index)
+    match material:
+        case Conductor():
+            across = material.roughness if material.roughness_across is None else material.roughness_across
+            row[0], row[1], row[2] = CONDUCTOR, material.roughness, across
+            for band, wavelength_nm in enumerate(bands_nm):
+                row[4 + band], row[7 + band] = complex_index(material.metal, wavelength_nm)
+        case Coated():
+            row[0], row[1], row[2], row[3] = COATED, material.roughness, material.roughness, material.index
+            row[10] = diffuse_reflectance(1.0 / material.index)
+        case Glass():
+            alpha = material.roughness if material.roughness >= POLISHED else 0.0
+            # one path carries three bands, so that it is bent as the middle one is
+            row[0], row[1], row[2], row[3] = DIELECTRIC, alpha, alpha, glass_index(material, bands_nm[1])
+        case Subsurface():
+            row[0], row[1], row[2], row[3] = SUBSURFACE, material.roughness, material.roughness, material.index
+            row[ANISOTROPY] = material.anisotropy
+            free, albedo = _rgb(material.mean_free_path), _rgb(material.scattering_albedo)
+            for band, wavelength_nm in enumerate(bands_nm):
+                row[EXTINCTION + band] = 1.0 / at_wavelength(free, wavelength_nm)
+                row[SCATTERED + band] = at_wavelength(albedo, wavelength_nm)
+        case Emitter():
+            row[0], row[EMITTED : EMITTED + 3] = EMITTER, material.radiance
     return row
+
+
+def _rgb(value: float | tuple[float, float, float]) -> tuple[float, float, float]:
+    return value if isinstance(value, tuple) else (value, value, value)

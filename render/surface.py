@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bsdf import LAMBERTIAN
+from render.bsdf import DIELECTRIC, EMITTED, EMITTER, LAMBERTIAN, SUBSURFACE
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -32,8 +32,33 @@ class Surface(NamedTuple):
 
 
 def has_gloss(surface: Surface) -> bool:
-    """Some material is not Lambertian."""
-    return bool(np.any(surface.rows[:, 0] != LAMBERTIAN))
+    """Some material scatters otherwise than Lambert says."""
+    return bool(np.any((surface.rows[:, 0] != LAMBERTIAN) & (surface.rows[:, 0] != EMITTER)))
+
+
+def has_glass(surface: Surface) -> bool:
+    """Light passes through some surface: glass, or the boundary of a medium."""
+    return bool(np.any((surface.rows[:, 0] == DIELECTRIC) | (surface.rows[:, 0] == SUBSURFACE)))
+
+
+def has_medium(surface: Surface) -> bool:
+    """Light scatters within some object."""
+    return bool(np.any(surface.rows[:, 0] == SUBSURFACE))
+
+
+def has_emission(surface: Surface) -> bool:
+    """Some object shines."""
+    return bool(np.any(surface.rows[:, EMITTED : EMITTED + 3] > 0.0))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def emission(row: Float, cosine: float, rgb: Float) -> None:
+    """Radiance (W/(m^2 sr), RGB) that a material emits -> rgb (3,).
+
+    cosine: of the direction it leaves by with the mesh's own normal; an emitter's back is dark.
+    """
+    for band in range(3):
+        rgb[band] = row[EMITTED + band] if cosine > 0.0 else 0.0
 
 
 class View(NamedTuple):
@@ -47,6 +72,8 @@ class View(NamedTuple):
     folds: Float
     """(720,) `render.distortion.fold_radii`."""
     T_world_camera: Float
+    lens: Float
+    """(4,) aperture's radius m (0: a pinhole), 1 / focus distance, slopes g1, g2 of the plane of focus (`render.lens`)."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)

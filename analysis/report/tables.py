@@ -23,7 +23,18 @@ from analysis.report.units import (
     seconds,
 )
 from render.laser import Divergence
-from render.material import Blend, Coated, Conductor, FromMesh, Lambertian, Material, Texture
+from render.material import (
+    Blend,
+    Coated,
+    Conductor,
+    Emitter,
+    FromMesh,
+    Glass,
+    Lambertian,
+    Material,
+    Subsurface,
+    Texture,
+)
 from render.shape import MeshFile
 
 MOST_STEPS = 24
@@ -149,23 +160,39 @@ def scene_tables(report: ReportInput) -> Tables:
 
 def _material(material: Material) -> str:
     """In words, with the numbers that decide how it shines."""
-    if isinstance(material, Blend):
-        return f"{_material(material.base)}; where {material.mask.path} is white, {_material(material.over)}"
-    if isinstance(material, Conductor):
-        across = "" if material.roughness_across is None else f" along u, {material.roughness_across:g} along v"
-        return f"{material.metal.replace('_', ' ')}, roughness {material.roughness:g}{across}"
-    if isinstance(material, Coated):
-        return f"{_albedo(material)} under a coat of index {material.index:g}, roughness {material.roughness:g}"
-    return f"diffuse, {_albedo(material)}"
+    match material:
+        case Blend():
+            return f"{_material(material.base)}; where {material.mask.path} is white, {_material(material.over)}"
+        case Conductor():
+            across = "" if material.roughness_across is None else f" along u, {material.roughness_across:g} along v"
+            return f"{material.metal.replace('_', ' ')}, roughness {material.roughness:g}{across}"
+        case Coated():
+            return f"{_albedo(material)} under a coat of index {material.index:g}, roughness {material.roughness:g}"
+        case Glass():
+            what = material.substance.replace("_", " ") if material.index is None else f"index {material.index:g}"
+            return f"transparent, {what}, roughness {material.roughness:g}, tint {_numbers(material.tint)}"
+        case Subsurface():
+            return (
+                f"translucent, index {material.index:g}, roughness {material.roughness:g}, mean free path "
+                f"{_numbers(material.mean_free_path, 1e3)} mm, scattering albedo "
+                f"{_numbers(material.scattering_albedo)}, anisotropy {material.anisotropy:g}"
+            )
+        case Emitter():
+            return f"shines with {_numbers(material.radiance)} W/(m^2 sr), {_albedo(material)}"
+        case _:
+            return f"diffuse, {_albedo(material)}"
 
 
-def _albedo(material: Lambertian | Coated) -> str:
+def _albedo(material: Lambertian | Coated | Emitter) -> str:
     if isinstance(material.albedo, Texture):
         return f"albedo of {material.albedo.path}"
     if isinstance(material.albedo, FromMesh):
         return "albedo of the mesh file"
-    bands = material.albedo if isinstance(material.albedo, tuple) else (material.albedo,)
-    return "albedo " + ", ".join(f"{value:g}" for value in bands)
+    return f"albedo {_numbers(material.albedo)}"
+
+
+def _numbers(value: float | tuple[float, ...], factor: float = 1.0) -> str:
+    return ", ".join(f"{factor * each:g}" for each in (value if isinstance(value, tuple) else (value,)))
 
 
 def _motion(report: ReportInput) -> str:

@@ -27,6 +27,7 @@ ROUGH = {
     "brushed glass": material(bsdf.DIELECTRIC, (0.2, 0.5), 1.33),
     "paint": material(bsdf.COATED, (0.1, 0.1)),
     "matt plastic": material(bsdf.COATED, (0.4, 0.3), 1.4),
+    "skin of wax": material(bsdf.SUBSURFACE, (0.5, 0.5), 1.44),
 }
 GREY, WHITE = np.array([0.7, 0.5, 0.3]), np.ones(3)
 DIRECTIONS = [(0.1, 0.2, 0.9), (0.8, -0.3, 0.4), (-0.5, 0.5, -0.7), (0.1, 0.9, -0.15)]
@@ -80,7 +81,7 @@ def test_samples_follow_their_density(name, o):
     row, o, count, n_theta, n_phi = ROUGH[name], unit(o), 100_000, 30, 60
     directions, _, chance = draw(row, GREY, o, np.random.default_rng(7).random((count, 3)))
     # refraction has a hard edge at the critical angle, which asks for a finer quadrature of the expected counts
-    grid, share = sphere_grid(n_theta, n_phi, 40 if row[0] == bsdf.DIELECTRIC else 16)
+    grid, share = sphere_grid(n_theta, n_phi, 40 if bsdf.is_boundary(row) else 16)
     density_at = densities(row, GREY, o, grid.reshape(-1, 3)).reshape(share.shape)
     expected = np.sum(density_at * share, axis=1) * count
     kept = directions[chance > 0]
@@ -118,7 +119,7 @@ def test_scattering_is_reciprocal(name):
     a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in rng.normal(size=(2, 300, 3)))
     for o, i in zip(a, b, strict=True):
         forward, backward = values(row, GREY, o, i[None])[0], values(row, GREY, i, o[None])[0]
-        if row[0] == bsdf.DIELECTRIC and o[2] * i[2] < 0:
+        if bsdf.is_boundary(row) and o[2] * i[2] < 0:
             # radiance over index squared is what is conserved: f(o, i) / eta_i^2 = f(i, o) / eta_o^2
             inside = row[3] ** 2
             forward, backward = (forward, backward * inside) if i[2] < 0 else (forward * inside, backward)
