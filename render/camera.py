@@ -1,13 +1,16 @@
-"""The camera: pinhole with skew and OpenCV distortion, pixel centres at integers.
+"""The camera: pinhole or thin lens with skew and OpenCV distortion, pixel centres at integers.
 
     x = X/Z, y = Y/Z  ->  (x', y') = distort(x, y)  ->  u = fx x' + skew y' + cx,  v = fy y' + cy
 
-`project` runs the model forwards, `rays` inverts it (to 1e-10 px); both say where the model has no answer.
+`project` runs the model forwards, `rays` inverts it (to 1e-10 px); both say where the model has no answer. They follow
+the ray through the lens's centre; what the rest of the aperture sees is in `render.lens`.
 """
 
 from __future__ import annotations
 
+import math
 from functools import cached_property, lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +29,14 @@ MAX_SIDE = 32768
 
 
 class Lens(Model):
-    """What the lens does to the amount of light; the geometry is in the camera."""
+    """What the lens does to the amount of light and to what is out of focus; the geometry is in the camera."""
 
+    model: Literal["pinhole", "thin-lens"] = quantity(
+        "pinhole",
+        label="Rendered as",
+        help="pinhole: sharp at every depth, so that f-number and focus may change after the render. thin-lens: rays "
+        "through the whole aperture, blurred off the plane of focus, which tilts with the sensor (tauX, tauY).",
+    )
     f_number: float = quantity(1.4, label="f-number", help="Focal length over entrance pupil.", gt=0, le=256)
     transmission: UnitInterval = quantity(0.9, label="Transmission", help="Of lens and filter, at the laser.")
     focus_distance: float | None = quantity(
@@ -109,6 +118,30 @@ class Camera(Model):
         return any(c != 0.0 for c in self.distortion)
 
     @property
+    def focal_length(self) -> float:
+        """m; f of the thin lens with 1 / f = 1 / image distance + 1 / focus distance."""
+        image_distance = self.fx * self.pixel_pitch
+        return image_distance / (1.0 + image_distance * self.focus_vergence)
+
+    @property
+    def focus_vergence(self) -> float:
+        """1 / m; 1 / focus distance, 0 for far away."""
+        return 0.0 if self.lens.focus_distance is None else 1.0 / self.lens.focus_distance
+
+    @property
+    def aperture_radius(self) -> float:
+        """m; half of focal length over f-number."""
+        return 0.5 * self.focal_length / self.lens.f_number
+
+    @property
+    def focus_plane(self) -> Array:
+        """(4,) plane of focus in the camera frame, tilted with the sensor: -g1 X - g2 Y + Z / s - 1 = 0."""
+        tau_x, tau_y = self.coefficients[12:]
+        image_distance = self.fx * self.pixel_pitch
+        g1 = math.tan(tau_y) / math.cos(tau_x) / image_distance
+        return np.array([-g1, math.tan(tau_x) / image_distance, self.focus_vergence, -1.0])
+
+    @property
     def working_f_number(self) -> float:
         """N (1 + m), m the magnification of the focused plane."""
         if self.lens.focus_distance is None:
@@ -175,7 +208,11 @@ class Camera(Model):
     def view(self, T_world_camera: Array) -> View:
         """The camera in the world, as the kernels take it."""
         intrinsics = np.array([self.fx, self.fy, self.cx, self.cy, self.skew])
-        return View(self.width, intrinsics, self.coefficients, self.fold_table, T_world_camera)
+        lens = np.zeros(4)
+        if self.lens.model == "thin-lens":
+            plane = self.focus_plane
+            lens = np.array([self.aperture_radius, plane[2], -plane[0], -plane[1]])
+        return View(self.width, intrinsics, self.coefficients, self.fold_table, T_world_camera, lens)
 
     @property
     def fold_table(self) -> Array:

@@ -1,4 +1,7 @@
-"""Rays through jittered cells of pixels: how every camera-side stage looks into the scene."""
+"""Rays through jittered cells of pixels: how every camera-side stage looks into the scene.
+
+`camera_rays` look through the lens's centre, `lens_rays` through the whole aperture (a pinhole's is a point).
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.distortion import tilt_matrix, undistort
+from render.lens import chief_ray, lens_direction, lens_point, lens_position
+from render.net import morton, net_point
 from render.random import uniform
 from render.surface import View
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
+
+LENS_DIMENSION = 1 << 20
+"""Where the random numbers of the aperture begin, apart from those of the pixel's area."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -58,3 +66,51 @@ def camera_rays(
             for axis in range(3):
                 d = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2]
                 directions[r, axis] = d if ok else 0.0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def lens_rays(
+    view: View,
+    pixels: Int,
+    cells: int,
+    seed: int,
+    centre: Float,
+    normalised: Float,
+    offsets: Float32,
+    lens: Float,
+    origins: Float32,
+    directions: Float32,
+) -> None:
+    """As `camera_rays`, jittered, each ray through its own point of the aperture; (n cells^2, ...) throughout.
+
+    Fills normalised (.., 2) slopes of the chief ray (NaN: no ray), offsets (.., 2) px, lens (.., 2) the point (a, b) m,
+    origins (.., 3), from `centre` as embree's scene is, and directions (.., 3), world, of length 1 along the axis.
+    In float64 the ray is `lens_position(view, a, b)`, `lens_direction(view, x, y, a, b)`.
+    """
+    k = view.distortion
+    tilt = tilt_matrix(k[12], k[13])
+    distorted = bool(np.any(k))
+    size, radius = 1.0 / cells, view.lens[0]
+    for i in range(pixels.shape[0]):
+        column, row = pixels[i] % view.width, pixels[i] // view.width
+        for cell in range(cells * cells):
+            r = i * cells * cells + cell
+            ci, cj = cell % cells, cell // cells
+            du = (uniform(seed, pixels[i], cell, 2 * cells) - 0.5) * size
+            dv = (uniform(seed, pixels[i], cell, 2 * cells + 1) - 0.5) * size
+            x, y, ok = chief_ray(
+                view, tilt, distorted, column - 0.5 + (ci + 0.5) * size + du, row - 0.5 + (cj + 0.5) * size + dv
+            )
+            a = b = 0.0
+            if radius > 0.0:
+                r1, r2 = net_point(seed, pixels[i], morton(ci, cj), LENS_DIMENSION + cells)
+                a, b = lens_point(radius, r1, r2)
+            if not ok:
+                x = y = np.nan
+            normalised[r, 0], normalised[r, 1] = x, y
+            offsets[r, 0], offsets[r, 1] = du, dv
+            lens[r, 0], lens[r, 1] = a, b
+            o0, o1, o2 = lens_position(view, a, b)
+            origins[r, 0], origins[r, 1], origins[r, 2] = o0 - centre[0], o1 - centre[1], o2 - centre[2]
+            d0, d1, d2 = lens_direction(view, x, y, a, b)
+            directions[r, 0], directions[r, 1], directions[r, 2] = (d0, d1, d2) if ok else (0.0, 0.0, 0.0)

@@ -13,7 +13,18 @@ from render.errors import InputError
 
 Data = dict[str, Any]
 
-STEPS: dict[int, Callable[[Data], Data]] = {}
+
+def _lens_model(data: Data) -> Data:
+    """1 to 2: the lens says how it is rendered; until then every camera was a pinhole."""
+    part: Any = data
+    for name in ("scene", "rig", "camera", "lens"):
+        part = part.get(name) if isinstance(part, dict) else None
+    if isinstance(part, dict):
+        part.setdefault("model", "pinhole")
+    return data | {"schema_version": 2}
+
+
+STEPS: dict[int, Callable[[Data], Data]] = {1: _lens_model}
 OLDEST = 1
 CURRENT = OLDEST + len(STEPS)
 

@@ -26,7 +26,7 @@ MAX_SEED = 2**63 - 1
 class Project(Model):
     """Frozen; what a file leaves out takes the defaults, and what it should not hold is refused."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Literal[2] = 2
     name: str = quantity("untitled", label="Name", min_length=1, max_length=200)
     seed: int = quantity(0, label="Seed", help="Decides every random number of the scan.", ge=0, le=MAX_SEED)
     scene: Scene
