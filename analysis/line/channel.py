@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from analysis.line.noise import NoiseModel
@@ -85,19 +86,21 @@ class Lines:
 
     def _electrons(self, numbers: NDArray[Any]) -> tuple[Float32, Mask]:
         noise = self.noise
+        if numbers.dtype.kind == "u":
+            signal, mask = np.empty(numbers.shape, np.float32), np.empty(numbers.shape, np.uint8)
+            full = math.inf if noise.saturation is None else noise.saturation
+            _count(numbers, full, np.float32(noise.black_level), np.float32(1.0 / noise.gain), signal, mask)
+            return signal, mask
         if noise.saturation is None:
             mask = np.zeros(numbers.shape, np.uint8)
         else:
             mask = np.ascontiguousarray(numbers >= noise.saturation).view(np.uint8)
-        signal = np.empty(numbers.shape, np.float32)
-        np.copyto(signal, numbers, casting="same_kind" if numbers.dtype.kind == "f" else "unsafe")
-        signal -= np.float32(noise.black_level)
+        signal = (numbers - noise.black_level).astype(np.float32, copy=False)
         signal *= np.float32(1.0 / noise.gain)
-        if numbers.dtype.kind == "f":
-            bad = ~np.isfinite(signal)
-            if bad.any():
-                mask[bad] = MISSING
-                signal[bad] = 0.0
+        bad = ~np.isfinite(signal)
+        if bad.any():
+            mask[bad] = MISSING
+            signal[bad] = 0.0
         return signal, mask
 
     def _other_colours(self, start: int, stop: int, width: int) -> Mask:
@@ -105,6 +108,17 @@ class Lines:
         wanted = self.channel[0].upper()
         tile = np.array([[0 if c == wanted else MISSING for c in self.pattern[k : k + 2]] for k in (0, 2)], np.uint8)
         return np.asarray(np.tile(tile, ((stop - start) // 2 + 2, width // 2 + 1))[start % 2 :][: stop - start, :width])
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _count(numbers: NDArray[Any], full: float, black: float, scale: float, signal: Float32, mask: Mask) -> None:
+    """Whole numbers (n, w) -> electrons and mask (n, w)."""
+    for y in range(numbers.shape[0]):
+        row, out, above = numbers[y], signal[y], mask[y]
+        for x in range(row.shape[0]):
+            out[x] = (np.float32(row[x]) - black) * scale
+        for x in range(row.shape[0]):
+            above[x] = np.uint8(np.float32(row[x]) >= full)
 
 
 def kernel_radius(smoothing: float) -> int:

@@ -67,7 +67,7 @@ def pick(candidates: Line, choice: Int) -> Line:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def cheapest_chain(u: Float, strength: Float) -> Int:
     """Positions (n, k), NaN for none, and strengths (n, k) -> (n,) rank on the cheapest chains, -1 for none."""
     n, k = u.shape

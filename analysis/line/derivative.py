@@ -36,7 +36,7 @@ _SATURATED, _AT_BORDER = int(Flag.SATURATED), int(Flag.AT_BORDER)
 _NOT_CONVERGED, _OUT_OF_WINDOW = int(Flag.NOT_CONVERGED), int(Flag.OUT_OF_WINDOW)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _derivatives(y: Array, n: int, x: float, spread: float, weight: Array) -> tuple[float, float]:
     """r' and r'' at x of pixels 0..n-1, with the taps of r' -> weight (n,)."""
     first, second = 0.0, 0.0
@@ -50,7 +50,7 @@ def _derivatives(y: Array, n: int, x: float, spread: float, weight: Array) -> tu
     return first, second
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def differentiate_seeds(
     signal: Float32,
     mask: Mask,

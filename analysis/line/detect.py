@@ -42,7 +42,7 @@ _OK, _NO_PEAK, _NO_PIXELS = int(Flag.OK), int(Flag.NO_PEAK), int(Flag.NO_PIXELS)
 _SATURATED, _TOO_WIDE = int(Flag.SATURATED), int(Flag.TOO_WIDE)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _crossing(row: Float32, start: int, step: int, limit: int, value: float) -> float:
     """Distance from pixel `start` to where the row first falls below `value`, going by `step`; linear in between."""
     w = row.shape[0]
@@ -56,7 +56,7 @@ def _crossing(row: Float32, start: int, step: int, limit: int, value: float) -> 
     return float(limit)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _plateau(mask: Mask, centre: int) -> tuple[int, int]:
     """First and last saturated pixel of the run at, or within 2 px of, `centre`; (0, -1) where there is none."""
     w = mask.shape[0]
@@ -72,7 +72,7 @@ def _plateau(mask: Mask, centre: int) -> tuple[int, int]:
     return 0, -1
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _measure(
     row: Float32, response: Float32, mask: Mask, i: int, base: float, width: float, max_width: float, seed: Array
 ) -> int:
@@ -111,7 +111,7 @@ def _measure(
     return _OK if seed[WIDTH] <= max_width else _TOO_WIDE
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def detect(
     signal: Float32,
     mask: Mask,

@@ -26,7 +26,7 @@ Mask = NDArray[np.uint8]
 _SATURATED, _AT_BORDER, _NOT_CONVERGED = int(Flag.SATURATED), int(Flag.AT_BORDER), int(Flag.NOT_CONVERGED)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _slope(y: Array, middle: int, arm: int) -> float:
     """Left sum less right sum: rises through zero at a peak."""
     total = 0.0
@@ -35,7 +35,7 @@ def _slope(y: Array, middle: int, arm: int) -> float:
     return total
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def cross_seeds(signal: Float32, mask: Mask, seeds: Array, flags: Mask, arm: int, out: Array) -> None:
     """Scan lines (n, w) and seeds (n, k, 6) -> out (n, k, 6): u, NaN, width, amplitude, background, NaN.
 

@@ -31,7 +31,7 @@ _TOO_FEW, _NOT_CONVERGED = int(Flag.TOO_FEW_PIXELS), int(Flag.NOT_CONVERGED)
 _OUT_OF_WINDOW, _TOO_WIDE = int(Flag.OUT_OF_WINDOW), int(Flag.TOO_WIDE)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _cost(y: Array, floor: Array, g: Array, n: int, p: Array, likelihood: bool) -> float:
     """Twice the negative log likelihood up to a constant, or the sum of squares."""
     total = 0.0
@@ -45,7 +45,7 @@ def _cost(y: Array, floor: Array, g: Array, n: int, p: Array, likelihood: bool) 
     return total
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _normal(
     y: Array, floor: Array, shape: Array, n: int, p: Array, likelihood: bool, hessian: Array, score: Array
 ) -> None:
@@ -77,7 +77,7 @@ def _normal(
         score[3] += weight * rest
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _solve(hessian: Array, damping: float, right: Array, factor: Array, out: Array) -> bool:
     """(H + damping diag H) out = right by Cholesky on the lower triangle; False where H is not positive definite."""
     for i in range(4):
@@ -104,7 +104,7 @@ def _solve(hessian: Array, damping: float, right: Array, factor: Array, out: Arr
     return True
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _hold_sigma(hessian: Array, score: Array) -> None:
     """Take sigma out of the unknowns."""
     for j in range(4):
@@ -116,7 +116,7 @@ def _hold_sigma(hessian: Array, score: Array) -> None:
     score[2] = 0.0
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _optimise(
     x: Array, y: Array, floor: Array, n: int, p: Array, likelihood: bool, integrated: bool, shape: Array, hessian: Array
 ) -> bool:
@@ -164,7 +164,7 @@ def _optimise(
     return converged or (improved and decrement <= ACCEPTED_STEP * scale)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _gather(
     signal: Float32, mask: Mask, floor: Float32, middle: float, half: float, x: Array, y: Array, base: Array
 ) -> int:
@@ -177,7 +177,7 @@ def _gather(
     return count
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def fit_seeds(
     signal: Float32,
     mask: Mask,

@@ -26,7 +26,7 @@ WINDOW = 3.0
 _SATURATED, _AT_BORDER, _NOT_POSITIVE = int(Flag.SATURATED), int(Flag.AT_BORDER), int(Flag.NOT_POSITIVE)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def halve_seeds(signal: Float32, mask: Mask, seeds: Array, flags: Mask, out: Array) -> None:
     """Scan lines (n, w) and seeds (n, k, 6) -> out (n, k, 6): u, NaN, width, amplitude, background, NaN."""
     y = np.empty(signal.shape[1])

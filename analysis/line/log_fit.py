@@ -39,7 +39,7 @@ _NOT_CONVERGED, _OUT_OF_WINDOW = int(Flag.NOT_CONVERGED), int(Flag.OUT_OF_WINDOW
 _AT_BORDER = int(Flag.AT_BORDER)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _parabola(x: Array, z: Array, weight: Array, n: int, p: Array, inverse: Array) -> bool:
     """Weighted fit of z (n,) by p[0] + p[1] x + p[2] x^2, with the inverse (3, 3) of the normal matrix."""
     m0 = m1 = m2 = m3 = m4 = r0 = r1 = r2 = 0.0
@@ -67,7 +67,7 @@ def _parabola(x: Array, z: Array, weight: Array, n: int, p: Array, inverse: Arra
     return True
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _run(signal: Float32, mask: Mask, top: int, half: int, level: float) -> tuple[int, int]:
     """First and last pixel of the run around `top` that is above a level, at least a pixel on either side."""
     first = last = top
@@ -78,7 +78,7 @@ def _run(signal: Float32, mask: Mask, top: int, half: int, level: float) -> tupl
     return min(first, top - 1), max(last, top + 1)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def fit_logarithms(
     signal: Float32, mask: Mask, floor: Float32, seeds: Array, flags: Mask, guo: bool, correlation: Array, out: Array
 ) -> None:

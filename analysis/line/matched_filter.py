@@ -40,7 +40,7 @@ def response_gain(correlation: Array) -> float:
     return float(2.0 * (overlap[:m] * correlation[:m]).sum() - overlap[0] * correlation[0])
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def load_row(signal: Float32, mask: Mask, row: Float32) -> int:
     """(w,) -> padded (w + 2 RADIUS,), gaps filled linearly; returns the number of usable pixels."""
     w = signal.shape[0]
@@ -68,7 +68,7 @@ def load_row(signal: Float32, mask: Mask, row: Float32) -> int:
     return w - gaps
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def respond(row: Float32, out: Float32) -> None:
     """Gaussian filter of unit sum."""
     for i in range(out.shape[0]):
@@ -81,13 +81,13 @@ def respond(row: Float32, out: Float32) -> None:
         )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def block_size(w: int) -> int:
     """Pixels in a block, at most BLOCK."""
     return max(4, min(BLOCK, w // 8))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _insert(ordered: Array, count: int, value: float) -> None:
     """Put a value into its place among the `count` first."""
     while count > 0 and ordered[count - 1] > value:
@@ -96,25 +96,35 @@ def _insert(ordered: Array, count: int, value: float) -> None:
     ordered[count] = value
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
+def _low(a: float, b: float) -> float:
+    return a if a < b else b
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _high(a: float, b: float) -> float:
+    return b if a < b else a
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def _median(a: float, b: float, c: float, d: float, e: float, f: float, g: float) -> float:
-    """Of seven, by minima and maxima alone, so that there is no branch to guess (Devillard, 1998)."""
-    a, f = min(a, f), max(a, f)
-    a, d = min(a, d), max(a, d)
-    b, g = min(b, g), max(b, g)
-    c, e = min(c, e), max(c, e)
-    b = max(a, b)
-    d, f = min(d, f), max(d, f)
-    c, g = min(c, g), max(c, g)
-    d = max(c, d)
-    d = min(d, g)
-    e = min(e, f)
-    b, e = min(b, e), max(b, e)
-    d = max(b, d)
-    return min(d, e)
+    """Of seven, by minima and maxima alone, so that several are found at a time (Devillard, 1998)."""
+    a, f = _low(a, f), _high(a, f)
+    a, d = _low(a, d), _high(a, d)
+    b, g = _low(b, g), _high(b, g)
+    c, e = _low(c, e), _high(c, e)
+    b = _high(a, b)
+    d, f = _low(d, f), _high(d, f)
+    c, g = _low(c, g), _high(c, g)
+    d = _high(c, d)
+    d = _low(d, g)
+    e = _low(e, f)
+    b, e = _low(b, e), _high(b, e)
+    d = _high(b, d)
+    return _low(d, e)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def block_background(response: Float32, means: Array, level: Array) -> None:
     """Robust level at the centre of each block: the median over up to 7 blocks, of which a line spoils 2 or 3.
 
@@ -123,18 +133,19 @@ def block_background(response: Float32, means: Array, level: Array) -> None:
     """
     w, blocks = response.shape[0], means.shape[0]
     block = block_size(w)
+    first, quarter = min(1, w - 1), block // 4
     for b in range(blocks):
-        total, count = 0.0, 0
-        for i in range(b * block + 1, min((b + 1) * block, w), 4):  # smooth: every fourth holds nearly all of it
-            total += response[i]
-            count += 1
-        means[b] = total / count if count else response[0]
+        total, start = np.float32(0.0), np.uint64(b * block + first)
+        for i in range(quarter):  # smooth: every fourth holds nearly all of it
+            total += response[start + np.uint64(4 * i)]
+        means[b] = total / np.float32(quarter)
+    for b in range(blocks - 6):
+        level[b + 3] = _median(
+            means[b], means[b + 1], means[b + 2], means[b + 3], means[b + 4], means[b + 5], means[b + 6]
+        )
     near, far = np.empty(7), np.empty(7)
     for b in range(blocks):
         if 3 <= b < blocks - 3:
-            level[b] = _median(
-                means[b - 3], means[b - 2], means[b - 1], means[b], means[b + 1], means[b + 2], means[b + 3]
-            )
             continue
         near[0] = far[0] = means[b]
         pairs = continued = 0
@@ -157,7 +168,7 @@ def block_background(response: Float32, means: Array, level: Array) -> None:
         level[b] = min(near[pairs], far[continued])
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def background_at(x: float, level: Array, block: int) -> float:
     """The level at x, on straight lines between the centres of blocks."""
     blocks = level.shape[0]
@@ -169,7 +180,7 @@ def background_at(x: float, level: Array, block: int) -> float:
     return (1.0 - t) * level[b] + t * level[b + 1]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def noise_margin(
     response: Float32,
     floor: Float32,
@@ -188,61 +199,78 @@ def noise_margin(
     w, blocks = response.shape[0], level.shape[0]
     block = block_size(w)
     level_gain = 0.5 * math.pi / (block * min(5, blocks))  # a median of block means
+    scale = math.sqrt(gain * (1.0 + level_gain / NOISE_GAIN))
+    lift = max(threshold * threshold - 1.0, 0.0) / 6.0 * SKEW_GAIN / (NOISE_GAIN * math.sqrt(NOISE_GAIN))
     sigma = np.empty(blocks)
     for b in range(blocks):
-        photons = max(level[b], 0.0)
-        variance = max(photons + floor[min(b * block + block // 2, floor.shape[0] - 1)], 1e-2)
-        sigma[b] = math.sqrt(gain * (1.0 + level_gain / NOISE_GAIN) * variance)
-        pixel_variance = NOISE_GAIN * variance
-        skew = SKEW_GAIN * photons / (pixel_variance * math.sqrt(pixel_variance))
-        margin[b] = max((threshold + skew * max(threshold * threshold - 1.0, 0.0) / 6.0) * sigma[b], step)
-    spread, count = 0, 0
+        sigma[b] = floor[min(b * block + block // 2, floor.shape[0] - 1)]
+    for b in range(blocks):  # conditions in place of max, so that it is done four at a time
+        photons = level[b] if level[b] > 0.0 else 0.0
+        variance = photons + sigma[b]
+        variance = variance if variance > 1e-2 else 1e-2
+        root = math.sqrt(variance)
+        rise = (threshold + lift * photons / (variance * root)) * scale * root
+        sigma[b] = scale * root
+        margin[b] = rise if rise > step else step
+    spread = np.int32(0)
     for b in range(blocks):
-        middle, bound = level[b], 0.6745 * TEXTURE * sigma[b]
-        for i in range(b * block + 2, min((b + 1) * block, w), 8):
-            spread += abs(response[i] - middle) > bound
-            count += 1
+        middle, bound = np.float32(level[b]), np.float32(0.6745 * TEXTURE * sigma[b])
+        start = np.uint64(min(b * block + 2, w - 1))
+        for i in range((block + 5) // 8):
+            spread += np.int32(abs(response[start + np.uint64(8 * i)] - middle) > bound)
+    count = blocks * ((block + 5) // 8)
     if 2 * spread <= count + 3.0 * math.sqrt(count):  # three sigma of a fair coin
         return
     size = np.empty(blocks)
     every = 1 + blocks // TEXTURED_BLOCKS
     for b in range(0, blocks, every):
         before, after = max(b - 1, 0), min(b + 1, blocks - 1)
-        slope = np.float32((level[after] - level[before]) / (block * max(after - before, 1)))
-        middle, centre = np.float32(level[b]), np.float32((b + 0.5) * block - 0.5)
-        sum_of, count = np.float32(0.0), 0
-        for i in range(b * block, min((b + 1) * block, w)):
-            sum_of += abs(response[i] - middle - slope * (np.float32(i) - centre))
-            count += 1
-        _insert(size, b // every, sum_of / max(count, 1))
+        slope = (level[after] - level[before]) / (block * max(after - before, 1))
+        lowest = level[b] - slope * 0.5 * (block - 1)
+        values = response[b * block : min((b + 1) * block, w)]
+        _insert(size, b // every, _deviation(values, np.float32(lowest), np.float32(slope)))
     texture = 1.2533 * size[(blocks - 1) // every // 2]
     for b in range(blocks):
         margin[b] = max(margin[b], threshold * texture)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy", fastmath={"reassoc"})
+def _deviation(values: Float32, start: float, slope: float) -> float:
+    """Mean distance of values (n,) from start + slope i, summed in any order."""
+    total = np.float32(0.0)
+    for i in range(values.shape[0]):
+        total += abs(values[i] - start - slope * np.float32(i))
+    return total / max(values.shape[0], 1)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def local_maxima(response: Float32, level: Array, margin: Array, at: NDArray[np.int32]) -> int:
     """Pixels where the response is a maximum and exceeds background + margin; returns how many."""
     w, blocks = response.shape[0], level.shape[0]
     block = block_size(w)
+    bound = np.empty(blocks, np.float32)
+    for b in range(blocks):
+        bound[b] = level[b] + margin[b]
     found = 0
-    for b in range(max(1, blocks - 1)):
-        # from the centre of one block to the next, the bound is a straight line
-        after_b = min(b + 1, blocks - 1)
-        low, high = level[b] + margin[b], level[after_b] + margin[after_b]
-        slope = np.float32((high - low) / block)
-        start = 0 if b == 0 else b * block + block // 2
-        stop = w if b >= blocks - 2 else (b + 1) * block + block // 2
-        bound = np.float32(low) + slope * np.float32(start - (b * block + 0.5 * block - 0.5))
-        lowest = min(bound, bound + slope * np.float32(stop - start))
-        above = np.int32(0)
-        for i in range(start, stop):  # without a branch: most stretches hold nothing
-            above += np.int32(response[i] > lowest)
+    for b in range(-1, blocks):
+        # from the centre of one block to the next the bound is a straight line, beyond the outermost it is level
+        start = 0 if b < 0 else b * block + block // 2
+        stop = w if b == blocks - 1 else (b + 1) * block + block // 2
+        low, high = bound[max(b, 0)], bound[min(b + 1, blocks - 1)]
+        # without a branch, and most often over a length known beforehand: most stretches hold nothing
+        lowest, above, origin = min(low, high), np.int32(0), np.uint64(start)
+        if stop - start == BLOCK:
+            for i in range(BLOCK):
+                above += np.int32(response[origin + np.uint64(i)] > lowest)
+        else:
+            for i in range(stop - start):
+                above += np.int32(response[origin + np.uint64(i)] > lowest)
         if above == 0:
             continue
+        slope = (high - low) / np.float32(block)
         for i in range(start, stop):
             value = response[i]
-            if value > bound + slope * np.float32(i - start):
+            if value > low + slope * (np.float32(i - start) + np.float32(0.5)):
                 before = response[i - 1] if i > 0 else np.float32(-np.inf)
                 after = response[i + 1] if i < w - 1 else np.float32(-np.inf)
                 if value >= before and value > after:

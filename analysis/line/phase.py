@@ -29,7 +29,7 @@ _SATURATED, _AT_BORDER = int(Flag.SATURATED), int(Flag.AT_BORDER)
 _NOT_CONVERGED, _OUT_OF_WINDOW = int(Flag.NOT_CONVERGED), int(Flag.OUT_OF_WINDOW)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def turn_seeds(
     signal: Float32, mask: Mask, floor: Float32, seeds: Array, flags: Mask, correlation: Array, out: Array
 ) -> None:

@@ -14,7 +14,7 @@ ROOT_HALF = math.sqrt(0.5)
 ROOT_HALF_PI = math.sqrt(0.5 * math.pi)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def profile(x: Array, n: int, centre: float, sigma: float, integrated: bool, out: Array) -> None:
     """x (n,) ascending pixels -> out (3, n): unit-amplitude profile g, dg/dcentre, dg/dsigma.
 
@@ -44,7 +44,7 @@ def profile(x: Array, n: int, centre: float, sigma: float, integrated: bool, out
         last = x[i]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def linear_variance(weight: Array, variance: Array, x: Array, n: int, correlation: Array) -> float:
     """Variance of sum(weight * pixel) over (n,) pixels; their covariance at distance d is correlation[d] * variance.
 

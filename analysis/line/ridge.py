@@ -42,7 +42,7 @@ _NOT_CONVERGED, _OUT_OF_WINDOW, _NOT_POSITIVE = int(Flag.NOT_CONVERGED), int(Fla
 _ALONG = int(Flag.ALONG_SCAN_LINE)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def fill_gaps(signal: Float32, mask: Mask) -> Float32:
     """(n, w) with missing pixels linear along the scan line, and whole missing lines as their neighbours' mean."""
     n, w = signal.shape
@@ -70,7 +70,7 @@ def fill_gaps(signal: Float32, mask: Mask) -> Float32:
     return filled
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _kernel(offset: float, half: int, spread: float, taps: Array) -> None:
     """Gaussian, its first and second derivative at offset - j, j = -half..half -> taps (3, 2 half + 1)."""
     inverse = 1.0 / (spread * spread)
@@ -83,7 +83,7 @@ def _kernel(offset: float, half: int, spread: float, taps: Array) -> None:
         taps[2, j + half] = (d * d * inverse - 1.0) * inverse * g
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _hessian(signal: Float32, base: float, y: int, x: int, half: int, across: Array, along: Array, r: Array) -> None:
     """r (5,) = r_x, r_y, r_xx, r_xy, r_yy from taps across (along x) and along (along y), edges repeated."""
     n, w = signal.shape
@@ -105,7 +105,7 @@ def _hessian(signal: Float32, base: float, y: int, x: int, half: int, across: Ar
         r[4] += s0 * g2
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _normal(r: Array) -> tuple[float, float, float]:
     """Eigenvalue of the Hessian that is most negative, and its unit vector (n_x, n_y) with n_x >= 0."""
     half_sum, half_gap = 0.5 * (r[2] + r[4]), 0.5 * (r[2] - r[4])
@@ -119,7 +119,7 @@ def _normal(r: Array) -> tuple[float, float, float]:
     return half_sum - root, sign * a / length, sign * b / length
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def ridge_seeds(
     signal: Float32,
     raw: Float32,
@@ -194,7 +194,7 @@ def ridge_seeds(
             write_peak(seed, x, sigma, out[row, k])
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _weigh_normal(
     signal: Float32, seed: Array, y: int, x: float, nx: float, ny: float, reason: int, weight: Array
 ) -> tuple[float, int, int, int]:
@@ -243,7 +243,7 @@ def _weigh_normal(
     return x, middle, half, outcome
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _bilinear(signal: Float32, x: float, y: float) -> float:
     m, w = signal.shape
     ix, iy = min(max(math.floor(x), 0), w - 2), min(max(math.floor(y), 0), max(m - 2, 0))
@@ -254,7 +254,7 @@ def _bilinear(signal: Float32, x: float, y: float) -> float:
     return float((1.0 - ty) * upper + ty * lower)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _sigma(raw: Float32, mask: Mask, floor: Float32, y: int, x: int, half: int, weight: Array) -> float:
     """Standard deviation of a position that moves by weight[j, i] for one electron more in pixel (x + i, y + j).
 

@@ -34,7 +34,7 @@ _SATURATED, _AT_BORDER, _NOT_POSITIVE = int(Flag.SATURATED), int(Flag.AT_BORDER)
 _NOT_CONVERGED = int(Flag.NOT_CONVERGED)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _is_steady(seed: Array, floor: Float32) -> bool:
     """Whether gauss_3 has an honest sigma on this line: judged from the seed, since the three pixels are the noise."""
     if seed[WIDTH] < NARROWEST:
@@ -45,7 +45,7 @@ def _is_steady(seed: Array, floor: Float32) -> bool:
     return bool(square * math.sqrt(0.5 * (flank + max(still, 0.0))) < STEADY * flank)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def interpolate_seeds(
     signal: Float32,
     mask: Mask,

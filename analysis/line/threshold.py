@@ -24,7 +24,7 @@ FRACTION = 0.2
 _SATURATED, _AT_BORDER, _NOT_POSITIVE = int(Flag.SATURATED), int(Flag.AT_BORDER), int(Flag.NOT_POSITIVE)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def weigh_above(
     signal: Float32, mask: Mask, seeds: Array, flags: Mask, fraction: float, subtract: bool, out: Array
 ) -> None:

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def brightest(signal: Float32, mask: Mask, seed: Array) -> int:
     """The brightest usable pixel of a scan line (w,) within a sigma of the seed; a plateau's middle."""
     w = signal.shape[0]
@@ -32,7 +32,7 @@ def brightest(signal: Float32, mask: Mask, seed: Array) -> int:
     return best
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def load_window(signal: Float32, mask: Mask, first: int, last: int, base: float, y: Array) -> int:
     """Pixels first..last less the background -> y; gaps filled linearly. Returns how many were there, -1 off the image.
 
@@ -52,7 +52,7 @@ def load_window(signal: Float32, mask: Mask, first: int, last: int, base: float,
     return usable
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _neighbours(mask: Mask, i: int) -> tuple[int, int, float]:
     """The usable pixels left and right of a gap and where i lies between them, 0 to 1; left -1: there are none."""
     w = mask.shape[0]
@@ -70,7 +70,7 @@ def _neighbours(mask: Mask, i: int) -> tuple[int, int, float]:
     return left, right, (i - left) / (right - left)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def any_saturated(mask: Mask, first: int, last: int) -> bool:
     """Whether a pixel of first..last only says "at least this much"."""
     found = np.uint8(0)
@@ -79,7 +79,7 @@ def any_saturated(mask: Mask, first: int, last: int) -> bool:
     return bool(found > 0)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def position_sigma(
     signal: Float32, mask: Mask, floor: Float32, first: int, n: int, weight: Array, correlation: Array
 ) -> float:
@@ -105,7 +105,7 @@ def position_sigma(
     return math.sqrt(linear_variance(weight, variance, x, n, correlation))
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def write_peak(seed: Array, u: float, sigma_u: float, out: Array) -> None:
     """A position with the seed's width, amplitude and background -> out (6,)."""
     out[0], out[1] = u, sigma_u
