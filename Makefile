@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 INSTALLED_VALIDATION := $(VENV)/.installed-validation
 WORKERS ?= 2
 
-.PHONY: run test lint validate benchmark format clean system system-tests system-validation
+.PHONY: run test lint validate benchmark peers format clean system system-tests system-validation
 
 run: $(INSTALLED)
 	$(BIN)/python main.py
@@ -25,7 +25,10 @@ validate: $(INSTALLED_VALIDATION)
 	$(BIN)/pytest -m validation tests
 
 benchmark: $(INSTALLED)
-	@for script in tests/benchmarks/bench_*.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+	@for script in $(filter-out %/bench_peers.py,$(wildcard tests/benchmarks/bench_*.py)); do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+peers: $(INSTALLED_VALIDATION)
+	$(BIN)/python tests/benchmarks/bench_peers.py
 
 format: $(INSTALLED)
 	$(BIN)/ruff check --fix .

@@ -43,7 +43,10 @@ LIBRARIES = (
     Need("libpangoft2-1.0.so.0", "libpangoft2-1.0-0", "the PDF report (WeasyPrint)"),
     Need("libharfbuzz-subset.so.0", "libharfbuzz-subset0", "the PDF report (WeasyPrint)"),
 )
-VALIDATION_LIBRARIES = (Need("libatomic.so.1", "libatomic1", "the comparison with another renderer (Mitsuba)"),)
+VALIDATION_LIBRARIES = (
+    Need("libatomic.so.1", "libatomic1", "the comparison with another renderer (Mitsuba)"),
+    Need("libLLVM-19.so", "libllvm19", "the fastest variants of another renderer (Mitsuba)"),
+)
 DESKTOP_LIBRARIES = (
     Need("libxcb.so.1", "libxcb1", "the desktop (Qt)"),
     Need("libxcb-cursor.so.0", "libxcb-cursor0", "the desktop (Qt)"),
