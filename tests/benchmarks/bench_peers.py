@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("--engines", nargs="*", default=[], metavar="NAME", help="starts of their names")
     parser.add_argument("--budgets", nargs="*", type=float, help="seconds")
     parser.add_argument("--runs", type=int, help="of each engine, with seeds of their own")
-    parser.add_argument("--folder", type=Path, default=Path("benchmark-output/peers"), help="for the chart and the table")
+    parser.add_argument("--folder", type=Path, default=Path("benchmark-output/peers"), help="for the results")
     options = parser.parse_args()
     budgets = options.budgets or (QUICK if options.quick else FULL)
     runs = options.runs or (1 if options.quick else 3)
