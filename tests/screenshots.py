@@ -17,9 +17,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from virtual_display import display
+
+ROOT = Path(__file__).resolve().parents[1]
 if TYPE_CHECKING:
     from studio.qt.window import MainWindow
 
@@ -36,12 +38,9 @@ def main() -> int:
     parser.add_argument("--scale", type=float, default=0.5, help="image scale of the render")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
-    display = virtual_display()
-    with tempfile.TemporaryDirectory() as home:
+    with display(), tempfile.TemporaryDirectory() as home:
         os.environ.update(XDG_CONFIG_HOME=f"{home}/config", XDG_STATE_HOME=f"{home}/state")
         take(options.folder, options.scale, options.readme)
-    if display is not None:
-        display.stop()
     return 0
 
 
@@ -138,17 +137,6 @@ def write_small(source: Path, target: Path) -> None:
         small = image.convert("RGB").resize((README_WIDTH, height), Image.Resampling.LANCZOS)
         with atomic_write(target) as temporary:
             small.quantize(192, dither=Image.Dither.NONE).save(temporary, optimize=True)
-
-
-def virtual_display() -> object | None:
-    """Started where there is no display."""
-    if os.environ.get("DISPLAY"):
-        return None
-    from pyvirtualdisplay import Display
-
-    made = Display(visible=False, size=(1920, 1200), color_depth=24)
-    made.start()
-    return made
 
 
 if __name__ == "__main__":

@@ -17,9 +17,12 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from virtual_display import display
+
+ROOT = Path(__file__).resolve().parents[2]
 BAR = 0.05
 TEMPLATES = ("step_block", "weld_seam", "sphere")
 LASER = ("scene", "rig", "lasers", 0)
@@ -30,12 +33,9 @@ SCALE = 0.125
 
 def main() -> int:
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 2.0
-    display = virtual_display()
-    with tempfile.TemporaryDirectory() as home:
+    with display(), tempfile.TemporaryDirectory() as home:
         os.environ.update(XDG_CONFIG_HOME=f"{home}/config", XDG_STATE_HOME=f"{home}/state")
         good = soak(60.0 * minutes, Path(home))
-    if display is not None:
-        display.stop()
     return 0 if good else 1
 
 
@@ -138,17 +138,6 @@ def memory_mb() -> int:
 
 def peak_mb() -> int:
     return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**10 if sys.platform != "darwin" else 2**20))
-
-
-def virtual_display() -> object | None:
-    """Started where there is no display."""
-    if os.environ.get("DISPLAY"):
-        return None
-    from pyvirtualdisplay import Display
-
-    made = Display(visible=False, size=(1920, 1200), color_depth=24)
-    made.start()
-    return made
 
 
 if __name__ == "__main__":
