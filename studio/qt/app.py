@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studio.display import INSTEAD, why_no_display
+from studio.qt.quick_start import no_collection, plain_imports
 from studio.system import message, missing_desktop_needs, missing_needs
 
 if TYPE_CHECKING:
@@ -39,6 +41,8 @@ def open_studio(path: Path | None = None) -> int:
         return BAD_INPUT
     app = application()
     window = start(path)
+    # what is there now stays to the end: looking through it for garbage would only hold up the window
+    gc.freeze()
     code = app.exec()
     window.deleteLater()
     return code
@@ -53,6 +57,8 @@ def application() -> QApplication:
         # VTK's window does not work on Wayland; XWayland is everywhere
         os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
     from PySide6.QtCore import Qt
+
+    plain_imports()
     from PySide6.QtGui import QGuiApplication, QSurfaceFormat
     from PySide6.QtWidgets import QApplication
 
@@ -74,6 +80,7 @@ def application() -> QApplication:
     return app
 
 
+@no_collection()
 def start(path: Path | None) -> MainWindow:
     """The window, shown, on a project, recovered work or the sample. A bad project is told over the sample."""
     from PySide6.QtCore import QTimer

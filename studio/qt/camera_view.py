@@ -262,7 +262,7 @@ class CameraView(QWidget):
             self._draw_live()
 
     def _draw_live(self) -> None:
-        if not self.isVisible():
+        if not self.isVisible() or not self.live.ready:
             return
         look = self.live.look
         image = look.image(seconds=DRAG_SECONDS if self.session.dragging else REST_SECONDS)
