@@ -1,7 +1,7 @@
 """Which pixels a laser can reach directly: the triangles that meet its slab, clipped to it and drawn conservatively.
 
 The slab is the sheet out to `SHEET_SIGMAS`, within the fan. Triangles that do not face both camera and laser are left
-out; occlusion is not looked at, so the set is a superset.
+out; occlusion is not looked at, so the set is a superset. A thin lens spreads each point over its blur disc.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from render.beam import SHEET_SIGMAS, sheet_sigma
 from render.camera import Camera
 from render.curve import project_point
-from render.distortion import tilt_matrix
+from render.distortion import distort, tilt_matrix
 from render.laser import LineLaser
+from render.lens import chief_ray
 from render.pose import invert
 from render.surface import Surface, View
 from render.threads import map_chunks
@@ -58,9 +59,13 @@ def mark_triangles(
     T_camera_laser: Float,
     laser_centre: Float,
     beam: Float,
+    blur: float,
     mask: NDArray[np.uint8],
 ) -> None:
-    """Set mask (h, w) wherever triangles start..stop may show direct light of the laser."""
+    """Set mask (h, w) wherever triangles start..stop may show direct light of the laser.
+
+    blur: px of the blur disc's radius for a difference of 1/m in 1 / depth; 0 for a pinhole.
+    """
     height, width = mask.shape
     vertices, triangles, camera_centre = surface.vertices, surface.triangles, view.T_world_camera[:3, 3]
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
@@ -69,6 +74,7 @@ def mark_triangles(
     planes = np.zeros((6, 4))
     left, right = np.empty(height, dtype=np.int64), np.empty(height, dtype=np.int64)
     p = np.empty(3)
+    margin = MARGIN_PX
     for t in range(start, stop):
         low, high, near, far = np.inf, -np.inf, np.inf, -np.inf
         for c in range(3):
@@ -93,7 +99,10 @@ def mark_triangles(
         to_camera = nx * (camera_centre[0] - a[0]) + ny * (camera_centre[1] - a[1]) + nz * (camera_centre[2] - a[2])
         to_laser = nx * (laser_centre[0] - a[0]) + ny * (laser_centre[1] - a[1]) + nz * (laser_centre[2] - a[2])
         if not to_camera * to_laser > 0.0:
-            continue
+            # the rim of an aperture may see what its centre does not
+            rim = view.lens[0] * math.sqrt(nx * nx + ny * ny + nz * nz)
+            if abs(to_camera) >= rim or to_laser == 0.0:
+                continue
         # sigma(z) is convex, so the chord over the triangle's depths bounds it
         slope = (sigma_far - sigma_near) / (far - near) if far > near else 0.0
         offset = max(sigma_near - slope * near, sigma_far - slope * far)
@@ -135,7 +144,11 @@ def mark_triangles(
                     continue
                 column = int(math.floor(u + 0.5))
                 row = int(math.floor(v + 0.5))
-                for y in range(max(row - MARGIN_PX, 0), min(row + MARGIN_PX, height - 1) + 1):
+                if blur > 0.0:
+                    lens = view.lens
+                    off_focus = lens[1] - (lens[2] * p[0] + lens[3] * p[1] + 1.0) / p[2]
+                    margin = MARGIN_PX + int(min(1e4, math.ceil(blur * abs(off_focus))))
+                for y in range(max(row - margin, 0), min(row + margin, height - 1) + 1):
                     if y < top or y > bottom:
                         # widen the range of rows, clearing what it takes in
                         if bottom < 0:
@@ -147,10 +160,34 @@ def mark_triangles(
                         while y > bottom:
                             bottom += 1
                             left[bottom], right[bottom] = width, -1
-                    left[y], right[y] = min(left[y], column - MARGIN_PX), max(right[y], column + MARGIN_PX)
+                    left[y], right[y] = min(left[y], column - margin), max(right[y], column + margin)
         for y in range(top, bottom + 1):
             for x in range(max(left[y], 0), min(right[y], width - 1) + 1):
                 mask[y, x] = 1
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def blur_scale(view: View, height: int) -> float:
+    """px of the blur disc's radius for a difference of 1/m in 1 / depth: at most, anywhere in the image."""
+    if view.lens[0] == 0.0:
+        return 0.0
+    k, tilt = view.distortion, tilt_matrix(view.distortion[12], view.distortion[13])
+    distorted = bool(np.any(k))
+    stretch = 1.0
+    for i in range(17):
+        for j in range(17):
+            u, v = view.width * i / 16.0 - 0.5, height * j / 16.0 - 0.5
+            x, y, ok = chief_ray(view, tilt, distorted, u, v)
+            if ok and distorted:
+                _, _, xx, xy, yx, yy = distort(x, y, k, tilt)
+                stretch = max(stretch, math.sqrt(xx * xx + xy * xy + yx * yx + yy * yy))
+    if distorted:
+        # between the samples
+        stretch *= 1.1
+    # on a tilted plane of focus the disc's far side is a little larger
+    far_side = 1.0 / max(0.1, 1.0 - view.lens[0] * math.hypot(view.lens[2], view.lens[3]))
+    skew = 1.0 + abs(view.intrinsics[4]) / view.intrinsics[0]
+    return view.lens[0] * max(view.intrinsics[0], view.intrinsics[1]) * stretch * far_side * skew
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -188,9 +225,10 @@ def reachable_pixels(
     mask = np.zeros((camera.height, camera.width), dtype=np.uint8)
     T_laser_world, T_camera_laser = invert(T_world_laser), invert(T_world_camera) @ T_world_laser
     view, surface, laser_centre, beam = camera.view(T_world_camera), world.surface, T_world_laser[:3, 3], laser.packed()
+    blur = blur_scale(view, camera.height)
 
     def work(start: int, stop: int) -> None:
-        mark_triangles(start, stop, surface, view, T_laser_world, T_camera_laser, laser_centre, beam, mask)
+        mark_triangles(start, stop, surface, view, T_laser_world, T_camera_laser, laser_centre, beam, blur, mask)
 
     map_chunks(work, len(world.triangles), TRIANGLES_A_CHUNK, threads)
     return marked_pixels(mask.ravel())
