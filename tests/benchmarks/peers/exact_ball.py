@@ -1,6 +1,6 @@
 """s3 and s4 with the exact ball, by particles in float64: nothing of the renderer, and no fault that it could share.
 
-Particles leave the laser stratified, split at the ball by Fresnel's equations, with the sphere itself for a surface, and
+Particles leave the laser stratified, split at the ball by Fresnel's equations, the sphere itself for a surface, and
 are seen where they land on the wall: straight, or through the plate, where Snell's law leaves one unknown. Pixels in
 which the ball is seen, and light that meets the wall twice, are left out; `ball_pixels` tells the former. On s3 it
 agrees with `references/s3.npz`, made apart from it: 1e-4 in the line's light, 1e-3 in the caustic's.
