@@ -1,7 +1,10 @@
 import numpy as np
 import pytest
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 
-from render.embree import RayScene
+from render import embree
+from render.embree import RayScene, commit
 from render.errors import Cancelled
 from render.primitives import primitive_mesh
 from render.shape import Sphere
@@ -34,6 +37,21 @@ def test_a_mesh_handed_over_in_pieces_is_hit_in_the_same_triangles():
     assert np.mean(first[0] == second[0]) > 0.999  # a ray through an edge may name either side
     assert ((first[0] >= 0) == (second[0] >= 0)).all() and len(np.unique(second[0])) > 5_000
     np.testing.assert_allclose(first[1], second[1], rtol=1e-5)
+
+
+def test_the_tree_is_built_without_the_interpreter_and_by_embreex_where_that_cannot_be(monkeypatch):
+    corners, triangle = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
+    origin, towards = np.zeros((2, 3), np.float32), np.array([[1, 1, 1], [-1, -1, -1]], np.float32)
+    scene = EmbreeScene(robust=True)
+    mesh = TriangleMesh(scene, corners, triangle)
+    assert commit(scene) and scene.is_committed
+    assert scene.run(origin, towards).tolist() == [0, -1]
+    del mesh
+
+    monkeypatch.setattr(embree, "_rtc_commit_scene", lambda: None)
+    assert not commit(EmbreeScene(robust=True))
+    scene = ball()
+    assert (scene.intersect(np.zeros((8, 3), np.float32), np.ones((8, 3), np.float32))[0] >= 0).all()
 
 
 def test_occlusion_ends_at_the_target():
