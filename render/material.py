@@ -1,8 +1,12 @@
-"""Materials. Each object has one; `kind` tells which model, so that more can join without changing a file."""
+"""Materials. Each object has one; `kind` tells which model, so that more can join without changing a file.
+
+Two-sided are the opaque ones: light on either side is treated alike. One-sided are glass and subsurface, whose normals
+point out of the substance, and the light of an emitter, which leaves where its normals point.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -19,6 +23,40 @@ class Texture(Model):
     scale: float = quantity(1.0, label="Factor", help="Multiplies the values.", gt=0, le=1)
 
 
+class GreyTexture(Model):
+    """An image file whose grey values are the numbers themselves, mapped as a texture is."""
+
+    path: str = quantity(label="Image", help="Relative to the project file.", min_length=1, max_length=1000)
+    scale: float = quantity(1.0, label="Factor", help="The number that white stands for.", gt=0, le=1)
+
+
+class NormalMap(Model):
+    """An image of normals in the frame of the texture: R along u, G along v, B out of the surface.
+
+    The middle code (128 of 255) is zero.
+    """
+
+    kind: Literal["normal_map"] = "normal_map"
+    path: str = quantity(label="Image", help="Relative to the project file.", min_length=1, max_length=1000)
+    strength: float = quantity(1.0, label="Strength", help="Multiplies the slopes.", ge=0, le=10)
+    green_down: bool = quantity(False, label="Green points down", help="As Direct3D has it; off: as OpenGL has it.")
+
+
+class BumpMap(Model):
+    """A grey image of heights: slopes are shaded as if they were there, the surface itself stays as it is."""
+
+    kind: Literal["bump_map"] = "bump_map"
+    path: str = quantity(label="Image", help="Relative to the project file.", min_length=1, max_length=1000)
+    height: float = quantity(
+        1e-4, unit="m", label="Height", help="Of white above black; negative: below.", ge=-1.0, le=1.0
+    )
+
+
+def _relief() -> Any:
+    help = "Fine shape that shading sees and the truth does not."
+    return quantity(None, label="Relief", help=help, discriminator="kind")
+
+
 class FromMesh(Model):
     """Use the colour or texture that the mesh file brings (OBJ with MTL, GLB); grey 0.5 where it brings none."""
 
@@ -32,6 +70,7 @@ class Lambertian(Model):
     albedo: UnitInterval | RGBReflectance | Texture | FromMesh = quantity(
         0.5, label="Albedo", help="One number, three for R, G, B, a texture, or what the mesh file says."
     )
+    relief: NormalMap | BumpMap | None = _relief()
 
 
 Metal = Literal[
@@ -48,6 +87,9 @@ Metal = Literal[
     "nickel",
 ]
 Roughness = Annotated[float, Field(ge=0.01, le=1.0)]
+SmoothOrRough = Annotated[float, Field(ge=0.0, le=1.0)]
+POLISHED = 0.005
+"""A GGX alpha below this is taken for a perfectly smooth surface, a mirror."""
 Radiance = Annotated[float, Field(ge=0.0, le=1e9)]
 ScatteringAlbedo = Annotated[float, Field(ge=0.0, le=0.99999)]
 MeanFreePath = Annotated[float, Field(ge=1e-6, le=10.0)]
@@ -58,11 +100,14 @@ class Conductor(Model):
 
     kind: Literal["conductor"] = "conductor"
     metal: Metal = quantity("steel", label="Metal")
-    roughness: Roughness = quantity(0.15, label="Roughness", help="GGX alpha; 0.05 polished, 0.15 ground, 0.4 blasted.")
+    roughness: SmoothOrRough | GreyTexture = quantity(
+        0.15, label="Roughness", help="GGX alpha; 0 mirror (below 0.005), 0.05 polished, 0.15 ground, 0.4 blasted."
+    )
     roughness_across: Roughness | None = quantity(
         None, label="Roughness along v", help="For a grain along u; empty: the same in every direction."
     )
     tint: UnitInterval = quantity(1.0, label="Tint", help="Multiplies the reflectance; below 1 for dirt.")
+    relief: NormalMap | BumpMap | None = _relief()
 
     @property
     def albedo(self) -> float:
@@ -76,8 +121,9 @@ class Coated(Model):
     albedo: UnitInterval | RGBReflectance | Texture | FromMesh = quantity(
         0.5, label="Albedo of the base", help="One number, three for R, G, B, a texture, or what the mesh file says."
     )
-    roughness: Roughness = quantity(0.1, label="Roughness", help="GGX alpha of the boundary.")
+    roughness: Roughness | GreyTexture = quantity(0.1, label="Roughness", help="GGX alpha of the boundary.")
     index: float = quantity(1.5, label="Refractive index", help="Of the coat.", ge=1.01, le=3.0)
+    relief: NormalMap | BumpMap | None = _relief()
 
 
 Substance = Literal["BK7", "fused_silica", "SF11", "sapphire", "acrylic", "polycarbonate", "polystyrene", "water"]
@@ -94,12 +140,13 @@ class Glass(Model):
     index: float | None = quantity(
         None, label="Refractive index", help="In place of the substance's, at every wavelength.", ge=1.01, le=3.0
     )
-    roughness: float = quantity(
-        0.0, label="Roughness", help="GGX alpha; 0 polished, 0.1 satin, 0.4 frosted. Below 0.005: polished.", ge=0, le=1
+    roughness: SmoothOrRough | GreyTexture = quantity(
+        0.0, label="Roughness", help="GGX alpha; 0 polished (below 0.005), 0.1 satin, 0.4 frosted."
     )
     tint: UnitInterval | RGBReflectance = quantity(
         1.0, label="Tint", help="What is left of light at each surface; one number, or R, G, B."
     )
+    relief: NormalMap | BumpMap | None = _relief()
 
     @property
     def albedo(self) -> float | RGBReflectance:
@@ -125,6 +172,7 @@ class Subsurface(Model):
     anisotropy: float = quantity(
         0.0, label="Anisotropy", help="Mean cosine g of scattering: 0 even, towards 1 forward.", ge=-0.98, le=0.98
     )
+    relief: NormalMap | BumpMap | None = _relief()
 
     @property
     def albedo(self) -> float:
@@ -144,6 +192,7 @@ class Emitter(Model):
     albedo: UnitInterval | RGBReflectance | Texture | FromMesh = quantity(
         0.5, label="Albedo", help="One number, three for R, G, B, a texture, or what the mesh file says."
     )
+    relief: NormalMap | BumpMap | None = _relief()
 
 
 BaseMaterial = Annotated[Lambertian | Conductor | Coated | Glass | Subsurface | Emitter, Field(discriminator="kind")]

@@ -25,13 +25,21 @@ from render.bsdf import (
 )
 from render.errors import InputError
 from render.fresnel import diffuse_reflectance
-from render.material import BaseMaterial, Coated, Conductor, Emitter, Glass, Subsurface, at_wavelength
+from render.material import (
+    POLISHED,
+    BaseMaterial,
+    Coated,
+    Conductor,
+    Emitter,
+    Glass,
+    GreyTexture,
+    Subsurface,
+    at_wavelength,
+)
 
 Float = NDArray[np.float64]
 
 ASSETS = Path(__file__).parents[1] / "assets"
-POLISHED = 0.005
-"""A GGX alpha below this is taken for a perfectly smooth surface."""
 
 
 @lru_cache(maxsize=1)
@@ -83,21 +91,31 @@ def glass_index(glass: Glass, wavelength_nm: float) -> float:
     return glass.index if glass.index is not None else substance_index(glass.substance, wavelength_nm)
 
 
-def material_row(material: BaseMaterial, bands_nm: tuple[float, float, float]) -> Float:
-    """(ROW,) parameters at three wavelengths; the layout is in `render.bsdf`."""
+def material_row(material: BaseMaterial, bands_nm: tuple[float, float, float], least_alpha: float = 1.0) -> Float:
+    """(ROW,) parameters at three wavelengths; the layout is in `render.bsdf`.
+
+    least_alpha: the least value of a roughness that is an image, which stands for it here.
+    """
     row = np.zeros(ROW)
     row[0] = LAMBERTIAN
     match material:
         case Conductor():
-            across = material.roughness if material.roughness_across is None else material.roughness_across
-            row[0], row[1], row[2] = CONDUCTOR, material.roughness, across
+            alpha = least_alpha if isinstance(material.roughness, GreyTexture) else material.roughness
+            alpha = alpha if alpha >= POLISHED else 0.0
+            row[0], row[1], row[2] = CONDUCTOR, alpha, alpha
+            if material.roughness_across is not None:
+                # a grain keeps its direction, however near the two are
+                row[1], row[2] = max(alpha, POLISHED), material.roughness_across
+                row[1] *= 1.0 if row[1] != row[2] else 1.0 - 1e-9
             for band, wavelength_nm in enumerate(bands_nm):
                 row[4 + band], row[7 + band] = complex_index(material.metal, wavelength_nm)
         case Coated():
-            row[0], row[1], row[2], row[3] = COATED, material.roughness, material.roughness, material.index
+            alpha = least_alpha if isinstance(material.roughness, GreyTexture) else material.roughness
+            row[0], row[1], row[2], row[3] = COATED, alpha, alpha, material.index
             row[10] = diffuse_reflectance(1.0 / material.index)
         case Glass():
-            alpha = material.roughness if material.roughness >= POLISHED else 0.0
+            alpha = least_alpha if isinstance(material.roughness, GreyTexture) else material.roughness
+            alpha = alpha if alpha >= POLISHED else 0.0
             # one path carries three bands, so that it is bent as the middle one is
             row[0], row[1], row[2], row[3] = DIELECTRIC, alpha, alpha, glass_index(material, bands_nm[1])
         case Subsurface():

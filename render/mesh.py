@@ -22,5 +22,7 @@ class Mesh:
     uv: NDArray[np.float32] | None = None
     texture: NDArray[np.float32] | None = None
     colour: tuple[float, float, float] | None = None
+    normals: NDArray[np.float32] | None = None
+    """(t, 3, 3) unit normals of the corners for shading, or None: shade the facets."""
     smooth_normals: bool = False
     """The file carries vertex normals that differ from its facets."""

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from render.errors import InputError
 from render.files import inside, sha256
-from render.material import Blend, FromMesh, Texture
+from render.material import Blend, BumpMap, FromMesh, GreyTexture, NormalMap, Texture
 from render.mesh import Mesh
 from render.mesh_colour import merged_look, part_look
 from render.mesh_reader import EXTENSIONS, check_triangle_count, read_parts
 from render.primitives import Primitive, primitive_mesh
 from render.scene import SceneObject
-from render.shape import UNITS, MeshFile, WeldTee
+from render.shape import UNITS, MeshFile, Sphere, WeldTee
 from render.texture import load_texture
+from render.vertex_normals import corner_normals
 from render.weld_tee import weld_tee_mesh
 
 MAX_FILE_BYTES = 4 * 2**30
@@ -41,7 +42,7 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
     if isinstance(item.shape, MeshFile):
         mesh = _from_file(item, item.shape, Path(root), where)
     else:
-        mesh = _made(item.shape)
+        mesh = _made(item.shape, item.crease_angle)
         if item.scale != 1.0:
             mesh = dataclasses.replace(mesh, vertices=mesh.vertices * item.scale)
         _check_size(mesh.vertices, where)
@@ -61,12 +62,14 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
     return dataclasses.replace(mesh, texture=object_texture(albedo, Path(root), field))
 
 
-def object_texture(texture: Texture, root: Path, field: str) -> NDArray[np.float32]:
+def object_texture(texture: Texture | GreyTexture | NormalMap | BumpMap, root: Path, field: str) -> NDArray[np.float32]:
     """(h, w, 3) linear image of a texture below root; kept until the file changes. InputError: absent or bad."""
     path = inside(root, texture.path, field)
     state = path.stat() if path.exists() else None
     version = None if state is None else (state.st_mtime_ns, state.st_size)
-    return _texture(path, texture.srgb, texture.scale, field, version)
+    srgb = isinstance(texture, Texture) and texture.srgb
+    scale = texture.scale if isinstance(texture, Texture | GreyTexture) else 1.0
+    return _texture(path, srgb, scale, field, version)
 
 
 def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
@@ -83,8 +86,16 @@ def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
 
 
 @lru_cache(maxsize=8)
-def _made(shape: Primitive | WeldTee) -> Mesh:
-    return weld_tee_mesh(shape) if isinstance(shape, WeldTee) else primitive_mesh(shape)
+def _made(shape: Primitive | WeldTee, crease_angle: float) -> Mesh:
+    mesh = weld_tee_mesh(shape) if isinstance(shape, WeldTee) else primitive_mesh(shape)
+    if crease_angle == 0.0:
+        return mesh
+    if isinstance(shape, Sphere):
+        # those of the sphere itself, which the mean over facets is not
+        normals = (mesh.vertices / shape.radius)[mesh.triangles].astype(np.float32)
+    else:
+        normals = corner_normals(mesh.vertices, mesh.triangles, crease_angle)
+    return dataclasses.replace(mesh, normals=normals)
 
 
 @lru_cache(maxsize=8)
@@ -115,7 +126,8 @@ def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str) -> Me
     material = item.material.base if isinstance(item.material, Blend) else item.material
     colours = isinstance(material.albedo, FromMesh)
     factor = UNITS[shape.unit] * item.scale
-    mesh = _read(path, Path(root), where, factor, colours, shape.sha256, (state.st_mtime_ns, state.st_size))
+    version = state.st_mtime_ns, state.st_size
+    mesh = _read(path, Path(root), where, factor, colours, shape.sha256, item.crease_angle, version)
     warning = unit_warning(mesh, item)
     if warning and shape.unit == "m" and item.scale == 1.0:
         cure = 'if it really is in metres, say so with unit "cm" and scale 100'
@@ -125,7 +137,14 @@ def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str) -> Me
 
 @lru_cache(maxsize=16)
 def _read(
-    path: Path, root: Path, where: str, factor: float, colours: bool, expected_sha256: str | None, version: object
+    path: Path,
+    root: Path,
+    where: str,
+    factor: float,
+    colours: bool,
+    expected_sha256: str | None,
+    crease_angle: float,
+    version: object,
 ) -> Mesh:
     """A checked mesh, its vertices multiplied by factor; `version` changes with the file."""
     if expected_sha256 is not None and sha256(path) != expected_sha256:
@@ -152,13 +171,23 @@ def _read(
     look = merged_look(looks, counts, where)
     keep = _with_area(vertices, triangles, where)
     uv = None if look.uv is None else look.uv[keep]
+    kept = np.ascontiguousarray(triangles[keep], dtype=np.int32)
+    normals = None
+    if crease_angle > 0.0:
+        normals = corner_normals(vertices, kept, crease_angle)
+        starts = np.cumsum([0, *counts])
+        for part, start, stop in zip(parts, starts[:-1], starts[1:], strict=True):
+            if part.normals is not None:
+                mine = np.cumsum(keep)[start:stop][keep[start:stop]] - 1
+                normals[mine] = part.normals[part.triangles[keep[start:stop]]]
     return Mesh(
         vertices,
-        np.ascontiguousarray(triangles[keep], dtype=np.int32),
+        kept,
         None if uv is None else np.ascontiguousarray(uv, dtype=np.float32),
         look.texture,
         look.colour,
-        smooth_normals=any(part.smooth for part in parts),
+        normals,
+        smooth_normals=any(part.normals is not None for part in parts),
     )
 
 

@@ -35,8 +35,8 @@ class Part:
 
     vertices: Float
     triangles: NDArray[np.int64]
-    smooth: bool
-    """The file brings vertex normals that differ from the facets."""
+    normals: Float | None
+    """(v, 3) unit vertex normals, where the file brings some that differ from the facets."""
     geometry: Any
     """What trimesh loaded, for its colours."""
 
@@ -138,12 +138,18 @@ def _placed(scene: Any, where: str) -> list[Part]:
             raise _no_such_vertex(lowest if lowest < 0 else highest, where, f"0 ... {len(vertices) - 1}")
         # trimesh makes up vertex normals on request; only those in its cache came from the file.
         normals = np.array(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
-        smooth = normals is not None and _differs_from_facets(vertices, triangles, normals)
+        if normals is not None and not _differs_from_facets(vertices, triangles, normals):
+            normals = None
         if not np.array_equal(matrix, np.eye(4)):
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+            if normals is not None:
+                # as planes are: by the inverse transposed
+                normals = normals @ np.linalg.inv(matrix[:3, :3])
             if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror turns counter-clockwise into clockwise
                 triangles = triangles[:, ::-1]
-        parts.append(Part(vertices, triangles, smooth, geometry))
+        if normals is not None:
+            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        parts.append(Part(vertices, triangles, normals, geometry))
     return parts
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Annotated
 
@@ -37,6 +38,15 @@ class SceneObject(Model):
     material: Material = Lambertian()
     T_world_object: Pose = Pose()
     scale: float = quantity(1.0, label="Scale", help="Multiplies the shape's size.", gt=0, le=1e6)
+    crease_angle: float = quantity(
+        0.0,
+        unit="rad",
+        label="Smooth shading up to",
+        help="Facets that meet at less are shaded as one curved surface, by the file's normals if it has any; "
+        "0: as they are. The truth stays that of the facets.",
+        ge=0,
+        le=math.pi,
+    )
     visible: bool = quantity(True, label="Visible", help="Hidden objects are neither drawn nor measured.")
 
 

@@ -29,11 +29,16 @@ class Surface(NamedTuple):
     rows: Float
     second: Int
     mask_shape: Int
+    normals: Float32
+    detail: Int
+    maps: Int
+    relief: Float
 
 
 def has_gloss(surface: Surface) -> bool:
-    """Some material scatters otherwise than Lambert says."""
-    return bool(np.any((surface.rows[:, 0] != LAMBERTIAN) & (surface.rows[:, 0] != EMITTER)))
+    """Some material scatters otherwise than Lambert says, or is shaded on another normal than its facet's."""
+    plain = (surface.rows[:, 0] == LAMBERTIAN) | (surface.rows[:, 0] == EMITTER)
+    return not bool(np.all(plain & (surface.detail == 0)))
 
 
 def has_glass(surface: Surface) -> bool:
@@ -73,7 +78,7 @@ class View(NamedTuple):
     """(720,) `render.distortion.fold_radii`."""
     T_world_camera: Float
     lens: Float
-    """(4,) aperture's radius m (0: a pinhole), 1 / focus distance, slopes g1, g2 of the plane of focus (`render.lens`)."""
+    """(4,) aperture's radius m (0: a pinhole), 1 / focus distance, slopes g1, g2 of the plane of focus: `render.lens`."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
@@ -157,6 +162,13 @@ def lookup(
     surface: Surface, start: int, rows: int, columns: int, t: int, p0: float, p1: float, p2: float, rgb: Float
 ) -> None:
     """Bilinear value -> rgb (3,) of the texture of rows x columns from `start`, at the point p of triangle t."""
+    s, r = uv_at(surface, t, p0, p1, p2)
+    bilinear(surface.textures, start, rows, columns, s, r, rgb)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def uv_at(surface: Surface, t: int, p0: float, p1: float, p2: float) -> tuple[float, float]:
+    """UV of the point p of triangle t."""
     a, b, c = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
     v, uv = surface.vertices, surface.uv
     ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
@@ -172,6 +184,12 @@ def lookup(
     f, g = (cc * qb - bc * qc) / det, (bb * qc - bc * qb) / det
     s = (1.0 - f - g) * uv[t, 0, 0] + f * uv[t, 1, 0] + g * uv[t, 2, 0]
     r = (1.0 - f - g) * uv[t, 0, 1] + f * uv[t, 1, 1] + g * uv[t, 2, 1]
+    return s, r
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def bilinear(textures: Float32, start: int, rows: int, columns: int, s: float, r: float, rgb: Float) -> None:
+    """Value -> rgb (3,) of the texture of rows x columns from `start`, at the UV (s, r)."""
     # texel centres at half integers; v points up, rows point down; repeated outside [0, 1]
     x, y = (s - math.floor(s)) * columns - 0.5, (1.0 - (r - math.floor(r))) * rows - 0.5
     i, j = int(math.floor(x)), int(math.floor(y))
@@ -187,4 +205,4 @@ def lookup(
             texel = 3 * (start + row * columns + column)
             weight = (fx if di else 1.0 - fx) * (fy if dj else 1.0 - fy)
             for band in range(3):
-                rgb[band] += weight * surface.textures[texel + band]
+                rgb[band] += weight * textures[texel + band]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from render.bsdf import ROW
 from render.embree import RayScene
-from render.errors import InputError
-from render.material import BAND_CENTRES_NM, BaseMaterial, Blend, FromMesh, Texture
+from render.material import BAND_CENTRES_NM, BaseMaterial, Blend
+from render.material_atlas import MaterialAtlas
 from render.material_rows import material_row
 from render.mesh import Mesh
 from render.pose import transform_points
-from render.scene import Scene, SceneObject
+from render.scene import Scene
 from render.surface import Surface
 
 Float = NDArray[np.float64]
@@ -48,6 +48,16 @@ class World:
     """(s, 3) the blend's mask, as in `texture_shape`."""
     materials: tuple[BaseMaterial, ...]
     """(s,) descriptions, blends taken apart."""
+    normals: Float32
+    """(t, 3, 3) unit normals of the corners for shading, 0 where facets are shaded; (0, 3, 3) when all are."""
+    detail: Int
+    """(s,) what there is beside constants: the flags of `render.interaction`."""
+    maps: Int
+    """(s, 6) start, height, width of the roughness and of the relief in `textures`."""
+    relief: Float
+    """(s, 2) factors of the relief: its slopes along u and v, or its height in m."""
+    least_alpha: Float
+    """(s,) least value of a roughness that is an image."""
 
     @cached_property
     def rays(self) -> RayScene:
@@ -61,7 +71,8 @@ class World:
 
     def surface_at(self, bands_nm: tuple[float, float, float]) -> Surface:
         """The arrays, as the kernels take them, with what the materials do to three wavelengths."""
-        rows = np.array([material_row(material, bands_nm) for material in self.materials]).reshape(-1, ROW)
+        pairs = zip(self.materials, self.least_alpha, strict=True)
+        rows = np.array([material_row(material, bands_nm, float(least)) for material, least in pairs]).reshape(-1, ROW)
         return Surface(
             self.vertices,
             self.triangles,
@@ -73,6 +84,10 @@ class World:
             rows,
             self.second,
             self.mask_shape,
+            self.normals,
+            self.detail,
+            self.maps,
+            self.relief,
         )
 
 
@@ -84,10 +99,11 @@ def build_world(scene: Scene, root: Path, step: int = 0) -> World:
 
 
 def place_meshes(scene: Scene, meshes: list[Mesh], step: int = 0, root: Path | None = None) -> World:
-    """Meshes of `scene.visible_objects`, in that order -> one world. root: where the textures of blends are."""
+    """Meshes of `scene.visible_objects`, in that order -> one world. root: where images are."""
     pairs = list(zip(scene.visible_objects, meshes, strict=True))
-    atlas = _Atlas()
-    vertices, triangles, object_ids, uvs = [], [], [], []
+    atlas = MaterialAtlas(root)
+    vertices, triangles, object_ids, uvs, normals = [], [], [], [], []
+    smooth = any(mesh.normals is not None for _, mesh in pairs)
     offset = 0
     for i, (item, mesh) in enumerate(pairs):
         vertices.append(transform_points(scene.T_world_object(item, step), mesh.vertices))
@@ -95,11 +111,15 @@ def place_meshes(scene: Scene, meshes: list[Mesh], step: int = 0, root: Path | N
         object_ids.append(np.full(len(mesh.triangles), i, dtype=np.int32))
         offset += len(mesh.vertices)
         uvs.append(mesh.uv if mesh.uv is not None else np.zeros((len(mesh.triangles), 3, 2), dtype=np.float32))
+        if smooth:
+            corner = mesh.normals if mesh.normals is not None else np.zeros((len(mesh.triangles), 3, 3), np.float32)
+            normals.append(corner @ scene.T_world_object(item, step)[:3, :3].T.astype(np.float32))
         material = item.material.base if isinstance(item.material, Blend) else item.material
-        atlas.add(material, mesh)
+        part = ".base" if isinstance(item.material, Blend) else ""
+        atlas.add(material, mesh, f"object {item.name!r}: material{part}")
     for i, (item, mesh) in enumerate(pairs):
         if isinstance(item.material, Blend):
-            atlas.add_blend(i, item, mesh, root)
+            atlas.add_blend(i, item, mesh)
     keep_uv = bool(atlas.images) or any(mesh.uv is not None for _, mesh in pairs)
     return World(
         vertices=np.concatenate(vertices) if vertices else np.zeros((0, 3)),
@@ -112,62 +132,9 @@ def place_meshes(scene: Scene, meshes: list[Mesh], step: int = 0, root: Path | N
         second=np.array(atlas.second, dtype=np.int32),
         mask_shape=np.array(atlas.masks, dtype=np.int32).reshape(-1, 3),
         materials=tuple(atlas.materials),
+        normals=np.concatenate(normals) if smooth else np.zeros((0, 3, 3), dtype=np.float32),
+        detail=np.array(atlas.detail, dtype=np.int32),
+        maps=np.array(atlas.maps, dtype=np.int32).reshape(-1, 6),
+        relief=np.array(atlas.relief, dtype=np.float64).reshape(-1, 2),
+        least_alpha=np.array(atlas.least_alpha, dtype=np.float64),
     )
-
-
-class _Atlas:
-    """Collects materials and their textures while a world is put together."""
-
-    def __init__(self) -> None:
-        self.albedo: list[tuple[float, float, float]] = []
-        self.images: list[Float32] = []
-        self.shapes: list[tuple[int, int, int]] = []
-        self.masks: list[tuple[int, int, int]] = []
-        self.second: list[int] = []
-        self.materials: list[BaseMaterial] = []
-        self.texels = 0
-
-    def add(self, material: BaseMaterial, mesh: Mesh) -> int:
-        """A material with the texture or colour that its mesh brings; returns its number."""
-        uses_texture = isinstance(material.albedo, Texture | FromMesh) and mesh.texture is not None
-        self.shapes.append(self.image(mesh.texture) if uses_texture and mesh.texture is not None else (0, 0, 0))
-        self.albedo.append((1.0, 1.0, 1.0) if uses_texture else _constant_albedo(material, mesh))
-        self.masks.append((0, 0, 0))
-        self.second.append(-1)
-        self.materials.append(material)
-        return len(self.materials) - 1
-
-    def add_blend(self, index: int, item: SceneObject, mesh: Mesh, root: Path | None) -> None:
-        """The second material and the mask of a blend. InputError: no UV, or a bad image."""
-        from render.mesh_files import object_texture
-
-        assert isinstance(item.material, Blend)
-        where = f"object {item.name!r}"
-        if root is None or mesh.uv is None:
-            raise InputError(
-                "a blend needs a mesh with UV",
-                where=f"{where}: material.mask",
-                cure="use one of the two materials alone, or unwrap the mesh and export it with UV",
-            )
-        over = item.material.over
-        texture = None
-        if isinstance(over.albedo, Texture):
-            texture = object_texture(over.albedo, root, f"{where}: material.over.albedo.path")
-        self.second[index] = self.add(over, replace(mesh, texture=texture))
-        self.masks[index] = self.image(object_texture(item.material.mask, root, f"{where}: material.mask.path"))
-
-    def image(self, image: Float32) -> tuple[int, int, int]:
-        """Append (h, w, 3); returns its start, height and width."""
-        shape = (self.texels, image.shape[0], image.shape[1])
-        self.images.append(image.astype(np.float32).ravel())
-        self.texels += image.shape[0] * image.shape[1]
-        return shape
-
-
-def _constant_albedo(material: BaseMaterial, mesh: Mesh) -> tuple[float, float, float]:
-    albedo = material.albedo
-    if isinstance(albedo, FromMesh):
-        return mesh.colour if mesh.colour is not None else (0.5, 0.5, 0.5)
-    if isinstance(albedo, Texture):
-        return (1.0, 1.0, 1.0)
-    return albedo if isinstance(albedo, tuple) else (albedo, albedo, albedo)

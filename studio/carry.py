@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from render.errors import InputError
 from render.files import atomic_write, inside, sha256
-from render.material import Texture
+from render.material import BumpMap, GreyTexture, NormalMap, Texture
 from render.scene import Scene
 from render.shape import MeshFile
 from studio.mesh_import import side_files
@@ -17,7 +17,7 @@ from studio.mesh_import import side_files
 
 def named_files(item: BaseModel, where: str) -> dict[str, str]:
     """Relative path -> the field that names it, of every mesh and texture in a model, however deep."""
-    if isinstance(item, MeshFile | Texture):
+    if isinstance(item, MeshFile | Texture | GreyTexture | NormalMap | BumpMap):
         return {item.path: f"{where}.path"}
     found: dict[str, str] = {}
     for name in type(item).model_fields:

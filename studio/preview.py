@@ -117,12 +117,12 @@ class Preview:
         key, shape_key = _key(item, root), _shape_key(item, root)
         try:
             mesh = load_mesh(item, root)
+            # the world of this object alone, standing at its own origin
+            alone = item.model_copy(update={"T_world_object": Pose()})
+            world = place_meshes(Scene(rig=ALONE, objects=(alone,)), [mesh], root=root)
         except InputError as error:
             self._failed[key] = error
             return
-        # the world of this object alone, standing at its own origin
-        alone = item.model_copy(update={"T_world_object": Pose()})
-        world = place_meshes(Scene(rig=ALONE, objects=(alone,)), [mesh])
         with self._lock:
             if shape_key not in self._rays:
                 self._rays[shape_key] = (

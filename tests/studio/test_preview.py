@@ -72,7 +72,7 @@ def assert_same_curve(project: Project, root: Path, step: int = 0) -> None:
     np.testing.assert_allclose(preview.laser_angle, exact.laser_angle, rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["weld_seam", "sphere", "step_block", "v_groove"])
+@pytest.mark.parametrize("name", ["weld_seam", "shiny_weld_seam", "sphere", "step_block", "v_groove"])
 def test_the_lit_curve_is_that_of_the_merged_world(name: str) -> None:
     assert_same_curve(*sample(name))
 
