@@ -4,7 +4,8 @@ A pixel is divided into n x n cells with one jittered camera ray each. Where the
 tells how the sheet's coordinate q = x / sigma(z) changes along the cell, so the Gaussian across it is integrated in
 closed form (a difference of error functions) instead of being sampled; visibility and albedo are sampled. Each ray also
 predicts its whole pixel; the spread of these predictions is the error estimate, and pixels that need it (edges, strong
-curvature, texture) get twice the cells a side until the image's error is below the target.
+curvature, texture) get twice the cells a side until the image's error is below the target. Through a thin lens each ray
+has its own point of the aperture, and `render.direct_lens` takes the noise of that away.
 """
 
 from __future__ import annotations
@@ -20,15 +21,17 @@ from numpy.typing import NDArray
 from render.beam import fan_density, sheet_sigma
 from render.bsdf import evaluate, is_diffuse
 from render.camera import Camera
-from render.camera_rays import camera_rays
+from render.camera_rays import camera_rays, lens_rays
+from render.direct_lens import gather_aperture
 from render.distortion import distort, tilt_matrix
 from render.embree import CHUNK
 from render.footprint import reachable_pixels
 from render.interaction import detailed, light_side
 from render.laser import LineLaser
+from render.lens import lens_direction, lens_position
 from render.material import reflectance_weights
 from render.pose import invert
-from render.sheet_integral import mean_over, sheet_slope
+from render.sheet_integral import about_over_aperture, mean_over, sheet_slope
 from render.surface import Surface, View, has_gloss, lookup, slot_reflectance, to_local
 from render.threads import Cancel, Progress, map_chunks
 from render.world import World
@@ -97,8 +100,8 @@ def scattered(
     return total
 
 
-def _shade_kernel(glossy: bool) -> Any:
-    """The shading kernel; compiled apart for scenes of diffuse materials alone, where it is much quicker."""
+def _shade_kernel(glossy: bool, aperture: bool) -> Any:
+    """The shading kernel; compiled apart for diffuse materials alone and for a pinhole, where it is much quicker."""
 
     @numba.njit(nogil=True, cache=True, error_model="numpy")
     def shade(
@@ -107,6 +110,7 @@ def _shade_kernel(glossy: bool) -> Any:
         triangle: Int,
         normalised: Float,
         offsets: Float32,
+        lens: Float,
         cells: int,
         T_laser_world: Float,
         laser_centre: Float,
@@ -115,6 +119,7 @@ def _shade_kernel(glossy: bool) -> Any:
         centre: Float,
         surface_offset: float,
         values: Float,
+        planes: Float,
         origins: Float32,
         directions: Float32,
         far: Float32,
@@ -122,7 +127,8 @@ def _shade_kernel(glossy: bool) -> Any:
     ) -> int:
         """Unoccluded radiance of each ray's cell and whole pixel -> values (n, 2), and the shadow rays that decide.
 
-        Returns how many shadow rays were written; `sample` says whose each is.
+        Returns how many shadow rays were written; `sample` says whose each is. With an aperture, lens (n, 2) are the
+        rays' points of it, and planes (n, 5) take q in the middle of the pixel and its change with u, v, a and b.
         """
         intrinsics, k, m, w = view.intrinsics, view.distortion, view.T_world_camera, T_laser_world
         vertices, triangles = surface.vertices, surface.triangles
@@ -148,6 +154,8 @@ def _shade_kernel(glossy: bool) -> Any:
             if length == 0.0:
                 continue
             n0, n1, n2 = n0 / length, n1 / length, n2 / length
+            if aperture:
+                o0, o1, o2 = lens_position(view, lens[r, 0], lens[r, 1])
             height_camera = n0 * (o0 - a0) + n1 * (o1 - a1) + n2 * (o2 - a2)
             height_laser = n0 * (laser_centre[0] - a0) + n1 * (laser_centre[1] - a1) + n2 * (laser_centre[2] - a2)
             if not height_camera * height_laser > 0.0:
@@ -159,6 +167,8 @@ def _shade_kernel(glossy: bool) -> Any:
                 m[1, 0] * x + m[1, 1] * y + m[1, 2],
                 m[2, 0] * x + m[2, 1] * y + m[2, 2],
             )
+            if aperture:
+                d0, d1, d2 = lens_direction(view, x, y, lens[r, 0], lens[r, 1])
             cosine = n0 * d0 + n1 * d1 + n2 * d2
             if cosine == 0.0:
                 continue
@@ -186,6 +196,11 @@ def _shade_kernel(glossy: bool) -> Any:
                     -jyx * xu / det,
                     (-jyx * xv + jxx * yv) / det,
                 )
+            if aperture:
+                # the focus differs along a tilted sensor, which turns a ray through the rim
+                gu, gv = view.lens[2] * xu + view.lens[3] * yu, view.lens[2] * xv + view.lens[3] * yv
+                xu, xv = xu + gu * lens[r, 0], xv + gv * lens[r, 0]
+                yu, yv = yu + gu * lens[r, 1], yv + gv * lens[r, 1]
             q = lx / sigma
             qu = sheet_slope(xu, yu, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
             qv = sheet_slope(xv, yv, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
@@ -193,7 +208,15 @@ def _shade_kernel(glossy: bool) -> Any:
             cell = r % (cells * cells)
             pixel_u, pixel_v = (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
             in_cell = mean_over(q - qu * du - qv * dv, qu * half, qv * half)
-            in_pixel = mean_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
+            if aperture:
+                off_focus = 1.0 / s - (view.lens[1] - view.lens[2] * x - view.lens[3] * y)
+                qa = off_focus * sheet_slope(1.0, 0.0, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+                qb = off_focus * sheet_slope(0.0, 1.0, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+                middle = q - qu * pixel_u - qv * pixel_v - qa * lens[r, 0] - qb * lens[r, 1]
+                in_pixel = about_over_aperture(middle, qu * 0.5, qv * 0.5, view.lens[0] * math.hypot(qa, qb))
+                planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3], planes[r, 4] = middle, qu, qv, qa, qb
+            else:
+                in_pixel = mean_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
             if in_cell == 0.0 and in_pixel == 0.0:
                 continue
             # irradiance without the Gaussian: P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)|
@@ -235,7 +258,8 @@ def _shade_kernel(glossy: bool) -> Any:
     return shade
 
 
-shade_diffuse, shade_glossy = _shade_kernel(False), _shade_kernel(True)
+shade_diffuse, shade_glossy = _shade_kernel(False, False), _shade_kernel(True, False)
+shade_diffuse_lens, shade_glossy_lens = _shade_kernel(False, True), _shade_kernel(True, True)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -330,21 +354,32 @@ class _Task:
         rays, n = self.world.rays, self.cells**2
         count = (stop - start) * n
         view, surface = self.camera.view(self.T_world_camera), self.surface
+        aperture = bool(view.lens[0] > 0.0)
         normalised, offsets = np.empty((count, 2)), np.empty((count, 2), np.float32)
         directions = np.empty((count, 3), np.float32)
+        lens, planes = np.empty((count if aperture else 0, 2)), np.empty((count if aperture else 0, 5))
         pixels = self.pixels[start:stop]
-        camera_rays(view, pixels, self.cells, self.seed, True, normalised, offsets, directions)
-        triangle = rays.from_point(self.T_world_camera[:3, 3], directions)
+        if aperture:
+            origins = np.empty((count, 3), np.float32)
+            lens_rays(view, pixels, self.cells, self.seed, rays.centre, normalised, offsets, lens, origins, directions)
+            triangle, _ = rays.intersect(origins, directions)
+        else:
+            camera_rays(view, pixels, self.cells, self.seed, True, normalised, offsets, directions)
+            triangle = rays.from_point(self.T_world_camera[:3, 3], directions)
         values = np.empty((count, 2))
         origins, towards = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
         far, sample = np.empty(count, np.float32), np.empty(count, np.int32)
-        shade = shade_glossy if has_gloss(surface) else shade_diffuse
+        if aperture:
+            shade = shade_glossy_lens if has_gloss(surface) else shade_diffuse_lens
+        else:
+            shade = shade_glossy if has_gloss(surface) else shade_diffuse
         shadows = shade(
             surface,
             view,
             triangle,
             normalised,
             offsets,
+            lens,
             self.cells,
             invert(self.T_world_laser),
             self.T_world_laser[:3, 3].copy(),
@@ -353,10 +388,15 @@ class _Task:
             rays.centre,
             rays.surface_offset,
             values,
+            planes,
             origins,
             towards,
             far,
             sample,
         )
         blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows])
-        gather(values, blocked, sample, shadows, self.cells, self.mean[start:stop], self.error[start:stop])
+        result = self.mean[start:stop], self.error[start:stop]
+        if aperture:
+            gather_aperture(values, planes, lens, view.lens[0], blocked, sample, shadows, self.cells, *result)
+        else:
+            gather(values, blocked, sample, shadows, self.cells, *result)

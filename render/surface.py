@@ -78,7 +78,7 @@ class View(NamedTuple):
     """(720,) `render.distortion.fold_radii`."""
     T_world_camera: Float
     lens: Float
-    """(4,) aperture's radius m (0: a pinhole), 1 / focus distance, slopes g1, g2 of the plane of focus: `render.lens`."""
+    """(4,) aperture's radius m (0: a pinhole), 1 / focus distance, slopes of the plane of focus (`render.lens`)."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
