@@ -121,6 +121,37 @@ def working(command: Callable[..., Any]) -> Callable[..., Any]:
     return common(command)
 
 
+METHOD = click.option("--method", help="How the line is found; auto picks, an unknown name lists all.")
+SELECT = click.option(
+    "--select",
+    type=click.Choice(["strongest", "first", "last", "continuous"]),
+    help="Which peak of a scan line; continuous: the one on the smoothest chain of peaks.",
+)
+GEOMETRY = click.option(
+    "--geometry/--no-geometry", default=None, help="Only peaks that the laser can have made, in the working volume."
+)
+NEAREST = click.option("--nearest", type=float, help="Nearest depth of the working volume, m.")
+FARTHEST = click.option("--farthest", type=float, help="Farthest depth of the working volume, m.")
+
+
+def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Settings of the line extraction in place of the project's."""
+    for option in (
+        click.option("--spacetime/--no-spacetime", default=None, help="Measure a moving scan along time."),
+        click.option(
+            "--exposure-ratio", type=float, help="Each exposure is so many times shorter than the one before."
+        ),
+        click.option("--exposures", type=int, help="Exposures taken of each frame and fused."),
+        FARTHEST,
+        NEAREST,
+        GEOMETRY,
+        SELECT,
+        METHOD,
+    ):
+        command = option(command)
+    return command
+
+
 PROJECT = click.argument("project", required=False, type=click.Path(path_type=Path))
 
 
@@ -173,6 +204,7 @@ def why_no_studio() -> str | None:
 @cli.command()
 @PROJECT
 @click.option("--report/--no-report", default=True, show_default=True, help="Write the HTML and PDF report.")
+@measuring
 @working
 def run(project: Path | None, **options: Any) -> None:
     """Scan a project: render, extract the line, triangulate, compare with the truth, report. Default: the sample."""
@@ -194,40 +226,59 @@ def render(project: Path | None, **options: Any) -> None:
 
 
 @cli.command()
-@click.argument("source", type=click.Path(path_type=Path))
+@click.argument("sources", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--project", type=click.Path(path_type=Path), help="Project with camera, laser and settings.")
 @click.option("--laser", type=click.IntRange(0), default=0, show_default=True, help="Which laser made the line.")
+@click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5.")
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside the source].")
+@measuring
 @THREADS
 @common
-def reconstruct(source: Path, **options: Any) -> None:
-    """Points from rendered frames (a folder that `render` wrote) or from a photograph (with --project)."""
+def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
+    """Points from rendered frames (a folder that `render` wrote), or from photographs with --project.
+
+    Several photographs are the steps of the project's motion, or, with --hdr, exposures of one scene.
+    """
     _require_system()
     from studio.commands import reconstruct_source
 
-    reconstruct_source(source, **options)
+    reconstruct_source(sources, **options)
 
 
 @cli.command()
 @click.argument("images", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--method", default="likelihood", show_default=True, help="How; auto picks, an unknown name lists all.")
+@METHOD
 @click.option(
     "--laser", type=click.Choice(["auto", "mono", "red", "green", "blue"]), default="auto", help="Its colour."
 )
 @click.option("--axis", type=click.Choice(["rows", "columns"]), default="rows", show_default=True, help="Scan lines.")
-@click.option("--off", type=click.Path(path_type=Path), help="Image with the laser off, to subtract.")
+@click.option(
+    "--off",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    help="Image with the laser off, to subtract: one for all, or one for each image, in order.",
+)
 @click.option("--pattern", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"]), help="Bayer pattern of raw images.")
 @click.option("--peaks", type=int, default=1, show_default=True, help="Peaks kept on each scan line.")
+@SELECT
+@click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5. One table.")
 @click.option(
-    "--select", type=click.Choice(["strongest", "first", "last", "continuous"]), default="strongest", help="Which peak."
+    "--spacetime", is_flag=True, help="The images are a sweep over a scene at rest: when it passes each pixel."
 )
+@click.option("--project", type=click.Path(path_type=Path), help="Project with camera and laser, for --geometry.")
+@click.option(
+    "--laser-number", type=click.IntRange(0), default=0, show_default=True, help="Which laser of the project."
+)
+@GEOMETRY
+@NEAREST
+@FARTHEST
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside each image].")
 @THREADS
 @common
 def extract(images: tuple[Path, ...], **options: Any) -> None:
     """The laser line in image files of a real scanner (PNG, TIFF, EXR, JPEG, BMP), as a table for each."""
     _require_system()
-    from studio.commands import extract_images
+    from studio.extract_command import extract_images
 
     if extract_images(images, **options):
         click.get_current_context().exit(BAD_INPUT)

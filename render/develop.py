@@ -61,6 +61,10 @@ class Image:
     """e-, standard deviation."""
     pattern: str | None
     """Bayer pattern of the first 2 x 2 pixels, None for mono."""
+    exposure_time: float = 1.0
+    """s."""
+    shorter: tuple[Image, ...] = ()
+    """Further exposures of the same scene, to be fused with this one."""
 
 
 def develop(
@@ -108,7 +112,7 @@ def develop(
     map_chunks(rows, height, ROWS, threads)
     saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
     pattern = sensor.pattern if sensor.colour == "bayer" else None
-    return Image(pixels, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern)
+    return Image(pixels, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time)
 
 
 def expected_electrons(

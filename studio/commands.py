@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import re
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,9 +73,11 @@ def run_project(
     as_json: bool,
     measure: bool = True,
     report: bool = True,
+    **extraction: Any,
 ) -> None:
-    """`run`, and `render` with `measure` off."""
+    """`run`, and `render` with `measure` off. extraction: settings in place of the project's, None: the project's."""
     project, root = load_project(path)
+    project = with_extraction(project, extraction)
     folder = out if out is not None else Path(OUTPUT) / folder_name(project.name)
     check_output(folder)
     from studio.scan import run_scan
@@ -105,110 +106,68 @@ def run_project(
         print(f"report: {file}")
 
 
+def with_extraction(project: Project, options: dict[str, Any]) -> Project:
+    """The project with other extraction settings, where an option is given. InputError names the setting."""
+    if all(value is None for value in options.values()):
+        return project
+    from analysis.line.extract import settings_of
+
+    return project.model_copy(update={"extraction": settings_of(project.extraction, **options)})
+
+
 def render_project(path: Path | None, **options: Any) -> None:
     """`render`: frames and truth only."""
     run_project(path, measure=False, **options)
 
 
 def reconstruct_source(
-    source: Path, *, project: Path | None, laser: int, out: Path | None, threads: int | None, quiet: bool, as_json: bool
+    sources: tuple[Path, ...],
+    *,
+    project: Path | None,
+    laser: int,
+    hdr: str | None,
+    out: Path | None,
+    threads: int | None,
+    quiet: bool,
+    as_json: bool,
+    **extraction: Any,
 ) -> None:
-    """`reconstruct`: from a scan's folder, or from an image with a project."""
-    from studio.reconstruct import reconstruct_folder, reconstruct_image
+    """`reconstruct`: from a scan's folder, or from images with a project."""
+    from studio.extract_command import exposure_times
+    from studio.reconstruct import reconstruct_folder
+    from studio.reconstruct_images import reconstruct_images
     from studio.scan_folder import open_folder
     from studio.stages import Clock
 
+    missing = [source for source in sources if not source.exists()]
+    if missing:
+        raise InputError("there is no such image or scan folder", where=str(missing[0]))
+    source = sources[0]
     if source.is_dir():
+        if len(sources) > 1:
+            raise InputError("a scan folder is measured alone", where=str(sources[1]), allowed="one folder, or images")
         found = open_folder(source)
         chosen, root = (found.project, found.root) if project is None else load_project(project)
+        chosen = with_extraction(chosen, extraction)
         folder = out if out is not None else source
         check_output(folder)
         with stage_progress(quiet) as progress:
             clock = Clock(progress, never)
             result = reconstruct_folder(found, chosen, root, folder, clock, report=False, threads=threads)
     else:
-        if not source.exists():
-            raise InputError("there is no such image or scan folder", where=str(source))
         if project is None:
             raise InputError(
                 "an image does not say by which camera and laser it was taken",
                 where=str(source),
                 cure="give the project with --project",
             )
-        chosen, _ = load_project(project)
+        chosen = with_extraction(load_project(project)[0], extraction)
         folder = out if out is not None else source.parent
         check_output(folder)
+        times = exposure_times(hdr, len(sources))
         with stage_progress(quiet) as progress:
-            result = reconstruct_image(source, chosen, laser, folder, Clock(progress, never), threads)
+            result = reconstruct_images(sources, chosen, laser, folder, Clock(progress, never), times, threads)
     _print_reconstruction(result, as_json)
-
-
-def extract_images(
-    images: tuple[Path, ...],
-    *,
-    method: str,
-    laser: str,
-    axis: str,
-    off: Path | None,
-    pattern: str | None,
-    peaks: int,
-    select: str,
-    out: Path | None,
-    threads: int | None,
-    quiet: bool,
-    as_json: bool,
-) -> int:
-    """`extract`: a table for each image. A bad image is told and left out; returns how many there were."""
-    from analysis.line.extract import settings_of
-    from studio.photographs import extract_photograph, load_photograph, summary, table_path, write_line
-
-    settings = settings_of(None, method=method, channel=laser, axis=axis, pattern=pattern, peaks=peaks, select=select)
-    dark = None if off is None else load_photograph(off)
-    if out is not None:
-        check_output(out)
-    done: list[dict[str, Any]] = []
-    failed: list[dict[str, Any]] = []
-    taken: set[Path] = set()
-    with stage_progress(quiet or as_json or len(images) < 2) as progress:
-        for number, path in enumerate(images):
-            progress("images", number / len(images))
-            try:
-                line = extract_photograph(path, settings, dark, threads)
-                table = table_path(path, out, taken)
-                write_line(table, line)
-                done.append(summary(path, line, table))
-            except InputError as error:
-                failed.append({"image": str(path), "message": str(error)})
-        progress("images", 1.0)
-    if as_json:
-        print_json({"ok": not failed, "images": done, "errors": failed})
-    else:
-        _print_lines(done)
-    for failure in failed:
-        print(f"error: {failure['message']}", file=sys.stderr)
-    return len(failed)
-
-
-def _print_lines(done: list[dict[str, Any]]) -> None:
-    def number(value: float | None, form: str) -> str:
-        return "-" if value is None else form.format(value)
-
-    header = ("Line", "found", "sigma_u px", "width px", "peak e-", "method")
-    rows = [
-        (
-            Path(row["image"]).name,
-            f"{row['found']} of {row['scan_lines']} {row['axis']}",
-            number(row["sigma_u_px"], "{:.4f}"),
-            number(row["width_px"], "{:.2f}"),
-            number(row["amplitude_e"], "{:.0f}"),
-            row["note"] or row["method"],
-        )
-        for row in done
-    ]
-    if rows:
-        print_table("Laser line", rows, header=header)
-    for row in done:
-        print(f"wrote {row['file']}")
 
 
 def rebuild_report(folder: Path, *, threads: int | None, quiet: bool, as_json: bool) -> None:

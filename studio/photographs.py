@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.channel import check_image
-from analysis.line.estimate import estimate_noise
+from analysis.line.estimate import estimate_noise, residual_ratio
 from analysis.line.extract import extract
+from analysis.line.geometry import WorkingVolume
+from analysis.line.hdr import Fused, fuse
 from analysis.line.noise import image_saturation
 from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
 from analysis.line.subtract import subtract_off
 from render.errors import InputError
 from render.files import atomic_write
+from studio.line import tell
 from studio.reconstruct import MAX_IMAGE_BYTES, read_image
 
 SCARCE, PLENTY = 0.25, 0.5
 """Shares of scan lines with a line: below the first, the other axis is tried, and named if it has the second."""
+GAIN_ROUNDS = 5
+SATURATED_SHARE = 0.5
+"""Of the scan lines; an exposure with more of them is no base to estimate noise from."""
 COLUMNS = ("scan_line", "rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "flag")
 
 
@@ -54,28 +63,113 @@ def _read_exr(path: Path) -> NDArray[Any]:
 
 
 def extract_photograph(
-    path: Path, settings: ExtractionSettings, off: NDArray[Any] | None = None, threads: int | None = None
+    path: Path,
+    settings: ExtractionSettings,
+    off: NDArray[Any] | None = None,
+    threads: int | None = None,
+    volume: WorkingVolume | None = None,
 ) -> Line:
     """The line in an image file, less a laser-off image; the noise is estimated from it.
 
-    InputError names the file and what is wrong: unreadable, of the wrong type or size, black, saturated, not a number,
-    without the channel asked for, or with its line along the other axis.
+    volume: only peaks that the laser can have made in it. InputError names the file and what is wrong: unreadable, of
+    the wrong type or size, black, saturated, not a number, without the channel asked for, or with its line along the
+    other axis.
     """
-    try:
+    with naming(path):
         image = check_image(load_photograph(path))
         _check_light(image)
         noise = None
         if off is not None:
             image, saturation = subtract_off(image, off)
             noise = estimate_noise(image, settings).model_copy(update={"saturation": saturation})
-        line = extract(image, settings=settings, noise=noise, threads=threads)
+        check_camera(image, volume)
+        line = extract(image, settings=settings, noise=noise, volume=volume, threads=threads)
         _check_axis(image, line, settings, threads)
+    return replace(line, note=tell(line, settings, []))
+
+
+def extract_series(
+    paths: Sequence[Path],
+    times: Sequence[float],
+    settings: ExtractionSettings,
+    offs: Sequence[NDArray[Any]] = (),
+    volume: WorkingVolume | None = None,
+    threads: int | None = None,
+) -> Line:
+    """The line in several exposures of one scene, fused in electrons; times in any unit. InputError names the file."""
+    fused = fuse_files(paths, times, settings, offs)
+    with naming(paths[0]):
+        check_camera(fused.electrons, volume)
+        line = extract(
+            fused.electrons,
+            settings=settings,
+            noise=fused.noise,
+            variance=fused.variance,
+            volume=volume,
+            threads=threads,
+        )
+    told = f"{len(paths)} exposures fused"
+    return replace(line, note="; ".join(filter(None, (tell(line, settings, []), told))))
+
+
+def fuse_files(
+    paths: Sequence[Path], times: Sequence[float], settings: ExtractionSettings, offs: Sequence[NDArray[Any]] = ()
+) -> Fused:
+    """Mono image files of one scene, less their laser-off images -> Fused. InputError names the file."""
+    images: list[NDArray[Any]] = []
+    highest = 0.0
+    for number, path in enumerate(paths):
+        with naming(path):
+            image = check_image(load_photograph(path))
+            if image.ndim != 2:
+                raise InputError("exposures are fused of mono or raw images only", found="colour")
+            highest = max(highest, image_saturation(image) or 0.0)
+            if offs:
+                image, _ = subtract_off(image, offs[number if len(offs) > 1 else 0])
+            images.append(image)
+    full = highest or 2.0 * max(float(np.nanmax(image)) for image in images)  # none is saturated
+    # the more light, the better the noise can be told, as long as the line is not cut off on most scan lines
+    order, across = np.argsort(times)[::-1], 1 if settings.axis == "rows" else 0
+    whole = [k for k in order if np.mean((images[k] >= full).any(axis=across)) < SATURATED_SHARE]
+    with naming(paths[0]):
+        noise = estimate_noise(images[whole[0] if whole else order[-1]], settings)
+        noise = noise.model_copy(update={"saturation": full})
+        fused = fuse(images, times, noise)
+        plain = settings.model_copy(
+            update={"method": "likelihood", "peaks": 1, "select": "strongest", "smoothing": 0.0}
+        )
+        for _ in range(GAIN_ROUNDS):  # all exposures together say more of the gain than one
+            line = extract(fused.electrons, settings=plain, noise=fused.noise, variance=fused.variance)
+            ratio = residual_ratio(line)
+            if ratio is None or abs(ratio - 1.0) < 0.02:
+                break
+            gain = noise.gain * min(max(ratio, 0.2), 5.0)
+            noise = noise.model_copy(update={"gain": gain, "read_noise": noise.read_noise * noise.gain / gain})
+            fused = fuse(images, times, noise)
+        return fused
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Put the file's name into an InputError that does not say where."""
+    try:
+        yield
     except InputError as error:
         if str(path) in error.where:
             raise
         where = f"{path}: {error.where}" if error.where not in ("", "image") else str(path)
         raise InputError(error.what, where=where, found=error.found, allowed=error.allowed, cure=error.cure) from None
-    return line
+
+
+def check_camera(image: NDArray[Any], volume: WorkingVolume | None) -> None:
+    """InputError: the image is not of the size of the camera whose geometry is asked for."""
+    if volume is None or image.shape[:2] == (volume.camera.height, volume.camera.width):
+        return
+    raise InputError(
+        "the image is not of the camera's size",
+        found=f"{image.shape[1]} x {image.shape[0]} px",
+        allowed=f"{volume.camera.width} x {volume.camera.height} px",
+    )
 
 
 def _check_light(image: NDArray[Any]) -> None:

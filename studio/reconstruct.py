@@ -1,16 +1,14 @@
-"""Points without rendering: from the frames of an earlier scan, or from a photograph of a real scanner."""
+"""Points without rendering, from the frames of an earlier scan; and how an image file is read."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.cloud import cloud, write_csv, write_ply
-from analysis.line.extract import extract
-from analysis.line.result import Flag
 from analysis.report.model import FrameResult
 from render.errors import InputError
 from render.frame_files import read_frame
@@ -18,8 +16,9 @@ from render.world import build_world
 from studio import scan_folder
 from studio.project import Project
 from studio.results import measure_frame, now, write_points, write_reports
-from studio.stages import Clock, develop_step, step_world, triangulate_line
+from studio.stages import Clock, develop_step, step_world
 from studio.summary import summarise
+from studio.sweep import Passing, Sweep, Taken
 
 MAX_IMAGE_BYTES = 2**30
 
@@ -41,6 +40,15 @@ def reconstruct_folder(
     results: list[FrameResult] = []
     with clock.stage("loading meshes"):
         first = world = build_world(project.scene, root, 0)
+    sweep = Sweep(project)
+
+    def take(ready: Iterable[tuple[Taken, Passing | None]]) -> None:
+        keep = len(found.frames) <= 16
+        for one, passing in ready:
+            before = results[0] if results else None
+            where = (one.frame, one.world, one.images)
+            results.append(measure_frame(project, *where, clock, threads, keep=keep, passing=passing, first=before))
+
     for n in clock.frames(len(found.frames)):
         path = found.frames[n]
         with clock.stage("reading frames"):
@@ -52,7 +60,8 @@ def reconstruct_folder(
             )
         world = step_world(project, root, frame.step, None if frame.step == 0 else world)
         images = develop_step(project, frame, clock, threads)
-        results.append(measure_frame(project, frame, world, images, clock, threads, keep=len(found.frames) <= 16))
+        take(sweep.add(frame, world, images))
+    take(sweep.finish())
     if not results or not project.scene.lasers:
         raise InputError("the scan holds no laser image", where=str(found.folder))
     files = write_points(out, project, results, clock)
@@ -64,44 +73,6 @@ def reconstruct_folder(
         "name": project.name,
         "files": [str(path) for path in files],
         "results": summarise(results, project.scene),
-        "seconds": clock.seconds,
-    }
-
-
-def reconstruct_image(
-    path: Path, project: Project, laser: int, out: Path, clock: Clock, threads: int | None = None
-) -> dict[str, Any]:
-    """Points of one laser in a photograph; the noise is estimated from it. There is no truth to compare with.
-
-    InputError: the image cannot be read or is not of the camera's size, or there is no such laser.
-    """
-    camera, lasers = project.scene.camera, project.scene.lasers
-    if not 0 <= laser < len(lasers):
-        raise InputError("there is no such laser in the project", found=laser, allowed=f"0 to {len(lasers) - 1}")
-    image = read_image(path)
-    if image.shape[:2] != (camera.height, camera.width):
-        raise InputError(
-            "the image is not of the camera's size",
-            where=str(path),
-            found=f"{image.shape[1]} x {image.shape[0]} px",
-            allowed=f"{camera.width} x {camera.height} px",
-        )
-    with clock.stage("line extraction"):
-        line = extract(image, settings=project.extraction, threads=threads)
-    with clock.stage("triangulation"):
-        points = triangulate_line(project, line, laser, 0)
-    with clock.stage("writing points"):
-        columns = cloud(points, None, laser, 0, project.scene)
-        files = [out / f"{path.stem}.ply", out / f"{path.stem}.csv"]
-        write_ply(files[0], columns)
-        write_csv(files[1], columns)
-    flags, counts = np.unique(line.flag[:, 0], return_counts=True)
-    return {
-        "name": project.name,
-        "files": [str(file) for file in files],
-        "points": int(points.valid.sum()),
-        "scan_lines": len(line.u),
-        "flags": {Flag(int(flag)).name: int(count) for flag, count in zip(flags, counts, strict=True)},
         "seconds": clock.seconds,
     }
 

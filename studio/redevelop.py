@@ -15,6 +15,7 @@ from render.frame import Frame
 from render.scene import Scene
 from render.threads import Cancel
 from render.world import World
+from studio.expose import expose
 from studio.project import Project
 from studio.stages import Clock, Measurement, measure_step, scaled
 
@@ -80,10 +81,7 @@ def develop_again(
         if cancelled is not None and cancelled():
             raise Cancelled
         power = [value if i == k else 0.0 for k, value in enumerate(how.laser_power)]
-        seed = (project.seed + i) % 2**63
-        images.append(
-            develop(frame, project.scene, project.sensor, seed=seed, threads=threads, laser_power=power, noise=noise)
-        )
+        images.append(expose(project, frame, power, i, noise=noise, threads=threads))
     if not images:
         images.append(develop(frame, project.scene, project.sensor, seed=project.seed, threads=threads, noise=noise))
     return images

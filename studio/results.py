@@ -18,23 +18,37 @@ from render.model import Model
 from render.world import World
 from studio.project import Project
 from studio.stages import Clock, Measurement, measure_step
+from studio.sweep import Passing
 
 METHODS: tuple[Method, ...] = ("likelihood", "gaussian", "centre_of_mass")
+MOST_NOTES = 12
 LIBRARIES = ("blazer-studio", "embreex", "numba", "numpy", "opencv-contrib-python-headless", "open3d", "OpenEXR")
 
 
 def measure_frame(
-    project: Project, frame: Frame, world: World, images: list[Image], clock: Clock, threads: int | None, *, keep: bool
+    project: Project,
+    frame: Frame,
+    world: World,
+    images: list[Image],
+    clock: Clock,
+    threads: int | None,
+    *,
+    keep: bool,
+    passing: Passing | None = None,
+    first: FrameResult | None = None,
 ) -> FrameResult:
-    """One frame by the project's method and, to compare with, by the others. `keep` the images for the report."""
-    chosen = project.extraction.method
+    """One frame by the project's method and, to compare with, by the others. `keep` the images for the report.
+
+    passing: the frames around it, for the project's method alone. first: of the scan, whose methods are compared with
+    in all its frames: "auto" may pick another in each.
+    """
     before = dict(clock.seconds)
-    by_method: list[list[Measurement]] = [measure_step(project, frame, world, images, clock, threads)]
+    own = measure_step(project, frame, world, images, clock, threads, passing=passing)
+    by_method: list[list[Measurement]] = [own]
     with clock.stage("other methods, to compare with"):
         aside = Clock(lambda stage, done: None, clock.cancelled)
-        for method in METHODS:
-            if method != chosen:
-                by_method.append(measure_step(project, frame, world, images, aside, threads, method))
+        for method in _others(own) if first is None else _compared(first):
+            by_method.append(measure_step(project, frame, world, images, aside, threads, method))
     lasers = []
     for i, image in enumerate(images):
         extractions = tuple(Extraction(found[i].line, found[i].points, found[i].errors) for found in by_method)
@@ -42,6 +56,27 @@ def measure_frame(
     spent = {name: seconds - before.get(name, 0.0) for name, seconds in clock.seconds.items()}
     seconds = {**frame.seconds, **{name: value for name, value in spent.items() if value > 0.0}}
     return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=seconds, counts=frame.counts)
+
+
+def _others(own: list[Measurement]) -> tuple[Method, ...]:
+    """Those to compare with; never what "auto" picked for the first laser."""
+    return tuple(method for method in METHODS if not own or method != own[0].line.method)
+
+
+def _compared(frame: FrameResult) -> tuple[Method, ...]:
+    methods = {extraction.line.method: None for laser in frame.lasers for extraction in laser.extractions[1:]}
+    return tuple(method for method in METHODS if method in methods)
+
+
+def extraction_notes(results: Sequence[FrameResult], project: Project) -> list[str]:
+    """What was done to find each laser's line beyond its method, and in how many frames."""
+    told = []
+    for i, laser in enumerate(project.scene.lasers):
+        notes = [frame.lasers[i].extractions[0].line.note for frame in results]
+        for note in dict.fromkeys(filter(None, notes)):
+            where = f" in {notes.count(note)} of {len(notes)} frames" if notes.count(note) < len(notes) else ""
+            told.append(f"Line of {laser.name}{where}: {note}.")
+    return told[:MOST_NOTES]
 
 
 def write_points(out: Path, project: Project, results: list[FrameResult], clock: Clock) -> list[Path]:
@@ -111,6 +146,8 @@ def settings_table(settings: Model) -> dict[str, str]:
         extra = info.json_schema_extra
         unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
         value = getattr(settings, name)
+        if isinstance(value, bool):
+            value = "yes" if value else "no"
         rows[info.title or name] = "automatic" if value is None else f"{value} {unit}".strip()
     return rows
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +19,10 @@ from render.frame_files import write_frame
 from render.world import build_world
 from studio import scan_folder
 from studio.project import Project
-from studio.results import measure_frame, now, write_points, write_reports
+from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
 from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, render_step, scaled, step_world
 from studio.summary import summarise
+from studio.sweep import Passing, Sweep, Taken
 from studio.warm_up import warm_up
 
 __all__ = ["Measurement", "ScanResult", "run_scan"]
@@ -73,6 +74,7 @@ def run_scan(
         project = project.model_copy(update={"seed": seed})
     if measure and not project.scene.lasers:
         raise InputError("the rig has no laser, so there is no line to measure", where="scene.rig.lasers", found="none")
+    sweep = Sweep(project) if measure else None
     count = min(steps or project.scene.frame_count, project.scene.frame_count)
     clock = Clock(progress, cancelled)
     with warnings.catch_warnings(record=True) as caught:
@@ -87,6 +89,25 @@ def run_scan(
         files: list[Path] = []
         names: list[str] = []
         world = first
+
+        def take(found: Iterable[tuple[Taken, Passing | None]]) -> None:
+            for taken, passing in found:
+                keep, before = taken.frame.step in shown, results[0] if results else None
+                results.append(
+                    measure_frame(
+                        project,
+                        taken.frame,
+                        taken.world,
+                        taken.images,
+                        clock,
+                        threads,
+                        keep=keep,
+                        passing=passing,
+                        first=before,
+                    )
+                )
+                each(results[-1])
+
         for step in clock.frames(count):
             world = world if step == 0 else step_world(project, root, step, world)
             frame = render_step(project, world, step, clock, threads)
@@ -98,10 +119,12 @@ def run_scan(
                 )
                 files += written
                 names.append(written[-1].name)
-            if measure:
-                results.append(measure_frame(project, frame, world, images, clock, threads, keep=step in shown))
-                each(results[-1])
-        notes = [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
+            if sweep is not None:
+                take(sweep.add(frame, world, images))
+        if sweep is not None:
+            take(sweep.finish())
+        notes = extraction_notes(results, project)
+        notes += [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
         result: dict[str, Any] = {
             "name": project.name,
             "created": now(),

@@ -9,18 +9,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from analysis.error import Errors, compare
-from analysis.line.extract import extract
-from analysis.line.noise import NoiseModel
 from analysis.line.result import Line
 from analysis.line.settings import Method
 from analysis.triangulate import Points, triangulate
-from render.develop import Image, develop
+from render.develop import Image
 from render.errors import Cancelled
 from render.frame import Frame
 from render.motion import NoMotion
 from render.render import render_world
 from render.world import World, build_world
+from studio.expose import expose
+from studio.line import extract_line
 from studio.project import Project
+from studio.sweep import Passing, along_time
 
 StageProgress = Callable[[str, float], None]
 Cancel = Callable[[], bool]
@@ -110,8 +111,7 @@ def develop_step(project: Project, frame: Frame, clock: Clock, threads: int | No
     with clock.stage("sensor"):
         for i in range(len(scene.lasers)):
             power = [laser.power if i == k else 0.0 for k, laser in enumerate(scene.lasers)]
-            seed = (project.seed + i) % 2**63
-            images.append(develop(frame, scene, project.sensor, seed=seed, threads=threads, laser_power=power))
+            images.append(expose(project, frame, power, i, threads=threads))
     return images
 
 
@@ -123,12 +123,18 @@ def measure_step(
     clock: Clock,
     threads: int | None,
     method: Method | None = None,
+    passing: Passing | None = None,
 ) -> list[Measurement]:
-    """Line, points and errors of every laser's image, by the project's method or another."""
+    """Line, points and errors of every laser's image, by the project's method or another.
+
+    passing: the frames around this one, where the line is to be measured along time.
+    """
     found = []
     for i, image in enumerate(images):
         with clock.stage("line extraction"):
-            line = extract_line(project, image, threads, method)
+            line = extract_line(project, image, i, threads, method)
+            if passing is not None:
+                line = along_time(project, line, passing, i, threads)
         with clock.stage("triangulation"):
             points = triangulate_line(project, line, i, frame.step)
         with clock.stage("comparison with the truth"):
@@ -136,19 +142,6 @@ def measure_step(
             errors = compare(points, line, frame.curves[i], world.vertices, world.triangles, pose)
         found.append(Measurement(frame.step, i, image, line, points, errors))
     return found
-
-
-def extract_line(project: Project, image: Image, threads: int | None, method: Method | None = None) -> Line:
-    """The line in an image whose sensor is known, by the project's method or another."""
-    noise = NoiseModel(
-        gain=image.gain, black_level=image.black_level, read_noise=image.read_noise, saturation=image.saturation
-    )
-    settings = project.extraction
-    if method == "likelihood" != settings.method:
-        settings = settings.model_copy(update={"smoothing": 0.0})  # it needs independent pixels
-    if image.pattern is not None and settings.pattern is None:
-        settings = settings.model_copy(update={"pattern": image.pattern})
-    return extract(image.pixels, method=method, settings=settings, noise=noise, threads=threads)
 
 
 def triangulate_line(project: Project, line: Line, laser: int, step: int) -> Points:

@@ -47,7 +47,7 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
 
     log_gain, slope, before = math.log(_full_scale(image) / FULL_WELL), -1.0, (0.0, 0.0)
     for number in range(ROUNDS):
-        ratio = _residual_ratio(measure(replace(lines, noise=model(math.exp(log_gain))), settings, threads=1))
+        ratio = residual_ratio(measure(replace(lines, noise=model(math.exp(log_gain))), settings, threads=1))
         if ratio is None:
             break
         # secant on log(chi2) against log(gain): -1 where shot noise is all, flatter where read noise holds part of it
@@ -60,7 +60,7 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
     return model(math.exp(log_gain))
 
 
-def _residual_ratio(line: Line) -> float | None:
+def residual_ratio(line: Line) -> float | None:
     """Typical residual variance over the one assumed: median reduced chi-square over that of its distribution."""
     valid = np.isfinite(line.chi2)
     if valid.sum() < 8:

@@ -85,4 +85,5 @@ def settings_of(settings: ExtractionSettings | None, **given: Any) -> Extraction
     except ValidationError as error:
         first = error.errors()[0]
         where = "extraction." + ".".join(str(part) for part in first["loc"]) if first["loc"] else "extraction"
-        raise InputError(first["msg"], where=where, found=first["input"]) from None
+        found = first["input"] if first["loc"] else None  # else it is all of the settings
+        raise InputError(first["msg"].removeprefix("Value error, "), where=where, found=found) from None

@@ -48,9 +48,12 @@ def fuse(images: Sequence[NDArray[Any]], exposure_times: Sequence[float], noise:
     if any(array.ndim != 2 or array.shape != arrays[0].shape for array in arrays):
         found = ", ".join(str(array.shape) for array in arrays)
         raise InputError("the exposures are not of one shape", where="exposures", found=found, allowed="all (h, w)")
+    types = sorted({str(array.dtype) for array in arrays})
+    if len(types) > 1:
+        raise InputError("the exposures are not of one type", where="exposures", found=", ".join(types))
     times = np.asarray(exposure_times, dtype=np.float64)
     if not (np.isfinite(times).all() and (times > 0.0).all()):
-        raise InputError("an exposure time is out of range", where="exposures", found=list(times), allowed="above 0 s")
+        raise InputError("an exposure time is out of range", where="exposures", found=times.tolist(), allowed="above 0")
     if noise.saturation is None:
         raise InputError("fusion needs to know which pixels are saturated", where="noise.saturation")
     full = (noise.saturation - noise.black_level) / noise.gain

@@ -86,6 +86,42 @@ class ExtractionSettings(Model):
         le=4,
     )
 
+    geometry: bool = quantity(
+        False,
+        label="Geometric check",
+        help="Only peaks that can be the laser's direct light: on its plane, within its fan, inside the working "
+        "volume, no wider than its sheet. Best with the continuous selection.",
+    )
+    nearest: float | None = quantity(
+        None, unit="m", label="Nearest depth", help="Of the working volume; empty: from the camera on.", ge=0, le=1e4
+    )
+    farthest: float | None = quantity(
+        None, unit="m", label="Farthest depth", help="Of the working volume; empty: no end.", gt=0, le=1e4
+    )
+    exposures: int = quantity(
+        1,
+        label="Exposures",
+        help="Taken of every frame and fused in electrons, for lines of very different brightness. The longest is the "
+        "sensor's exposure time.",
+        ge=1,
+        le=8,
+    )
+    exposure_ratio: float = quantity(
+        4.0, label="Exposure ratio", help="Each exposure is shorter than the one before by this.", gt=1, le=100
+    )
+    spacetime: bool = quantity(
+        False,
+        label="Along time",
+        help="Of a moving scan: the sheet's passage over each patch of surface (Curless and Levoy). Edges and textures "
+        "then pull the line no more. The steps must be finer than the line's width; only whole scans can do it.",
+    )
+
+    @model_validator(mode="after")
+    def _volume_is_not_empty(self) -> ExtractionSettings:
+        if self.farthest is not None and (self.nearest or 0.0) >= self.farthest:
+            raise ValueError(f"nearest is {self.nearest} m, farthest {self.farthest} m; allowed: nearest < farthest")
+        return self
+
     @model_validator(mode="after")
     def _bayer_has_colours(self) -> ExtractionSettings:
         if self.channel == "mono" and self.pattern is not None:

@@ -63,6 +63,14 @@ class DevelopPanel(QWidget):
         self.noise = QCheckBox("shot, dark, read, pixels")
         self.noise.setChecked(True)
         self.noise.setToolTip("Off: the mean image, still saturated and quantised. A look only, the project keeps it.")
+        self.exposures = QComboBox()
+        for count in range(1, 9):
+            self.exposures.addItem("one" if count == 1 else f"{count}, fused", count)
+        self.exposures.setToolTip("Several are fused in electrons, each shorter than the one before by the ratio")
+        self.continuous = QCheckBox("on the smoothest chain")
+        self.continuous.setToolTip("Of all peaks of a scan line the one that continues the line, or none")
+        self.geometry = QCheckBox("that the laser can have made")
+        self.geometry.setToolTip("On the laser's plane, within its fan and the working volume, no wider than its sheet")
         self.powers: list[LogField] = []
         self.methods_button = QPushButton()
         self.methods_button.setToolTip("Every chosen method measures the same image")
@@ -72,6 +80,8 @@ class DevelopPanel(QWidget):
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
         self.table = QLabel(textFormat=Qt.TextFormat.RichText)
+        self.noted = QLabel(wordWrap=True)
+        self.noted.setObjectName("muted")
         self._form = QFormLayout()
         self._power_rows = QVBoxLayout()
         self._lay_out()
@@ -103,11 +113,15 @@ class DevelopPanel(QWidget):
         form.addRow("Bit depth", self.bits)
         form.addRow("Laser power", self._power_rows)
         form.addRow("Noise", self.noise)
+        form.addRow("Exposures", self.exposures)
+        form.addRow("Only peaks", self.continuous)
+        form.addRow("", self.geometry)
         form.addRow("Measure by", self.methods_button)
         layout = QVBoxLayout(self)
         layout.addLayout(form)
         layout.addWidget(self.told)
         layout.addWidget(self.table)
+        layout.addWidget(self.noted)
         layout.addStretch(1)
 
     def _method_action(self, method: Method) -> QAction:
@@ -127,6 +141,13 @@ class DevelopPanel(QWidget):
             field.released.connect(self._end_merge)
         self.automatic_gain.clicked.connect(self._choose_gain)
         self.bits.activated.connect(lambda i: session.set(("sensor", "bits"), self.bits.itemData(i), "bit depth"))
+        self.exposures.activated.connect(
+            lambda i: session.set(("extraction", "exposures"), self.exposures.itemData(i), "exposures")
+        )
+        self.continuous.clicked.connect(
+            lambda on: session.set(("extraction", "select"), "continuous" if on else "strongest", "selection")
+        )
+        self.geometry.clicked.connect(lambda on: session.set(("extraction", "geometry"), on, "geometric check"))
         self.noise.toggled.connect(self.refresh)
         for action in self.methods.values():
             action.toggled.connect(self._methods_changed)
@@ -163,6 +184,9 @@ class DevelopPanel(QWidget):
         self.gain.setEnabled(sensor.gain is not None)
         self.gain.set_value(sensor.dn_per_electron)
         self.bits.setCurrentIndex(self.bits.findData(sensor.bits))
+        self.exposures.setCurrentIndex(self.exposures.findData(project.extraction.exposures))
+        self.continuous.setChecked(project.extraction.select == "continuous")
+        self.geometry.setChecked(project.extraction.geometry)
         if len(self.powers) != len(lasers):
             self._make_powers(len(lasers))
         for field, laser in zip(self.powers, lasers, strict=True):
@@ -199,6 +223,7 @@ class DevelopPanel(QWidget):
             self.runner.cancel("measure")
             self.told.setText("Render the scene, then change these as often as you like.")
             self.table.clear()
+            self.noted.clear()
             return
         frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()
         how = development(render.project, self.session.project, render.image_scale)
@@ -256,6 +281,11 @@ class DevelopPanel(QWidget):
                     f"<td align='right'>{item.errors.completeness:.1%}</td></tr>"
                 )
         self.table.setText(f"<table cellspacing='2'>{''.join(rows)}</table>")
+        own = next(iter(found.values()), [])
+        notes = [item.line.note for item in own if item.line.note]
+        if self.session.project.extraction.spacetime:
+            notes.append("Along time is for whole scans: Motion, Run the scan")
+        self.noted.setText("\n".join(dict.fromkeys(notes)))
 
     def _tell_failure(self, job: Job[object]) -> None:
         if job.problem is not None:

@@ -17,7 +17,8 @@ from render.scene import SceneObject
 from render.shape import MeshFile
 from studio import scan_folder
 from studio.project import Project
-from studio.reconstruct import read_image, reconstruct_folder, reconstruct_image
+from studio.reconstruct import read_image, reconstruct_folder
+from studio.reconstruct_images import reconstruct_images
 from studio.scan import run_scan
 from studio.stages import Clock, scaled
 from studio.templates import template_folder
@@ -112,7 +113,7 @@ class TestRepeating:
         project, root = still("plane"), template_folder("plane")
         run_scan(project, root, out=tmp_path, image_scale=SCALE, report=False)
         small = scaled(project, SCALE)
-        made = reconstruct_image(tmp_path / "frame_0000.png", small, 0, tmp_path / "photo", quiet())
+        made = reconstruct_images([tmp_path / "frame_0000.png"], small, 0, tmp_path / "photo", quiet())
         assert made["points"] > 0.95 * small.scene.camera.height
         photo, scan = read_ply(tmp_path / "photo" / "frame_0000.ply"), read_ply(tmp_path / "points.ply")
         rows = np.intersect1d(photo["row"], scan["row"])
@@ -222,7 +223,7 @@ class TestDamagedFolders:
 
     def test_a_photograph_of_another_size_is_refused(self, finished: Path, tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"306 x 256 px.*153 x 128|153 x 128 px"):
-            reconstruct_image(finished / "frame_0000.png", template("scan"), 0, tmp_path, quiet())
+            reconstruct_images([finished / "frame_0000.png"], template("scan"), 0, tmp_path, quiet())
         assert list(tmp_path.iterdir()) == []
 
     def test_what_is_no_image_is_refused(self, tmp_path: Path) -> None:

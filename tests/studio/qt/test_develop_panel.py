@@ -137,3 +137,23 @@ def test_without_a_render_it_says_what_to_do(qtbot):
     made.refresh()
     assert "Render" in made.told.text()
     made.close()
+
+
+def test_exposures_and_the_choice_of_peaks_are_the_projects_and_told(qtbot, panel):
+    session = panel.session
+    panel.exposures.setCurrentIndex(2)
+    panel.exposures.activated.emit(2)
+    for box in (panel.continuous, panel.geometry):
+        qtbot.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
+    extraction = session.project.extraction
+    assert (extraction.exposures, extraction.select, extraction.geometry) == (3, "continuous", True)
+    settle(qtbot, panel)
+    image = session.shown.images[0]
+    assert [one.exposure_time for one in (image, *image.shorter)] == pytest.approx(
+        [session.project.sensor.exposure_time / 4**k for k in range(3)]
+    )
+    line = session.shown.measurements["likelihood"][0].line
+    assert line.candidates is not None and line.valid.mean() > 0.5
+    assert "3 exposures fused" in panel.noted.text() and "fan" in panel.noted.text()
+    session.document.undo()
+    assert not panel.geometry.isChecked()
