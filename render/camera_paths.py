@@ -1,0 +1,129 @@
+"""Paths from the camera through a scene, in waves: intersect, shade, connect, until none is left."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.embree import RayScene
+from render.errors import Cancelled
+from render.light_rows import Lights, pack_lights
+from render.path import shade_diffuse, shade_glossy
+from render.scene import Scene
+from render.sequence import pair_table
+from render.surface import Surface, View, has_gloss
+from render.threads import Cancel
+from render.wave import Shadows, Wave, add_clear, launch
+from render.world import World
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+
+WAVE = 1 << 15
+"""Rays: their states stay in the cache, and a pass through a room full of mirrors is cancelled in time."""
+UNBOUNDED = 1 << 30
+
+
+@dataclass(frozen=True)
+class CameraPaths:
+    """A scene and a camera, ready to be sampled."""
+
+    surface: Surface
+    rays: RayScene
+    lights: Lights
+    environment: Float
+    view: View
+    surfaces: int
+    """The most that light may meet, counted as in `render.path`."""
+    limit: float
+    """The most radiance that a contribution by way of two and more surfaces may add; infinite: no clamp."""
+    seed: int
+    _scratch: threading.local = field(default_factory=threading.local, repr=False, compare=False)
+
+    def add(self, pixels: Int, first: Int, count: Int, sums: Float, tally: Float, cancelled: Cancel | None) -> None:
+        """Samples first .. first + count, (m, 2) for both halves, of the pixels (m,), at most WAVE in all.
+
+        Their radiance is added to sums (2 m, 3), halves side by side. Raises Cancelled.
+        """
+        wave, shadows = self._arrays()
+        rays, glossy = self.rays, has_gloss(self.surface)
+        shade = shade_glossy if glossy else shade_diffuse
+        table = pair_table()
+        n = launch(self.view, table, self.seed, pixels, first, count, rays.centre, wave)
+        depth = 0
+        while n > 0:
+            if cancelled is not None and cancelled():
+                raise Cancelled
+            triangle, _ = rays.intersect(wave.origin[:n], wave.direction[:n])
+            n, asked = shade(
+                self.surface,
+                self.lights,
+                self.environment,
+                table,
+                self.seed,
+                pixels,
+                rays.centre,
+                rays.surface_offset,
+                depth,
+                self.surfaces,
+                self.limit,
+                triangle,
+                wave,
+                shadows,
+                sums,
+                tally,
+            )
+            if asked:
+                blocked = rays.occluded(shadows.origin[:asked], shadows.direction[:asked], shadows.far[:asked])
+                add_clear(shadows, blocked, self.limit if depth > 0 else np.inf, sums, tally)
+            depth += 1
+
+    def _arrays(self) -> tuple[Wave, Shadows]:
+        """Of this thread: fresh ones would cost as much as tracing, in pages that the system must clear."""
+        arrays: tuple[Wave, Shadows] | None = getattr(self._scratch, "arrays", None)
+        if arrays is None:
+            m = 2 * WAVE
+            wave = Wave(
+                origin=np.empty((WAVE, 3), np.float32),
+                direction=np.empty((WAVE, 3), np.float32),
+                weight=np.empty((WAVE, 3), np.float32),
+                density=np.empty(WAVE, np.float32),
+                owner=np.empty(WAVE, np.int32),
+                sample=np.empty(WAVE, np.int32),
+            )
+            shadows = Shadows(
+                origin=np.empty((m, 3), np.float32),
+                direction=np.empty((m, 3), np.float32),
+                far=np.empty(m, np.float32),
+                light=np.empty((m, 3), np.float32),
+                owner=np.empty(m, np.int32),
+            )
+            arrays = self._scratch.arrays = wave, shadows
+        return arrays
+
+
+def camera_paths(
+    world: World,
+    scene: Scene,
+    view: View,
+    *,
+    surfaces: int | None = 1,
+    clamp: float | None = None,
+    seed: int = 0,
+) -> CameraPaths:
+    """surfaces: None for as many as roulette lets a path meet; clamp in W/(m^2 sr)."""
+    surface = world.surface
+    return CameraPaths(
+        surface,
+        world.rays,
+        pack_lights(scene, surface),
+        np.array(scene.environment.radiance, dtype=np.float64),
+        view,
+        UNBOUNDED if surfaces is None else surfaces,
+        np.inf if clamp is None else clamp,
+        seed,
+    )
