@@ -75,6 +75,12 @@ def move(session: Session, by: int) -> None:
         apply(session, "move in the list", lambda project: scene_edits.move(project, path, int(path[-1]) + by))
 
 
+def move_to(session: Session, path: FieldPath, index: int) -> None:
+    """An item to another place in its list."""
+    if scene_edits.in_list(path):
+        apply(session, "move in the list", lambda project: scene_edits.move(project, path, index))
+
+
 def fill_add_menu(menu: QMenu, session: Session, parent: QWidget, what: str = "") -> None:
     """Entries that add things: everything, or only "lasers", "objects" or "lights"."""
     if what in ("", "lasers"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt, QTimer
 from PySide6.QtGui import (
     QColor,
     QContextMenuEvent,
@@ -148,7 +148,8 @@ class SceneTree(QTreeWidget):
         self.setExpandsOnDoubleClick(False)
         self.setItemDelegate(_Delegate(self))
         self.setAcceptDrops(True)
-        self.setDragDropMode(QAbstractItemView.DragDropMode.DropOnly)
+        self.setDragEnabled(True)
+        self.setDragDropMode(QAbstractItemView.DragDropMode.DragDrop)
         self.setMinimumWidth(180)
         header = self.header()
         header.setStretchLastSection(False)
@@ -159,6 +160,7 @@ class SceneTree(QTreeWidget):
         self._nodes: list[Node] = []
         self._items: dict[FieldPath, QTreeWidgetItem] = {}
         self._filling = False
+        self._dragged: FieldPath = ()
         session.project_changed.connect(self.refresh)
         session.selection_changed.connect(self._follow_selection)
         theme.notice.changed.connect(self._repaint)
@@ -211,6 +213,8 @@ class SceneTree(QTreeWidget):
             item.setData(NAME, PATH, node.path)
             if node.path == () or in_list(node.path):
                 item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
+            if not in_list(node.path):
+                item.setFlags(item.flags() & ~Qt.ItemFlag.ItemIsDragEnabled)
             self._items[node.path] = item
         for path, item in self._items.items():
             item.setExpanded(path not in folded)
@@ -330,19 +334,49 @@ class SceneTree(QTreeWidget):
         menu.addSeparator()
         scene_actions.fill_add_menu(menu.addMenu("Add"), session, self, str(path[-2]))
 
+    def startDrag(self, actions: Qt.DropAction) -> None:
+        """An item is dragged to another place in its list."""
+        self._dragged = self.session.selection
+        super().startDrag(actions)
+        self._dragged = ()
+
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        if _meshes(event):
+        if self._dragged or _meshes(event):
             event.acceptProposedAction()
 
     def dragMoveEvent(self, event: QDragMoveEvent) -> None:
-        if _meshes(event):
+        super().dragMoveEvent(event)  # it scrolls, and draws where the item would go
+        if _meshes(event) or self._place(event.position().toPoint()) is not None:
             event.acceptProposedAction()
+        else:
+            event.ignore()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        files = _meshes(event)
+        path, files, place = self._dragged, _meshes(event), self._place(event.position().toPoint())
+        self.setState(self.State.NoState)
         if files:
             event.acceptProposedAction()
             import_meshes(self.session, files, self)
+        elif path and place is not None:
+            event.acceptProposedAction()
+            # after the drag has ended: it still knows the items that are replaced now
+            QTimer.singleShot(0, self, lambda: scene_actions.move_to(self.session, path, place))
+
+    def _place(self, at: QPoint) -> int | None:
+        """The index in its list that the dragged item gets where it is dropped; None: not there, or no change."""
+        item, path = self.itemAt(at), self._dragged
+        if item is None or not path:
+            return None
+        over, index = _path(item), int(path[-1])
+        if over == path[:-1]:
+            place = 0
+        elif over[:-1] == path[:-1]:
+            below = at.y() > self.visualItemRect(item).center().y()
+            place = int(over[-1]) + below
+            place -= place > index
+        else:
+            return None
+        return None if place == index else place
 
 
 def _path(item: QTreeWidgetItem) -> FieldPath:

@@ -8,10 +8,11 @@ from pathlib import Path
 import pytest
 import trimesh
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QDragEnterEvent, QDragMoveEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QMessageBox
 from pytestqt.qtbot import QtBot
 
+from render.shape import Box
 from studio import scene_edits
 from studio.document import Document, FieldPath
 from studio.project import Project
@@ -243,6 +244,55 @@ class TestMenus:
 
 
 @pytest.mark.filterwarnings("ignore:.*QDragEnterEvent:DeprecationWarning")  # takes QPointF only from Qt 6.12 on
+class TestOrder:
+    def drop(self, tree: SceneTree, dragged: FieldPath, onto: FieldPath, below: bool) -> bool:
+        """Drag an item as Qt does once the mouse has moved: events of the drag, and the drop if it is taken."""
+        tree._dragged = dragged
+        data = tree.mimeData([tree.item(dragged)])
+        box = tree.visualItemRect(tree.item(onto))
+        at = QPoint(box.center().x(), box.bottom() - 1 if below else box.top() + 1)
+        action, button, free = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+        enter = QDragEnterEvent(at, action, data, button, free)
+        QApplication.sendEvent(tree.viewport(), enter)
+        assert enter.isAccepted()
+        move = QDragMoveEvent(at, action, data, button, free)
+        QApplication.sendEvent(tree.viewport(), move)
+        if move.isAccepted():
+            QApplication.sendEvent(tree.viewport(), QDropEvent(QPointF(at), action, data, button, free))
+        QApplication.processEvents()
+        tree._dragged = ()
+        return move.isAccepted()
+
+    def test_an_object_is_dragged_to_another_place_and_undone(self, session: Session, tree: SceneTree) -> None:
+        apply_many(session, 2)
+        before = names(session)
+        assert len(before) >= 3
+        last = (*OBJECTS, len(before) - 1)
+        assert self.drop(tree, last, (*OBJECTS, 0), below=False)
+        assert names(session) == [before[-1], *before[:-1]] and session.selection == (*OBJECTS, 0)
+        assert self.drop(tree, (*OBJECTS, 0), (*OBJECTS, 1), below=True)
+        assert names(session) == [before[0], before[-1], *before[1:-1]]
+        session.document.undo()
+        session.document.undo()
+        assert names(session) == before
+
+    def test_it_stays_in_its_own_list_and_where_it_is(self, session: Session, tree: SceneTree) -> None:
+        before = session.project
+        assert not self.drop(tree, (*OBJECTS, 0), (*LASERS, 0), below=True)
+        assert not self.drop(tree, (*OBJECTS, 0), (*OBJECTS, 0), below=True)
+        assert session.project is before
+
+    def test_what_is_in_no_list_is_not_dragged(self, tree: SceneTree) -> None:
+        assert tree.item((*OBJECTS, 0)).flags() & Qt.ItemFlag.ItemIsDragEnabled
+        for path in (("sensor",), OBJECTS, ("scene", "rig", "camera")):
+            assert not tree.item(path).flags() & Qt.ItemFlag.ItemIsDragEnabled
+
+
+def apply_many(session: Session, count: int) -> None:
+    for _ in range(count):
+        scene_actions.apply(session, "add box", lambda project: scene_edits.add_primitive(project, Box))
+
+
 class TestDropping:
     @pytest.fixture
     def outside(self, tmp_path_factory: pytest.TempPathFactory) -> Path:
