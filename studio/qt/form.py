@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from PySide6.QtCore import QPointF, QSize, Qt
@@ -10,10 +11,10 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from render.errors import InputError
-from studio.document import FieldPath
+from studio.document import FieldPath, value_at
 from studio.forms import Alternative, FieldSpec, describe_item, edited, field_path, start_value
 from studio.qt import theme
-from studio.qt.fields import ChoiceField, TextField, reason
+from studio.qt.fields import ChoiceField, TextField, reason, tool_button
 from studio.qt.form_rows import LABEL_WIDTH, RESET_WIDTH, SPACING, PositionRow, RotationRow, Row
 from studio.qt.session import Session
 
@@ -64,7 +65,8 @@ class Section(QWidget):
 
     folded: dict[str, bool] = {}  # noqa: RUF012 - shared on purpose: a section folded once stays so for every item
 
-    def __init__(self, title: str, help: str = "") -> None:
+    def __init__(self, title: str, help: str = "", tools: tuple[QWidget, ...] = ()) -> None:
+        """tools: small buttons at the end of the title's line."""
         super().__init__()
         self.title = title
         self.button = Fold(title)
@@ -76,7 +78,12 @@ class Section(QWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 2, 0, 0)
         column.setSpacing(0)
-        column.addWidget(self.button)
+        head = QHBoxLayout()
+        head.setContentsMargins(0, 0, RESET_WIDTH + SPACING if tools else 0, 0)
+        head.addWidget(self.button, 1)
+        for tool in tools:
+            head.addWidget(tool)
+        column.addLayout(head)
         column.addWidget(self.body)
         shown = not Section.folded.get(title, False)
         self.button.setChecked(shown)
@@ -151,15 +158,23 @@ class Form(QWidget):
             if spec.kind in GROUPS:
                 self._add_group(layout, owner, spec)
 
-    def _add_group(self, layout: QVBoxLayout, owner: FieldPath, spec: FieldSpec) -> None:
+    def _add_group(
+        self, layout: QVBoxLayout, owner: FieldPath, spec: FieldSpec, tools: tuple[QWidget, ...] = ()
+    ) -> None:
         path = field_path(owner, spec)
-        section = Section(spec.label, spec.help)
+        poses = spec.kind == "list" and all(item.kind == "pose" for item in spec.fields)
+        if poses:
+            tools = (self._tool("+", "Add a pose like the last one", lambda: self._add_item(path)),)
+        section = Section(spec.label, spec.help, tools)
         if spec.kind == "pose":
             self._add_row(section.rows, PositionRow(self, owner, spec))
             self._add_row(section.rows, RotationRow(self, owner, spec))
         elif spec.kind == "list":
-            for item in spec.fields[:MAX_ITEMS]:
-                if item.kind in GROUPS:
+            for i, item in enumerate(spec.fields[:MAX_ITEMS]):
+                if poses and len(spec.fields) > 1:
+                    remove = self._tool("\u2212", "Remove this pose", partial(self._remove_item, path, i))
+                    self._add_group(section.rows, path, item, (remove,))
+                elif item.kind in GROUPS:
                     self._add_group(section.rows, path, item)
                 else:
                     self._add_row(section.rows, Row(self, path, item))
@@ -170,6 +185,20 @@ class Form(QWidget):
                 self._add_kind(section.rows, path, spec)
             self._add_fields(section.rows, path, spec.fields)
         layout.addWidget(section)
+
+    def _tool(self, text: str, tip: str, handler: Callable[[], object]) -> QWidget:
+        button = tool_button(text, tip)
+        button.setFixedSize(RESET_WIDTH, RESET_WIDTH)
+        button.clicked.connect(lambda _checked=False: handler())
+        return button
+
+    def _add_item(self, path: FieldPath) -> None:
+        items = value_at(self.session.project, path)
+        self.session.set(path, (*items, items[-1]), "add a pose")
+
+    def _remove_item(self, path: FieldPath, index: int) -> None:
+        items = value_at(self.session.project, path)
+        self.session.set(path, (*items[:index], *items[index + 1 :]), "remove a pose")
 
     def _add_kind(self, layout: QVBoxLayout, path: FieldPath, spec: FieldSpec) -> None:
         if len(spec.alternatives) < 2:

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 import trimesh
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
 from render.laser import Waist
@@ -16,7 +18,7 @@ from render.shape import MeshFile
 from studio.qt import mesh_importer
 from studio.qt.inspector import Inspector
 from studio.qt.session import Session
-from tests.studio.qt.inspector_hands import CAMERA, LASER, field, inspector_window, sample_session
+from tests.studio.qt.inspector_hands import CAMERA, LASER, field, inspector_window, sample_session, type_into
 
 
 @pytest.fixture
@@ -28,6 +30,16 @@ def session(tmp_path: Path) -> Session:
 def inspector(session: Session, qtbot: QtBot) -> Iterator[Inspector]:
     with inspector_window(session, qtbot) as panel:
         yield panel
+
+
+def tools(inspector: Inspector) -> list[QToolButton]:
+    return [tool for tool in inspector.form.findChildren(QToolButton) if tool.isVisible()]
+
+
+def click_tool(qtbot: QtBot, inspector: Inspector, tip: str) -> None:
+    """The first one with this tip."""
+    qtbot.waitUntil(lambda: any(tool.toolTip() == tip for tool in tools(inspector)))
+    qtbot.mouseClick(next(tool for tool in tools(inspector) if tool.toolTip() == tip), Qt.MouseButton.LeftButton)
 
 
 class TestKinds:
@@ -45,6 +57,21 @@ class TestKinds:
         assert field(inspector, *LASER, "sheet", "radius").suffix == "um"
         session.document.undo()
         assert field(inspector, *LASER, "sheet", "full_angle").text() == "1.15"
+
+    def test_poses_are_added_and_removed(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+        path = ("scene", "motion")
+        session.select(path)
+        self.choose(qtbot, inspector, path, "List of poses")
+        type_into(qtbot, field(inspector, *path, "poses", 0, axis=0), "10")
+        click_tool(qtbot, inspector, "Add a pose like the last one")
+        type_into(qtbot, field(inspector, *path, "poses", 1, axis=0), "25")
+        assert [pose.translation[0] for pose in session.project.scene.motion.poses] == [0.010, 0.025]
+        click_tool(qtbot, inspector, "Remove this pose")
+        assert [pose.translation[0] for pose in session.project.scene.motion.poses] == [0.025]
+        qtbot.waitUntil(lambda: any("Add a pose" in tool.toolTip() for tool in tools(inspector)))
+        assert not [tool for tool in tools(inspector) if tool.toolTip() == "Remove this pose"]  # one must stay
+        session.document.undo()
+        assert session.project.scene.frame_count == 2
 
     def test_motion_shape_and_filter(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
         session.select(("scene", "motion"))
