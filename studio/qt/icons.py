@@ -29,21 +29,22 @@ SHAPES = {
 }
 DOCUMENT = (
     "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 24 24' fill='none' stroke='{colour}' "
-    "stroke-width='1.7' stroke-linecap='round' stroke-linejoin='round'>{shape}</svg>"
+    "stroke-width='1.6' stroke-linecap='round' stroke-linejoin='round'>{shape}</svg>"
 )
 
 
 class _Engine(QIconEngine):
     """Paints with the palette of the moment, so that a change of theme needs no new icons."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, shape: str, accent: str) -> None:
         super().__init__()
-        self.name = name
+        self.shape, self.accent = shape, accent
 
     def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
+        role = QPalette.ColorRole.HighlightedText if mode == QIcon.Mode.Selected else QPalette.ColorRole.WindowText
         group = QPalette.ColorGroup.Disabled if mode == QIcon.Mode.Disabled else QPalette.ColorGroup.Active
-        colour = QApplication.palette().color(group, QPalette.ColorRole.WindowText).name()
-        shape = SHAPES[self.name].replace("currentColor", colour)
+        colour = QApplication.palette().color(group, role).name()
+        shape = self.shape.replace("currentColor", colour).replace("{accent}", self.accent or colour)
         text = DOCUMENT.format(colour=colour, shape=shape)
         QSvgRenderer(QByteArray(text.encode())).render(painter, QRectF(rect))
 
@@ -56,9 +57,14 @@ class _Engine(QIconEngine):
         return made
 
     def clone(self) -> QIconEngine:
-        return _Engine(self.name)
+        return _Engine(self.shape, self.accent)
+
+
+def drawn(shape: str, accent: str = "") -> QIcon:
+    """An icon of SVG elements on 24 x 24; `currentColor` is the text's colour, `{accent}` the one given (#rrggbb)."""
+    return QIcon(_Engine(shape, accent))
 
 
 def icon(name: str) -> QIcon:
     """One of `SHAPES`."""
-    return QIcon(_Engine(name))
+    return drawn(SHAPES[name])

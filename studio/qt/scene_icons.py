@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QByteArray, QRect, QRectF, QSize, Qt
-from PySide6.QtGui import QIcon, QIconEngine, QPainter, QPalette, QPixmap
-from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QApplication
+from PySide6.QtGui import QIcon
 
 from analysis.report.colour import hex_colour, wavelength_colour
 from render.laser import LineLaser
 from studio.document import FieldPath, value_at
 from studio.project import Project
+from studio.qt.icons import drawn
 
 SHAPES = {
     "project": "<path d='M6 3h8l4 4v14H6zM14 3v4h4'/>",
@@ -38,42 +36,11 @@ SHAPES = {
     "eye": "<path d='M2.5 12c4-7 15-7 19 0-4 7-15 7-19 0z'/><circle cx='12' cy='12' r='2.8'/>",
     "hidden": "<path d='M3 13c4 6 14 6 18 0M6 16l-1.5 2.5M12 17.5v3M18 16l1.5 2.5' opacity='.55'/>",
 }
-DOCUMENT = (
-    "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 24 24' fill='none' stroke='{colour}' "
-    "stroke-width='1.6' stroke-linecap='round' stroke-linejoin='round'>{shape}</svg>"
-)
-
-
-class _Engine(QIconEngine):
-    """Painted with the palette of the moment, so that a change of theme needs no new icons."""
-
-    def __init__(self, name: str, accent: str) -> None:
-        super().__init__()
-        self.name, self.accent = name, accent
-
-    def paint(self, painter: QPainter, rect: QRect, mode: QIcon.Mode, state: QIcon.State) -> None:
-        role = QPalette.ColorRole.HighlightedText if mode == QIcon.Mode.Selected else QPalette.ColorRole.WindowText
-        group = QPalette.ColorGroup.Disabled if mode == QIcon.Mode.Disabled else QPalette.ColorGroup.Active
-        colour = QApplication.palette().color(group, role).name()
-        shape = SHAPES[self.name].replace("currentColor", colour).replace("{accent}", self.accent or colour)
-        text = DOCUMENT.format(colour=colour, shape=shape)
-        QSvgRenderer(QByteArray(text.encode())).render(painter, QRectF(rect))
-
-    def pixmap(self, size: QSize, mode: QIcon.Mode, state: QIcon.State) -> QPixmap:
-        made = QPixmap(size)
-        made.fill(Qt.GlobalColor.transparent)
-        painter = QPainter(made)
-        self.paint(painter, QRect(0, 0, size.width(), size.height()), mode, state)
-        painter.end()
-        return made
-
-    def clone(self) -> QIconEngine:
-        return _Engine(self.name, self.accent)
 
 
 def scene_icon(name: str, accent: str = "") -> QIcon:
     """One of `SHAPES`; accent: #rrggbb of a laser's light."""
-    return QIcon(_Engine(name, accent))
+    return drawn(SHAPES[name], accent)
 
 
 def icon_name(project: Project, path: FieldPath) -> tuple[str, str]:
