@@ -15,8 +15,8 @@ DIVERGING = "RdBu_r"
 """Red and blue about white: told apart by every common colour vision (ColorBrewer)."""
 
 # Okabe & Ito (2008), chosen to be told apart by every common colour vision
-METHODS = {"likelihood": "#d55e00", "gaussian": "#8a5aa8", "centre_of_mass": "#e0a100"}
-OTHERS = ("#009e73", "#c2438f", "#7a5230", "#3d5a80")
+METHODS = {"likelihood": "#d55e00", "gaussian": "#8a5aa8", "centre_of_mass": "#009e73"}
+OTHERS = ("#b58900", "#c2438f", "#7a5230", "#3d5a80")
 METHOD_NAMES = {
     "likelihood": "maximum likelihood",
     "gaussian": "Gaussian fit",

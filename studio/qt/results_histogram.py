@@ -36,7 +36,7 @@ class ErrorHistogram(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self._outlines = []
         self.plot.setLabel("bottom", f"{view.title} / {view.unit}")
         limit = max([symmetric_limit(error, PLOTTED) for error in measured.values()], default=1.0)
-        for method, error in measured.items():
+        for method, error in reversed(measured.items()):  # the first method on top
             edges, counts = histogram(error, limit)
             colour = pg.mkColor(method_colour(method))
             fill = pg.mkColor(colour)

@@ -49,7 +49,7 @@ class ProfilePlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             self.truth.setData([], [])
         else:
             self.truth.setData(truth.across, truth.distance)
-        for method, series in measured.items():
+        for method, series in reversed(measured.items()):  # the first method on top
             item = plots.dots(method_colour(method))
             here = np.isfinite(series.distance)
             item.setData(series.across[here], series.distance[here])

@@ -59,7 +59,7 @@ class RowPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.error.setLabel("bottom", "Row" if axis == "rows" else "Column")
         self.position.setLabel("left", f"{'u' if axis == 'rows' else 'v'} / px")
         self.error.setLabel("left", f"{view.title} / {view.unit}")
-        for method, (series, error) in measured.items():
+        for method, (series, error) in reversed(measured.items()):  # the first method on top
             for plot, values in ((self.position, series.position), (self.depth, series.depth), (self.error, error)):
                 here = np.isfinite(values)
                 self._add(plot, plots.dots(method_colour(method))).setData(series.index[here], values[here])
