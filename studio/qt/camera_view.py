@@ -38,8 +38,6 @@ DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 HOVER_HZ = 30
 LOW = 400
 """px of height, for picture and profile together."""
-NARROW = 760
-"""px of width, for the names of the lines."""
 LIVE = "Live estimate"
 
 
@@ -61,6 +59,7 @@ class CameraView(QWidget):
         self.readout = QLabel()
         self.badge = QFrame()
         self.badge_text = QLabel()
+        self.lines = QWidget()
         self.render_button = QPushButton("Render")
         self.is_live = True
         self._judged: tuple[Render, Project, int, bool] | None = None
@@ -82,7 +81,7 @@ class CameraView(QWidget):
         super().resizeEvent(event)
         # a low panel shows the picture alone rather than two strips
         self.profile.setVisible(self.height() >= LOW)
-        self.overlay.show_names(self.width() >= NARROW)
+        self.overlay.show_names_within(self.lines.width())
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -119,9 +118,10 @@ class CameraView(QWidget):
         bar = QHBoxLayout()
         bar.setContentsMargins(6, 4, 6, 4)
         bar.addWidget(self.choice)
+        bar.addSpacing(8)
         bar.addWidget(self.bright)
         bar.addSpacing(8)
-        lines = QWidget()
+        lines = self.lines
         lines.setLayout(self.overlay.bar)
         self.overlay.bar.setContentsMargins(0, 0, 0, 0)
         self.overlay.bar.addStretch(1)
@@ -173,6 +173,7 @@ class CameraView(QWidget):
         session.measured.connect(self._draw_overlay)
         session.hover_changed.connect(self._draw_hover)
         self.live.changed.connect(self._live_changed)
+        self.live.loading.connect(lambda on: self._show_badge())
         self.choice.activated.connect(self._choose)
         self.bright.toggled.connect(lambda on: self.refresh())
         self.render_button.clicked.connect(session.render_asked)
@@ -238,7 +239,9 @@ class CameraView(QWidget):
 
     def _show_badge(self) -> None:
         shown = self.session.shown
-        if shown is None:
+        if self.is_live and not self.live.ready:
+            text = "Preparing the live estimate; the very first time this takes half a minute."
+        elif shown is None:
             text = "Live estimate: one ray a pixel, no noise. Render for the real image."
         elif self.stale:
             text = (
@@ -316,6 +319,7 @@ class CameraView(QWidget):
             return
         self.overlay.show_truth(list(shown.frame.curves))
         self.overlay.show_methods([item.line for items in shown.measurements.values() for item in items])
+        self.overlay.show_names_within(self.lines.width())
         self._draw_hover()
 
     # under the cursor

@@ -18,6 +18,8 @@ from studio.qt import theme
 Float = NDArray[np.float64]
 SYMBOLS_FROM = 6.0
 """Screen pixels a pixel from which single positions are marked."""
+BOX_PX = 52
+"""Of a box besides its name: mark, colour and the space to the next."""
 JUMP_PX = 4.0
 """Positions of neighbouring scan lines that are further apart are not joined."""
 
@@ -79,11 +81,14 @@ class LineOverlay:
         self._switch()
         self._zoomed()
 
-    def show_names(self, on: bool) -> None:
-        """The boxes with their names, or with their colours alone."""
-        self._named = on
-        for box in (self.truth_box, *self.method_boxes.values()):
-            box.setText(str(box.property("name")) if on else "")
+    def show_names_within(self, width: int) -> None:
+        """The boxes with their names where there is room for all of them, else with their colours alone."""
+        boxes = (self.truth_box, *self.method_boxes.values())
+        metrics = self.truth_box.fontMetrics()
+        needed = sum(BOX_PX + metrics.horizontalAdvance(box.property("name")) for box in boxes if not box.isHidden())
+        self._named = needed <= width
+        for box in boxes:
+            box.setText(str(box.property("name")) if self._named else "")
 
     def show_hover(self, index: int | None, axis: str) -> None:
         """Mark a scan line; None: none."""

@@ -56,6 +56,7 @@ class Viewport(QWidget):
         self._hover = QTimer(self, singleShot=True, interval=HOVER_MS)
         self._hover.timeout.connect(self._tell_name)
         self._connect()
+        self.bar.tell_loading(self.live.is_loading)
         self._paint()
         self._draw()
 

@@ -187,7 +187,7 @@ class ViewportScene:
         """Take the colours of a theme."""
         self._colours = colours
         self.renderer.SetBackground(*pv.Color(colours.base).float_rgb)
-        self._grid.colour(mixed(colours.line, colours.base, 0.75))
+        self._grid.colour(mixed(colours.muted, colours.base, 0.45))
         self._axis_x.colour(mixed(colours.error, colours.base, 0.8))
         self._axis_y.colour(mixed(colours.good, colours.base, 0.8))
         for label in self._labels:
