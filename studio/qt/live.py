@@ -125,7 +125,7 @@ class Live(QObject):
                     break
                 progress(item.name, i / len(triangles_first))
                 preview.load(item, root)
-            if not ready:
+            if not ready and not cancelled():
                 warm_up()
             return items
 

@@ -52,6 +52,14 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.fixture(scope="session", autouse=True)
+def kernels() -> None:
+    """Compiled, or read from their cache, before any window asks for them: a compiler cannot be cancelled."""
+    from studio.qt.live import warm_up
+
+    warm_up()
+
+
 @pytest.fixture(autouse=True)
 def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     """A job that outlives its window would crash later, in a test that has nothing to do with it."""
@@ -59,7 +67,7 @@ def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     yield
     left = [thread for thread in set(threading.enumerate()) - before if thread.name.startswith("job ")]
     for thread in left:
-        thread.join(10.0)
+        thread.join(2.0)
     assert not [thread.name for thread in left if thread.is_alive()]
 
 
