@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import weakref
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,16 +30,43 @@ def signed_distance(
     return distance, nearest
 
 
+class _Scene:
+    """Open3D's tree of a mesh, about the mesh's own centre."""
+
+    last: _Scene | None = None
+    """The one that was made last: several methods, lasers and steps measure the same mesh."""
+
+    def __init__(self, vertices: Float, triangles: Int) -> None:
+        import open3d as o3d
+
+        self.centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        self.scene: Any = o3d.t.geometry.RaycastingScene()
+        corners = o3d.core.Tensor.from_numpy((vertices - self.centre).astype(np.float32))
+        self.scene.add_triangles(corners, o3d.core.Tensor.from_numpy(triangles.astype(np.uint32)))
+        self.mesh = weakref.ref(vertices, _forget), weakref.ref(triangles, _forget)
+
+    @classmethod
+    def of(cls, vertices: Float, triangles: Int) -> _Scene:
+        """Of these very arrays, which nobody changes."""
+        last = cls.last
+        if last is None or last.mesh[0]() is not vertices or last.mesh[1]() is not triangles:
+            last = cls.last = cls(vertices, triangles)
+        return last
+
+
+def _forget(_: object) -> None:
+    """The mesh is gone, and so its tree."""
+    _Scene.last = None
+
+
 def _signed_distance(
     points: Float, vertices: Float, triangles: Int, camera_centre: Float
 ) -> tuple[Float, NDArray[np.int64]]:
     import open3d as o3d
 
     # open3d computes in float32: near the origin it names the right triangles, and float64 does the rest
-    centre = np.median(points, axis=0)
-    scene = o3d.t.geometry.RaycastingScene()
-    corners = o3d.core.Tensor.from_numpy((vertices - centre).astype(np.float32))
-    scene.add_triangles(corners, o3d.core.Tensor.from_numpy(triangles.astype(np.uint32)))
+    built = _Scene.of(vertices, triangles)
+    scene, centre = built.scene, built.centre
     local = o3d.core.Tensor.from_numpy((points - centre).astype(np.float32))
     nearest = scene.compute_closest_points(local)["primitive_ids"].numpy().astype(np.int64)
     towards = points - camera_centre

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from analysis import distance
 from analysis.distance import point_triangle_distance, signed_distance
 from analysis.error import compare, match
 from analysis.line.result import Flag, Line
@@ -183,6 +184,18 @@ def test_distance_to_a_box_is_right_and_signed_at_faces_edges_and_corners(revers
     assert np.max(wrong) < np.finfo(np.float32).eps
     assert np.percentile(wrong, 99) < 1e-13
     assert (nearest >= 0).all()
+
+
+def test_the_tree_of_a_mesh_is_built_once_and_goes_with_it():
+    vertices, triangles = box(0.5)
+    points, camera = np.array([[0.0, 0.0, 0.6]]), np.array([0.0, 0.0, 3.0])
+    assert signed_distance(points, vertices, triangles, camera)[0] == pytest.approx(0.1)
+    built = distance._Scene.last
+    signed_distance(points, vertices, triangles, camera)
+    assert built is not None and distance._Scene.last is built
+    # another mesh, also of the same size, is another tree
+    assert signed_distance(points, vertices - [0.0, 0.0, 0.2], triangles, camera)[0] == pytest.approx(0.3)
+    assert distance._Scene.last is None  # what was measured just now is gone already
 
 
 def test_distance_off_a_tilted_sheet_keeps_its_sign_within_a_nanometre():
