@@ -139,6 +139,7 @@ class CameraView(QWidget):
             bar.addWidget(button)
         badge = QHBoxLayout(self.badge)
         badge.setContentsMargins(8, 3, 4, 3)
+        self.badge_text.setMinimumWidth(1)  # a narrow panel may cut it off
         badge.addWidget(self.badge_text, 1)
         badge.addWidget(self.render_button)
         self.readout.setContentsMargins(8, 2, 8, 2)
@@ -275,6 +276,7 @@ class CameraView(QWidget):
         curves = [look.lit_curve(i) for i in range(len(look.scene.lasers))]
         self.overlay.show_truth(curves)
         self.overlay.show_methods([])
+        self.overlay.show_names_within(self.lines.width())
         self._draw_hover()
 
     # the render

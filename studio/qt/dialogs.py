@@ -79,6 +79,8 @@ class TemplateDialog(QDialog):
         self.setObjectName("templates")
         self.list = QListWidget()
         self.list.setSpacing(3)
+        self.list.setWordWrap(True)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         for key, text in DESCRIPTIONS.items():
             name = key.replace("_", " ").capitalize()
             item = QListWidgetItem(f"{name}\n{text[0].upper()}{text[1:]}")
@@ -93,7 +95,7 @@ class TemplateDialog(QDialog):
         layout.addWidget(QLabel("Start with a copy of"))
         layout.addWidget(self.list)
         layout.addWidget(buttons)
-        self.resize(460, 360)
+        self.resize(560, 420)
 
     @property
     def chosen(self) -> str:

@@ -83,6 +83,7 @@ class History(QWidget):
         self.comparison: CompareView | None = None
         self.list = QListWidget()
         self.list.setIconSize(THUMBNAIL)
+        self.list.setMinimumHeight(2 * THUMBNAIL.height() + 16)
         self.list.setItemDelegate(_TwoLines(self.list))
         self.list.setWordWrap(True)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)

@@ -184,8 +184,11 @@ class MotionPanel(QWidget):
 
     def _lay_out(self) -> None:
         still = QWidget()
-        row = QHBoxLayout(still)
-        row.addWidget(QLabel("Nothing moves: a scan is a single frame."))
+        column, row = QVBoxLayout(still), QHBoxLayout()
+        column.setContentsMargins(8, 8, 8, 6)
+        column.addWidget(QLabel("Nothing moves: a scan is a single frame.", wordWrap=True))
+        column.addLayout(row)
+        column.addStretch(1)
         for text, kind in (("Add a linear stage", LinearStage), ("Add a turntable", Turntable)):
             button = QPushButton(text)
             button.clicked.connect(lambda _checked=False, kind=kind: self._set_motion(kind))

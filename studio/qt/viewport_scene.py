@@ -48,7 +48,7 @@ class Lines:
         self.look.SetLineWidth(width)
         self.look.SetOpacity(opacity)
         self.look.SetLighting(lit)
-        self.look.SetAmbient(0.35)
+        self.look.SetAmbient(0.35 if lit else 0.0)  # without light VTK adds it to the colour
         if opacity < 1.0:
             self.actor.ForceTranslucentOn()
 
