@@ -262,6 +262,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 @click.option("--peaks", type=int, default=1, show_default=True, help="Peaks kept on each scan line.")
 @SELECT
 @click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5. One table.")
+@click.option("--ridges", is_flag=True, help="Lines of any direction, as points with their normal (Steger in 2-D).")
 @click.option(
     "--spacetime", is_flag=True, help="The images are a sweep over a scene at rest: when it passes each pixel."
 )

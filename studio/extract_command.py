@@ -42,6 +42,7 @@ def extract_images(
     project: Path | None,
     laser_number: int,
     spacetime: bool,
+    ridges: bool,
     out: Path | None,
     threads: int | None,
     quiet: bool,
@@ -51,12 +52,13 @@ def extract_images(
     """`extract`: a bad image is told and left out; returns how many there were."""
     from studio.commands import check_output
     from studio.photographs import extract_photograph, extract_series, summary, table_path, write_line
+    from studio.ridge_files import ridges_of_file
 
     asked = _asked(images, settings, off, hdr, project, laser_number)
     if out is not None:
         check_output(out)
-    if spacetime and hdr is not None:
-        raise InputError("images are either exposures of one scene or a sweep", where="--hdr and --spacetime")
+    if spacetime + ridges + (hdr is not None) > 1:
+        raise InputError("only one of these at a time", where="--hdr, --spacetime, --ridges")
     if spacetime:
         return _extract_sweep(images, asked, out, threads, as_json)
     done: list[dict[str, Any]] = []
@@ -67,6 +69,9 @@ def extract_images(
         for number, group in enumerate(groups):
             progress("images", number / len(groups))
             try:
+                if ridges:
+                    done.append(ridges_of_file(group[0], asked.settings, asked.off(number), out, taken, threads))
+                    continue
                 if asked.times:
                     line = extract_series(group, asked.times, asked.settings, asked.offs, asked.volume, threads)
                 else:
@@ -154,7 +159,7 @@ def _print_lines(done: list[dict[str, Any]]) -> None:
     rows = [
         (
             Path(row["image"]).name,
-            f"{row['found']} of {row['scan_lines']} {row['axis']}",
+            row["what"] if "what" in row else f"{row['found']} of {row['scan_lines']} {row['axis']}",
             number(row["sigma_u_px"], "{:.4f}"),
             number(row["width_px"], "{:.2f}"),
             number(row["amplitude_e"], "{:.0f}"),

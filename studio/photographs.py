@@ -77,7 +77,7 @@ def extract_photograph(
     """
     with naming(path):
         image = check_image(load_photograph(path))
-        _check_light(image)
+        check_light(image)
         noise = None
         if off is not None:
             image, saturation = subtract_off(image, off)
@@ -172,7 +172,8 @@ def check_camera(image: NDArray[Any], volume: WorkingVolume | None) -> None:
     )
 
 
-def _check_light(image: NDArray[Any]) -> None:
+def check_light(image: NDArray[Any]) -> None:
+    """InputError: an image that is black, saturated or the same all over."""
     finite = image[np.isfinite(image)] if image.dtype.kind == "f" else image
     low, high = float(finite.min()), float(finite.max())
     if high <= 0.0:
@@ -243,12 +244,12 @@ def summary(path: Path, line: Line, table: Path) -> dict[str, Any]:
     }
 
 
-def table_path(path: Path, out: Path | None, taken: set[Path]) -> Path:
+def table_path(path: Path, out: Path | None, taken: set[Path], what: str = "line") -> Path:
     """Where an image's table goes: beside it or in `out`; a number tells images of one name apart."""
     folder, number = out if out is not None else path.parent, 1
-    target = folder / f"{path.stem}_line.csv"
+    target = folder / f"{path.stem}_{what}.csv"
     while target in taken:
         number += 1
-        target = folder / f"{path.stem}_{number}_line.csv"
+        target = folder / f"{path.stem}_{number}_{what}.csv"
     taken.add(target)
     return target

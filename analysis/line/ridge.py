@@ -71,7 +71,7 @@ def fill_gaps(signal: Float32, mask: Mask) -> Float32:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _kernel(offset: float, half: int, spread: float, taps: Array) -> None:
+def taps(offset: float, half: int, spread: float, taps: Array) -> None:
     """Gaussian, its first and second derivative at offset - j, j = -half..half -> taps (3, 2 half + 1)."""
     inverse = 1.0 / (spread * spread)
     norm = 1.0 / (spread * math.sqrt(2.0 * math.pi))
@@ -84,7 +84,7 @@ def _kernel(offset: float, half: int, spread: float, taps: Array) -> None:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _hessian(signal: Float32, base: float, y: int, x: int, half: int, across: Array, along: Array, r: Array) -> None:
+def hessian(signal: Float32, base: float, y: int, x: int, half: int, across: Array, along: Array, r: Array) -> None:
     """r (5,) = r_x, r_y, r_xx, r_xy, r_yy from taps across (along x) and along (along y), edges repeated."""
     n, w = signal.shape
     for j in range(5):
@@ -106,7 +106,7 @@ def _hessian(signal: Float32, base: float, y: int, x: int, half: int, across: Ar
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _normal(r: Array) -> tuple[float, float, float]:
+def normal(r: Array) -> tuple[float, float, float]:
     """Eigenvalue of the Hessian that is most negative, and its unit vector (n_x, n_y) with n_x >= 0."""
     half_sum, half_gap = 0.5 * (r[2] + r[4]), 0.5 * (r[2] - r[4])
     root = math.hypot(half_gap, r[3])
@@ -152,7 +152,7 @@ def ridge_seeds(
             seed = seeds[row, k]
             spread = min(max(scale * seed[WIDTH], NARROWEST, 0.5 * seed[PLATEAU]), WIDEST)
             half = math.ceil(CUT * spread)
-            _kernel(0.0, half, spread, along)
+            taps(0.0, half, spread, along)
             x, reason, slope, nx, ny = seed[CENTRE], _NOT_CONVERGED, -1.0, 1.0, 0.0
             reach = 2.0 * spread + seed[WIDTH] + seed[PLATEAU] + 1.0
             middle = round(x)
@@ -161,9 +161,9 @@ def ridge_seeds(
                 if min(x, w - 1 - x) < 2.0 * spread or min(y, m - 1 - y) < spread:
                     reason = _AT_BORDER
                     break
-                _kernel(x - middle, half, spread, across)
-                _hessian(signal, seed[BACKGROUND], y, middle, half, across, along, r)
-                value, nx, ny = _normal(r)
+                taps(x - middle, half, spread, across)
+                hessian(signal, seed[BACKGROUND], y, middle, half, across, along, r)
+                value, nx, ny = normal(r)
                 if value >= 0.0 or nx < STEEPEST:
                     reason = _ALONG if value < 0.0 else _NOT_CONVERGED
                     break
@@ -190,7 +190,7 @@ def ridge_seeds(
             flags[row, k] = reason
             if reason > _SATURATED:
                 continue
-            sigma = _sigma(raw, mask, floor, y, middle, half, weight) if independent else np.nan
+            sigma = weight_noise(raw, mask, floor, y, middle, half, weight) if independent else np.nan
             write_peak(seed, x, sigma, out[row, k])
 
 
@@ -255,7 +255,7 @@ def _bilinear(signal: Float32, x: float, y: float) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _sigma(raw: Float32, mask: Mask, floor: Float32, y: int, x: int, half: int, weight: Array) -> float:
+def weight_noise(raw: Float32, mask: Mask, floor: Float32, y: int, x: int, half: int, weight: Array) -> float:
     """Standard deviation of a position that moves by weight[j, i] for one electron more in pixel (x + i, y + j).
 
     NaN where a pixel is saturated or missing: its noise is not that of a count.

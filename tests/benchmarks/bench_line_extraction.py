@@ -19,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from analysis.line.extract import extract
 from analysis.line.noise import NoiseModel
+from analysis.line.ridges import find_ridges
 from analysis.line.settings import Method
 from tests.analysis.line_images import expected, exposed
 
@@ -159,6 +160,24 @@ def plain_ridge(image: Array) -> Array:
     return np.asarray(top + t * n[:, 0])
 
 
+def plain_ridges(image: Array) -> tuple[Array, Array]:
+    """OpenCV and NumPy, everywhere: five derivatives, eigenvectors, points within half a pixel of theirs (u, v)."""
+    import cv2
+
+    smooth = cv2.GaussianBlur(image.astype(np.float32), (0, 0), 1.5 * SIGMA)
+    rx, ry, rxx, rxy, ryy = (
+        cv2.Sobel(smooth, cv2.CV_32F, i, j, scale=0.125 if i + j == 1 else 0.25)
+        for i, j in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+    )
+    gap = 0.5 * (rxx - ryy)
+    value = 0.5 * (rxx + ryy) - np.hypot(gap, rxy)
+    angle = 0.5 * np.arctan2(-rxy, -gap)
+    nx, ny = np.cos(angle), np.sin(angle)
+    t = -(rx * nx + ry * ny) / np.minimum(value, -1e-3)
+    v, u = np.nonzero((value < -0.5) & (np.abs(t * nx) <= 0.5) & (np.abs(t * ny) <= 0.5))
+    return u + t[v, u] * nx[v, u], v + t[v, u] * ny[v, u]
+
+
 def plain_normal(image: Array) -> Array:
     """Structure from OpenCV, samples along the normal from scipy.ndimage.map_coordinates."""
     from scipy.ndimage import map_coordinates
@@ -215,6 +234,26 @@ PLAIN: dict[str, Callable[[Array], Array]] = {
 }
 
 
+def ridges(image: Array, noise: NoiseModel) -> None:
+    """Points of any direction, the whole frame searched: ours and the plain code."""
+    work = partial(find_ridges, image, noise=noise, threads=2)
+    best, median = milliseconds(work)
+    plain = milliseconds(partial(plain_ridges, image), 5)[0]
+
+    def rms(u: Array, v: Array) -> float:
+        centre = 1200 + 300 * np.sin(v / 250)
+        across = np.hypot(1.0, 1.2 * np.cos(v / 250))
+        off = (u - centre) / across
+        return float(np.sqrt(np.mean(off[np.abs(off) < 3] ** 2)))
+
+    found = work()
+    verdict = "ok" if best <= 250 and best < plain else "MISSED"
+    print(
+        f"  {'ridges, free (Steger 2-D)':26} {best:7.1f} / {median:7.1f} ms  rms {rms(found.u, found.v):.4f}   "
+        f"bar   250 ms  plain {plain:8.1f} ms  rms {rms(*plain_ridges(image)):.4f}  {plain / best:6.1f} x  {verdict}"
+    )
+
+
 def main() -> None:
     image, centre, noise = frame()
     print(f"8 bit, {WIDTH} x {ROWS}, one peak a row, 2 threads; best / median of {REPEATS}; rms error in px")
@@ -235,6 +274,7 @@ def main() -> None:
             f"  {method:26} {best:7.1f} / {median:7.1f} ms  rms {rms:.4f}   bar {bar:5.0f} ms  "
             f"plain {plain:8.1f} ms  rms {plain_rms:.4f}  {plain / best:6.1f} x  {verdict}"
         )
+    ridges(image, noise)
     quick = milliseconds(lambda: image.argmax(axis=1))[0]
     print(f"  (numpy.argmax alone, with no background, threshold or reason: {quick:.1f} ms)")
 
