@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import field_validator
+from pydantic import field_validator, model_validator
 
 from render.distortion import distort_points, fold_radii, undistort_points
 from render.model import Model, UnitInterval, quantity
@@ -26,6 +26,8 @@ Mask = NDArray[np.bool_]
 
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 MAX_SIDE = 32768
+FASTEST = 0.5
+"""f-number of an aperture as wide as the sine condition allows."""
 
 
 class Lens(Model):
@@ -68,6 +70,22 @@ class Camera(Model):
         if len(value) not in DISTORTION_LENGTHS:
             raise ValueError(f"has {len(value)} coefficients; allowed: 0, 4, 5, 8, 12 or 14")
         return value
+
+    @model_validator(mode="after")
+    def _lens_is_possible(self) -> Camera:
+        if self.lens.model == "thin-lens":
+            image_distance, focus = self.fx * self.pixel_pitch, self.lens.focus_distance
+            if self.lens.f_number < FASTEST:
+                raise ValueError(
+                    f"lens.f_number is {self.lens.f_number:g}; allowed for a thin lens: {FASTEST:g} or more, the limit "
+                    "of any lens in air"
+                )
+            if focus is not None and focus <= image_distance:
+                raise ValueError(
+                    f"lens.focus_distance is {1e3 * focus:.4g} mm; allowed for a thin lens: more than the focal "
+                    f"length, {1e3 * image_distance:.4g} mm (fx times pixel pitch)"
+                )
+        return self
 
     @classmethod
     def from_physical(

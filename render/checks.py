@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from render.errors import InputError
+from render.lens_plan import check_lens
 from render.pose import invert, transform_points
 from render.scene import Scene
 from render.world import World
@@ -35,6 +36,7 @@ def check_placement(world: World, scene: Scene, step: int = 0) -> None:
                 allowed=f"more than {CENTRE_TOLERANCE * 1e6:g} um",
                 cure="move the laser sideways (a baseline) or turn its sheet away from the camera",
             )
+    check_lens(scene.camera)
     inside = _object_around(world, scene.T_world_camera(step)[:3, 3])
     if inside is not None:
         raise InputError(

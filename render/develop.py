@@ -1,7 +1,7 @@
 """From radiance to digital numbers, after EMVA 1288; the last step of a frame, milliseconds, never a new render.
 
     optics      each light group through defocus and the lens's point spread, each laser's through its speckle: all off
-                unless the sensor's switches say so
+                unless the sensor's switches say so; a thin lens is rendered with its defocus, which is not done twice
     signal      mu    = sum over light groups of radiance x response, x the pixel's own gain (PRNU)
     charge      e     ~ Poisson(mu + dark current x exposure)
     read-out    e    += the pixel's own offset (DSNU) + Gaussian read noise;  e <= full well
@@ -137,6 +137,11 @@ def expected_electrons(
     return electrons
 
 
+def applies_defocus(scene: Scene, sensor: Sensor) -> bool:
+    """Whether developing blurs by depth: asked for, and the lens is not rendered with its aperture, blurred already."""
+    return sensor.defocus and scene.camera.lens.model == "pinhole"
+
+
 class _Exposure:
     """A frame's light groups with the electrons that each makes per radiance."""
 
@@ -195,7 +200,7 @@ class _Optics:
     def __init__(self, frame: Frame, scene: Scene, sensor: Sensor, threads: int | None) -> None:
         self.camera, self.sensor, self.threads = scene.camera, sensor, threads
         self.diameter = None
-        if sensor.defocus:
+        if applies_defocus(scene, sensor):
             if frame.truth is None:
                 cure = "render the frame with its truth, or switch defocus off"
                 raise InputError(
@@ -205,7 +210,7 @@ class _Optics:
 
     def __call__(self, image: Float32) -> Float32:
         """(h, w) or (h, w, 3) radiance, as the lens throws it on the sensor."""
-        if image.ndim == 3 and not (self.sensor.defocus or self.sensor.blur_sigma or self.sensor.halo):
+        if image.ndim == 3 and not (self.diameter is not None or self.sensor.blur_sigma or self.sensor.halo):
             return np.ascontiguousarray(image, dtype=np.float32)
         if image.ndim == 3:
             return np.stack([self(image[..., channel]) for channel in range(3)], axis=2)

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from render.lens_plan import lens_lines
 from render.light_path import indirect_flux, indirect_image
 from render.scene import Scene
 from render.settings import RenderSettings
@@ -47,7 +48,7 @@ def choose_plan(
 
     direct: (h, w) direct radiance of each laser.
     """
-    tail = (*_ambient_lines(scene, settings), _lens_line())
+    tail = (*_ambient_lines(scene, settings), *lens_lines(scene.camera))
     if settings.transport == "direct":
         return Plan(False, (DIRECT, f"left out: {INDIRECT} - switched off, its share was not measured", *tail))
     share, error = pilot_share(world, scene, direct, step=step, seed=seed, cancelled=cancelled)
@@ -129,7 +130,3 @@ def _ambient_lines(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
         f"ambient: lamps and surroundings by way of one surface, {samples} samples on each pixel",
         "left out: ambient light by way of two or more surfaces - it moves no line",
     )
-
-
-def _lens_line() -> str:
-    return "left out: the lens's blur (defocus, diffraction) - every depth is in focus"

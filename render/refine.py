@@ -20,6 +20,7 @@ from render.checks import check_placement
 from render.curve import laser_curve
 from render.direct import direct_image
 from render.frame import Axis, Frame, LaserCurve
+from render.lens_plan import lens_lines
 from render.plan import DIRECT, INDIRECT, indirect_light
 from render.scene import Scene
 from render.settings import RenderSettings
@@ -61,6 +62,7 @@ def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
         )
     else:
         lines.append("ambient: none, the scene has no lamp and dark surroundings")
+    lines.extend(lens_lines(scene.camera))
     lines.append(
         "truth: depth, position, normal and object at every pixel's centre"
         if settings.truth_images

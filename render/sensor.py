@@ -75,7 +75,8 @@ class Sensor(Model):
     defocus: bool = quantity(
         False,
         label="Defocus",
-        help="Blur by each pixel's depth, after focus distance and f-number; edges of depth are not mixed. "
+        help="Blur by each pixel's depth, after focus distance and f-number, for a lens rendered as a pinhole; a thin "
+        "lens is rendered with its own and ignores this. Edges of depth are not mixed. "
         "Takes about 0.1 s for a line, seconds where light fills an image far out of focus.",
     )
 

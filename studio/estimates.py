@@ -152,27 +152,21 @@ def speckle_px(camera: Camera, wavelength_nm: float, sigma: Float) -> Float:
     return np.asarray(np.sqrt(area * sigma / (4.0 * math.sqrt(math.pi))) / camera.pixel_pitch)
 
 
-def blur_px(camera: Camera, depth_z: Float) -> Float:
-    """(n,) diameter of the blur disc at a depth, px: thin lens, aperture D: D d_i |1/s - 1/z| / pitch."""
-    return np.asarray(_blur_scale(camera) * np.abs(1.0 / depth_z - _focus(camera)))
+def blur_px(camera: Camera, points: Float) -> Float:
+    """(n,) diameter, px, of the blur disc of (n, 3) points, camera frame: D fx |w - 1/z|, w as in `render.lens`."""
+    plane = camera.focus_plane
+    return np.asarray(_blur_scale(camera) * np.abs(points @ plane[:3] + plane[3]) / points[:, 2])
 
 
 def depth_of_field(camera: Camera, sharp_px: float = SHARP_PX) -> tuple[float, float]:
-    """Nearest and farthest depth at which the blur disc is at most `sharp_px` across; inf: no end."""
-    reach, focus = sharp_px / _blur_scale(camera), _focus(camera)
+    """Nearest and farthest depth on the axis at which the blur disc is at most `sharp_px` across; inf: no end."""
+    reach, focus = sharp_px / _blur_scale(camera), camera.focus_vergence
     return 1.0 / (focus + reach), 1.0 / (focus - reach) if focus > reach else math.inf
-
-
-def _focus(camera: Camera) -> float:
-    """1 / focus distance."""
-    return 0.0 if camera.lens.focus_distance is None else 1.0 / camera.lens.focus_distance
 
 
 def _blur_scale(camera: Camera) -> float:
     """Blur in px for one dioptre: aperture times image distance over pitch."""
-    image_distance = camera.fx * camera.pixel_pitch
-    focal_length = 1.0 / (1.0 / image_distance + _focus(camera))
-    return focal_length / camera.lens.f_number * image_distance / camera.pixel_pitch
+    return 2.0 * camera.aperture_radius * camera.fx
 
 
 def _by_pixel(response: Float, pixels: Float) -> Float:

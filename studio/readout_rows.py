@@ -168,9 +168,10 @@ def _saturation(r: Readouts) -> Row:
 def _focus(r: Readouts) -> Row:
     far = "∞" if math.isinf(r.sharp_farthest) else _digits(1e3 * r.sharp_farthest)
     help = (
-        f"Diameter of the blur disc along the line (thin lens). At most {SHARP_PX:g} px, which counts as sharp, from "
+        f"Diameter of the blur disc along the line. At most {SHARP_PX:g} px, which counts as sharp, on the axis from "
         f"{_digits(1e3 * r.sharp_nearest)} to {far} mm. Set the focus distance to that of the line, or close the "
-        "aperture. Images show it where the sensor's defocus is switched on."
+        "aperture; a tilted sensor (tauX, tauY of the distortion) tilts the plane in focus. Images show it where the "
+        "camera's lens is rendered as a thin lens, or the sensor's defocus is switched on."
     )
     note = f"sharp {_digits(1e3 * r.sharp_nearest)} to {far}"
     if r.blur_px is None:

@@ -121,7 +121,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         peak_electrons=_range(peak),
         saturated=len(np.unique(curve.index[peak > sensor.full_well])) / len(hit),
         ambient_electrons=float(np.median(ambient)),
-        blur_px=_range(estimates.blur_px(camera, curve.depth_z)),
+        blur_px=_range(estimates.blur_px(camera, curve.point)),
         photon_sigma=_median(bound * depth),
         speckle_sigma=_median(contrast * estimates.speckle_px(camera, source.wavelength_nm, width) * depth),
     )

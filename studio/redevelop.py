@@ -1,4 +1,4 @@
-"""What a render can still answer: the sensor, the lens and the lasers' power change without rendering again.
+"""What a render can still answer: the sensor, a pinhole's lens and the lasers' power change without rendering again.
 
 A render is stale when the project has changed in anything else that light meets.
 """
@@ -46,7 +46,11 @@ def is_stale(rendered: Project, now: Project) -> bool:
 
 def _light_path(scene: Scene) -> Scene:
     """The scene without what developing decides, and without names."""
-    camera = scene.camera.model_copy(update={"lens": Lens()})
+    lens = scene.camera.lens
+    # a thin lens is rendered through its aperture; all else of it only scales the light
+    rendered = {"transmission": 1.0, "vignetting": True}
+    lens = lens.model_copy(update=rendered) if lens.model == "thin-lens" else Lens()
+    camera = scene.camera.model_copy(update={"lens": lens})
     lasers = tuple(laser.model_copy(update={"power": 1.0, "name": "laser"}) for laser in scene.lasers)
     objects = tuple(item.model_copy(update={"name": "object"}) for item in scene.visible_objects)
     lights = tuple(light.model_copy(update={"name": "light"}) for light in scene.lights)
@@ -54,11 +58,17 @@ def _light_path(scene: Scene) -> Scene:
     return scene.model_copy(update={"rig": rig, "objects": objects, "lights": lights})
 
 
+def _developing_lens(rendered: Lens, now: Lens) -> Lens:
+    """The present lens, as far as a frame rendered through another can show it: an aperture stays in the frame."""
+    kept = ("model", "f_number", "focus_distance") if rendered.model == "thin-lens" else ("model",)
+    return now.model_copy(update={name: getattr(rendered, name) for name in kept})
+
+
 def development(rendered: Project, now: Project, image_scale: float = 1.0) -> Development:
     """How the project, as it is now, develops a frame of `rendered`, which is at `image_scale`."""
     now = scaled(now, image_scale)
     scene = rendered.scene
-    camera = scene.camera.model_copy(update={"lens": now.scene.camera.lens})
+    camera = scene.camera.model_copy(update={"lens": _developing_lens(scene.camera.lens, now.scene.camera.lens)})
     scene = scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": camera})})
     # the frame's exact line is along its own axis
     extraction = now.extraction.model_copy(update={"axis": rendered.extraction.axis})

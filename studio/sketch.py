@@ -23,6 +23,8 @@ CLOSE_STEPS = 8.0
 """Points of neighbouring scan lines farther apart than this many usual steps are not joined."""
 MOST_JOINS = 3
 """Crossings of one scan line that a join may step over."""
+FAR_CORNERS = 4.0
+"""Working distances to which the frustum's edges are drawn where nothing is in focus."""
 
 
 def image_corners(camera: Camera, depth: float) -> Float:
@@ -36,11 +38,23 @@ def image_corners(camera: Camera, depth: float) -> Float:
     return np.concatenate([flat * depth, np.full((4, 1), depth)], axis=1)
 
 
+def focus_corners(scene: Scene) -> Float:
+    """(4, 3) where the image's corners meet the plane of focus, which a tilted sensor tilts (`render.lens`).
+
+    A corner that meets it nowhere, or far beyond the work, ends at a few working distances.
+    """
+    camera, distance = scene.camera, working_distance(scene)
+    plane, corners = camera.focus_plane, image_corners(camera, 1.0)
+    if not plane[:3].any():
+        return corners * distance
+    vergence = corners @ plane[:3]
+    most = FAR_CORNERS * max(distance, camera.lens.focus_distance or 0.0)
+    return np.asarray(corners / np.maximum(vergence, 1.0 / most)[:, None])
+
+
 def frustum(scene: Scene) -> tuple[Float, list[tuple[int, int]]]:
     """Points, camera frame, and lines: the edges out to the plane in focus (or the working distance), and its frame."""
-    camera = scene.camera
-    far = camera.lens.focus_distance or working_distance(scene)
-    points = np.concatenate([np.zeros((1, 3)), image_corners(camera, far)])
+    points = np.concatenate([np.zeros((1, 3)), focus_corners(scene)])
     return points, [(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)]
 
 

@@ -121,7 +121,8 @@ def test_speckle_follows_the_published_figures() -> None:
 def test_blur_is_nought_in_focus_and_the_limits_of_sharpness_have_one_pixel() -> None:
     camera = Camera.from_physical(2448, 2048, 3.45e-6, 0.012, f_number=5.6, focus_distance=0.8)
     near, far = depth_of_field(camera)
-    np.testing.assert_allclose(blur_px(camera, np.array([near, 0.8, far])), (1.0, 0.0, 1.0), atol=1e-9)
+    points = np.array([[0.1, -0.05, depth] for depth in (near, 0.8, far)])
+    np.testing.assert_allclose(blur_px(camera, points), (1.0, 0.0, 1.0), atol=1e-9)
     assert near < 0.8 < far
     # the textbook's hyperfocal distance f^2 / (N c), beyond which focusing keeps infinity sharp
     hyperfocal = 0.012**2 / (5.6 * 3.45e-6) + 0.012

@@ -64,6 +64,19 @@ def test_what_light_meets_makes_it_stale(project, path, value):
     assert is_stale(project, replaced(project, path, value))
 
 
+def test_an_aperture_that_was_rendered_stays_in_its_frame(project):
+    f_number = ("scene", "rig", "camera", "lens", "f_number")
+    thin = replaced(project, ("scene", "rig", "camera", "lens", "model"), "thin-lens")
+    assert is_stale(project, thin) and is_stale(thin, project)
+    wider = replaced(thin, f_number, 2.0)
+    assert is_stale(thin, wider)
+    assert not is_stale(thin, replaced(thin, ("scene", "rig", "camera", "lens", "transmission"), 0.5))
+    # what is developed meanwhile is the frame as it is, with the light of its own aperture
+    assert development(thin, wider).project.scene.camera.lens == thin.scene.camera.lens
+    assert development(project, replaced(thin, f_number, 2.0)).project.scene.camera.lens.model == "pinhole"
+    assert development(project, replaced(thin, f_number, 2.0)).project.scene.camera.lens.f_number == 2.0
+
+
 def test_a_hidden_object_may_change_unseen(project):
     hidden = replaced(project, ("scene", "objects", 0, "visible"), False)
     assert not is_stale(hidden, replaced(hidden, ("scene", "objects", 0, "scale"), 2.0))
