@@ -25,6 +25,8 @@ Float = NDArray[np.float64]
 COLOURS = ("#e5534b", "#4aa851", "#3f86e8")
 """Of the axes x, y, z, as everywhere in 3D programs."""
 HELD = "#ffcc33"
+NEAREST = 1e-3
+"""Of the distance to what is looked at: nearer to the eye there is no gizmo. Drawn at no size it ends the program."""
 TIP_PX, TIP_RADIUS_PX, TIP_SIDES = 15.0, 5.5, 12
 
 
@@ -69,10 +71,12 @@ class Gizmo(QObject):
         self.view.redraw()
 
     def frame(self) -> Frame | None:
-        """Where it stands on the screen, as large as it is drawn there."""
+        """Where it stands on the screen, as large as it is drawn there; None where the eye itself stands."""
         if self.target is None:
             return None
-        T = self.target.T_world_item
+        T, eye = self.target.T_world_item, self.view.eye
+        if not eye.parallel and (eye.position - T[:3, 3]) @ eye.rotation[:, 2] < NEAREST * eye.distance:
+            return None
         axes = T[:3, :3].copy() if self.local else np.eye(3)
         return Frame(T[:3, 3], axes, self.view.eye.metres_per_pixel(T[:3, 3], self.view.pixels))
 
@@ -137,6 +141,7 @@ class Gizmo(QObject):
         """Before each painting: as large on the screen as ever, and only what can be got hold of from here."""
         frame = self.frame()
         if frame is None:
+            self._hide(True)
             return
         held = self._drag.handle if self._drag is not None else None
         eye, pixel = self.view.eye, frame.pixel

@@ -275,3 +275,18 @@ def test_a_full_turn_and_more_does_not_jump_back() -> None:
     for degrees in range(10, 500, 10):
         turning.to(*ray(degrees))
     assert math.degrees(turning.angle) == pytest.approx(480.0, abs=0.01)
+
+
+@pytest.mark.parametrize("path", [CAMERA, LASER])
+def test_there_is_no_gizmo_where_the_eye_stands(viewport: Viewport, path: FieldPath) -> None:
+    select(viewport, path)
+    viewport.look_through(path)
+    paints = viewport.view.paints
+    viewport.view.redraw()
+    QApplication.processEvents()
+    # drawn at the eye, of no size, it would end the program
+    assert viewport.view.paints > paints and viewport.gizmo.frame() is None
+    assert not any(lines.actor.GetVisibility() for lines in viewport.gizmo._shapes.values())
+    viewport.frame(path)
+    QApplication.processEvents()
+    assert any(lines.actor.GetVisibility() for lines in viewport.gizmo._shapes.values())
