@@ -21,6 +21,7 @@ from render.world import build_world
 from studio.document import replaced
 from studio.preview import Look, Preview
 from studio.project import Project
+from studio.templates import DESCRIPTIONS
 
 PROJECTS = Path(__file__).parents[2] / "assets/projects"
 SCENE = ("scene",)
@@ -49,6 +50,15 @@ def crowded() -> tuple[Project, Path]:
                     T_world_object=before_camera(0.01, 0.08, 0.87, 0.0)),
     )  # fmt: skip
     return replaced(project, OBJECTS, objects), root
+
+
+@pytest.mark.parametrize("name", DESCRIPTIONS)
+def test_every_template_is_shown_whole(name: str) -> None:
+    project, root = sample(name)
+    preview = Preview(1)
+    look = preview.look(project, root)
+    assert not preview.errors and len(look.placed) == len(project.scene.visible_objects)
+    assert sum(len(look.lit_curve(i).index) for i in range(len(project.scene.lasers))) > 100
 
 
 def both_curves(project: Project, root: Path, step: int = 0, laser: int = 0):
