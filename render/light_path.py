@@ -4,8 +4,8 @@ Light that met one surface only is left to `render.direct`, so nothing is counte
 that can hit anything; across and along the sheet, and for the first bounce, the paths follow a low-discrepancy sequence
 with a random start of its own for each pass, so that the spread of the passes is an honest error.
 
-A photon of power Phi that meets a surface adds  Phi f cos(camera) fx fy J / (cos^3(off axis) d^2)  to the radiance of
-the pixel it is seen in, J being the lens distortion's Jacobian: the pixel is one unit of image area.
+A photon of power Phi that meets a surface adds  Phi f cos(to the camera) A  to the radiance of the pixel it is seen in,
+A being the image area of a patch there (`render.lens.lens_project`), through one point of the aperture drawn by chance.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from render.bsdf import evaluate, is_boundary, sample
 from render.camera import Camera
-from render.distortion import distort, fold_radius_at, tilt_matrix
+from render.distortion import tilt_matrix
 from render.emission import SEQUENCE, Paths, emit, fan_span
 from render.laser import LineLaser
+from render.lens import lens_point, lens_position, lens_project
 from render.random import uniform
 from render.surface import Surface, View, scattering, to_local, to_world
 from render.threads import Cancel, Progress, map_chunks, thread_count
@@ -73,9 +74,8 @@ def bounce(
 
     Returns the number of connections, and of paths that go on. A connection, if clear, adds `worth` to its `pixel`.
     """
-    camera, intrinsics, k = view.T_world_camera, view.intrinsics, view.distortion
-    tilt = tilt_matrix(k[12], k[13])
-    distorted = bool(np.any(k))
+    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
+    distorted = bool(np.any(view.distortion))
     vertices, triangles = surface.vertices, surface.triangles
     o, i, f, rgb, frame = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
     connections = going = 0
@@ -108,28 +108,19 @@ def bounce(
         for axis in range(3):
             o[axis] = -(frame[axis, 0] * d0 + frame[axis, 1] * d1 + frame[axis, 2] * d2)
         if depth > 0:
-            e0, e1, e2 = camera[0, 3] - p0, camera[1, 3] - p1, camera[2, 3] - p2
+            a, b = lens_point(view.lens[0], uniform(seed, number, depth, 5), uniform(seed, number, depth, 6))
+            e0, e1, e2 = lens_position(view, a, b)
+            e0, e1, e2 = e0 - p0, e1 - p1, e2 - p2
             distance = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
             e0, e1, e2 = e0 / distance, e1 / distance, e2 / distance
             facing = n0 * e0 + n1 * e1 + n2 * e2
-            ahead = -(camera[0, 2] * e0 + camera[1, 2] * e1 + camera[2, 2] * e2)
-            if facing > 0.0 and ahead > 1e-6:
-                x = -(camera[0, 0] * e0 + camera[1, 0] * e1 + camera[2, 0] * e2) / ahead
-                y = -(camera[0, 1] * e0 + camera[1, 1] * e1 + camera[2, 1] * e2) / ahead
-                jacobian = 1.0
-                seen = True
-                if distorted:
-                    seen = math.hypot(x, y) < fold_radius_at(x, y, view.folds)
-                    x, y, jxx, jxy, jyx, jyy = distort(x, y, k, tilt)
-                    jacobian = jxx * jyy - jxy * jyx
-                u = intrinsics[0] * x + intrinsics[4] * y + intrinsics[2]
-                v = intrinsics[1] * y + intrinsics[3]
-                if seen and -0.5 <= u < view.width - 0.5 and -0.5 <= v < height - 0.5:
+            if facing > 0.0:
+                u, v, image_area = lens_project(view, tilt, distorted, p0, p1, p2, a, b)
+                if image_area > 0.0 and -0.5 <= u < view.width - 0.5 and -0.5 <= v < height - 0.5:
                     for axis in range(3):
                         i[axis] = frame[axis, 0] * e0 + frame[axis, 1] * e1 + frame[axis, 2] * e2
                     evaluate(row, rgb, o[0], o[1], o[2], i[0], i[1], i[2], f)
                     if f[0] > 0.0:
-                        image_area = intrinsics[0] * intrinsics[1] * jacobian / (ahead**3 * distance * distance)
                         worth[connections] = paths.power[r] * f[0] * facing * image_area
                         pixel[connections] = int(math.floor(v + 0.5)) * view.width + int(math.floor(u + 0.5))
                         origins[connections, 0] = p0 - centre[0] + n0 * surface_offset

@@ -170,3 +170,24 @@ def test_metal_at_an_unknown_wavelength_is_named():
     with pytest.raises(InputError, match="not known at this wavelength"):
         setting_parts = setting([turned_groove()], [Conductor(metal="gold")], laser=paper_laser(wavelength_nm=1550.0))
         direct_image(*setting_parts[1])
+
+
+def test_an_aperture_blurs_reflected_light_and_keeps_it():
+    from render.camera import Lens
+
+    camera = paper_camera(0.1)
+    thin = camera.model_copy(update={"lens": Lens(model="thin-lens", f_number=1.0, focus_distance=0.5)})
+    images = []
+    for lensed in (camera, thin):
+        _, parts = setting([turned_groove()], [Lambertian(albedo=0.8)], camera=lensed)
+        images.append(indirect_image(*parts, target=0.02, most_paths=1 << 22, seed=3).radiance.astype(np.float64))
+    sharp, blurred = images
+    assert blurred.sum() == pytest.approx(sharp.sum(), rel=5e-3)
+    # along the groove the light is even; across it the disc's second moment c^2 / 16 is added
+    disc = 2 * thin.aperture_radius * thin.fx * abs(1 / 0.5 - 1 / 0.86)
+    spread = []
+    for image in images:
+        x = np.arange(image.shape[0])
+        light = image.sum(axis=1)
+        spread.append(light @ (x - light @ x / light.sum()) ** 2 / light.sum())
+    assert spread[1] - spread[0] == pytest.approx(disc**2 / 16, rel=0.1)
