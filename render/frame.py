@@ -75,6 +75,8 @@ class Frame:
     """What was computed, what was left out, and why; one line each."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage."""
+    warnings: tuple[str, ...] = field(default=(), kw_only=True)
+    """What may make a sensible picture of the wrong thing (`render.material_checks`)."""
     counts: dict[str, float] = field(default_factory=dict)
     """Rays, samples, lit pixels, seconds inside embree, estimated relative error."""
 

@@ -42,6 +42,7 @@ class MaterialAtlas:
         self.masks: list[Place] = []
         self.second: list[int] = []
         self.materials: list[BaseMaterial] = []
+        self.places: list[str] = []
         self.detail: list[int] = []
         self.maps: list[tuple[Place, Place]] = []
         self.relief: list[tuple[float, float]] = []
@@ -59,6 +60,7 @@ class MaterialAtlas:
         self.masks.append(NOWHERE)
         self.second.append(-1)
         self.materials.append(material)
+        self.places.append(where)
         self._add_detail(material, mesh, where)
         return len(self.materials) - 1
 

@@ -48,14 +48,14 @@ def metals() -> dict[str, dict[str, Any]]:
     return dict(json.loads((ASSETS / "metals.json").read_text(encoding="utf-8")))
 
 
-def complex_index(metal: str, wavelength_nm: float) -> tuple[float, float]:
+def complex_index(metal: str, wavelength_nm: float, where: str = "material") -> tuple[float, float]:
     """n and k, linear between the table's wavelengths. InputError: beyond them."""
     entry = metals()[metal]
     known = entry["wavelength_nm"]
     if not known[0] <= wavelength_nm <= known[-1]:
         raise InputError(
             f"the refractive index of {entry['label'].lower()} is not known at this wavelength",
-            where="material.metal",
+            where=f"{where}.metal",
             found=f"{wavelength_nm:g} nm",
             allowed=f"{known[0]:g} to {known[-1]:g} nm",
             cure="choose another metal, or a laser within that range",
@@ -69,14 +69,14 @@ def substances() -> dict[str, dict[str, Any]]:
     return dict(json.loads((ASSETS / "substances.json").read_text(encoding="utf-8")))
 
 
-def substance_index(substance: str, wavelength_nm: float) -> float:
+def substance_index(substance: str, wavelength_nm: float, where: str = "material") -> float:
     """n by Sellmeier's equation, n^2 = 1 + sum b l^2 / (l^2 - c). InputError: beyond the range it was measured in."""
     entry = substances()[substance]
     shortest, longest = entry["range_nm"]
     if not shortest <= wavelength_nm <= longest:
         raise InputError(
             f"the refractive index of {entry['label']} is not known at this wavelength",
-            where="material.substance",
+            where=f"{where}.substance",
             found=f"{wavelength_nm:g} nm",
             allowed=f"{shortest:g} to {longest:g} nm",
             cure="give the index as a number, or choose another substance or laser",
@@ -86,15 +86,13 @@ def substance_index(substance: str, wavelength_nm: float) -> float:
     return float(np.sqrt(1.0 + sum(b * square_um / (square_um - c) for b, c in terms)))
 
 
-def glass_index(glass: Glass, wavelength_nm: float) -> float:
-    """The index that is given, or that of the substance. InputError: not known at this wavelength."""
-    return glass.index if glass.index is not None else substance_index(glass.substance, wavelength_nm)
-
-
-def material_row(material: BaseMaterial, bands_nm: tuple[float, float, float], least_alpha: float = 1.0) -> Float:
+def material_row(
+    material: BaseMaterial, bands_nm: tuple[float, float, float], least_alpha: float = 1.0, where: str = "material"
+) -> Float:
     """(ROW,) parameters at three wavelengths; the layout is in `render.bsdf`.
 
-    least_alpha: the least value of a roughness that is an image, which stands for it here.
+    least_alpha: the least value of a roughness that is an image, which stands for it here. where: for messages.
+    InputError: not known at a wavelength.
     """
     row = np.zeros(ROW)
     row[0] = LAMBERTIAN
@@ -108,7 +106,7 @@ def material_row(material: BaseMaterial, bands_nm: tuple[float, float, float], l
                 row[1], row[2] = max(alpha, POLISHED), material.roughness_across
                 row[1] *= 1.0 if row[1] != row[2] else 1.0 - 1e-9
             for band, wavelength_nm in enumerate(bands_nm):
-                row[4 + band], row[7 + band] = complex_index(material.metal, wavelength_nm)
+                row[4 + band], row[7 + band] = complex_index(material.metal, wavelength_nm, where)
         case Coated():
             alpha = least_alpha if isinstance(material.roughness, GreyTexture) else material.roughness
             row[0], row[1], row[2], row[3] = COATED, alpha, alpha, material.index
@@ -117,7 +115,9 @@ def material_row(material: BaseMaterial, bands_nm: tuple[float, float, float], l
             alpha = least_alpha if isinstance(material.roughness, GreyTexture) else material.roughness
             alpha = alpha if alpha >= POLISHED else 0.0
             # one path carries three bands, so that it is bent as the middle one is
-            row[0], row[1], row[2], row[3] = DIELECTRIC, alpha, alpha, glass_index(material, bands_nm[1])
+            known = material.index
+            index = substance_index(material.substance, bands_nm[1], where) if known is None else known
+            row[0], row[1], row[2], row[3] = DIELECTRIC, alpha, alpha, index
         case Subsurface():
             row[0], row[1], row[2], row[3] = SUBSURFACE, material.roughness, material.roughness, material.index
             row[ANISOTROPY] = material.anisotropy

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from render.closed import closed_outward
 from render.errors import InputError
 from render.files import inside, sha256
-from render.material import Blend, BumpMap, FromMesh, GreyTexture, NormalMap, Texture
+from render.material import Blend, BumpMap, FromMesh, Glass, GreyTexture, NormalMap, Subsurface, Texture
 from render.mesh import Mesh
 from render.mesh_colour import merged_look, part_look
 from render.mesh_reader import EXTENSIONS, check_triangle_count, read_parts
@@ -36,13 +37,15 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
     root: the project folder, which every path is relative to and must stay inside.
     Zero-area triangles are dropped with a warning. A file that changed since the project was saved gives a warning.
     InputError: the file is absent, damaged, empty, of an unknown kind, too large, plainly not in metres though the unit
-    says so, or has NaN, wrong indices or no area; the albedo is a texture and the mesh has no UV, or the image is bad.
+    says so, or has NaN, wrong indices or no area; it is open and the material needs a closed one; the albedo is a
+    texture and the mesh has no UV, or the image is bad.
     """
     where = f"object {item.name!r}"
+    filled = isinstance(item.material, Glass | Subsurface)
     if isinstance(item.shape, MeshFile):
-        mesh = _from_file(item, item.shape, Path(root), where)
+        mesh = _from_file(item, item.shape, Path(root), where, filled)
     else:
-        mesh = _made(item.shape, item.crease_angle)
+        mesh = _made(item.shape, item.crease_angle, where if filled else "")
         if item.scale != 1.0:
             mesh = dataclasses.replace(mesh, vertices=mesh.vertices * item.scale)
         _check_size(mesh.vertices, where)
@@ -86,8 +89,10 @@ def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
 
 
 @lru_cache(maxsize=8)
-def _made(shape: Primitive | WeldTee, crease_angle: float) -> Mesh:
+def _made(shape: Primitive | WeldTee, crease_angle: float, filled: str) -> Mesh:
+    """filled: whose material needs a closed surface; empty: it does not."""
     mesh = weld_tee_mesh(shape) if isinstance(shape, WeldTee) else primitive_mesh(shape)
+    mesh = closed_outward(mesh, f"{filled}: shape") if filled else mesh
     if crease_angle == 0.0:
         return mesh
     if isinstance(shape, Sphere):
@@ -104,7 +109,7 @@ def _texture(path: Path, srgb: bool, scale: float, field: str, version: object) 
     return load_texture(path, srgb=srgb, scale=scale, where=field)
 
 
-def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str) -> Mesh:
+def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str, filled: bool) -> Mesh:
     path = inside(root, shape.path, f"{where}: shape.path")
     where = f"{where}: {shape.path}"
     cure = "put the mesh into the project folder, or correct shape.path"
@@ -127,7 +132,7 @@ def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str) -> Me
     colours = isinstance(material.albedo, FromMesh)
     factor = UNITS[shape.unit] * item.scale
     version = state.st_mtime_ns, state.st_size
-    mesh = _read(path, Path(root), where, factor, colours, shape.sha256, item.crease_angle, version)
+    mesh = _read(path, Path(root), where, factor, colours, shape.sha256, item.crease_angle, filled, version)
     warning = unit_warning(mesh, item)
     if warning and shape.unit == "m" and item.scale == 1.0:
         cure = 'if it really is in metres, say so with unit "cm" and scale 100'
@@ -144,6 +149,7 @@ def _read(
     colours: bool,
     expected_sha256: str | None,
     crease_angle: float,
+    filled: bool,
     version: object,
 ) -> Mesh:
     """A checked mesh, its vertices multiplied by factor; `version` changes with the file."""
@@ -180,7 +186,7 @@ def _read(
             if part.normals is not None:
                 mine = np.cumsum(keep)[start:stop][keep[start:stop]] - 1
                 normals[mine] = part.normals[part.triangles[keep[start:stop]]]
-    return Mesh(
+    mesh = Mesh(
         vertices,
         kept,
         None if uv is None else np.ascontiguousarray(uv, dtype=np.float32),
@@ -189,6 +195,7 @@ def _read(
         normals,
         smooth_normals=any(part.normals is not None for part in parts),
     )
+    return closed_outward(mesh, where) if filled else mesh
 
 
 def _check_size(vertices: NDArray[np.float64], where: str) -> None:

@@ -21,6 +21,7 @@ from render.curve import laser_curve
 from render.direct import direct_image
 from render.frame import Axis, Frame, LaserCurve
 from render.lens_plan import lens_lines
+from render.material_checks import check_materials, scene_warnings
 from render.plan import DIRECT, INDIRECT, indirect_light
 from render.scene import Scene
 from render.settings import RenderSettings
@@ -101,9 +102,11 @@ def refine(
     clock = _Clock(_workload(world, scene, settings), progress)
     with clock.stage("acceleration structure", len(world.triangles) * 10):
         check_placement(world, scene, step)
+        check_materials(world, scene)
+        warnings = scene_warnings(world, scene, step)
         rays = world.rays
     ray_start, embree_start = rays.rays, rays.seconds
-    frame = Frame(step, (), None, (), None, "\n".join(plan(scene, settings)))
+    frame = Frame(step, (), None, (), None, "\n".join(plan(scene, settings)), warnings=warnings)
 
     def told(frame: Frame, **counts: float) -> Frame:
         so_far = {"rays": rays.rays - ray_start, "seconds in embree, all threads": rays.seconds - embree_start}

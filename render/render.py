@@ -12,6 +12,7 @@ from render.checks import check_placement
 from render.curve import laser_curve
 from render.direct import direct_image
 from render.frame import Axis, Frame
+from render.material_checks import check_materials, scene_warnings
 from render.plan import indirect_light
 from render.scene import Scene
 from render.settings import RenderSettings
@@ -79,6 +80,8 @@ def render_world(
 
     with stage("acceleration structure"):
         check_placement(world, scene, step)
+        check_materials(world, scene)
+        warnings = scene_warnings(world, scene, step)
         rays = world.rays
     ray_start, embree_start = rays.rays, rays.seconds
     curves, direct = [], []
@@ -143,6 +146,7 @@ def render_world(
         truth=truth,
         laser_indirect=indirect,
         plan=plan.text,
+        warnings=warnings,
         seconds=seconds,
         counts=counts,
     )

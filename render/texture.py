@@ -47,7 +47,7 @@ def load_texture(path: Path, *, srgb: bool, scale: float, where: str) -> Float32
             "the texture is not there" if not path.exists() else "the texture is not a file",
             where=where,
             found=path.name,
-            cure="put the image into the project folder, or give the albedo as a number",
+            cure="put the image into the project folder, or give a number instead",
         )
     try:
         data = path.read_bytes()

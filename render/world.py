@@ -48,6 +48,8 @@ class World:
     """(s, 3) the blend's mask, as in `texture_shape`."""
     materials: tuple[BaseMaterial, ...]
     """(s,) descriptions, blends taken apart."""
+    places: tuple[str, ...]
+    """(s,) whose each is, for messages."""
     normals: Float32
     """(t, 3, 3) unit normals of the corners for shading, 0 where facets are shaded; (0, 3, 3) when all are."""
     detail: Int
@@ -70,9 +72,13 @@ class World:
         return self.surface_at(BAND_CENTRES_NM)
 
     def surface_at(self, bands_nm: tuple[float, float, float]) -> Surface:
-        """The arrays, as the kernels take them, with what the materials do to three wavelengths."""
-        pairs = zip(self.materials, self.least_alpha, strict=True)
-        rows = np.array([material_row(material, bands_nm, float(least)) for material, least in pairs]).reshape(-1, ROW)
+        """The arrays, as the kernels take them, with what the materials do to three wavelengths.
+
+        InputError: a material is not known at one of them.
+        """
+        rows = np.empty((len(self.materials), ROW))
+        for i, (material, least) in enumerate(zip(self.materials, self.least_alpha, strict=True)):
+            rows[i] = material_row(material, bands_nm, float(least), self.places[i])
         return Surface(
             self.vertices,
             self.triangles,
@@ -132,6 +138,7 @@ def place_meshes(scene: Scene, meshes: list[Mesh], step: int = 0, root: Path | N
         second=np.array(atlas.second, dtype=np.int32),
         mask_shape=np.array(atlas.masks, dtype=np.int32).reshape(-1, 3),
         materials=tuple(atlas.materials),
+        places=tuple(atlas.places),
         normals=np.concatenate(normals) if smooth else np.zeros((0, 3, 3), dtype=np.float32),
         detail=np.array(atlas.detail, dtype=np.int32),
         maps=np.array(atlas.maps, dtype=np.int32).reshape(-1, 6),

@@ -18,6 +18,7 @@ from render.checks import check_placement
 from render.develop import expected_electrons
 from render.frame import Frame, LaserCurve
 from render.lights import Environment
+from render.material_checks import check_materials, scene_warnings
 from render.motion import NoMotion
 from render.render import render_world
 from render.settings import RenderSettings
@@ -88,6 +89,7 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
     scene = project.scene
     world = build_world(scene, root, 0)
     check_placement(world, scene, 0)
+    check_materials(world, scene)
     dark = scene.model_copy(update={"lights": (), "environment": Environment(), "motion": NoMotion()})
     settings = RenderSettings(laser_error=PROBE_ERROR, truth_images=False)
     frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, threads=threads)
@@ -102,7 +104,7 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
         frames=scene.frame_count,
         full_well=project.sensor.full_well,
         lasers=views,
-        warnings=tuple(_warnings(project, views)),
+        warnings=(*_warnings(project, views), *scene_warnings(world, scene)),
     )
 
 

@@ -87,6 +87,7 @@ def run_scan(
         results: list[FrameResult] = []
         shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
         files: list[Path] = []
+        doubts: dict[str, str] = {}
         names: list[str] = []
         world = first
 
@@ -111,6 +112,8 @@ def run_scan(
         for step in clock.frames(count):
             world = world if step == 0 else step_world(project, root, step, world)
             frame = render_step(project, world, step, clock, threads)
+            for text in frame.warnings:  # in words as at first, though figures change from step to step
+                doubts.setdefault(text.split(",", 1)[0], text)
             images = develop_step(project, frame, clock, threads)
             with clock.stage("writing frames"):
                 stem = scan_folder.frame_stem(step)
@@ -124,6 +127,7 @@ def run_scan(
         if sweep is not None:
             take(sweep.finish())
         notes = extraction_notes(results, project)
+        notes += list(doubts.values())
         notes += [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
         result: dict[str, Any] = {
             "name": project.name,

@@ -252,6 +252,8 @@ class RenderPanel(QWidget):
                 source=source,
             )
             self.session.add_render(self._render)
+            for text in frame.warnings:
+                self.session.message.emit("warning", text)
         else:
             self._render.frame = frame
             self.session.renders_changed.emit()

@@ -48,8 +48,10 @@ def normal_image(path: Path, normal: tuple[float, float, float]) -> str:
 
 
 def placed(item: SceneObject, root: Path, **parts):
+    """The object alone; an open plane may be glass here, though not in a project."""
     scene = scene_of(paper_camera(0.1), paper_laser(), **parts).model_copy(update={"objects": (item,)})
-    return scene, place_meshes(scene, [load_mesh(item, root)], root=root)
+    mesh = load_mesh(item.model_copy(update={"material": Lambertian()}), root)
+    return scene, place_meshes(scene, [mesh], root=root)
 
 
 @numba.njit
