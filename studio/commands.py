@@ -242,9 +242,12 @@ def _print_results(result: dict[str, Any]) -> None:
 
 def _project_rows(project: Project, found: Inspection) -> list[tuple[str, str]]:
     camera, sensor, settings = project.scene.camera, project.sensor, project.extraction
+    focus = camera.lens.focus_distance
     rows = [
         ("camera", f"{camera.width} x {camera.height} px, f {camera.fx * camera.pixel_pitch * 1e3:.2f} mm, "
                    f"f/{camera.lens.f_number:g}, {camera.pixel_pitch * 1e6:.2f} um pixels"),
+        ("lens", f"focused {'far away' if focus is None else f'at {focus * 1e3:g} mm'}, rendered as a "
+                 + camera.lens.model.replace("-", " ")),
         ("sensor", f"{sensor.colour}, {sensor.bits} bit, exposure {sensor.exposure_time * 1e3:.3g} ms, "
                    f"full well {sensor.full_well:.0f} e-, read noise {sensor.read_noise:g} e-"),
     ]  # fmt: skip
