@@ -133,7 +133,9 @@ class _Film:
         self.done = np.zeros((self.tiles, 2), np.int32)
         self.spread = np.zeros((self.tiles, 2))
         """Of each tile and half, sum of the squared differences of a pixel's first and second sample."""
-        self.tally = np.zeros(3)
+        self.cut = np.zeros((self.tiles, 2))
+        """Of each tile and half, the sum of what the clamp took."""
+        self.tally = np.zeros(2)
 
     def expose(
         self,
@@ -147,7 +149,7 @@ class _Film:
         more = np.maximum(count - self.done, 0).astype(np.int32)
         pixels_of = self._size_of(np.arange(self.tiles))
         chunks = _chunks(more.sum(axis=1) * pixels_of, WAVE)
-        tallies = np.zeros((len(chunks), 3))
+        tallies = np.zeros((len(chunks), 2))
 
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
@@ -169,7 +171,7 @@ class _Film:
             samples,
             int(self.tally[DROPPED]),
             int(self.tally[CLAMPED]),
-            float(self.tally[CUT] / (self.width * self.height * samples)),
+            float((self.cut / np.maximum(self.done, 1)).sum() / 2 / pixels_of.sum()),
         )
 
     def shares(self) -> Float:
@@ -183,13 +185,16 @@ class _Film:
     def _expose_tiles(self, paths: CameraPaths, tiles: Int, more: Int, tally: Float, cancelled: Cancel | None) -> None:
         pixels, place = self._pixels_of(tiles)
         first, count = self.done[tiles][place], more[tiles][place]
-        sums = np.zeros((2 * len(pixels), 3))
+        sums = np.zeros((2 * len(pixels), 4))
         # a single tile may need more than a wave
         step = max(1, WAVE // max(2 * len(pixels), 1)) if len(tiles) == 1 else int(count.max())
         for begin in range(0, int(count.max()), step):
             some = np.clip(count - begin, 0, step).astype(np.int32)
             paths.add(pixels, (first + begin).astype(np.int32), some, sums, tally, cancelled)
-        new = sums.reshape(-1, 2, 3).astype(np.float32)
+        new = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32)
+        if sums[:, CUT].any():
+            for half in range(2):
+                self.cut[tiles, half] += np.bincount(place, sums[half::2, CUT], len(tiles))
         if np.all(first == 1) and np.all(count == 1):
             squares = np.sum((new.astype(np.float64) - self.sums[pixels]) ** 2, axis=2)
             for half in range(2):

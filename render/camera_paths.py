@@ -47,7 +47,7 @@ class CameraPaths:
     def add(self, pixels: Int, first: Int, count: Int, sums: Float, tally: Float, cancelled: Cancel | None) -> None:
         """Samples first .. first + count, (m, 2) for both halves, of the pixels (m,), at most WAVE in all.
 
-        Their radiance is added to sums (2 m, 3), halves side by side. Raises Cancelled.
+        Their radiance is added to sums (2 m, 4), halves side by side. Raises Cancelled.
         """
         wave, shadows = self._arrays()
         rays, glossy = self.rays, has_gloss(self.surface)

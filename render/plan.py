@@ -48,7 +48,7 @@ def choose_plan(
 
     direct: (h, w) direct radiance of each laser.
     """
-    tail = (*_ambient_lines(scene, settings), *lens_lines(scene.camera))
+    tail = lens_lines(scene.camera)
     if settings.transport == "direct":
         return Plan(False, (DIRECT, f"left out: {INDIRECT} - switched off, its share was not measured", *tail))
     share, error = pilot_share(world, scene, direct, step=step, seed=seed, cancelled=cancelled)
@@ -120,13 +120,3 @@ def pilot_share(
     if known <= 0.0:
         return (math.inf, 0.0) if flux > 0.0 else (0.0, 0.0)
     return flux / known, math.sqrt(variance) / known
-
-
-def _ambient_lines(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
-    if not (scene.lights or any(scene.environment.radiance)):
-        return ()
-    samples = math.ceil(math.sqrt(settings.ambient_samples)) ** 2
-    return (
-        f"ambient: lamps and surroundings by way of one surface, {samples} samples on each pixel",
-        "left out: ambient light by way of two or more surfaces - it moves no line",
-    )

@@ -1,7 +1,6 @@
 """One frame that gets better while it is looked at: a quick one first, then truth and ever more samples.
 
-The last frame holds the same numbers, bit for bit, as `render_world` gives for the same settings. The ambient passes
-before it are thrown away (a third more work at most), so that no number depends on how it was looked at.
+The last frame holds the same numbers, bit for bit, as `render_world` gives for the same settings.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from render.ambient import ambient_image
+from render.ambient_plan import choose_ambient, expected_ambient, has_ambient, planned_images
 from render.checks import check_placement
 from render.curve import laser_curve
 from render.direct import direct_image
@@ -35,20 +34,10 @@ Progress = Callable[[str, float], None]
 
 QUICK_ERROR = 0.05
 """Relative error of the laser light in the first frame."""
-GROWTH = 4
-"""Of the samples from one ambient pass to the next."""
-AMBIENT_ERROR = "relative error, ambient"
-AMBIENT_SAMPLES = "samples a pixel, ambient"
-
-
-def has_ambient(scene: Scene) -> bool:
-    """There is light besides the lasers."""
-    return bool(scene.lights) or any(scene.environment.radiance)
 
 
 def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
     """What will be computed, what is left out, and why; one line each."""
-    camera = scene.camera
     lines = [DIRECT]
     if settings.transport == "direct":
         lines.append(f"left out: {INDIRECT} - switched off")
@@ -56,13 +45,7 @@ def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
         lines.append(f"interreflection: {INDIRECT} - asked for")
     else:
         lines.append(f"{INDIRECT}: a pilot decides, it is left out below {settings.negligible:.2%} of the light")
-    if has_ambient(scene):
-        lines.append(
-            f"ambient: lamps and surroundings by way of one surface, {_rounded(settings.ambient_samples)} samples on "
-            f"each of {camera.width} x {camera.height} pixels"
-        )
-    else:
-        lines.append("ambient: none, the scene has no lamp and dark surroundings")
+    lines.extend(expected_ambient(scene, settings))
     lines.extend(lens_lines(scene.camera))
     lines.append(
         "truth: depth, position, normal and object at every pixel's centre"
@@ -70,15 +53,6 @@ def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
         else "left out: truth at every pixel (switched off); the exact line is there"
     )
     return tuple(lines)
-
-
-def ambient_passes(samples: int) -> tuple[int, ...]:
-    """Samples a pixel of each pass: 1, 4, 16, ... and at last what is asked for."""
-    passes, n = [], 1
-    while n * 2 <= samples:
-        passes.append(n)
-        n *= GROWTH
-    return (*passes, samples)
 
 
 def refine(
@@ -96,7 +70,7 @@ def refine(
     """Frames of a world placed for `step`, each usable and better than the one before; the last is the final one.
 
     `Frame.ambient` and `Frame.truth` are None until their turn comes. `Frame.counts` tells the estimated relative error
-    of each laser and, from the second pass on, of the ambient light. Raises InputError, Cancelled.
+    of each laser and of the ambient light. Raises InputError, Cancelled.
     """
     settings = settings or RenderSettings()
     clock = _Clock(_workload(world, scene, settings), progress)
@@ -110,7 +84,7 @@ def refine(
 
     def told(frame: Frame, **counts: float) -> Frame:
         so_far = {"rays": rays.rays - ray_start, "seconds in embree, all threads": rays.seconds - embree_start}
-        return replace(frame, seconds=dict(clock.seconds), counts={**frame.counts, **counts, **so_far})
+        return replace(frame, seconds=clock.so_far(), counts={**frame.counts, **counts, **so_far})
 
     pixels = scene.camera.width * scene.camera.height
     with clock.stage("exact line", 0):
@@ -133,7 +107,8 @@ def refine(
             cancelled=cancelled,
             progress=report,
         )
-    frame = told(replace(frame, laser_indirect=indirect, plan=chosen.text), **counts)
+    lines = "\n".join((*chosen.lines, *expected_ambient(scene, settings)))
+    frame = told(replace(frame, laser_indirect=indirect, plan=lines), **counts)
     if indirect:
         yield frame
     if settings.truth_images:
@@ -142,48 +117,23 @@ def refine(
             truth = truth_images(world, camera, pose, threads=threads, cancelled=cancelled, progress=report)
         frame = told(replace(frame, truth=truth))
         yield frame
-    passes = ambient_passes(settings.ambient_samples) if has_ambient(scene) else ()
-    for i, samples in enumerate(passes):
-        # independent of the last pass, whose numbers are those of render_world
-        own = seed if i == len(passes) - 1 else (seed + 1_000_003 * (i + 1)) % 2**63
-        with clock.stage(f"ambient light, {samples} samples", _ambient_work(pixels, scene, samples)) as report:
-            image = ambient_image(
+    if has_ambient(scene):
+        with clock.stage("ambient light", _ambient_work(pixels, settings)) as report:
+            wanted = choose_ambient(world, scene, settings, step=step, seed=seed, cancelled=cancelled)
+            frame = replace(frame, plan="\n".join((*chosen.lines, *wanted.lines)))
+            for image, counts in planned_images(
                 world,
                 scene,
-                scene.camera,
-                scene.T_world_camera(step),
-                samples=samples,
-                seed=own,
+                settings,
+                wanted,
+                step=step,
+                seed=seed,
                 threads=threads,
                 cancelled=cancelled,
                 progress=report,
-            )
-        known = {AMBIENT_SAMPLES: float(_rounded(samples))}
-        if frame.ambient is not None:
-            known[AMBIENT_ERROR] = pass_error(frame.ambient, image, passes[i - 1], samples)
-        frame = told(replace(frame, ambient=image), **known)
-        yield frame
-
-
-def pass_error(before: Float32, now: Float32, samples_before: int, samples: int) -> float:
-    """Relative RMS error of `now` (h, w, 3), from its difference to an independent pass with fewer samples.
-
-    The squared difference is the sum of both variances, which fall at least as 1 / samples: an upper estimate.
-    """
-    difference, power = 0.0, 0.0
-    # in bands of rows: the whole in float64 would be six times the image
-    for i in range(0, len(now), 64):
-        a, b = before[i : i + 64].astype(np.float64), now[i : i + 64].astype(np.float64)
-        difference += float(np.sum((a - b) ** 2))
-        power += float(np.sum(b * b))
-    if power == 0.0:
-        return 0.0
-    return math.sqrt(difference / power / (1.0 + _rounded(samples) / _rounded(samples_before)))
-
-
-def _rounded(samples: int) -> int:
-    """As `ambient_image` rounds up: a square."""
-    return math.ceil(math.sqrt(samples)) ** 2
+            ):
+                frame = told(replace(frame, ambient=image.radiance), **counts)
+                yield frame
 
 
 def _curves(world: World, scene: Scene, step: int, axis: Axis, threads: int | None) -> Iterator[LaserCurve]:
@@ -229,8 +179,9 @@ def _laser_work(pixels: int, scene: Scene, target: float) -> float:
     return 0.2 * pixels * len(scene.lasers) * (1.0 + 0.2 * math.log2(max(1.0, QUICK_ERROR / target)))
 
 
-def _ambient_work(pixels: int, scene: Scene, samples: int) -> float:
-    return float(pixels) * _rounded(samples) * (1 + len(scene.lights) + any(scene.environment.radiance))
+def _ambient_work(pixels: int, settings: RenderSettings) -> float:
+    """About how many rays: a camera ray and two more a sample; it ends before that where the error is reached."""
+    return 3.0 * pixels * settings.ambient_samples
 
 
 def _workload(world: World, scene: Scene, settings: RenderSettings) -> float:
@@ -241,7 +192,7 @@ def _workload(world: World, scene: Scene, settings: RenderSettings) -> float:
     total += pixels
     total += pixels if settings.truth_images else 0.0
     if has_ambient(scene):
-        total += sum(_ambient_work(pixels, scene, samples) for samples in ambient_passes(settings.ambient_samples))
+        total += _ambient_work(pixels, settings)
     return max(total, 1.0)
 
 
@@ -253,11 +204,20 @@ class _Clock:
     progress: Progress | None
     finished: float = 0.0
     seconds: dict[str, float] = field(default_factory=dict)
+    running: tuple[str, float] | None = None
+
+    def so_far(self) -> dict[str, float]:
+        """Seconds by stage, with those of the one under way."""
+        seconds = dict(self.seconds)
+        if self.running is not None:
+            name, start = self.running
+            seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
+        return seconds
 
     @contextmanager
     def stage(self, name: str, work: float) -> Iterator[Callable[[float], None]]:
         """Time a stage; yields the function that takes its own progress, 0..1."""
-        start = time.perf_counter()
+        self.running = name, time.perf_counter()
 
         def report(done: float) -> None:
             if self.progress is not None:
@@ -265,7 +225,5 @@ class _Clock:
 
         report(0.0)
         yield report
-        # passes of one kind are one stage in the summary, as in render_world
-        kind = name.partition(",")[0]
-        self.seconds[kind] = self.seconds.get(kind, 0.0) + time.perf_counter() - start
+        self.seconds, self.running = self.so_far(), None
         self.finished += work

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from render.ambient import ambient_image
+from render.ambient_plan import choose_ambient, expected_ambient, has_ambient, planned_images
 from render.checks import check_placement
 from render.curve import laser_curve
 from render.direct import direct_image
@@ -123,19 +123,24 @@ def render_world(
     if settings.truth_images:
         with stage("truth images") as report:
             truth = truth_images(world, camera, T_world_camera, threads=threads, cancelled=cancelled, progress=report)
-    if scene.lights or any(scene.environment.radiance):
+    lines = expected_ambient(scene, settings)
+    if has_ambient(scene):
         with stage("ambient light") as report:
-            ambient = ambient_image(
+            chosen = choose_ambient(world, scene, settings, step=step, seed=seed, cancelled=cancelled)
+            lines = chosen.lines
+            for exposed, tallies in planned_images(
                 world,
                 scene,
-                camera,
-                T_world_camera,
-                samples=settings.ambient_samples,
+                settings,
+                chosen,
+                step=step,
                 seed=seed,
                 threads=threads,
                 cancelled=cancelled,
                 progress=report,
-            )
+            ):
+                ambient = exposed.radiance
+                counts |= tallies
     counts["rays"] = rays.rays - ray_start
     counts["seconds in embree, all threads"] = rays.seconds - embree_start
     return Frame(
@@ -145,7 +150,7 @@ def render_world(
         curves=tuple(curves),
         truth=truth,
         laser_indirect=indirect,
-        plan=plan.text,
+        plan="\n".join((*plan.lines, *lines)),
         warnings=warnings,
         seconds=seconds,
         counts=counts,

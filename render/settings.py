@@ -32,5 +32,29 @@ class RenderSettings(Model):
         ge=1 << 20,
         le=1 << 40,
     )
-    ambient_samples: int = quantity(16, label="Ambient samples", help="Per pixel.", ge=1, le=65536)
+    ambient_error: float = quantity(
+        0.01, label="Ambient error", help="Target relative RMS error of the ambient light.", gt=1e-4, le=1
+    )
+    ambient_samples: int = quantity(
+        16,
+        label="Most ambient samples",
+        help="Per pixel, on average; ends the ambient light in any case. Noisy places get more of them.",
+        ge=1,
+        le=65536,
+    )
+    max_bounces: int | None = quantity(
+        None,
+        label="Most surfaces",
+        help="That ambient light may meet on its way; empty: no bound, chance ends dim paths without bias.",
+        ge=1,
+        le=1024,
+    )
+    clamp: float | None = quantity(
+        None,
+        label="Clamp",
+        unit="W/(m^2 sr)",
+        help="Most that one sample of ambient light may add by way of two or more surfaces; it takes single bright "
+        "pixels away, and with them light: biased. Empty: none.",
+        gt=0,
+    )
     truth_images: bool = quantity(True, label="Per-pixel truth", help="Depth, position, normal and object images.")

@@ -20,8 +20,10 @@ Int = NDArray[np.int32]
 
 ON_IMAGE, ON_LENS, FIRST_SURFACE, EACH_SURFACE = 0, 1, 2, 4
 """Dimensions of the sequence: two pairs for the camera, then four for each surface."""
-DROPPED, CLAMPED, CUT = 0, 1, 2
-"""A tally (3,): contributions that were no number, infinite or negative; those clamped; mean radiance cut."""
+DROPPED, CLAMPED = 0, 1
+"""A tally (2,): contributions that were no number, infinite or negative; those clamped."""
+CUT = 3
+"""Sums (.., 4): R, G, B, and the mean of what the clamp took of them."""
 
 
 class Wave(NamedTuple):
@@ -100,7 +102,7 @@ def deposit(sums: Float, tally: Float, owner: int, limit: float, r: float, g: fl
     if largest > limit:
         scale = limit / largest
         tally[CLAMPED] += 1.0
-        tally[CUT] += (1.0 - scale) * (r + g + b) / 3.0
+        sums[owner, CUT] += (1.0 - scale) * (r + g + b) / 3.0
         r, g, b = scale * r, scale * g, scale * b
     sums[owner, 0] += r
     sums[owner, 1] += g
@@ -109,7 +111,7 @@ def deposit(sums: Float, tally: Float, owner: int, limit: float, r: float, g: fl
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def add_clear(shadows: Shadows, occluded: NDArray[np.bool_], limit: float, sums: Float, tally: Float) -> None:
-    """Add what every clear shadow ray sees to its owner (.., 3)."""
+    """Add what every clear shadow ray sees to its owner (.., 4)."""
     for j in range(occluded.shape[0]):
         if not occluded[j]:
             light = shadows.light[j]

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from render.refine import AMBIENT_SAMPLES
+from render.ambient_plan import AMBIENT_SAMPLES
 from render.tone import Picture, grey
 from studio.qt.compare_view import CompareView
 from studio.qt.session import Render, Session

@@ -23,8 +23,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from render.ambient_plan import AMBIENT_ERROR, AMBIENT_SAMPLES, CLAMPED_SAMPLES, DROPPED_SAMPLES
 from render.frame import Frame
-from render.refine import AMBIENT_ERROR, AMBIENT_SAMPLES, plan, refine
+from render.refine import plan, refine
 from render.threads import Cancel
 from render.world import World, build_world
 from studio.jobs import Job, Progress, State
@@ -64,12 +65,19 @@ class RenderPanel(QWidget):
         self.laser_error.setToolTip("Relative RMS error of the laser light over the lit pixels.")
         self.samples = QSpinBox(minimum=1, maximum=65536)
         self.samples.setStepType(QSpinBox.StepType.AdaptiveDecimalStepType)
-        self.samples.setToolTip("Samples of the ambient light on each pixel; four times as many halve the noise.")
+        self.samples.setToolTip(
+            "The ambient light ends here where its error is not reached. Samples of a pixel, on average: noisy places "
+            "get more; four times as many halve the noise."
+        )
+        self.ambient_error = QDoubleSpinBox(decimals=2, minimum=0.01, maximum=100.0)
+        self.ambient_error.setSuffix(" %")
+        self.ambient_error.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
+        self.ambient_error.setToolTip("Relative RMS error of the ambient light at which it ends.")
         self.limit = QSpinBox(minimum=0, maximum=86400)
         self.limit.setSuffix(" s")
         self.limit.setSpecialValueText("none")
         self.limit.setToolTip("The best frame so far is kept when the time is over.")
-        for box in (self.laser_error, self.samples, self.limit):
+        for box in (self.laser_error, self.ambient_error, self.samples, self.limit):
             box.setKeyboardTracking(False)
         self.transport = QComboBox()
         for value, text in TRANSPORT.items():
@@ -151,8 +159,9 @@ class RenderPanel(QWidget):
     def _lay_out(self) -> None:
         form = QFormLayout()
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        form.addRow("Laser light", self.transport)
+        form.addRow("Light transport", self.transport)
         form.addRow("Laser error", self.laser_error)
+        form.addRow("Ambient error", self.ambient_error)
         form.addRow("Ambient samples", self.samples)
         form.addRow("Time limit", self.limit)
         form.addRow("Image", self.scale)
@@ -184,6 +193,9 @@ class RenderPanel(QWidget):
         self.laser_error.valueChanged.connect(
             lambda percent: session.set(("render", "laser_error"), round(percent / 100, 8), "laser error")
         )
+        self.ambient_error.valueChanged.connect(
+            lambda percent: session.set(("render", "ambient_error"), round(percent / 100, 8), "ambient error")
+        )
         self.samples.valueChanged.connect(
             lambda count: session.set(("render", "ambient_samples"), count, "ambient samples")
         )
@@ -198,12 +210,13 @@ class RenderPanel(QWidget):
 
     def _follow_project(self) -> None:
         project = self.session.project
-        for box in (self.laser_error, self.samples):
+        for box in (self.laser_error, self.ambient_error, self.samples):
             box.blockSignals(True)
         self.laser_error.setValue(100 * project.render.laser_error)
+        self.ambient_error.setValue(100 * project.render.ambient_error)
         self.samples.setValue(project.render.ambient_samples)
         self.transport.setCurrentIndex(self.transport.findData(project.render.transport))
-        for box in (self.laser_error, self.samples):
+        for box in (self.laser_error, self.ambient_error, self.samples):
             box.blockSignals(False)
         camera, chosen = project.scene.camera, max(0, self.scale.currentIndex())
         if self.scale.count() == 0:
@@ -350,8 +363,13 @@ def error_text(render: Render) -> str:
         if error is not None:
             rows.append(f"{escape(laser.name)}, reflected on: error {error:.1%}")
     if render.frame.ambient is not None:
-        so_far, wanted = counts.get(AMBIENT_SAMPLES, 0.0), render.project.render.ambient_samples
+        so_far, settings = counts.get(AMBIENT_SAMPLES, 0.0), render.project.render
         error = counts.get(AMBIENT_ERROR)
-        known = f", error below about {error:.1%}" if error is not None else ""
-        rows.append(f"ambient: {so_far:.0f} of {wanted} samples{known}")
+        known = f"error {error:.2%}, target {settings.ambient_error:.2%}, " if error is not None else ""
+        rows.append(f"ambient: {known}{so_far:.0f} of {settings.ambient_samples} samples")
+        dropped, clamped = counts.get(DROPPED_SAMPLES, 0.0), counts.get(CLAMPED_SAMPLES)
+        if clamped is not None:
+            rows.append(f"ambient, clamped: {clamped:.0f} contributions (biased)")
+        if dropped:
+            rows.append(f"ambient: {dropped:.0f} contributions were no number, and were left out")
     return "<br>".join(rows)

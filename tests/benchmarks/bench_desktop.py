@@ -98,7 +98,7 @@ def main() -> None:
     runner, frames = JobRunner(), []
     world = build_world(project.scene, root)
     # ambient light to infinity, so that there is time to look
-    long = project.render.model_copy(update={"ambient_samples": 65536})
+    long = project.render.model_copy(update={"ambient_samples": 65536, "ambient_error": 2e-4})
 
     def render(progress, cancelled):  # type: ignore[no-untyped-def]
         world.__dict__.pop("rays", None)

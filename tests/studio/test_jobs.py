@@ -179,7 +179,7 @@ def test_a_render_in_a_job_is_cancelled_in_the_middle_of_a_pass() -> None:
     frames = []
 
     def work(progress: Progress, cancelled: Cancel) -> None:
-        settings = project.render.model_copy(update={"ambient_samples": 4096})
+        settings = project.render.model_copy(update={"ambient_samples": 4096, "ambient_error": 2e-4})
         for frame in refine(world, project.scene, settings=settings, progress=progress, cancelled=cancelled):
             frames.append(frame)
 

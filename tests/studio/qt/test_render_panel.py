@@ -43,6 +43,7 @@ def finish(qtbot, panel):
 def long_render(qtbot, panel):
     """A render that would take minutes, with its first frames there."""
     panel.session.set(("render", "ambient_samples"), 65536)
+    panel.session.set(("render", "ambient_error"), 2e-4)
     press(qtbot, panel.start_button)
     session = panel.session
     qtbot.waitUntil(lambda: session.shown is not None and session.shown.frame.ambient is not None, timeout=20000)
@@ -75,6 +76,7 @@ def test_cancel_forgets_the_render_and_shows_the_one_before(qtbot, panel):
     finish(qtbot, panel)
     before = panel.session.shown
     panel.session.set(("render", "ambient_samples"), 65536)
+    panel.session.set(("render", "ambient_error"), 2e-4)
     press(qtbot, panel.start_button)
     qtbot.waitUntil(lambda: len(panel.session.renders) == 2, timeout=20000)
     press(qtbot, panel.cancel_button)
@@ -99,6 +101,7 @@ def test_pause_holds_the_render_and_go_on_continues_it(qtbot, panel):
 
 def test_a_time_limit_keeps_what_there_is(qtbot, panel):
     panel.session.set(("render", "ambient_samples"), 65536)
+    panel.session.set(("render", "ambient_error"), 2e-4)
     panel.limit.setValue(1)
     press(qtbot, panel.start_button)
     finish(qtbot, panel)
