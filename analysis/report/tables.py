@@ -225,7 +225,7 @@ def timing(report: ReportInput) -> tuple[list[tuple[str, str, float]], str]:
 
 
 def counts(report: ReportInput) -> list[tuple[str, str]]:
-    """What the renderer counted: sums over the frames, means of errors and fractions."""
+    """What the renderer counted: sums over the frames, means of errors, of fractions and of what is said of a pixel."""
     names = list(dict.fromkeys(name for frame in report.frames for name in frame.counts))
     rows = []
     for name in names:
@@ -234,6 +234,8 @@ def counts(report: ReportInput) -> list[tuple[str, str]]:
             rows.append((name, percent(float(np.mean(values)), 2)))
         elif "seconds" in name:
             rows.append((name, seconds(float(np.sum(values)))))
+        elif "a pixel" in name or "mean" in name:
+            rows.append((name, f"{float(np.mean(values)):.3g}"))
         else:
             rows.append((name, count(float(np.sum(values)))))
     return rows
