@@ -13,7 +13,7 @@ from render.shape import Plane
 from studio.document import replaced
 from studio.preview import Look, Preview
 from studio.project import Project
-from studio.sketch import fan_points, grid, hidden_line, image_corners, joined, reach_of, working_volume
+from studio.sketch import fan_points, focus_corners, grid, hidden_line, image_corners, joined, reach_of, working_volume
 
 PROJECTS = Path(__file__).parents[2] / "assets/projects"
 
@@ -87,6 +87,21 @@ def test_the_frustums_corners_are_the_images() -> None:
     pixels, _ = camera.project(image_corners(camera, 0.5))
     w, h = camera.width - 0.5, camera.height - 0.5
     np.testing.assert_allclose(pixels, [[-0.5, -0.5], [w, -0.5], [w, h], [-0.5, h]], atol=1e-6)
+
+
+def test_the_frustum_ends_on_the_plane_of_focus_which_tilts_with_the_sensor() -> None:
+    scene = look_at("plane").scene
+    straight = focus_corners(scene)
+    np.testing.assert_allclose(straight[:, 2], scene.camera.lens.focus_distance)
+    distortion = (0.0,) * 12 + (np.radians(0.3), np.radians(0.6))
+    camera = scene.camera.model_copy(update={"distortion": distortion})
+    tilted = focus_corners(scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": camera})}))
+    np.testing.assert_allclose(tilted @ camera.focus_plane[:3], 1.0)
+    assert np.ptp(tilted[:, 2]) > 0.1
+    # where nothing is in focus the edges end somewhere
+    away = camera.model_copy(update={"distortion": (0.0,) * 13 + (1.3,)})
+    far = focus_corners(scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": away})}))
+    assert np.isfinite(far).all() and 0.0 < far[:, 2].max() < 20.0
 
 
 def test_the_grid_has_round_steps_and_covers_the_scene() -> None:
