@@ -112,7 +112,9 @@ def develop(
     map_chunks(rows, height, ROWS, threads)
     saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
     pattern = sensor.pattern if sensor.colour == "bayer" else None
-    return Image(pixels, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time)
+    return Image(
+        pixels, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time
+    )
 
 
 def expected_electrons(

@@ -30,13 +30,28 @@ SEQUENCE = _recurrence(5)
 """Additive recurrence in five dimensions (Roberts 2018, R5): two at the laser, three for the first bounce."""
 
 
+PARTS, EVERYWHERE = 128, 0.25
+"""Of the fan, each with its own density of photons; the share of them that is spread evenly."""
+
+
+class Fan(NamedTuple):
+    """Which photons are sent out."""
+
+    low: float
+    high: float
+    """Shares of the power between which the sheet can hit anything."""
+    cumulative: Float
+    """(PARTS + 1,) distribution over equal parts of what lies between, from 0 to 1."""
+
+
 class Paths(NamedTuple):
-    """Paths on their way: (n, 3) origin and direction (world), (n,) power, (n,) number of the path."""
+    """Paths on their way: (n, 3) origin and direction (world), (n,) power, number of the path, part of the fan."""
 
     origin: Float
     direction: Float
     power: Float
     number: Long
+    part: Long
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -87,26 +102,23 @@ def fan_quantile(share: float, beam: Float) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def emit(
-    first: int,
-    seed: int,
-    start: Float,
-    low: float,
-    high: float,
-    reach: float,
-    beam: Float,
-    T_world_laser: Float,
-    paths: Paths,
+    first: int, total: int, start: Float, fan: Fan, reach: float, beam: Float, T_world_laser: Float, paths: Paths
 ) -> None:
-    """Fill paths with photons number `first` .. whose share of the fan lies in [low, high]; `start` (5,) is the pass's.
+    """Fill paths with photons number `first` .. of `total`, in the fan's order; `start` (5,) is the pass's.
 
     A focused sheet bends; its photons fly straight towards where the sheet is at distance `reach`, about the part's.
     """
     m = T_world_laser
     emitter, _ = sheet_sigma(0.0, beam)
     sigma, _ = sheet_sigma(reach, beam)
+    part = 0
     for i in range(len(paths.number)):
         number = first + i
-        along = low + (high - low) * ((start[0] + number * SEQUENCE[0]) % 1.0)
+        place = (number + start[0]) / total
+        while part < PARTS - 1 and fan.cumulative[part + 1] <= place:
+            part += 1
+        chance = fan.cumulative[part + 1] - fan.cumulative[part]
+        along = fan.low + (fan.high - fan.low) * (part + (place - fan.cumulative[part]) / chance) / PARTS
         across = (start[1] + number * SEQUENCE[1]) % 1.0
         y = fan_quantile(min(max(along, 1e-15), 1.0 - 1e-15), beam)
         q = normal_quantile(min(max(across, 1e-12), 1.0 - 1e-12))
@@ -116,8 +128,34 @@ def emit(
         for axis in range(3):
             paths.origin[i, axis] = m[axis, 3] + m[axis, 0] * x0
             paths.direction[i, axis] = (m[axis, 0] * dx + m[axis, 1] * dy + m[axis, 2] * dz) / length
-        paths.power[i] = beam[0] * (high - low)
-        paths.number[i] = number
+        paths.power[i] = beam[0] * (fan.high - fan.low) / (PARTS * chance)
+        paths.number[i], paths.part[i] = number, part
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def emitted_density(y: float, fan: Fan, beam: Float) -> float:
+    """How much denser photons leave towards Y than the laser's light does, over its whole power; 0: none do."""
+    place = (fan_integral(y, beam) - fan.low) / (fan.high - fan.low) * PARTS
+    if place < 0.0 or place > PARTS:
+        return 0.0
+    part = min(int(place), PARTS - 1)
+    return PARTS * (fan.cumulative[part + 1] - fan.cumulative[part]) / (fan.high - fan.low)
+
+
+def even_fan(low: float, high: float) -> Fan:
+    """Photons as the laser's light, between two shares of its power."""
+    return Fan(low, high, np.linspace(0.0, 1.0, PARTS + 1))
+
+
+def aimed_fan(fan: Fan, found: Float) -> Fan:
+    """Photons where paths brought most: found (PARTS,), their squared worth; a part goes everywhere all the same."""
+    density = np.sqrt(found)
+    density = 0.5 * density + 0.25 * (np.roll(density, 1) + np.roll(density, -1))
+    if not density.sum() > 0.0:
+        return fan
+    density = (1.0 - EVERYWHERE) * density / density.sum() + EVERYWHERE / PARTS
+    cumulative = np.concatenate([[0.0], np.cumsum(density)])
+    return fan._replace(cumulative=cumulative / cumulative[-1])
 
 
 def fan_span(world: World, laser: LineLaser, T_world_laser: Float) -> tuple[float, float, float]:

@@ -41,10 +41,12 @@ def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
     lines = [DIRECT]
     if settings.transport == "direct":
         lines.append(f"left out: {INDIRECT} - switched off")
-    elif settings.transport == "interreflection":
-        lines.append(f"interreflection: {INDIRECT} - asked for")
+    elif settings.transport != "auto":
+        lines.append(f"{settings.transport}: {INDIRECT} - asked for")
     else:
-        lines.append(f"{INDIRECT}: a pilot decides, it is left out below {settings.negligible:.2%} of the light")
+        lines.append(
+            f"{INDIRECT}: a pilot decides step by step, and leaves out what is below {settings.negligible:.2%}"
+        )
     lines.extend(expected_ambient(scene, settings))
     lines.extend(lens_lines(scene.camera))
     lines.append(

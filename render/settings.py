@@ -13,11 +13,12 @@ class RenderSettings(Model):
     laser_error: float = quantity(
         0.003, label="Laser error", help="Target relative RMS error over the lit pixels.", gt=1e-6, le=1
     )
-    transport: Literal["auto", "direct", "interreflection"] = quantity(
+    transport: Literal["auto", "direct", "interreflection", "caustic", "specular-chain", "subsurface"] = quantity(
         "auto",
         label="Light transport",
-        help="auto: a short pilot decides. direct: the lasers' light by way of one surface. interreflection: also "
-        "by way of two and more, which shiny and concave parts need.",
+        help="auto: a short pilot decides. Or the last step that is computed: direct, the lasers' light by way of one "
+        "surface; interreflection, two and more; caustic, through clear glass and off mirrors; specular-chain, the "
+        "same on both sides of a surface; subsurface, below surfaces.",
     )
     negligible: float = quantity(
         0.02, label="Negligible share", help="auto leaves out what adds less than this share of the light.", ge=0, le=1

@@ -41,7 +41,10 @@ LONGEST_HEAD = 20
 TRANSPORT = {
     "auto": "as much as matters",
     "direct": "by way of one surface",
-    "interreflection": "reflected on as well",
+    "interreflection": "and reflected on",
+    "caustic": "and through glass, off mirrors",
+    "specular-chain": "and seen through glass again",
+    "subsurface": "and below surfaces",
 }
 
 

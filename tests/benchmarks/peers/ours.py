@@ -74,8 +74,8 @@ def efforts(name: str):
 
 def image(scene, world, targets, seed: int) -> np.ndarray:
     """All light of the laser in one image (h, w): the one place that knows how ours renders."""
+    from render.bidirectional import indirect_image
     from render.direct import direct_image
-    from render.light_path import indirect_image
 
     parts = (world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0))
     direct, indirect = targets

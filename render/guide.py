@@ -1,0 +1,119 @@
+"""Where the camera looks for a laser's indirect light, and where along the lit curve it expects it from.
+
+Both follow from the passes before, so a pass on its own stays unbiased: they decide how often something is tried, and
+every try is weighed by that.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, uniform_filter
+
+from render.bsdf import is_smooth
+from render.camera import Camera
+from render.random import uniform
+from render.surface import Surface
+from render.world import World
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int32]
+
+TILE, BINS = 8, 128
+"""Pixels a side of the guide's tiles; parts of the lit curve."""
+SHARES = ((1, 0.6), (9, 0.3), (33, 0.1))
+"""Window in pixels, and the share of the camera paths that goes by it."""
+LEAST = 1e-3
+LOOK = 4
+"""Pixels between the rays that look for glass."""
+FEWEST_TO_LEARN, FLAT = 4.0, 0.2
+"""Camera paths a pass in a tile that learns; the part of a guide that stays flat."""
+
+
+class Guide(NamedTuple):
+    """Where on the lit curve light is expected from, for each tile of the image."""
+
+    width: int
+    """Of the image."""
+    row: Int
+    """(tiles down, tiles across) row of `cumulative`, -1: nothing is known."""
+    cumulative: Float
+    """(n, BINS + 1) distribution over equal parts of the list of light vertices, from 0 to 1."""
+
+
+def share_samples(image: NDArray[np.float32], width: int, count: float) -> Float:
+    """(pixels,) radiance so far -> camera paths to be expected for each pixel, about `count` in all.
+
+    In proportion to the radiance, and to its mean over windows: of a glossy part's pixels light paths find few.
+    """
+    shared = np.zeros(len(image))
+    for window, share in SHARES:
+        blurred = image if window == 1 else uniform_filter(image.reshape(-1, width), window, mode="constant").ravel()
+        total = float(blurred.sum(dtype=np.float64))
+        if total > 0.0:
+            shared += blurred * (share * count / total)
+    shared[shared < LEAST] = 0.0
+    return np.minimum(shared, 64.0)
+
+
+def any_clear(surface: Surface) -> bool:
+    """Some material scatters into single directions only."""
+    return any(is_smooth(row) for row in surface.rows)
+
+
+def clear_pixels(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> Float:
+    """(pixels,) 1 where the camera looks at a mirror or clear glass, to the nearest few pixels; otherwise 0."""
+    v, u = np.mgrid[0 : camera.height : LOOK, 0 : camera.width : LOOK]
+    rays, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float64))
+    hit = world.rays.from_point(T_world_camera[:3, 3], (rays @ T_world_camera[:3, :3].T).astype(np.float32))
+    smooth = np.array([is_smooth(row) for row in surface.rows])
+    hit = np.where(known, hit, -1)
+    found = np.where(hit >= 0, smooth[world.object_id[hit]] | (surface.second[world.object_id[hit]] >= 0), False)
+    found = maximum_filter(found.reshape(v.shape).astype(np.float64), 3)
+    return np.kron(found, np.ones((LOOK, LOOK)))[: camera.height, : camera.width].ravel()
+
+
+def no_guide(camera: Camera) -> Guide:
+    """Nothing is known of any tile."""
+    tiles = -np.ones((-(-camera.height // TILE), -(-camera.width // TILE)), np.int32)
+    return Guide(camera.width, tiles, np.zeros((0, BINS + 1)))
+
+
+def first_guide(samples: Float, camera: Camera, passes: int) -> tuple[Guide, Float]:
+    """A guide, flat so far, for the tiles with enough camera paths to learn from; (passes, n, BINS) what is learnt."""
+    tiles = no_guide(camera).row
+    whole = np.zeros((tiles.shape[0] * TILE, tiles.shape[1] * TILE))
+    whole[: camera.height, : camera.width] = samples.reshape(camera.height, camera.width)
+    found = whole.reshape(tiles.shape[0], TILE, tiles.shape[1], TILE).sum(axis=(1, 3)) >= FEWEST_TO_LEARN
+    count = int(found.sum())
+    tiles[found] = np.arange(count)
+    cumulative = np.repeat(np.linspace(0.0, 1.0, BINS + 1)[None], count, axis=0)
+    return Guide(camera.width, tiles, cumulative), np.zeros((passes, count, BINS))
+
+
+def learn(guide: Guide, learnt: Float, knowledge: Float) -> Guide:
+    """Fold what the passes of a wave learnt (cleared) into `knowledge`; the guide that follows from it.
+
+    The best density is the root of the mean square of what is found; a part stays flat, for what was not found yet.
+    """
+    knowledge += learnt.sum(axis=0)
+    learnt[:] = 0.0
+    density = np.sqrt(knowledge)
+    density = 0.5 * density + 0.25 * (np.roll(density, 1, axis=1) + np.roll(density, -1, axis=1))
+    total = density.sum(axis=1, keepdims=True)
+    density = (1.0 - FLAT) * np.divide(
+        density, total, out=np.full_like(density, 1.0 / BINS), where=total > 0.0
+    ) + FLAT / BINS
+    cumulative = np.concatenate([np.zeros((len(density), 1)), np.cumsum(density, axis=1)], axis=1)
+    cumulative /= cumulative[:, -1:]
+    return guide._replace(cumulative=cumulative)
+
+
+@numba.njit(nogil=True, cache=True)
+def draw_counts(samples: Float, seed: int, counts: Int) -> None:
+    """How many camera paths this pass has for each pixel: `samples` up to a whole number, by chance."""
+    for pixel in range(samples.shape[0]):
+        counts[pixel] = int(samples[pixel] + uniform(seed, pixel, 0, 92)) if samples[pixel] > 0.0 else 0
