@@ -35,6 +35,8 @@ SEED_COLUMNS = 6
 
 NEIGHBOUR = 0.05
 """Fraction of a peak's response from which another peak limits its window of pixels."""
+HUMP = 2.0
+"""Filter sigmas; a peak that is wider than this at half its height may be a narrow one on a broad glow."""
 NARROWEST = 0.4
 """px; a narrower line cannot be told from this one before it is fitted."""
 
@@ -73,10 +75,47 @@ def _plateau(mask: Mask, centre: int) -> tuple[int, int]:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def _on_hump(response: Float32, i: int, base: float, spread: float, still: float, rise: float) -> tuple[float, float]:
+    """Spread and background of a narrow line on top of a broad glow, as rough metal reflects it; (0, 0): it is not one.
+
+    A Gaussian's curvature is -height / spread^2. A line on a hump is much more curved than the hump is wide, and stands
+    out of the hump's own noise.
+    """
+    w = response.shape[0]
+    if i < 1 or i > w - 2:
+        return 0.0, 0.0
+    bend = 2.0 * float(response[i]) - float(response[i - 1]) - float(response[i + 1])
+    if bend <= 0.0:
+        return 0.0, 0.0
+    under, narrow = base, spread
+    for _ in range(3):
+        narrow = math.sqrt((float(response[i]) - under) / bend)
+        if 2.0 * narrow > spread:
+            return 0.0, 0.0
+        reach = math.ceil(3.0 * narrow)
+        under = max(min(float(response[max(i - reach, 0)]), float(response[min(i + reach, w - 1)])), base)
+        if float(response[i]) - under <= rise * math.sqrt(max(under, 0.0) + max(still, 0.0)):
+            return 0.0, 0.0
+    return narrow, under
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def _measure(
-    row: Float32, response: Float32, mask: Mask, i: int, base: float, width: float, max_width: float, seed: Array
+    row: Float32,
+    response: Float32,
+    mask: Mask,
+    i: int,
+    base: float,
+    still: float,
+    rise: float,
+    width: float,
+    max_width: float,
+    seed: Array,
 ) -> int:
-    """Fill a seed from the filter's maximum at pixel i over background `base`; row is the scan line, unpadded."""
+    """Fill a seed from the filter's maximum at pixel i over background `base`; row is the scan line, unpadded.
+
+    still: variance of a pixel without signal. rise: threshold times the filter's gain in standard deviation.
+    """
     limit = int(4.0 * max_width) + 8
     w = row.shape[0]
     first, last = _plateau(mask, i)
@@ -98,6 +137,12 @@ def _measure(
     right = _crossing(response, i, 1, limit, base + 0.5 * top)
     left = _crossing(response, i, -1, limit, base + 0.5 * top)
     spread = (left + right) / 2.3548
+    if spread > HUMP * FILTER_SIGMA:
+        narrow, under = _on_hump(response, i, base, spread, still, rise)
+        if narrow > 0.0:
+            spread, base = narrow, under
+            top = float(response[i]) - base
+            seed[BACKGROUND] = base
     sigma = math.sqrt(max(spread * spread - FILTER_SIGMA * FILTER_SIGMA, NARROWEST**2))
     offset = 0.0
     if 0 < i < w - 1:
@@ -137,6 +182,7 @@ def detect(
     blocks = max(1, w // block)
     means, level, margin = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     at, height = np.empty(w, np.int32), np.empty(w)
+    rise = threshold * math.sqrt(gain)
     for y in range(n):
         usable = load_row(signal[y], mask[y], row)
         for k in range(wanted):
@@ -164,7 +210,8 @@ def detect(
             seed = seeds[y, taken]
             pixel = np.int64(at[best])
             base = background_at(pixel, level, block)
-            flags[y, taken] = _measure(line, response, mask[y], pixel, base, width, max_width, seed)
+            still = float(floor[y, min(pixel, floor.shape[1] - 1)])
+            flags[y, taken] = _measure(line, response, mask[y], pixel, base, still, rise, width, max_width, seed)
             claim = max(3.0 * seed[WIDTH], 3.0) + seed[PLATEAU]
             strength, reach = height[best], np.inf
             for j in range(found):

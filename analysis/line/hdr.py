@@ -3,7 +3,8 @@
     rate = sum(e_i t_i / v_i) / sum(t_i^2 / v_i),   v_i = rate t_i + floor,   var(rate) = 1 / sum(t_i^2 / v_i)
 
 over the exposures in which the pixel is not saturated. The variances are those of the rate itself, not of the noisy
-counts, which would pull it down. Without read noise it is all electrons over all time.
+counts, which would pull it down. Without read noise it is all electrons over all time. The image is given in electrons
+of all exposures together, so that its variance is never less than a count's.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ ROUNDS = 3
 
 @dataclass(frozen=True)
 class Fused:
-    """An image in electrons of the longest exposure; give all three to `extract`."""
+    """An image in electrons of all exposures together; give all three to `extract`."""
 
     electrons: Float32
     """(h, w); pixels saturated in every exposure hold `noise.saturation`."""
@@ -57,7 +58,7 @@ def fuse(images: Sequence[NDArray[Any]], exposure_times: Sequence[float], noise:
     if noise.saturation is None:
         raise InputError("fusion needs to know which pixels are saturated", where="noise.saturation")
     full = (noise.saturation - noise.black_level) / noise.gain
-    longest = float(times.max())
+    together = float(times.sum())
     counts = [((array.astype(np.float32) - noise.black_level) / noise.gain).astype(np.float32) for array in arrays]
     usable = [(array < noise.saturation).astype(np.float32) for array in arrays]  # NaN is not
     counts = [np.where(good > 0, count, np.float32(0)) for count, good in zip(counts, usable, strict=True)]
@@ -72,11 +73,11 @@ def fuse(images: Sequence[NDArray[Any]], exposure_times: Sequence[float], noise:
             total += weight * count
             information += weight * time
         rate = total / np.maximum(information, 1e-300)
-    top = full * longest / float(times.min())
+    top = full * together / float(times.min())
     blind = information <= 0.0
     missing = np.any([np.isnan(array) for array in arrays if array.dtype.kind == "f"], axis=0) & blind
-    electrons = np.where(blind, top, np.minimum(rate * longest, np.nextafter(np.float32(top), np.float32(0))))
-    variance = np.where(blind, top, longest**2 / np.maximum(information, 1e-300))
+    electrons = np.where(blind, top, np.minimum(rate * together, np.nextafter(np.float32(top), np.float32(0))))
+    variance = np.where(blind, top, together**2 / np.maximum(information, 1e-300))
     electrons = np.where(missing, np.nan, electrons)
     model = NoiseModel(
         gain=1.0, black_level=0.0, read_noise=noise.read_noise, saturation=float(np.float32(top)), step=0.0
