@@ -117,6 +117,8 @@ def worth(light: Float, p0: float, p1: float, p2: float) -> float:
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def pick(rows: Float, p0: float, p1: float, p2: float, r: float) -> tuple[int, float]:
     """A light for the point p and its chance; -1: none shines there. r in [0, 1)."""
+    if rows.shape[0] == 1:
+        return 0, 1.0
     total = 0.0
     for k in range(rows.shape[0]):
         total += worth(rows[k], p0, p1, p2)
@@ -136,6 +138,8 @@ def pick(rows: Float, p0: float, p1: float, p2: float, r: float) -> tuple[int, f
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def chance(rows: Float, k: int, p0: float, p1: float, p2: float) -> float:
     """With which `pick` draws light k for the point p."""
+    if rows.shape[0] == 1:
+        return 1.0
     total = 0.0
     for j in range(rows.shape[0]):
         total += worth(rows[j], p0, p1, p2)

@@ -48,18 +48,17 @@ def turn(r: float) -> tuple[float, float]:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def cosine_direction(r1: float, r2: float, n0: float, n1: float, n2: float, out: Float) -> float:
-    """A cosine-distributed direction (3,) about the unit normal n, by Duff et al. 2017; returns its cosine."""
+def cosine_direction(r1: float, r2: float, n0: float, n1: float, n2: float) -> tuple[float, float, float, float]:
+    """A cosine-distributed direction about the unit normal n, by Duff et al. 2017, and its cosine."""
     radius = math.sqrt(r1)
     x, y = turn(r2)
     x, y, z = radius * x, radius * y, math.sqrt(1.0 - r1)
     sign = 1.0 if n2 >= 0.0 else -1.0
     c = -1.0 / (sign + n2)
     b = n0 * n1 * c
-    out[0] = x * (1.0 + sign * n0 * n0 * c) + y * b + z * n0
-    out[1] = x * sign * b + y * (sign + n1 * n1 * c) + z * n1
-    out[2] = -x * sign * n0 - y * n1 + z * n2
-    return z
+    t0 = x * (1.0 + sign * n0 * n0 * c) + y * b + z * n0
+    t1 = x * sign * b + y * (sign + n1 * n1 * c) + z * n1
+    return t0, t1, -x * sign * n0 - y * n1 + z * n2, z
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -199,22 +198,24 @@ def _shade_kernel(glossy: bool) -> Any:
                     r1, r2 = pair(table, seed, index, s, base + 1)
                     if rows[k, 0] == SHINING:
                         shining_point(lights, surface, k, r1, r2, lamp, lamp_normal)
+                        e0, e1, e2 = lamp_normal[0], lamp_normal[1], lamp_normal[2]
                         # the ray ends before the shining triangle, though it starts beside p
-                        for axis in range(3):
-                            lamp[axis] += 2.0 * surface_offset * lamp_normal[axis]
+                        away = 2.0 * surface_offset
+                        t0, t1, t2 = lamp[0] + away * e0 - p0, lamp[1] + away * e1 - p1, lamp[2] + away * e2 - p2
                     else:
                         r1, r2 = 2.0 * r1 - 1.0, 2.0 * r2 - 1.0
-                        for axis in range(3):
-                            lamp[axis] = rows[k, 4 + axis] + r1 * rows[k, 7 + axis] + r2 * rows[k, 10 + axis]
-                            lamp_normal[axis] = rows[k, 13 + axis]
-                    t0, t1, t2 = lamp[0] - p0, lamp[1] - p1, lamp[2] - p2
+                        t0 = rows[k, 4] + r1 * rows[k, 7] + r2 * rows[k, 10] - p0
+                        t1 = rows[k, 5] + r1 * rows[k, 8] + r2 * rows[k, 11] - p1
+                        t2 = rows[k, 6] + r1 * rows[k, 9] + r2 * rows[k, 12] - p2
+                        e0, e1, e2 = rows[k, 13], rows[k, 14], rows[k, 15]
                     far = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
-                    t0, t1, t2 = t0 / far, t1 / far, t2 / far
+                    scale = 1.0 / far
+                    t0, t1, t2 = scale * t0, scale * t1, scale * t2
                     facing = n0 * t0 + n1 * t1 + n2 * t2
-                    worth = 1.0 / (chosen * far * far)
+                    worth = scale * scale / chosen
                     lamp_density = other = 0.0
                     if rows[k, 0] != POINT:
-                        lamp_cosine = -(lamp_normal[0] * t0 + lamp_normal[1] * t1 + lamp_normal[2] * t2)
+                        lamp_cosine = -(e0 * t0 + e1 * t1 + e2 * t2)
                         worth *= max(lamp_cosine, 0.0) * rows[k, 16]
                         lamp_density = chosen * far * far / (lamp_cosine * rows[k, 16])
                     if diffuse:
@@ -249,7 +250,8 @@ def _shade_kernel(glossy: bool) -> Any:
             r1, r2 = pair(table, seed, index, s, base)
             side = surface_offset
             if diffuse:
-                density = cosine_direction(r1, r2, n0, n1, n2, towards) / math.pi
+                t0, t1, t2, density = cosine_direction(r1, r2, n0, n1, n2)
+                density *= 1.0 / math.pi
                 w0, w1, w2 = w0 * rho[0], w1 * rho[1], w2 * rho[2]
             else:
                 density = sample(row, rho, o[0], o[1], o[2], choice, r1, r2, towards, f)
@@ -257,14 +259,14 @@ def _shade_kernel(glossy: bool) -> Any:
                     continue
                 leaves = towards[2]
                 to_world(frame, towards)
-                facing = n0 * towards[0] + n1 * towards[1] + n2 * towards[2]
+                t0, t1, t2 = towards[0], towards[1], towards[2]
+                facing = n0 * t0 + n1 * t1 + n2 * t2
                 if facing * leaves <= 0.0:
                     continue
                 side = surface_offset if facing > 0.0 else -surface_offset
                 w0, w1, w2 = w0 * f[0], w1 * f[1], w2 * f[2]
             if not w0 + w1 + w2 > 0.0:
                 continue
-            t0, t1, t2 = towards[0], towards[1], towards[2]
             if last:
                 far = 1e30
                 l0, l1, l2 = environment[0], environment[1], environment[2]
