@@ -141,7 +141,7 @@ class Glass(Model):
         None, label="Refractive index", help="In place of the substance's, at every wavelength.", ge=1.01, le=3.0
     )
     roughness: SmoothOrRough | GreyTexture = quantity(
-        0.0, label="Roughness", help="GGX alpha; 0 polished (below 0.005), 0.1 satin, 0.4 frosted."
+        0.0, label="Surface roughness", help="GGX alpha; 0 polished (below 0.005), 0.1 satin, 0.4 frosted."
     )
     tint: UnitInterval | RGBReflectance = quantity(
         1.0, label="Tint", help="What is left of light at each surface; one number, or R, G, B."
@@ -162,7 +162,7 @@ class Subsurface(Model):
 
     kind: Literal["subsurface"] = "subsurface"
     index: float = quantity(1.5, label="Refractive index", ge=1.01, le=3.0)
-    roughness: float = quantity(0.3, label="Roughness", help="GGX alpha of the boundary.", ge=0.05, le=1.0)
+    roughness: float = quantity(0.3, label="Surface roughness", help="GGX alpha of the boundary.", ge=0.05, le=1.0)
     mean_free_path: MeanFreePath | tuple[MeanFreePath, MeanFreePath, MeanFreePath] = quantity(
         0.0005, unit="m", label="Mean free path", help="From one scattering to the next; one number, or R, G, B."
     )

@@ -43,7 +43,7 @@ LABELS = {"T_rig_camera": "Pose on the rig", "T_rig_laser": "Pose on the rig", "
           "T_world_object": "Pose in the world", "T_world_light": "Pose in the world"}  # fmt: skip
 NAMES = {"MeshFile": "Mesh file", "FromMesh": "From the mesh file", "PointLight": "Point", "Waist": "Focused",
          "RectangleLight": "Rectangle", "NoMotion": "None, a single frame", "Divergence": "Diverging",
-         "Texture": "Image", "PoseList": "List of poses"}  # fmt: skip
+         "Texture": "Image", "GreyTexture": "Image", "PoseList": "List of poses"}  # fmt: skip
 
 
 class _Required:

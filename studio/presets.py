@@ -1,4 +1,4 @@
-"""Cameras, sensors and lasers that come with the program, each with the source of its figures."""
+"""Cameras, sensors, lasers and materials that come with the program, each with the source of its figures."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from typing import Any, Literal
 
 from render.camera import Camera, Lens
 from render.laser import LineLaser
+from render.scene import SceneObject
 from render.sensor import Sensor
 from studio.document import FieldPath, replaced, value_at
 from studio.linked_fields import focal_length, with_focal_length, with_height, with_pixel_pitch, with_width
 from studio.project import Project
 from studio.strict_json import read_object
 
-PresetKind = Literal["cameras", "sensors", "lasers"]
+PresetKind = Literal["cameras", "sensors", "lasers", "materials"]
 FOLDER = Path(__file__).resolve().parent.parent / "assets" / "presets"
 
 CAMERA: FieldPath = ("scene", "rig", "camera")
@@ -24,7 +25,7 @@ SENSOR: FieldPath = ("sensor",)
 
 @dataclass(frozen=True)
 class Preset:
-    """values: fields by model ("camera", "sensor", "laser"), as stored (SI); what is left out stays as it is."""
+    """values: fields by model ("camera", "sensor", "laser", "object"), as stored (SI); what is left out stays."""
 
     name: str
     source: str
@@ -44,18 +45,23 @@ def presets(kind: PresetKind) -> tuple[Preset, ...]:
 def presets_for(project: Project, path: FieldPath) -> tuple[Preset, ...]:
     """Those that fit the item at a path."""
     item = value_at(project, path)
-    kinds: dict[type, PresetKind] = {Camera: "cameras", Sensor: "sensors", LineLaser: "lasers"}
+    kinds: dict[type, PresetKind] = {
+        Camera: "cameras",
+        Sensor: "sensors",
+        LineLaser: "lasers",
+        SceneObject: "materials",
+    }
     kind = kinds.get(type(item))
     return presets(kind) if kind else ()
 
 
 def with_preset(project: Project, path: FieldPath, preset: Preset) -> Project:
-    """The project with a preset's values: the laser's at `path`, the camera's and sensor's at their place.
+    """The project with a preset's values: the laser's or object's at `path`, the camera's and sensor's at their place.
 
     Poses, names and exposure stay. A sensor without a lens keeps the camera's focal length. InputError: does not fit.
     """
-    if "laser" in preset.values:
-        project = _merged(project, path, preset.values["laser"])
+    for at_path in preset.values.keys() & {"laser", "object"}:
+        project = _merged(project, path, preset.values[at_path])
     if "camera" in preset.values:
         camera = with_camera_values(project.scene.camera, preset.values["camera"])
         project = _merged(project, CAMERA, camera)

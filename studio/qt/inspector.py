@@ -46,7 +46,7 @@ class Inspector(QWidget):
         self.title.setFont(font)
         self.kind = QLabel()
         self.kind.setObjectName("muted")
-        self.presets = tool_button("Presets ▾", "Cameras, sensors and lasers with their sources")
+        self.presets = tool_button("Presets ▾", "Cameras, sensors, lasers and materials with their sources")
         self.add = tool_button("Add ▾", "Add to the scene")
         head = QHBoxLayout()
         head.setContentsMargins(0, 0, 0, 0)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkActor, vtkBillboardTextActor3D, vtkPolyDataMapper
 
 from analysis.report.colour import wavelength_colour
+from render.bsdf import DIELECTRIC, EMITTED, EMITTER
 from render.pose import transform_points
 from render.surface import Surface
 from studio import sketch
@@ -29,6 +30,7 @@ LASERS: FieldPath = ("scene", "rig", "lasers")
 OBJECTS: FieldPath = ("scene", "objects")
 LIGHTS: FieldPath = ("scene", "lights")
 SMALL_PX, LINE_PX, CURVE_PX = 1.0, 1.6, 3.0
+GLASS_OPACITY = 0.35
 
 
 class Lines:
@@ -349,14 +351,22 @@ def mesh_actor(surface: Surface) -> vtkActor:
     look.SetAmbient(0.18)
     look.SetDiffuse(0.85)
     if textured:
-        _, height, width = surface.texture_shape[0]
-        image = encoded(surface.textures.reshape(height, width, 3))
+        start, height, width = surface.texture_shape[0]
+        texels = surface.textures[3 * start : 3 * (start + height * width)]
+        image = encoded(texels.reshape(height, width, 3))
         data.active_texture_coordinates = surface.uv.reshape(-1, 2)
         texture = pv.Texture((255.0 * image).astype(np.uint8))
         texture.SetRepeat(True)
         actor.SetTexture(texture)
     else:
         look.SetColor(*(float(c) for c in encoded(surface.albedo[0])))
+    if surface.rows[0, 0] == DIELECTRIC:
+        look.SetOpacity(GLASS_OPACITY)
+    elif surface.rows[0, 0] == EMITTER:
+        shine = surface.rows[0, EMITTED : EMITTED + 3]
+        look.SetColor(*(float(c) for c in encoded(shine / max(float(shine.max()), 1e-30))))
+        look.SetAmbient(1.0)
+        look.SetDiffuse(0.0)
     mapper.SetInputData(data)
     return actor
 

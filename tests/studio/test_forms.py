@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import random
 from typing import Any
@@ -153,6 +154,67 @@ class TestKinds:
                 assert owner is None or owner.value is not None
                 changed = edited(project, path[:-1], FieldSpec(str(path[-1]), "", "", "union", None), value)
                 assert describe_item(changed, path).chosen == i
+
+
+class TestMaterials:
+    PATH = ("scene", "objects", 0, "material")
+
+    def kinds(self, project: Project) -> tuple[Alternative, ...]:
+        return describe_item(project, self.PATH).alternatives
+
+    def test_every_material_is_offered_with_every_field_in_shown_units(self, project: Project) -> None:
+        kinds = self.kinds(project)
+        labels = ["Lambertian", "Conductor", "Coated", "Blend", "Glass", "Subsurface", "Emitter"]
+        assert [kind.label for kind in kinds] == labels
+        assert all(kind.help for kind in kinds)
+        changed = edited(project, self.PATH[:-1], describe_item(project, self.PATH), start_value(kinds[5], None))
+        free = next(field for field in describe_item(changed, self.PATH).fields if field.name == "mean_free_path")
+        assert [choice.label for choice in free.alternatives] == ["One value", "R, G, B"]
+        assert (free.unit.shown, free.unit.format(free.fields[0].value)) == ("mm", "0.5")
+
+    @pytest.mark.parametrize("kind", [1, 2, 4, 5, 6])
+    def test_each_part_of_a_material_takes_every_kind_it_offers(self, project: Project, kind: int) -> None:
+        chosen = start_value(self.kinds(project)[kind], None)
+        assert isinstance(chosen, BaseModel)
+        project = edited(project, self.PATH[:-1], describe_item(project, self.PATH), chosen)
+        parts = 0
+        for field in describe_item(project, self.PATH).fields:
+            for alternative in field.alternatives:
+                value = start_value(alternative, field.value, "map.png")
+                changed = edited(project, self.PATH, field, value)
+                assert getattr(value_at(changed, self.PATH), field.name) == value
+                assert Project.from_text(changed.to_text()) == changed
+                parts += 1
+        assert parts >= 5
+
+    def test_glass_is_polished_unless_said_otherwise(self, project: Project) -> None:
+        kinds = self.kinds(project)
+        ground = start_value(kinds[1], None).model_copy(update={"roughness": 0.3})
+        assert start_value(kinds[4], ground).roughness == 0.0
+        assert start_value(kinds[2], start_value(kinds[4], ground)).roughness == 0.1
+
+    @pytest.mark.parametrize(
+        ("kind", "field", "value", "allowed"),
+        [
+            ("conductor", "roughness", -0.1, "greater than or equal to 0"),
+            ("conductor", "tint", 1.2, "less than or equal to 1"),
+            ("glass", "tint", [0.5, 1.5, 0.5], "less than or equal to 1"),
+            ("glass", "index", 0.9, "greater than or equal to 1.01"),
+            ("glass", "substance", "cheese", "polycarbonate"),
+            ("subsurface", "roughness", 0.0, "greater than or equal to 0.05"),
+            ("subsurface", "scattering_albedo", 1.1, "less than or equal to 0.99999"),
+            ("emitter", "radiance", [1, -1, 1], "greater than or equal to 0"),
+            ("lambertian", "relief", {"kind": "bump_map", "path": "a.png", "height": 5}, "less than or equal to 1"),
+        ],
+    )
+    def test_what_cannot_be_is_refused_by_name(
+        self, project: Project, kind: str, field: str, value: object, allowed: str
+    ) -> None:
+        data = json.loads(project.to_text())
+        data["scene"]["objects"][0]["material"] = {"kind": kind, field: value}
+        with pytest.raises(InputError) as error:
+            Project.from_text(json.dumps(data))
+        assert f"scene.objects[0].material.{field}" in str(error.value) and allowed in str(error.value)
 
 
 class TestLinkedFields:

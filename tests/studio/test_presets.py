@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import get_args
 
+import numpy as np
 import pytest
 
+from render.material import Blend, Subsurface
+from render.material_rows import material_row
 from render.response import laser_response
 from studio.document import Document, replaced, value_at
 from studio.presets import Preset, PresetKind, presets, presets_for, with_preset
@@ -15,6 +19,7 @@ from studio.templates import template_folder
 
 LASER = ("scene", "rig", "lasers", 0)
 CAMERA = ("scene", "rig", "camera")
+OBJECT = ("scene", "objects", 0)
 ALL = [(kind, preset) for kind in get_args(PresetKind) for preset in presets(kind)]
 
 
@@ -28,14 +33,24 @@ def named(kind: PresetKind, part: str) -> Preset:
 
 
 def place(kind: str) -> tuple[str | int, ...]:
-    return {"lasers": LASER, "cameras": CAMERA, "sensors": ("sensor",)}[kind]
+    return {"lasers": LASER, "cameras": CAMERA, "sensors": ("sensor",), "materials": OBJECT}[kind]
 
 
 @pytest.mark.parametrize(("kind", "preset"), ALL, ids=[preset.name for _, preset in ALL])
 def test_every_preset_fits_and_says_where_its_figures_come_from(project: Project, kind: str, preset: Preset) -> None:
     assert len(preset.source) > 40
     changed = with_preset(project, place(kind), preset)
-    assert changed.scene.objects == project.scene.objects
+    if kind == "materials":
+        before, after = project.scene.objects[0], changed.scene.objects[0]
+        assert before.model_copy(update={"material": after.material}) == after
+        # every field as the file says, and a row of numbers for the kernels
+        written = preset.values["object"]["material"]
+        dumped = json.loads(after.material.model_dump_json())
+        assert {name: dumped[name] for name in written} == written
+        assert not isinstance(after.material, Blend)
+        assert np.isfinite(material_row(after.material, (660.0, 520.0, 450.0))).all()
+    else:
+        assert changed.scene.objects == project.scene.objects
     assert changed.scene.camera.T_rig_camera == project.scene.camera.T_rig_camera
     assert changed.scene.lasers[0].T_rig_laser == project.scene.lasers[0].T_rig_laser
     assert changed.scene.lasers[0].name == project.scene.lasers[0].name
@@ -66,6 +81,19 @@ def test_the_papers_laser_has_the_power_colour_and_fan_of_its_name(project: Proj
     assert laser.fan_angle == pytest.approx(math.radians(45))
 
 
+def test_media_have_the_coefficients_of_their_table(project: Project) -> None:
+    # Jensen et al. 2001, table 1, per mm
+    for name, scattering, absorption in (
+        ("Marble", (2.19, 2.62, 3.00), (0.0021, 0.0041, 0.0071)),
+        ("Skin", (0.74, 0.88, 1.01), (0.032, 0.17, 0.48)),
+    ):
+        material = with_preset(project, OBJECT, named("materials", name)).scene.objects[0].material
+        assert isinstance(material, Subsurface)
+        free, albedo = np.array(material.mean_free_path), np.array(material.scattering_albedo)
+        assert albedo / free / 1e3 == pytest.approx(scattering, rel=1e-3)
+        assert (1 - albedo) / free / 1e3 == pytest.approx(absorption, rel=1e-2)
+
+
 def test_another_sensor_keeps_the_lens(project: Project) -> None:
     changed = with_preset(project, ("sensor",), named("sensors", "IMX174"))
     camera = changed.scene.camera
@@ -94,8 +122,8 @@ def test_a_preset_is_one_undoable_edit(project: Project) -> None:
 
 
 def test_items_without_presets_offer_none(project: Project) -> None:
-    assert presets_for(project, ("scene", "objects", 0)) == ()
+    assert presets_for(project, ("scene", "motion")) == ()
     assert presets_for(project, ()) == ()
-    for kind in ("lasers", "cameras", "sensors"):
+    for kind in ("lasers", "cameras", "sensors", "materials"):
         assert presets_for(project, place(kind)) == presets(kind)  # type: ignore[arg-type]
         assert value_at(project, place(kind)) is not None
