@@ -16,6 +16,7 @@ PAGES = {
     "viewport": "3D view",
     "scene": "Scene",
     "inspector": "Inspector",
+    "materials": "Materials",
     "camera": "Camera view",
     "readout": "Design",
     "render": "Render",
