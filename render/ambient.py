@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from render.camera import Camera
 from render.camera_paths import WAVE, CameraPaths, camera_paths
+from render.errors import Cancelled
 from render.scene import Scene
 from render.threads import Cancel, Progress, map_chunks
 from render.wave import CLAMPED, CUT, DROPPED
@@ -70,13 +71,32 @@ def ambient_images(
     threads: int | None = None,
     cancelled: Cancel | None = None,
     progress: Progress | None = None,
+    keeps: Cancel | None = None,
 ) -> Iterator[AmbientImage]:
     """Ever better images, until the relative error is at most `target` or `most` samples a pixel are spent.
 
-    surfaces: the most that light may meet, None for no bound; clamp, W/(m^2 sr): see `CameraPaths`. Raises Cancelled.
+    surfaces: the most that light may meet, None for no bound; clamp, W/(m^2 sr): see `CameraPaths`. Raises Cancelled;
+    where keeps() then says so, after one more image, of all tiles that are done.
     """
     paths = camera_paths(world, scene, camera.view(T_world_camera), surfaces=surfaces, clamp=clamp, seed=seed)
     film = _Film(camera.width, camera.height)
+    try:
+        yield from _passes(film, paths, target, most, threads, cancelled, progress)
+    except Cancelled:
+        if keeps is not None and keeps() and np.all(film.done.sum(axis=1) > 0):
+            yield film.image()
+        raise
+
+
+def _passes(
+    film: _Film,
+    paths: CameraPaths,
+    target: float,
+    most: int,
+    threads: int | None,
+    cancelled: Cancel | None,
+    progress: Progress | None,
+) -> Iterator[AmbientImage]:
     even = np.ones((film.tiles, 2))
     wanted, error = 1.0, math.nan
     if most == 1:
@@ -155,10 +175,16 @@ class _Film:
             for number in range(start, stop):
                 self._expose_tiles(paths, chunks[number], more, tallies[number], cancelled)
 
-        map_chunks(work, len(chunks), 1, threads, cancelled, progress)
-        self.done = self.done + more
-        # in the order of the chunks, whichever thread was first
-        self.tally = self.tally + tallies.sum(axis=0)
+        try:
+            map_chunks(work, len(chunks), 1, threads, cancelled, progress)
+        finally:
+            # in the order of the chunks, whichever thread was first
+            self.tally = self.tally + tallies.sum(axis=0)
+        return self.image()
+
+    def image(self) -> AmbientImage:
+        """Of the samples so far."""
+        pixels_of = self._size_of(np.arange(self.tiles))
         image = np.empty((self.height, self.width, 3), np.float32)
         difference, power = develop_halves(self.sums, self.done, self.across, image)
         halves = bool(np.all(self.done > 0))
@@ -200,6 +226,8 @@ class _Film:
             for half in range(2):
                 self.spread[tiles, half] = np.bincount(place, squares[:, half], len(tiles))
         self.sums[pixels] += new
+        # no tile is in two chunks, and none is half done
+        self.done[tiles] += more[tiles]
 
     def _size_of(self, tiles: NDArray[np.int64]) -> NDArray[np.int64]:
         """(n,) pixels in each tile; those at the right and lower edge may be cut."""

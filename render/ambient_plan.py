@@ -104,8 +104,12 @@ def planned_images(
     threads: int | None = None,
     cancelled: Cancel | None = None,
     progress: Progress | None = None,
+    keeps: Cancel | None = None,
 ) -> Iterator[tuple[AmbientImage, dict[str, float]]]:
-    """Ever better images as the plan says, and what `Frame.counts` tells of each. Raises Cancelled."""
+    """Ever better images as the plan says, and what `Frame.counts` tells of each; keeps: see `ambient_images`.
+
+    Raises Cancelled.
+    """
     images = ambient_images(
         world,
         scene,
@@ -119,6 +123,7 @@ def planned_images(
         threads=threads,
         cancelled=cancelled,
         progress=progress,
+        keeps=keeps,
     )
     for image in images:
         counts = {AMBIENT_SAMPLES: image.samples, DROPPED_SAMPLES: float(image.dropped)}

@@ -68,11 +68,13 @@ def refine(
     threads: int | None = None,
     progress: Progress | None = None,
     cancelled: Cancel | None = None,
+    keeps: Cancel | None = None,
 ) -> Iterator[Frame]:
     """Frames of a world placed for `step`, each usable and better than the one before; the last is the final one.
 
     `Frame.ambient` and `Frame.truth` are None until their turn comes. `Frame.counts` tells the estimated relative error
-    of each laser and of the ambient light. Raises InputError, Cancelled.
+    of each laser and of the ambient light. keeps: asked when cancelled, whether the unfinished ambient light is wanted,
+    as one more frame. Raises InputError, Cancelled.
     """
     settings = settings or RenderSettings()
     clock = _Clock(_workload(world, scene, settings), progress)
@@ -133,6 +135,7 @@ def refine(
                 threads=threads,
                 cancelled=cancelled,
                 progress=report,
+                keeps=keeps,
             ):
                 frame = told(replace(frame, ambient=image.radiance), **counts)
                 yield frame

@@ -125,7 +125,7 @@ class RenderPanel(QWidget):
         refined = self._refined
 
         def work(progress: Progress, cancelled: Cancel) -> None:
-            render_frames(project, root, step, world, progress, cancelled, refined.emit)
+            render_frames(project, root, step, world, progress, cancelled, refined.emit, lambda: self._keep)
 
         number = max([render.number for render in session.renders], default=0) + 1
         self._template = (number, project, source, image_scale)
@@ -326,8 +326,12 @@ def render_frames(
     progress: Progress,
     cancelled: Cancel,
     take: Callable[[World, Frame], None],
+    keeps: Cancel,
 ) -> None:
-    """Load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled."""
+    """Load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled.
+
+    keeps: whether a cancelled render is kept, with all that was done.
+    """
     if world is None:
         progress("loading meshes", 0.0)
         world = build_world(project.scene, root, step)
@@ -340,6 +344,7 @@ def render_frames(
         seed=project.seed,
         progress=progress,
         cancelled=cancelled,
+        keeps=keeps,
     ):
         take(world, frame)
 

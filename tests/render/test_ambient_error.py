@@ -173,3 +173,35 @@ def test_shining_objects_are_ambient_light():
     assert has_ambient(scene)
     dark, _ = scene_with(paper_camera(0.01), (plane_mesh((0, 0, 1), 1.0), Emitter(radiance=(0.0, 0.0, 0.0))))
     assert not has_ambient(dark)
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_an_unfinished_pass_is_kept_where_that_is_wanted(wanted):
+    scene, world = box_on_a_wall(0.1)
+    images, calls, limit = [], itertools.count(), [10**9]
+
+    def cancelled():
+        return next(calls) > limit[0]
+
+    with pytest.raises(Cancelled):
+        for image in ambient_images(
+            world,
+            scene,
+            scene.camera,
+            scene.T_world_camera(0),
+            target=1e-6,
+            most=4096,
+            threads=1,
+            cancelled=cancelled,
+            keeps=lambda: wanted,
+        ):
+            images.append(image)
+            if len(images) == 3:
+                limit[0] = next(calls) + 30  # some chunks into the next pass
+    assert len(images) == (4 if wanted else 3)
+    if wanted:
+        before, kept = images[-2:]
+        assert kept.samples > 1.1 * before.samples
+        same = np.all(before.radiance == kept.radiance, axis=2).mean()
+        assert 0.02 < same < 0.98  # whole tiles of the new pass, the others as they were
+        assert np.abs(kept.radiance - before.radiance).mean() < 0.1 * before.radiance.mean()
