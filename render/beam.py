@@ -39,7 +39,7 @@ def fan_density(y: float, beam: Array) -> float:
         return 0.0
     if beam[5] == CONSTANT:
         # dOmega = (1 + Y^2)^(-3/2) dY; integrates to 2 sin(fan / 2) = 2 edge / sqrt(1 + edge^2)
-        return (1.0 + y * y) ** -1.5 * math.sqrt(1.0 + edge * edge) / (2.0 * edge)
+        return math.sqrt((1.0 + edge * edge) / (1.0 + y * y)) / ((1.0 + y * y) * 2.0 * edge)
     if beam[5] == GAUSSIAN:
         sigma = 0.5 * edge
         return math.exp(-0.5 * (y / sigma) ** 2) * INV_SQRT_2PI / (sigma * math.erf(edge / (sigma * SQRT2)))

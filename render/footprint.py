@@ -61,10 +61,12 @@ def mark_triangles(
     beam: Float,
     blur: float,
     mask: NDArray[np.uint8],
+    extent: NDArray[np.int64],
 ) -> None:
     """Set mask (h, w) wherever triangles start..stop may show direct light of the laser.
 
-    blur: px of the blur disc's radius for a difference of 1/m in 1 / depth; 0 for a pinhole.
+    extent (4,): widened to the marked rows and columns, first and last of each. blur: px of the blur disc's radius for
+    a difference of 1/m in 1 / depth; 0 for a pinhole.
     """
     height, width = mask.shape
     vertices, triangles, camera_centre = surface.vertices, surface.triangles, view.T_world_camera[:3, 3]
@@ -162,8 +164,12 @@ def mark_triangles(
                             left[bottom], right[bottom] = width, -1
                     left[y], right[y] = min(left[y], column - margin), max(right[y], column + margin)
         for y in range(top, bottom + 1):
-            for x in range(max(left[y], 0), min(right[y], width - 1) + 1):
+            first, last = max(left[y], 0), min(right[y], width - 1)
+            for x in range(first, last + 1):
                 mask[y, x] = 1
+            if first <= last:
+                extent[0], extent[1] = min(extent[0], y), max(extent[1], y)
+                extent[2], extent[3] = min(extent[2], first), max(extent[3], last)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -191,26 +197,21 @@ def blur_scale(view: View, height: int) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def marked_pixels(mask: NDArray[np.uint8]) -> Int:
-    """(n,) flags -> ascending indices of the set ones; eight at a time, since nearly all are clear."""
-    words = mask[: len(mask) // 8 * 8].view(np.uint64)
-    most = 8
-    for i in range(len(words)):
-        if words[i] != 0:
-            most += 8
-    out = np.empty(most, dtype=np.int32)
+def marked_pixels(mask: NDArray[np.uint8], extent: NDArray[np.int64]) -> Int:
+    """(h, w) flags, rows and columns (first, last) that hold all set ones -> their ascending flat indices."""
+    width = mask.shape[1]
+    count = 0
+    for y in range(extent[0], extent[1] + 1):
+        for x in range(extent[2], extent[3] + 1):
+            count += mask[y, x]
+    out = np.empty(count, dtype=np.int32)
     k = 0
-    for i in range(len(words)):
-        if words[i] != 0:
-            for j in range(8 * i, 8 * i + 8):
-                if mask[j]:
-                    out[k] = j
-                    k += 1
-    for j in range(8 * len(words), len(mask)):
-        if mask[j]:
-            out[k] = j
-            k += 1
-    return out[:k].copy()
+    for y in range(extent[0], extent[1] + 1):
+        for x in range(extent[2], extent[3] + 1):
+            if mask[y, x]:
+                out[k] = y * width + x
+                k += 1
+    return out
 
 
 def reachable_pixels(
@@ -227,8 +228,18 @@ def reachable_pixels(
     view, surface, laser_centre, beam = camera.view(T_world_camera), world.surface, T_world_laser[:3, 3], laser.packed()
     blur = blur_scale(view, camera.height)
 
+    # of each chunk its own, so that threads do not meet
+    chunks = -(-len(world.triangles) // TRIANGLES_A_CHUNK)
+    extents = np.tile(np.array([camera.height, -1, camera.width, -1]), (chunks, 1))
+
     def work(start: int, stop: int) -> None:
-        mark_triangles(start, stop, surface, view, T_laser_world, T_camera_laser, laser_centre, beam, blur, mask)
+        extent = extents[start // TRIANGLES_A_CHUNK]
+        mark_triangles(
+            start, stop, surface, view, T_laser_world, T_camera_laser, laser_centre, beam, blur, mask, extent
+        )
 
     map_chunks(work, len(world.triangles), TRIANGLES_A_CHUNK, threads)
-    return marked_pixels(mask.ravel())
+    if not chunks:
+        return np.zeros(0, np.int32)
+    extent = np.array([extents[:, 0].min(), extents[:, 1].max(), extents[:, 2].min(), extents[:, 3].max()])
+    return marked_pixels(mask, extent)

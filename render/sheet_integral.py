@@ -17,6 +17,9 @@ from render.beam import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2
 
 Float = NDArray[np.float64]
 
+SMALL = 0.3
+"""Half-widths of a cell, together, in sigmas, below which a series does."""
+
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def sheet_slope(
@@ -64,8 +67,16 @@ def _mean_gaussian(q: float, half: float) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def mean_over(q: float, half_u: float, half_v: float) -> float:
-    """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v."""
-    half_v = abs(half_v)
+    """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v; a series for small ones."""
+    half_u, half_v = abs(half_u), abs(half_v)
+    if half_u + half_v < SMALL:
+        if abs(q) - half_u - half_v > SHEET_SIGMAS:
+            return 0.0
+        # moments of the cell times Hermite polynomials: Taylor, to 1e-6
+        a, b, square = half_u * half_u, half_v * half_v, q * q
+        second, fourth = (a + b) / 6.0, (a * a + b * b) / 120.0 + a * b / 36.0
+        series = 1.0 + second * (square - 1.0) + fourth * ((square - 6.0) * square + 3.0)
+        return math.exp(-0.5 * square) * INV_SQRT_2PI * max(series, 0.0)
     if half_v < 0.02:
         return _mean_gaussian(q, half_u)
     if half_v < 0.5:
@@ -79,6 +90,15 @@ def mean_over(q: float, half_u: float, half_v: float) -> float:
         offset = (0.5773502691896257 if i % 2 else -0.5773502691896257) / (nodes // 2)
         total += _mean_gaussian(q + half_v * (centre + offset), half_u)
     return total / nodes
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def about_over(q: float, half_u: float, half_v: float) -> float:
+    """`mean_over` cheaply: the cell as a Gaussian of its variance; right to 1e-3 for half-widths of half a sigma."""
+    if abs(q) - abs(half_u) - abs(half_v) > SHEET_SIGMAS:
+        return 0.0
+    variance = 1.0 + (half_u * half_u + half_v * half_v) / 3.0
+    return math.exp(-0.5 * q * q / variance) * INV_SQRT_2PI / math.sqrt(variance)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
