@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from render.camera import Camera
 from render.camera_rays import camera_rays, lens_rays
-from render.direct_lens import gather_aperture
+from render.direct_lens import gather_aperture, worst_enough
 from render.direct_shade import (
     gather,
     place,
@@ -108,6 +108,8 @@ def direct_image(
             return DirectImage(image.reshape(shape), relative, count, samples)
         # a pixel below half of its equal share cannot keep the image from its target
         rough = error > 0.5 * target * signal
+        if camera.lens.model == "thin-lens":
+            rough &= worst_enough(error, (0.8 * target * signal) ** 2 * count)
         # all rays may miss the edge of a shadow that cuts a pixel's corner: its neighbours tell
         todo = np.flatnonzero(with_neighbours(rough, pixels, camera.width))
         cells *= 2
