@@ -189,6 +189,9 @@ def _shade_kernel(glossy: bool) -> Any:
             if not diffuse:
                 for axis in range(3):
                     o[axis] = -(frame[axis, 0] * d0 + frame[axis, 1] * d1 + frame[axis, 2] * d2)
+                # seen from one side of the facet and of the normal that is shaded, or light from behind leaks through
+                if o[2] * (n0 * d0 + n1 * d1 + n2 * d2) >= 0.0:
+                    continue
             pick_number, stay_number = 0.0, 0.0
             if rows.shape[0] > 1 or depth + 1 >= ROULETTE_AFTER:
                 pick_number, stay_number = pair(table, seed, index, s, base + 3)

@@ -88,6 +88,9 @@ def interact(
         for axis in range(3):
             v[SHADING + axis], v[TANGENT + axis] = frame[2, axis], frame[0, axis]
             v[BACK + axis] = -(frame[axis, 0] * d0 + frame[axis, 1] * d1 + frame[axis, 2] * d2)
+        # on one side of the facet and of the normal that is shaded, or light from behind would leak through
+        if v[BACK + 2] * cosine >= 0.0:
+            continue
         v[MATERIAL] = slot
         v[REFLECTANCE] = weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
         v[ALPHA], v[ALPHA + 1] = alpha[0], alpha[1]

@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 
 from render import bsdf
+from render.ambient import ambient_image
+from render.bidirectional import indirect_image, indirect_shares
 from render.direct import direct_image
 from render.interaction import interaction, light_side
 from render.laser import Divergence
+from render.lights import PointLight
 from render.material import (
     BumpMap,
     Coated,
@@ -28,7 +31,8 @@ from render.mesh_files import load_mesh
 from render.pose import Pose
 from render.scene import SceneObject
 from render.shape import Box, Cylinder, Plane, Sphere
-from render.world import place_meshes
+from render.truth import truth_images
+from render.world import build_world, place_meshes
 from tests.render.scenes import paper_camera, paper_laser, scene_of
 
 TILT = math.radians(12)
@@ -283,3 +287,37 @@ def test_plain_materials_are_left_as_they_are(tmp_path):
     assert world.normals.shape == (0, 3, 3) and not world.detail.any()
     _, _, normal, frame, _ = shaded(world)
     assert frame[:, 2] == pytest.approx(normal)
+
+
+def screen(tmp_path, relief, steep):
+    """A sheet across the view; lamp, laser and a wall that they light are behind it. Steeply seen, or steeply lit."""
+    sheet = SceneObject(
+        name="sheet",
+        shape=Plane(width=6.0, height=6.0),
+        material=Lambertian(albedo=0.9, relief=relief),
+        T_world_object=Pose(translation=(0.0, 0.0, 0.6), rotation=(0.0, math.radians(65) if steep else math.pi, 0.0)),
+    )
+    behind = Pose(translation=(0.5, 0.0, 0.8))
+    beyond = Pose(translation=(0.5, 0.0, 1.5))
+    if not steep:
+        behind = Pose(translation=(0.5, 0.0, 0.75), rotation=(0.0, math.pi / 2, 0.0))
+        beyond = Pose(translation=(0.9, 0.0, 1.1), rotation=(0.0, -math.pi / 2, 0.0))
+    wall = SceneObject(name="wall", shape=Plane(), T_world_object=beyond)
+    lamp = PointLight(name="lamp", intensity=(5.0, 5.0, 5.0), T_world_light=behind)
+    laser = paper_laser(T_rig_laser=behind)
+    scene = scene_of(paper_camera(0.02), laser, lights=(lamp,)).model_copy(update={"objects": (sheet, wall)})
+    return scene, build_world(scene, tmp_path)
+
+
+@pytest.mark.parametrize(("steep", "lean"), [(True, 0), (True, 1), (True, -1), (False, 1), (False, -1)])
+def test_no_light_leaks_through_a_sheet_whatever_its_relief(tmp_path, steep, lean):
+    name = normal_image(tmp_path / "n.png", (lean * 0.8, 0.0, 0.6))
+    scene, world = screen(tmp_path, NormalMap(path=name) if lean else None, steep)
+    pose, T_laser = scene.T_world_camera(), scene.T_world_laser(0)
+    view = truth_images(world, scene.camera, pose)
+    assert (view.object_id == 0).all()
+    assert not ambient_image(world, scene, scene.camera, pose, samples=16, surfaces=None).any()
+    image = indirect_image(world, scene.camera, scene.lasers[0], pose, T_laser, target=0.5, most_paths=1 << 20)
+    assert not image.radiance.any()
+    # there is light behind
+    assert indirect_shares(world, scene.camera, scene.lasers[0], T_laser, T_laser).plain[0] > 0.0
