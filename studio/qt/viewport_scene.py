@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkActor, vtkBillboardTextActor3D, vtkPolyDataMapper
 
 from analysis.report.colour import wavelength_colour
-from render.bsdf import DIELECTRIC, EMITTED, EMITTER
 from render.pose import transform_points
-from render.surface import Surface
 from studio import sketch
 from studio.document import FieldPath
 from studio.preview import Body, Look
+from studio.qt.mesh_actor import mesh_actor
 from studio.qt.theme import Colours, mixed
 
 Float = NDArray[np.float64]
@@ -30,7 +29,6 @@ LASERS: FieldPath = ("scene", "rig", "lasers")
 OBJECTS: FieldPath = ("scene", "objects")
 LIGHTS: FieldPath = ("scene", "lights")
 SMALL_PX, LINE_PX, CURVE_PX = 1.0, 1.6, 3.0
-GLASS_OPACITY = 0.35
 
 
 class Lines:
@@ -332,48 +330,6 @@ def object_path(look: Look, visible_index: int) -> FieldPath:
     """Path of the i-th visible object."""
     item = look.scene.visible_objects[visible_index]
     return (*OBJECTS, next(i for i, other in enumerate(look.scene.objects) if other is item))
-
-
-def mesh_actor(surface: Surface) -> vtkActor:
-    """Triangles with their colour or texture. Flat facets: smooth shading would hide what the light really meets."""
-    textured = surface.texture_shape[0, 1] > 0
-    vertices = surface.vertices[surface.triangles.ravel()] if textured else surface.vertices
-    triangles = np.arange(len(vertices)).reshape(-1, 3) if textured else surface.triangles
-    cells = np.empty((len(triangles), 4), dtype=np.int64)
-    cells[:, 0], cells[:, 1:] = 3, triangles
-    data = pv.PolyData(vertices.astype(np.float32), faces=cells.ravel())
-    mapper = vtkPolyDataMapper()
-    mapper.ScalarVisibilityOff()
-    actor = vtkActor()
-    actor.SetMapper(mapper)
-    look = actor.GetProperty()
-    look.SetInterpolationToFlat()
-    look.SetAmbient(0.18)
-    look.SetDiffuse(0.85)
-    if textured:
-        start, height, width = surface.texture_shape[0]
-        texels = surface.textures[3 * start : 3 * (start + height * width)]
-        image = encoded(texels.reshape(height, width, 3))
-        data.active_texture_coordinates = surface.uv.reshape(-1, 2)
-        texture = pv.Texture((255.0 * image).astype(np.uint8))
-        texture.SetRepeat(True)
-        actor.SetTexture(texture)
-    else:
-        look.SetColor(*(float(c) for c in encoded(surface.albedo[0])))
-    if surface.rows[0, 0] == DIELECTRIC:
-        look.SetOpacity(GLASS_OPACITY)
-    elif surface.rows[0, 0] == EMITTER:
-        shine = surface.rows[0, EMITTED : EMITTED + 3]
-        look.SetColor(*(float(c) for c in encoded(shine / max(float(shine.max()), 1e-30))))
-        look.SetAmbient(1.0)
-        look.SetDiffuse(0.0)
-    mapper.SetInputData(data)
-    return actor
-
-
-def encoded(linear: Any) -> Any:
-    """Reflectance as the screen shows it (a power of 1 / 2.2)."""
-    return np.clip(linear, 0.0, 1.0) ** (1.0 / 2.2)
 
 
 def _placed(T: Float, points: Float, pairs: list[tuple[int, int]]) -> tuple[Float, list[tuple[int, int]]]:

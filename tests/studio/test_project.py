@@ -226,6 +226,29 @@ class TestDamagedFiles:
         assert Project.load(path) == Project.load(SAMPLE_FILE)
 
 
+def with_every_material() -> dict[str, Any]:
+    """The sample with an object of every material, each with all it may have."""
+    data, grey = copy.deepcopy(SAMPLE), {"path": "a.png", "scale": 0.5}
+    normals, bumps = {"kind": "normal_map", "path": "n.png"}, {"kind": "bump_map", "path": "h.png", "height": 1e-3}
+    rgb = [0.9, 0.8, 0.7]
+    materials: list[dict[str, Any]] = [
+        {"kind": "conductor", "metal": "gold", "roughness": grey, "roughness_across": 0.2, "relief": normals},
+        {"kind": "coated", "albedo": rgb, "roughness": grey, "relief": bumps},
+        {"kind": "glass", "substance": "SF11", "index": 1.7, "roughness": grey, "tint": rgb, "relief": normals},
+        {"kind": "subsurface", "mean_free_path": [1e-3, 2e-3, 3e-3], "scattering_albedo": rgb, "anisotropy": 0.5},
+        {"kind": "emitter", "radiance": [1, 2, 3], "albedo": {"source": "mesh"}, "relief": bumps},
+        {"kind": "blend", "base": {"kind": "lambertian"}, "over": {"kind": "coated"}, "mask": {"path": "m.png"}},
+    ]
+    for i, material in enumerate(materials):
+        shape = {"kind": "sphere", "radius": 0.01}
+        item = {"name": f"ball {i}", "shape": shape, "material": material, "crease_angle": 0.5}
+        data["scene"]["objects"].append(item)
+    return data
+
+
+CROWDED = with_every_material()
+CROWDED_PATHS = [*ALL_PATHS, *(path for path in paths_of(CROWDED) if path not in ALL_PATHS for _ in range(3))]
+
 ODD_VALUES = st.one_of(
     st.none(),
     st.booleans(),
@@ -258,12 +281,19 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class TestAnyFile:
+    def test_every_material_is_a_valid_start(self) -> None:
+        project = Project.from_text(json.dumps(CROWDED))
+        assert {item.material.kind for item in project.scene.objects} == {
+            *("lambertian", "conductor", "coated", "glass", "subsurface", "emitter", "blend")
+        }
+        assert Project.from_text(project.to_text()) == project
+
     @settings(max_examples=300, deadline=None)
     @given(data=st.data())
     def test_mutated_projects_are_valid_or_refused(self, path: Path, data: st.DataObject) -> None:
-        project = copy.deepcopy(SAMPLE)
+        project = copy.deepcopy(CROWDED)
         for _ in range(data.draw(st.integers(1, 3))):
-            *parents, last = data.draw(st.sampled_from(ALL_PATHS))
+            *parents, last = data.draw(st.sampled_from(CROWDED_PATHS))
             place: Any = project
             try:
                 for part in parents:
