@@ -295,3 +295,15 @@ def test_an_aperture_blurs_reflected_light_and_keeps_it():
         light = image.sum(axis=1)
         spread.append(light @ (x - light @ x / light.sum()) ** 2 / light.sum())
     assert spread[1] - spread[0] == pytest.approx(disc**2 / 16, rel=0.1)
+
+
+@pytest.mark.parametrize("albedo", [0.5, 0.9])
+def test_an_integrating_sphere_is_evenly_lit_by_all_light_but_the_first(albedo):
+    # the first reflection spreads evenly over a sphere; the rest is the series a^2 + a^3 + ...
+    ball = primitive_mesh(Sphere(radius=1.0, segments=256))
+    _, parts = setting([ball], [Lambertian(albedo=albedo)])
+    radiance = indirect_image(*parts, target=0.5, most_paths=1 << 18, seed=4).radiance
+    expected = albedo / math.pi * albedo * parts[2].power / (4.0 * math.pi) / (1.0 - albedo)
+    assert radiance.mean() == pytest.approx(expected, rel=0.01)
+    halves = radiance[:, : radiance.shape[1] // 2].mean(), radiance[:, radiance.shape[1] // 2 :].mean()
+    assert halves == pytest.approx((expected, expected), rel=0.02)
