@@ -300,10 +300,10 @@ def test_an_aperture_blurs_reflected_light_and_keeps_it():
 @pytest.mark.parametrize("albedo", [0.5, 0.9])
 def test_an_integrating_sphere_is_evenly_lit_by_all_light_but_the_first(albedo):
     # the first reflection spreads evenly over a sphere; the rest is the series a^2 + a^3 + ...
-    ball = primitive_mesh(Sphere(radius=1.0, segments=256))
+    ball = primitive_mesh(Sphere(radius=1.0, segments=128))
     _, parts = setting([ball], [Lambertian(albedo=albedo)])
-    radiance = indirect_image(*parts, target=0.5, most_paths=1 << 18, seed=4).radiance
+    radiance = indirect_image(*parts, target=0.5, most_paths=1 << 16, seed=4).radiance
     expected = albedo / math.pi * albedo * parts[2].power / (4.0 * math.pi) / (1.0 - albedo)
-    assert radiance.mean() == pytest.approx(expected, rel=0.01)
+    assert radiance.mean() == pytest.approx(expected, rel=0.015)
     halves = radiance[:, : radiance.shape[1] // 2].mean(), radiance[:, radiance.shape[1] // 2 :].mean()
-    assert halves == pytest.approx((expected, expected), rel=0.02)
+    assert halves == pytest.approx((expected, expected), rel=0.03)
