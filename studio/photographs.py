@@ -30,6 +30,8 @@ from studio.reconstruct import MAX_IMAGE_BYTES, read_image
 SCARCE, PLENTY = 0.25, 0.5
 """Shares of scan lines with a line: below the first, the other axis is tried, and named if it has the second."""
 GAIN_ROUNDS = 5
+PLATEAU = 32
+"""Pixels of one number that a sensor's limit makes, and chance does not."""
 SATURATED_SHARE = 0.5
 """Of the scan lines; an exposure with more of them is no base to estimate noise from."""
 COLUMNS = ("scan_line", "rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "flag")
@@ -123,7 +125,7 @@ def fuse_files(
             image = check_image(load_photograph(path))
             if image.ndim != 2:
                 raise InputError("exposures are fused of mono or raw images only", found="colour")
-            highest = max(highest, image_saturation(image) or 0.0)
+            highest = max(highest, image_saturation(image) or _plateau(image))
             if offs:
                 image, _ = subtract_off(image, offs[number if len(offs) > 1 else 0])
             images.append(image)
@@ -147,6 +149,12 @@ def fuse_files(
             noise = noise.model_copy(update={"gain": gain, "read_noise": noise.read_noise * noise.gain / gain})
             fused = fuse(images, times, noise)
         return fused
+
+
+def _plateau(image: NDArray[Any]) -> float:
+    """The highest number where many pixels share it, as at a full well below the full scale; 0: they do not."""
+    top = float(np.nanmax(image))
+    return top if np.count_nonzero(image == top) >= PLATEAU else 0.0
 
 
 @contextmanager

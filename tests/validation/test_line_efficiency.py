@@ -50,3 +50,30 @@ def test_false_rows_on_noise(background, read_noise):
         false += int(extract(image, noise=electrons(read_noise)).valid.sum())
     print(f"\nfalse rows: {false} of 20000")
     assert false <= 20
+
+
+CLAIMING = ("gaussian", "phase", "centre_of_mass", "gauss_3", "caruana", "guo", "steger")
+"""Row by row; "likelihood" has its own test above, two-dimensional methods theirs in tests/analysis."""
+
+
+@pytest.mark.parametrize("method", CLAIMING)
+def test_every_method_that_claims_a_sigma_is_honest_over_the_grid(method):
+    rng = np.random.default_rng(11)
+    rows, covered, silent = 4000, [], 0
+    for amplitude, sigma, read_noise in cells():
+        centre = 100 + rng.uniform(-0.5, 0.5, rows)
+        image = exposed(expected(200, centre, amplitude, sigma, 10.0), read_noise, rng).astype(np.float32)
+        line = extract(image, method=method, noise=electrons(read_noise))
+        claimed = np.isfinite(line.sigma_u[:, 0])
+        if claimed.mean() < 0.9:  # it does not pretend where it cannot know; few rows by chance are no sample
+            silent += 1
+            continue
+        error = np.abs(line.u[claimed, 0] - centre[claimed])
+        covered.append((np.mean(error < 2 * line.sigma_u[claimed, 0]), amplitude, sigma, read_noise))
+    share = np.array([cell[0] for cell in covered])
+    told = f"{share.min():.3f} .. {share.max():.3f}, median {np.median(share):.3f} in {len(share)} cells"
+    print(f"\n{method}: 2 sigma cover {told}, no sigma in {silent}; lowest {min(covered)}, highest {max(covered)}")
+    chance = 3 * np.sqrt(0.95 * 0.05 / rows)
+    assert share.min() > 0.93 - chance
+    assert share.max() < 0.97 + chance
+    assert 0.93 < np.median(share) < 0.97
