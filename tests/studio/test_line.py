@@ -13,6 +13,7 @@ from render.motion import LinearStage
 from render.world import build_world
 from studio.line import extract_line, working_volume
 from studio.project import Project
+from studio.results import measure_frame
 from studio.scan import run_scan
 from studio.stages import Clock, develop_step, measure_step, render_step, scaled
 from studio.templates import template_folder
@@ -89,3 +90,16 @@ def test_along_time_needs_a_motion(tmp_path: Path):
     project = with_extraction(Project.load(ROOT / "project.json"), spacetime=True)
     with pytest.raises(InputError, match="nothing moves"):
         run_scan(project, ROOT, out=tmp_path)
+
+
+def test_auto_is_not_compared_with_itself(rendered):
+    project, world, frame = rendered
+    asked = with_extraction(project, method="auto")
+    images = develop_step(asked, frame, CLOCK, None)
+    first = measure_frame(asked, frame, world, images, CLOCK, None, keep=False)
+    methods = [one.line.method for one in first.lasers[0].extractions]
+    assert len(set(methods)) == len(methods) and first.lasers[0].extractions[0].line.note
+    # a later frame, where auto may pick another, is compared with the same methods
+    dim = develop_step(bright(asked, 0.02), frame, CLOCK, None)
+    later = measure_frame(asked, frame, world, dim, CLOCK, None, keep=False, first=first)
+    assert [one.line.method for one in later.lasers[0].extractions[1:]] == methods[1:]
