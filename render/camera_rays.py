@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from render.distortion import tilt_matrix, undistort
 from render.lens import chief_ray, lens_direction, lens_point, lens_position
-from render.net import morton, net_point
-from render.random import uniform
+from render.random import bits, uniform
+from render.sequence import ROWS
 from render.surface import View
 
 Float = NDArray[np.float64]
@@ -68,9 +68,31 @@ def camera_rays(
                 directions[r, axis] = d if ok else 0.0
 
 
+@numba.njit(nogil=True, cache=True)
+def _morton(i: int, j: int) -> int:
+    """The bits of i and j, below 2^6, by turns."""
+    code = 0
+    for bit in range(6):
+        code |= ((i >> bit) & 1) << (2 * bit) | ((j >> bit) & 1) << (2 * bit + 1)
+    return code
+
+
+@numba.njit(nogil=True, cache=True)
+def _net_point(table: Float32, draw: np.uint64, number: int) -> tuple[float, float]:
+    """Point `number` of the row of `pair_table` that 64 random bits choose, its digits flipped as they say.
+
+    Unlike a shift by chance this keeps nets aligned: of four cells each sees its own quarter of the aperture.
+    """
+    row = np.int64(draw & np.uint64(ROWS - 1))
+    x = np.int64(table[row, number, 0] * 2.0**24) ^ np.int64(draw >> np.uint64(40))
+    y = np.int64(table[row, number, 1] * 2.0**24) ^ np.int64((draw >> np.uint64(16)) & np.uint64(0xFFFFFF))
+    return x * 2.0**-24, y * 2.0**-24
+
+
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def lens_rays(
     view: View,
+    table: Float32,
     pixels: Int,
     cells: int,
     seed: int,
@@ -83,6 +105,9 @@ def lens_rays(
 ) -> None:
     """As `camera_rays`, jittered, each ray through its own point of the aperture; (n cells^2, ...) throughout.
 
+    The points are a row of `table`, `pair_table`, in the Morton order of the cells (Ahmed and Wonka 2020): any quad of
+    neighbouring cells, or of such quads, has a (0, 2)-net of them.
+
     Fills normalised (.., 2) slopes of the chief ray (NaN: no ray), offsets (.., 2) px, lens (.., 2) the point (a, b) m,
     origins (.., 3), from `centre` as embree's scene is, and directions (.., 3), world, of length 1 along the axis.
     In float64 the ray is `lens_position(view, a, b)`, `lens_direction(view, x, y, a, b)`.
@@ -93,6 +118,7 @@ def lens_rays(
     size, radius = 1.0 / cells, view.lens[0]
     for i in range(pixels.shape[0]):
         column, row = pixels[i] % view.width, pixels[i] // view.width
+        draw = bits(seed, pixels[i], cells, LENS_DIMENSION)
         for cell in range(cells * cells):
             r = i * cells * cells + cell
             ci, cj = cell % cells, cell // cells
@@ -103,7 +129,7 @@ def lens_rays(
             )
             a = b = 0.0
             if radius > 0.0:
-                r1, r2 = net_point(seed, pixels[i], morton(ci, cj), LENS_DIMENSION + cells)
+                r1, r2 = _net_point(table, draw, _morton(ci, cj))
                 a, b = lens_point(radius, r1, r2)
             if not ok:
                 x = y = np.nan

@@ -34,6 +34,7 @@ from render.laser import LineLaser
 from render.material import reflectance_weights
 from render.neighbours import with_neighbours
 from render.pose import invert
+from render.sequence import pair_table
 from render.surface import Surface, has_gloss
 from render.threads import Cancel, Progress, map_chunks
 from render.world import World
@@ -169,7 +170,8 @@ class _Task:
         pixels = self.pixels[start:stop]
         if aperture:
             origins = np.empty((count, 3), np.float32)
-            lens_rays(view, pixels, self.cells, self.seed, rays.centre, normalised, offsets, lens, origins, directions)
+            look = (rays.centre, normalised, offsets, lens, origins, directions)
+            lens_rays(view, pair_table(), pixels, self.cells, self.seed, *look)
             triangle, _ = rays.intersect(origins, directions)
         else:
             camera_rays(view, pixels, self.cells, self.seed, self.cells > 1, normalised, offsets, directions)

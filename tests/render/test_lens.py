@@ -8,8 +8,8 @@ from render.camera import Lens
 from render.camera_rays import camera_rays, lens_rays
 from render.distortion import tilt_matrix
 from render.lens import chief_ray, lens_direction, lens_point, lens_position, lens_project
-from render.net import morton, net_point
 from render.pose import Pose
+from render.sequence import pair, pair_table
 from tests.render.scenes import paper_camera
 
 DISTORTIONS = {
@@ -47,13 +47,9 @@ def images(view, tilt, distorted, points, a, b):
     return out
 
 
-@numba.njit
 def aperture_points(seed, count, radius):
-    out = np.empty((count, 2))
-    for i in range(count):
-        r1, r2 = net_point(seed, 7, i, 3)
-        out[i, 0], out[i, 1] = lens_point(radius, r1, r2)
-    return out
+    table = pair_table()
+    return np.array([lens_point(radius, *pair(table, seed, 7, i, 3)) for i in range(count)])
 
 
 def kernel_view(camera, pose=POSE):
@@ -170,18 +166,22 @@ def test_lens_points_fill_the_aperture_evenly():
     assert counts.std() < 4.0
 
 
-def test_sequence_has_one_point_in_every_cell_of_a_net_and_differs_by_pixel():
-    for start in (0, 64, 640):
-        points = np.array([net_point(1, 5, start + i, 2) for i in range(64)])
-        for shape in ((64, 1), (32, 2), (8, 8), (2, 32), (1, 64)):
-            cells = np.floor(points * shape).astype(int)
-            assert len(np.unique(cells[:, 0] * shape[1] + cells[:, 1])) == 64
-    assert net_point(1, 5, 0, 2) != net_point(1, 6, 0, 2)
-    assert net_point(1, 5, 0, 2) != net_point(2, 5, 0, 2)
-    codes = {morton(i, j) for i in range(16) for j in range(16)}
-    assert codes == set(range(256))
-    first = [net_point(3, pixel, 0, 0) for pixel in range(4000)]
-    assert np.mean(first, axis=0) == pytest.approx([0.5, 0.5], abs=4 * math.sqrt(1 / 12 / 4000))
+def test_cells_of_a_pixel_share_the_aperture_evenly_also_by_quarters():
+    camera = thin_camera(f_number=1.0)
+    pixels, cells = np.array([30000], np.int32), 16
+    n = cells**2
+    slopes, offsets, lens = np.empty((n, 2)), np.empty((n, 2), np.float32), np.empty((n, 2))
+    origins, directions = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
+    by_seed = []
+    for seed in range(20):
+        look = (np.zeros(3), slopes, offsets, lens, origins, directions)
+        lens_rays(camera.view(POSE), pair_table(), pixels, cells, seed, *look)
+        points = (lens / camera.aperture_radius).reshape(cells, cells, 2)
+        quarters = [points[i : i + 8, j : j + 8].reshape(-1, 2).mean(axis=0) for i in (0, 8) for j in (0, 8)]
+        by_seed.append(np.array(quarters))
+    # 64 independent points of a disc have a mean of standard deviation 1 / 2 / 8 along each axis
+    assert np.std(by_seed) < 0.3 / 16
+    assert not np.array_equal(by_seed[0], by_seed[1])
 
 
 def test_lens_rays_without_an_aperture_are_the_pinholes():
@@ -192,7 +192,7 @@ def test_lens_rays_without_an_aperture_are_the_pinholes():
     camera_rays(camera.view(POSE), pixels, 2, 9, True, slopes, offsets, directions)
     found = [np.empty((n, 2)), np.empty((n, 2), np.float32), np.empty((n, 2))]
     origins, towards = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
-    lens_rays(camera.view(POSE), pixels, 2, 9, centre, *found, origins, towards)
+    lens_rays(camera.view(POSE), pair_table(), pixels, 2, 9, centre, *found, origins, towards)
     assert np.array_equal(found[0], slopes) and np.array_equal(found[1], offsets)
     assert np.abs(towards - directions).max() < 1e-6 and not found[2].any()
     assert np.allclose(origins, POSE[:3, 3] - centre, atol=1e-6)
