@@ -8,8 +8,9 @@ so that how often a place is sampled never depends on the values that are averag
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from render.camera import Camera
 from render.camera_paths import WAVE, CameraPaths, camera_paths
-from render.errors import Cancelled
+from render.errors import Cancelled, InputError
 from render.scene import Scene
 from render.threads import Cancel, Progress, map_chunks
 from render.wave import CLAMPED, CUT, DROPPED
@@ -26,6 +27,7 @@ from render.world import World
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
+Arrays = dict[str, NDArray[Any]]
 
 TILE = 16
 """Pixels a side of what gets samples together."""
@@ -35,8 +37,12 @@ EVEN_SHARE = 0.25
 """Of the rest goes everywhere alike, for what the first samples missed."""
 MOST_SHARE = 64.0
 """Of the mean, for a single tile: the rest would wait for it."""
+CONVERGENCE = 0.75
+"""Power of the samples with which the error is taken to fall; 0.5 would be that of independent ones."""
 GROWTH = 4.0
 """Most by which a pass multiplies the samples."""
+GROUP = 256
+"""Chunks between two moments at which an unfinished pass may be kept."""
 
 
 @dataclass(frozen=True)
@@ -72,14 +78,20 @@ def ambient_images(
     cancelled: Cancel | None = None,
     progress: Progress | None = None,
     keeps: Cancel | None = None,
+    before: Arrays | None = None,
+    keep: Callable[[Film], None] | None = None,
 ) -> Iterator[AmbientImage]:
     """Ever better images, until the relative error is at most `target` or `most` samples a pixel are spent.
 
     surfaces: the most that light may meet, None for no bound; clamp, W/(m^2 sr): see `CameraPaths`. Raises Cancelled;
-    where keeps() then says so, after one more image, of all tiles that are done.
+    where keeps() then says so, after one more image, of all tiles that are done. keep: given what to go on from, which
+    changes from then on; before: its arrays, to go on to the same image bit for bit as without interruption.
     """
     paths = camera_paths(world, scene, camera.view(T_world_camera), surfaces=surfaces, clamp=clamp, seed=seed)
-    film = _Film(camera.width, camera.height)
+    film = Film(camera.width, camera.height)
+    if before is not None:
+        film.load(before)
+    film.keep = keep
     try:
         yield from _passes(film, paths, target, most, threads, cancelled, progress)
     except Cancelled:
@@ -89,7 +101,7 @@ def ambient_images(
 
 
 def _passes(
-    film: _Film,
+    film: Film,
     paths: CameraPaths,
     target: float,
     most: int,
@@ -99,25 +111,32 @@ def _passes(
 ) -> Iterator[AmbientImage]:
     even = np.ones((film.tiles, 2))
     wanted, error = 1.0, math.nan
+    # passes that are done already are gone through again, with their errors, to where the next one begins
+    known = iter(tuple(film.errors))
     if most == 1:
         yield film.expose(paths, np.broadcast_to([1, 0], (film.tiles, 2)), threads, cancelled, progress)
         return
+    if film.errors:
+        yield film.image()
     for level in range(1, min(PILOT, most // 2) + 1):
-        report = _part(progress, 0.0, min(1.0, 2.0 * level / most))
-        image = film.expose(paths, (level * even).astype(np.int64), threads, cancelled, report)
-        wanted, error = float(level), image.error
-        yield image
+        wanted, done = float(level), next(known, None)
+        if done is None:
+            report = _part(progress, 0.0, min(1.0, 2.0 * level / most))
+            image = film.expose(paths, (level * even).astype(np.int64), threads, cancelled, report)
+            yield image
+        error = film.errors[level - 1]
     share = film.shares()
     while error > target and 2.0 * wanted < most:
-        done = 2.0 * wanted / most
-        needed = wanted * (error / target) ** 2
-        # a pass that would leave a little to be done takes it along
-        wanted = min(max(1.1 * needed, 1.5 * wanted), GROWTH * wanted, most / 2)
-        count = np.maximum(PILOT, np.rint(wanted * share)).astype(np.int64)
-        report = _part(progress, done, 2.0 * wanted / most)
-        image = film.expose(paths, count, threads, cancelled, report)
-        error = image.error
-        yield image
+        spent = 2.0 * wanted / most
+        needed = 1.1 * wanted * (error / target) ** (1.0 / CONVERGENCE)
+        wanted = min(max(needed, 1.25 * wanted), GROWTH * wanted, most / 2)
+        done = next(known, None)
+        if done is None:
+            count = np.maximum(PILOT, np.rint(wanted * share)).astype(np.int64)
+            report = _part(progress, spent, 2.0 * wanted / most)
+            image = film.expose(paths, count, threads, cancelled, report)
+            yield image
+        error = film.errors[-1] if done is None else done
     if progress is not None:
         progress(1.0)
 
@@ -137,13 +156,16 @@ def ambient_image(
 ) -> Float32:
     """(h, w, 3) float32 radiance, W/(m^2 sr) in R, G, B, with as many samples everywhere. Raises Cancelled."""
     paths = camera_paths(world, scene, camera.view(T_world_camera), surfaces=surfaces, seed=seed)
-    film = _Film(camera.width, camera.height)
+    film = Film(camera.width, camera.height)
     count = np.broadcast_to([samples - samples // 2, samples // 2], (film.tiles, 2))
     return film.expose(paths, count, threads, cancelled, progress).radiance
 
 
-class _Film:
+class Film:
     """Sums of the samples of both halves, and how many there are of each in every tile."""
+
+    whole = True
+    """No tile is ever half done."""
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width, height
@@ -156,6 +178,24 @@ class _Film:
         self.cut = np.zeros((self.tiles, 2))
         """Of each tile and half, the sum of what the clamp took."""
         self.tally = np.zeros(2)
+        self.errors: list[float] = []
+        """After each pass."""
+        self.keep: Callable[[Film], None] | None = None
+        """Told after every group of chunks."""
+
+    def arrays(self) -> Arrays:
+        """As a file holds it."""
+        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "cut", "tally")}
+        return {**kept, "errors": np.array(self.errors, dtype=np.float64)}
+
+    def load(self, arrays: Arrays) -> None:
+        """Go on from `arrays`. InputError: they are not of this image."""
+        for name in ("sums", "done", "spread", "cut", "tally"):
+            mine, found = getattr(self, name), arrays.get(name)
+            if found is None or found.shape != mine.shape or found.dtype != mine.dtype:
+                raise InputError("the saved ambient light is damaged", where=name, found=getattr(found, "shape", None))
+            setattr(self, name, found)
+        self.errors = [float(error) for error in arrays.get("errors", ())]
 
     def expose(
         self,
@@ -175,12 +215,22 @@ class _Film:
             for number in range(start, stop):
                 self._expose_tiles(paths, chunks[number], more, tallies[number], cancelled)
 
+        group = max(1, len(chunks)) if self.keep is None else GROUP
         try:
-            map_chunks(work, len(chunks), 1, threads, cancelled, progress)
+            for start in range(0, len(chunks), group):
+                stop = min(start + group, len(chunks))
+                report = _part(progress, start / len(chunks), stop / len(chunks))
+                map_chunks(lambda a, b, s=start: work(s + a, s + b), stop - start, 1, threads, cancelled, report)  # type: ignore[misc]
+                if self.keep is not None:
+                    self.keep(self)
         finally:
             # in the order of the chunks, whichever thread was first
             self.tally = self.tally + tallies.sum(axis=0)
-        return self.image()
+        image = self.image()
+        self.errors.append(image.error)
+        if self.keep is not None:
+            self.keep(self)
+        return image
 
     def image(self) -> AmbientImage:
         """Of the samples so far."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from render.ambient import AmbientImage, ambient_images
+from render.ambient import AmbientImage, Arrays, Film, ambient_images
 from render.bsdf import DIELECTRIC, SMOOTH, SUBSURFACE
 from render.camera_paths import camera_paths
 from render.lights import PointLight
@@ -105,8 +105,12 @@ def planned_images(
     cancelled: Cancel | None = None,
     progress: Progress | None = None,
     keeps: Cancel | None = None,
+    before: Arrays | None = None,
+    keep: Callable[[Film], None] | None = None,
 ) -> Iterator[tuple[AmbientImage, dict[str, float]]]:
-    """Ever better images as the plan says, and what `Frame.counts` tells of each; keeps: see `ambient_images`.
+    """Ever better images as the plan says, and what `Frame.counts` tells of each.
+
+    keeps, before, keep: see `ambient_images`.
 
     Raises Cancelled.
     """
@@ -124,6 +128,8 @@ def planned_images(
         cancelled=cancelled,
         progress=progress,
         keeps=keeps,
+        before=before,
+        keep=keep,
     )
     for image in images:
         counts = {AMBIENT_SAMPLES: image.samples, DROPPED_SAMPLES: float(image.dropped)}

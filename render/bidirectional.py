@@ -8,17 +8,19 @@ make, light through clear glass on both sides, is found by merging (`render.merg
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from render.camera import Camera
 from render.connect import Take
-from render.emission import PARTS, aimed_fan, even_fan, fan_span
-from render.guide import BINS, clear_pixels, first_guide, learn, no_guide, share_samples
+from render.emission import PARTS, Fan, aimed_fan, even_fan, fan_span
+from render.errors import Cancelled
+from render.gathered import Gathered
+from render.guide import BINS, Guide, clear_pixels, first_guide, no_guide, share_samples
 from render.laser import LineLaser
 from render.light_pass import KINDS, LightPass
 from render.threads import Cancel, Progress, map_chunks, thread_count
@@ -40,11 +42,20 @@ ALL_KINDS = BENT | SUNK | UNJOINED
 
 @dataclass(frozen=True)
 class IndirectImage:
-    """(h, w) float32 radiance, W/(m^2 sr); the estimated relative RMS error; the light paths it took."""
+    """Radiance of one laser's indirect light, and how well it is known."""
 
     radiance: Float32
+    """(h, w) W/(m^2 sr)."""
     error: float
+    """Estimated relative RMS error."""
     paths: int
+    """From the laser."""
+    dropped: int = 0
+    """Contributions that were no number, infinite or negative."""
+    clamped: int = 0
+    """Pixels of passes that the clamp has cut."""
+    cut: float = 0.0
+    """Radiance that the clamp took away, mean over the image."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +73,14 @@ class Shares:
 
 
 def indirect_image(
+    world: World, camera: Camera, laser: LineLaser, T_world_camera: Float, T_world_laser: Float, **options: Any
+) -> IndirectImage:
+    """The last of `indirect_images`, whose options it takes. Raises Cancelled."""
+    *_, last = indirect_images(world, camera, laser, T_world_camera, T_world_laser, **options)
+    return last
+
+
+def indirect_images(
     world: World,
     camera: Camera,
     laser: LineLaser,
@@ -71,80 +90,96 @@ def indirect_image(
     target: float = 0.1,
     most_paths: int = 1 << 23,
     kinds: int = ALL_KINDS,
+    clamp: float | None = None,
     seed: int = 0,
     threads: int | None = None,
     cancelled: Cancel | None = None,
     progress: Progress | None = None,
-    refined: Callable[[IndirectImage], bool] | None = None,
-) -> IndirectImage:
+    enough: Cancel | None = None,
+    keeps: Cancel | None = None,
+    before: Gathered | None = None,
+    keep: Callable[[Gathered], None] | None = None,
+) -> Iterator[IndirectImage]:
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
-    The error is that of the whole image: sqrt(sum of variances / sum of squares). `most_paths` ends it in any case.
-    kinds: of light, besides plain interreflection (`render.vertex`). refined: given the image at every doubling of the
-    passes; it ends the render by returning True.
+    An image at every doubling of the passes, and the final one. The error is that of the whole image: sqrt(sum of
+    variances / sum of squares); `most_paths`, or `enough` (the time is over), ends it in any case. kinds: of light,
+    besides plain interreflection (`render.vertex`). clamp: most radiance of one pass in one pixel, W/(m^2 sr); biased.
+    before: go on from there, to the same image bit for bit as without interruption. keep: told of what to go on from
+    after every wave of passes; it stays whole when this raises Cancelled, where keeps() says so after one more image.
     """
     low, high, reach = fan_span(world, laser, T_world_laser)
     shape = (camera.height, camera.width)
     if high <= low:
-        return IndirectImage(np.zeros(shape, np.float32), 0.0, 0)
+        yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0)
+        return
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, kinds)
-    pixels = camera.width * camera.height
-    fan, paths, guide, samples = even_fan(low, high), PASS_PATHS, no_guide(camera), first_samples(task, camera)
-    takes = [empty_take(pixels) for _ in range(WAVE)]
+    takes = [empty_take(camera.width * camera.height) for _ in range(WAVE)]
 
-    def wave(first: int) -> None:
+    def wave(first: int, paths: int, fan: Fan, samples: Float, guide: Guide) -> None:
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
                 task.run(first + number, paths, fan, samples, guide, takes[number], cancelled)
 
         map_chunks(work, WAVE, 1, min(WAVE, thread_count(threads)), cancelled)
 
-    total, squares = np.zeros(pixels), np.zeros(pixels)
-    # a first look only says where laser and camera should look; what is behind glass only the camera finds
-    wave(0)
-    for take in takes:
-        gather_pass(take.image, total, squares)
-    fan = aimed_fan(fan, np.sum([take.found for take in takes], axis=0))
-    helped = np.zeros(pixels, np.float32)
-    for take in takes:
-        helped += take.helped
-        take.helped[:] = 0.0
-    # where camera paths have little to bring, most of the work is left to those from the laser
-    share = float(helped.sum()) / max(float(total.sum()), 1e-300)
-    wanted, paths = PASS_SAMPLES * share, PASS_PATHS * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
-    samples = share_samples(helped, camera.width, wanted)
-    guide, learnt = first_guide(samples, camera, WAVE)
+    if before is None:
+        # a first look only says where laser and camera should look; what is behind glass only the camera finds
+        fan = even_fan(low, high)
+        wave(0, PASS_PATHS, fan, first_samples(task, camera), no_guide(camera))
+        before = first_knowledge(takes, fan, camera, kinds)
+    so_far = before
+    learnt = np.zeros((WAVE, *so_far.knowledge.shape))
     takes = [take._replace(learnt=learnt[i]) for i, take in enumerate(takes)]
-    knowledge = np.zeros(learnt.shape[1:])
-    helped[:], total[:], squares[:] = 0.0, 0.0, 0.0
-    passes, error = 0, math.inf
 
     def image() -> IndirectImage:
-        return IndirectImage((total / passes).astype(np.float32).reshape(shape), error, passes * paths)
+        counts = so_far.passes * so_far.paths, round(so_far.dropped), round(so_far.clamped)
+        cut = so_far.cut / so_far.passes / so_far.total.size
+        return IndirectImage(so_far.radiance(shape), so_far.error, *counts, cut)
 
-    while passes * paths < most_paths:
-        wave(WAVE + passes)
-        for take in takes:
-            first, second = gather_pass(take.image, total, squares)
-            helped += take.helped
-            take.helped[:] = 0.0
-        passes += WAVE
-        variance = max(second - first / passes, 0.0) / (passes - 1) / passes
-        mean_square = max(first / passes**2 - variance, 1e-300)
-        error = math.sqrt(variance / mean_square) if first > 0.0 else 0.0
-        if error <= target:
-            break
-        doubled = passes & (passes - 1) == 0
-        if doubled and refined is not None and refined(image()):
-            break
-        if doubled:
-            samples = share_samples(helped, camera.width, wanted)
-        guide = learn(guide, learnt, knowledge)
+    def unfinished() -> bool:
+        return so_far.error > target and so_far.passes * so_far.paths < most_paths
+
+    while unfinished():
+        try:
+            wave(WAVE + so_far.passes, so_far.paths, so_far.fan, so_far.samples, so_far.guide)
+        except Cancelled:
+            if so_far.passes and keeps is not None and keeps():
+                yield image()
+            raise
+        so_far.add(takes, learnt, clamp)
+        if keep is not None:
+            keep(so_far)
         if progress is not None:
             # the error falls with the root of the passes, at least
+            passes, error = so_far.passes, so_far.error
             needed = passes * (error / target) ** 2 if math.isfinite(error) else math.inf
-            progress(min(0.99, passes / min(needed, most_paths / paths)))
-    return image()
+            progress(min(0.99, passes / min(max(needed, 1.0), most_paths / so_far.paths)))
+        if enough is not None and enough():
+            break
+        if so_far.doubled and unfinished():
+            yield image()
+    yield image()
+
+
+def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int) -> Gathered:
+    """Nothing gathered yet, but where a first look (cleared) says that light is to be found."""
+    pixels = camera.width * camera.height
+    radiance, helped = np.zeros(pixels), np.zeros(pixels, np.float32)
+    fan = aimed_fan(fan, np.sum([take.found for take in takes], axis=0))
+    for take in takes:
+        radiance += take.image
+        helped += take.helped
+        for sums in (take.image, take.helped, take.dropped):
+            sums[:] = 0.0
+    # where camera paths have little to bring, most of the work is left to those from the laser
+    share = float(helped.sum()) / max(float(radiance.sum()), 1e-300)
+    wanted, paths = PASS_SAMPLES * share, PASS_PATHS * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
+    samples = share_samples(helped, camera.width, wanted)
+    guide = first_guide(samples, camera)
+    knowledge = np.zeros((len(guide.cumulative), BINS))
+    nothing = np.zeros(pixels), np.zeros(pixels), np.zeros(pixels, np.float32)
+    return Gathered(kinds, fan, paths, wanted, samples, guide, knowledge, *nothing)
 
 
 def indirect_shares(
@@ -176,7 +211,7 @@ def indirect_shares(
 def empty_take(pixels: int) -> Take:
     """Nothing yet, and no guide to learn for."""
     zeros = np.zeros(KINDS), np.zeros(PARTS), np.zeros((0, BINS))
-    return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros)
+    return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1))
 
 
 def first_samples(task: LightPass, camera: Camera) -> Float:
@@ -185,18 +220,3 @@ def first_samples(task: LightPass, camera: Camera) -> Float:
         return np.zeros(camera.width * camera.height)
     samples = clear_pixels(task.world, task.surface, camera, task.view.T_world_camera)
     return samples * min(1.0, 2 * PASS_SAMPLES / max(float(samples.sum()), 1.0))
-
-
-@numba.njit(nogil=True, cache=True)
-def gather_pass(image: Float, total: Float, squares: Float) -> tuple[float, float]:
-    """Fold a pass into the running sums and clear it; returns the sums of total^2 and of squares."""
-    first = second = 0.0
-    for j in range(image.shape[0]):
-        value = image[j]
-        if value != 0.0:
-            total[j] += value
-            squares[j] += value * value
-            image[j] = 0.0
-        first += total[j] * total[j]
-        second += squares[j]
-    return first, second

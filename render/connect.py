@@ -69,6 +69,8 @@ class Take(NamedTuple):
     """(PARTS,) squared worth of what came from each part of the fan."""
     learnt: Float
     """As in `join_light`."""
+    dropped: Float
+    """(1,) joints whose worth was no number, infinite or negative."""
 
 
 class Lit(NamedTuple):
@@ -427,6 +429,9 @@ def count_joints(joints: Joints, blocked: NDArray[np.bool_], count: int, scale: 
     for j in range(count):
         if not blocked[j]:
             worth = joints.worth[j] * scale
+            if not 0.0 <= worth < math.inf:
+                take.dropped[0] += 1.0
+                continue
             take.image[joints.pixel[j]] += worth
             take.sums[joints.kind[j]] += worth
             if joints.helped[j]:

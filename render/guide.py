@@ -82,8 +82,8 @@ def no_guide(camera: Camera) -> Guide:
     return Guide(camera.width, tiles, np.zeros((0, BINS + 1)))
 
 
-def first_guide(samples: Float, camera: Camera, passes: int) -> tuple[Guide, Float]:
-    """A guide, flat so far, for the tiles with enough camera paths to learn from; (passes, n, BINS) what is learnt."""
+def first_guide(samples: Float, camera: Camera) -> Guide:
+    """A guide, flat so far, for the tiles with enough camera paths to learn from."""
     tiles = no_guide(camera).row
     whole = np.zeros((tiles.shape[0] * TILE, tiles.shape[1] * TILE))
     whole[: camera.height, : camera.width] = samples.reshape(camera.height, camera.width)
@@ -91,7 +91,7 @@ def first_guide(samples: Float, camera: Camera, passes: int) -> tuple[Guide, Flo
     count = int(found.sum())
     tiles[found] = np.arange(count)
     cumulative = np.repeat(np.linspace(0.0, 1.0, BINS + 1)[None], count, axis=0)
-    return Guide(camera.width, tiles, cumulative), np.zeros((passes, count, BINS))
+    return Guide(camera.width, tiles, cumulative)
 
 
 def learn(guide: Guide, learnt: Float, knowledge: Float) -> Guide:
@@ -99,7 +99,7 @@ def learn(guide: Guide, learnt: Float, knowledge: Float) -> Guide:
 
     The best density is the root of the mean square of what is found; a part stays flat, for what was not found yet.
     """
-    knowledge += learnt.sum(axis=0)
+    knowledge += np.nan_to_num(learnt.sum(axis=0), nan=0.0, posinf=0.0)
     learnt[:] = 0.0
     density = np.sqrt(knowledge)
     density = 0.5 * density + 0.25 * (np.roll(density, 1, axis=1) + np.roll(density, -1, axis=1))

@@ -80,11 +80,17 @@ def merge(vertex: Float, state: Float, rows: Float, light: Photons, take: Take) 
                     if alike > 0.7:
                         evaluate(row, rgb, w[BACK], w[BACK + 1], w[BACK + 2], v[BACK], v[BACK + 1], v[BACK + 2], f)
                         value = light.power[j] * f[0]
+                        if not 0.0 <= value < math.inf:
+                            take.dropped[0] += 1.0
+                            j += 1
+                            continue
                         total += value
                         take.found[light.part[j]] += (state[r, POWER] * value * share) ** 2
                 j += 1
-        if total > 0.0:
-            worth = state[r, POWER] * total * share
+        worth = state[r, POWER] * total * share
+        if not 0.0 <= worth < math.inf:
+            take.dropped[0] += 1.0
+        elif worth > 0.0:
             take.image[int(state[r, PIXEL])] += worth
             take.helped[int(state[r, PIXEL])] += worth
             take.sums[UNJOINED] += worth

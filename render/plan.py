@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bidirectional import indirect_image, indirect_shares
+from render.bidirectional import indirect_images, indirect_shares
+from render.laser import LineLaser
 from render.lens_plan import lens_lines
+from render.saved import RenderState
 from render.scene import Scene
 from render.settings import RenderSettings
 from render.threads import Cancel, Progress
@@ -104,26 +107,40 @@ def choose_plan(
         else:
             why = "not asked for" if wanted >= 0 else f"below the negligible {settings.negligible:.2%}"
             lines.append(f"left out: {rung.light} ({rung.name}) - {measured}, {why}")
-    return Plan(kinds, (*lines, *tail))
+    clamped = clamp_line(settings) if kinds is not None else ()
+    return Plan(kinds, (*lines, *clamped, *tail))
+
+
+def indirect_error(laser: LineLaser) -> str:
+    """Key of `Frame.counts`: the relative RMS error so far of a laser's indirect light."""
+    return f"relative error of reflections, {laser.name}"
 
 
 def indirect_light(
     world: World,
     scene: Scene,
     settings: RenderSettings,
-    direct: tuple[Float32, ...],
+    plan: Plan,
     *,
     step: int = 0,
     seed: int = 0,
     threads: int | None = None,
     cancelled: Cancel | None = None,
     progress: Progress | None = None,
-) -> tuple[Plan, tuple[Float32, ...], dict[str, float]]:
-    """The plan, the indirect radiance of each laser as it says (none: empty), and what it took. Raises Cancelled."""
-    plan = choose_plan(world, scene, settings, direct, step=step, seed=seed, cancelled=cancelled)
-    images, counts = [], {}
-    for i, laser in enumerate(scene.lasers if plan.kinds is not None else ()):
-        image = indirect_image(
+    keeps: Cancel | None = None,
+    enough: Callable[[int], Cancel | None] = lambda left: None,
+    state: RenderState | None = None,
+) -> Iterator[tuple[tuple[Float32, ...], dict[str, float]]]:
+    """Ever better indirect radiance of each laser as the plan says (dark until its turn), and `Frame.counts` of it.
+
+    enough: given how many lasers are left to be done, what ends the next one (`indirect_images`). state: to go on from,
+    and to keep. Raises Cancelled; where keeps() then says so, after one more image.
+    """
+    count = len(scene.lasers) if plan.kinds is not None else 0
+    images = [np.zeros((scene.camera.height, scene.camera.width), np.float32)] * count
+    counts: dict[str, float] = {}
+    for i, laser in enumerate(scene.lasers[:count]):
+        for image in indirect_images(
             world,
             scene.camera,
             laser,
@@ -132,15 +149,34 @@ def indirect_light(
             target=settings.indirect_error,
             most_paths=settings.light_paths,
             kinds=plan.kinds or PLAIN,
+            clamp=settings.laser_clamp,
             seed=seed + i,
             threads=threads,
             cancelled=cancelled,
-            progress=None if progress is None else partial(_share, progress, i, len(scene.lasers)),
-        )
-        images.append(image.radiance)
-        counts[f"relative error of reflections, {laser.name}"] = image.error
-        counts[f"light paths, {laser.name}"] = image.paths
-    return plan, tuple(images), counts
+            progress=None if progress is None else partial(_share, progress, i, count),
+            keeps=keeps,
+            enough=enough(count - i),
+            before=None if state is None else state.lasers.get(i),
+            keep=None if state is None else partial(state.keep_laser, i),
+        ):
+            images[i] = image.radiance
+            counts[indirect_error(laser)] = image.error
+            counts[f"light paths, {laser.name}"] = image.paths
+            counts[f"dropped contributions, {laser.name}"] = image.dropped
+            if settings.laser_clamp is not None:
+                counts[f"clamped contributions, {laser.name}"] = image.clamped
+                counts[f"mean radiance taken by the clamp, {laser.name}"] = image.cut
+            yield tuple(images), dict(counts)
+
+
+def clamp_line(settings: RenderSettings) -> tuple[str, ...]:
+    """What the clamp on the lasers' indirect light does, if there is one."""
+    if settings.laser_clamp is None:
+        return ()
+    return (
+        f"clamp: no pass of a laser's indirect light puts more than {settings.laser_clamp:g} W/(m^2 sr) into a pixel"
+        " - biased, too dark where it cuts",
+    )
 
 
 def _share(progress: Progress, index: int, count: int, done: float) -> None:

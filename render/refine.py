@@ -6,10 +6,8 @@ The last frame holds the same numbers, bit for bit, as `render_world` gives for 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +19,13 @@ from render.direct import direct_image
 from render.frame import Axis, Frame, LaserCurve
 from render.lens_plan import lens_lines
 from render.material_checks import check_materials, scene_warnings
-from render.plan import DIRECT, INDIRECT, indirect_light
+from render.plan import DIRECT, INDIRECT, choose_plan, clamp_line, indirect_light
+from render.saved import RenderState
 from render.scene import Scene
 from render.settings import RenderSettings
+from render.stage_clock import Clock, WholeClock
 from render.threads import Cancel
+from render.time_limit import Limit
 from render.truth import truth_images
 from render.world import World
 
@@ -47,6 +48,8 @@ def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
         lines.append(
             f"{INDIRECT}: a pilot decides step by step, and leaves out what is below {settings.negligible:.2%}"
         )
+    if settings.transport != "direct":
+        lines.extend(clamp_line(settings))
     lines.extend(expected_ambient(scene, settings))
     lines.extend(lens_lines(scene.camera))
     lines.append(
@@ -69,15 +72,39 @@ def refine(
     progress: Progress | None = None,
     cancelled: Cancel | None = None,
     keeps: Cancel | None = None,
+    seconds: float | None = None,
+    state: RenderState | None = None,
 ) -> Iterator[Frame]:
     """Frames of a world placed for `step`, each usable and better than the one before; the last is the final one.
 
     `Frame.ambient` and `Frame.truth` are None until their turn comes. `Frame.counts` tells the estimated relative error
-    of each laser and of the ambient light. keeps: asked when cancelled, whether the unfinished ambient light is wanted,
-    as one more frame. Raises InputError, Cancelled.
+    of each laser and of the ambient light. keeps: asked when cancelled, whether the unfinished light is wanted, as one
+    more frame. seconds: the refinement ends then, whatever its errors; every light group has its share of that time.
+    state: to go on from, and to keep. Raises InputError, Cancelled.
     """
     settings = settings or RenderSettings()
-    clock = _Clock(_workload(world, scene, settings), progress)
+    targets = (QUICK_ERROR, settings.laser_error) if settings.laser_error < QUICK_ERROR else (settings.laser_error,)
+    clock = WholeClock(_workload(world, scene, settings), progress)
+    return frames(world, scene, settings, clock, targets, step, axis, seed, threads, cancelled, keeps, seconds, state)
+
+
+def frames(
+    world: World,
+    scene: Scene,
+    settings: RenderSettings,
+    clock: Clock | WholeClock,
+    targets: tuple[float, ...],
+    step: int = 0,
+    axis: Axis = "rows",
+    seed: int = 0,
+    threads: int | None = None,
+    cancelled: Cancel | None = None,
+    keeps: Cancel | None = None,
+    seconds: float | None = None,
+    state: RenderState | None = None,
+) -> Iterator[Frame]:
+    """As `refine`; targets: errors of the laser light, one after the other."""
+    limit = Limit(seconds, cancelled, keeps)
     with clock.stage("acceleration structure", len(world.triangles) * 10):
         check_placement(world, scene, step)
         check_materials(world, scene)
@@ -90,30 +117,35 @@ def refine(
         so_far = {"rays": rays.rays - ray_start, "seconds in embree, all threads": rays.seconds - embree_start}
         return replace(frame, seconds=clock.so_far(), counts={**frame.counts, **counts, **so_far})
 
-    pixels = scene.camera.width * scene.camera.height
+    pixels, lit = scene.camera.width * scene.camera.height, has_ambient(scene)
     with clock.stage("exact line", 0):
         curves = tuple(_curves(world, scene, step, axis, threads))
-    targets = (QUICK_ERROR, settings.laser_error) if settings.laser_error < QUICK_ERROR else (settings.laser_error,)
     for target in targets:
         with clock.stage("laser light", _laser_work(pixels, scene, target)) as report:
-            images, counts = _lasers(world, scene, step, target, seed, threads, report, cancelled)
-        frame = told(replace(frame, laser_direct=images, curves=curves), **counts)
+            direct, counts = _lasers(world, scene, step, target, seed, threads, report, cancelled)
+        frame = told(replace(frame, laser_direct=direct, curves=curves), **counts)
         yield frame
-    with clock.stage("reflected laser light", pixels) as report:
-        chosen, indirect, counts = indirect_light(
+    with clock.stage("reflected laser light", _indirect_work(pixels, settings)) as report:
+        chosen = choose_plan(world, scene, settings, direct, step=step, seed=seed, cancelled=cancelled)
+        frame = told(replace(frame, plan="\n".join((*chosen.lines, *expected_ambient(scene, settings)))))
+        for indirect, counts in indirect_light(
             world,
             scene,
             settings,
-            images,
+            chosen,
             step=step,
             seed=seed,
             threads=threads,
             cancelled=cancelled,
             progress=report,
-        )
-    lines = "\n".join((*chosen.lines, *expected_ambient(scene, settings)))
-    frame = told(replace(frame, laser_indirect=indirect, plan=lines), **counts)
-    if indirect:
+            keeps=keeps,
+            enough=lambda left: limit.share(left + lit),
+            state=state,
+        ):
+            frame = told(replace(frame, laser_indirect=indirect), **counts)
+            yield frame
+    if not (frame.laser_indirect or settings.truth_images or lit):
+        # nothing is left to do but to say so
         yield frame
     if settings.truth_images:
         with clock.stage("truth images", pixels) as report:
@@ -121,21 +153,25 @@ def refine(
             truth = truth_images(world, camera, pose, threads=threads, cancelled=cancelled, progress=report)
         frame = told(replace(frame, truth=truth))
         yield frame
-    if has_ambient(scene):
+    if lit:
         with clock.stage("ambient light", _ambient_work(pixels, settings)) as report:
             wanted = choose_ambient(world, scene, settings, step=step, seed=seed, cancelled=cancelled)
             frame = replace(frame, plan="\n".join((*chosen.lines, *wanted.lines)))
-            for image, counts in planned_images(
-                world,
-                scene,
-                settings,
-                wanted,
-                step=step,
-                seed=seed,
-                threads=threads,
-                cancelled=cancelled,
-                progress=report,
-                keeps=keeps,
+            for image, counts in limit.until_over(
+                planned_images(
+                    world,
+                    scene,
+                    settings,
+                    wanted,
+                    step=step,
+                    seed=seed,
+                    threads=threads,
+                    cancelled=limit.over,
+                    progress=report,
+                    keeps=limit.keeps,
+                    before=None if state is None else state.ambient,
+                    keep=None if state is None else state.keep_film,
+                )
             ):
                 frame = told(replace(frame, ambient=image.radiance), **counts)
                 yield frame
@@ -184,6 +220,11 @@ def _laser_work(pixels: int, scene: Scene, target: float) -> float:
     return 0.2 * pixels * len(scene.lasers) * (1.0 + 0.2 * math.log2(max(1.0, QUICK_ERROR / target)))
 
 
+def _indirect_work(pixels: int, settings: RenderSettings) -> float:
+    """About how many rays: next to none where there is nothing to reflect on, dozens a pixel where there is."""
+    return float(pixels) if settings.transport == "direct" else 8.0 * pixels
+
+
 def _ambient_work(pixels: int, settings: RenderSettings) -> float:
     """About how many rays: a camera ray and two more a sample; it ends before that where the error is reached."""
     return 3.0 * pixels * settings.ambient_samples
@@ -194,41 +235,8 @@ def _workload(world: World, scene: Scene, settings: RenderSettings) -> float:
     pixels = scene.camera.width * scene.camera.height
     total = len(world.triangles) * 10 + _laser_work(pixels, scene, settings.laser_error)
     total += _laser_work(pixels, scene, QUICK_ERROR) if settings.laser_error < QUICK_ERROR else 0.0
-    total += pixels
+    total += _indirect_work(pixels, settings)
     total += pixels if settings.truth_images else 0.0
     if has_ambient(scene):
         total += _ambient_work(pixels, settings)
     return max(total, 1.0)
-
-
-@dataclass
-class _Clock:
-    """Seconds by stage, and the share of the whole work that is done."""
-
-    total: float
-    progress: Progress | None
-    finished: float = 0.0
-    seconds: dict[str, float] = field(default_factory=dict)
-    running: tuple[str, float] | None = None
-
-    def so_far(self) -> dict[str, float]:
-        """Seconds by stage, with those of the one under way."""
-        seconds = dict(self.seconds)
-        if self.running is not None:
-            name, start = self.running
-            seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
-        return seconds
-
-    @contextmanager
-    def stage(self, name: str, work: float) -> Iterator[Callable[[float], None]]:
-        """Time a stage; yields the function that takes its own progress, 0..1."""
-        self.running = name, time.perf_counter()
-
-        def report(done: float) -> None:
-            if self.progress is not None:
-                self.progress(name, (self.finished + done * work) / self.total)
-
-        report(0.0)
-        yield report
-        self.seconds, self.running = self.so_far(), None
-        self.finished += work

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
-from render.ambient_plan import choose_ambient, expected_ambient, has_ambient, planned_images
-from render.checks import check_placement
-from render.curve import laser_curve
-from render.direct import direct_image
 from render.frame import Axis, Frame
-from render.material_checks import check_materials, scene_warnings
-from render.plan import indirect_light
+from render.refine import frames
+from render.saved import RenderState
 from render.scene import Scene
 from render.settings import RenderSettings
+from render.stage_clock import Clock
 from render.threads import Cancel
-from render.truth import truth_images
 from render.world import World, build_world
 
 StageProgress = Callable[[str, float], None]
@@ -61,97 +55,19 @@ def render_world(
     threads: int | None = None,
     progress: StageProgress | None = None,
     cancelled: Cancel | None = None,
+    seconds: float | None = None,
+    state: RenderState | None = None,
+    refined: Callable[[Frame], None] = lambda frame: None,
 ) -> Frame:
-    """Render a world placed for `step`; `axis` is the scan axis of the exact line. Raises InputError, Cancelled."""
+    """Render a world placed for `step`; `axis` is the scan axis of the exact line.
+
+    progress: of each stage. seconds, state: see `render.refine.refine`. refined: hears of every frame, the last is the
+    result. Raises InputError, Cancelled.
+    """
     settings = settings or RenderSettings()
-    camera, T_world_camera = scene.camera, scene.T_world_camera(step)
-    seconds: dict[str, float] = {}
-    counts: dict[str, float] = {}
-
-    @contextmanager
-    def stage(name: str) -> Iterator[Callable[[float], None] | None]:
-        start = time.perf_counter()
-        if progress is not None:
-            progress(name, 0.0)
-        yield None if progress is None else lambda done: progress(name, done)
-        seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
-        if progress is not None:
-            progress(name, 1.0)
-
-    with stage("acceleration structure"):
-        check_placement(world, scene, step)
-        check_materials(world, scene)
-        warnings = scene_warnings(world, scene, step)
-        rays = world.rays
-    ray_start, embree_start = rays.rays, rays.seconds
-    curves, direct = [], []
-    for i, laser in enumerate(scene.lasers):
-        T_world_laser = scene.T_world_laser(i, step)
-        with stage("exact line"):
-            curves.append(laser_curve(world, camera, laser, T_world_camera, T_world_laser, axis, threads))
-        with stage("laser light") as report:
-            image = direct_image(
-                world,
-                camera,
-                laser,
-                T_world_camera,
-                T_world_laser,
-                target=settings.laser_error,
-                seed=seed + i,
-                threads=threads,
-                cancelled=cancelled,
-                progress=report,
-            )
-        direct.append(image.radiance)
-        counts[f"relative error, {laser.name}"] = image.error
-        counts[f"lit pixels, {laser.name}"] = image.pixels
-        counts[f"samples, {laser.name}"] = image.samples
-    with stage("reflected laser light") as report:
-        plan, indirect, tallies = indirect_light(
-            world,
-            scene,
-            settings,
-            tuple(direct),
-            step=step,
-            seed=seed,
-            threads=threads,
-            cancelled=cancelled,
-            progress=report,
-        )
-    counts |= tallies
-    truth = ambient = None
-    if settings.truth_images:
-        with stage("truth images") as report:
-            truth = truth_images(world, camera, T_world_camera, threads=threads, cancelled=cancelled, progress=report)
-    lines = expected_ambient(scene, settings)
-    if has_ambient(scene):
-        with stage("ambient light") as report:
-            chosen = choose_ambient(world, scene, settings, step=step, seed=seed, cancelled=cancelled)
-            lines = chosen.lines
-            for exposed, tallies in planned_images(
-                world,
-                scene,
-                settings,
-                chosen,
-                step=step,
-                seed=seed,
-                threads=threads,
-                cancelled=cancelled,
-                progress=report,
-            ):
-                ambient = exposed.radiance
-                counts |= tallies
-    counts["rays"] = rays.rays - ray_start
-    counts["seconds in embree, all threads"] = rays.seconds - embree_start
-    return Frame(
-        step=step,
-        laser_direct=tuple(direct),
-        ambient=ambient,
-        curves=tuple(curves),
-        truth=truth,
-        laser_indirect=indirect,
-        plan="\n".join((*plan.lines, *lines)),
-        warnings=warnings,
-        seconds=seconds,
-        counts=counts,
-    )
+    clock, targets = Clock(progress), (settings.laser_error,)
+    for frame in frames(
+        world, scene, settings, clock, targets, step, axis, seed, threads, cancelled, None, seconds, state
+    ):
+        refined(frame)
+    return frame

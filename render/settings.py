@@ -33,6 +33,14 @@ class RenderSettings(Model):
         ge=1 << 20,
         le=1 << 40,
     )
+    laser_clamp: float | None = quantity(
+        None,
+        label="Reflection clamp",
+        unit="W/(m^2 sr)",
+        help="Most radiance that one pass of reflected laser light may put into a pixel; it takes single bright pixels "
+        "away, and with them light: biased. Empty: none.",
+        gt=0,
+    )
     ambient_error: float = quantity(
         0.01, label="Ambient error", help="Target relative RMS error of the ambient light.", gt=1e-4, le=1
     )

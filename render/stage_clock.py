@@ -1,0 +1,70 @@
+"""Seconds by stage of a render, and how far it is: told of the whole, or of each stage on its own."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+Progress = Callable[[str, float], None]
+"""progress(what is being done, share 0..1)."""
+
+
+@dataclass
+class Clock:
+    """Times stages, and tells each one's own progress."""
+
+    progress: Progress | None
+    seconds: dict[str, float] = field(default_factory=dict)
+    running: tuple[str, float] | None = None
+
+    def so_far(self) -> dict[str, float]:
+        """Seconds by stage, with those of the one under way."""
+        seconds = dict(self.seconds)
+        if self.running is not None:
+            name, start = self.running
+            seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
+        return seconds
+
+    @contextmanager
+    def stage(self, name: str, work: float) -> Iterator[Callable[[float], None]]:
+        """Time a stage; yields the function that takes its own progress, 0..1. work: about how many rays."""
+        self.running = name, time.perf_counter()
+
+        def report(done: float) -> None:
+            if self.progress is not None:
+                self.progress(name, done)
+
+        report(0.0)
+        yield report
+        self.seconds, self.running = self.so_far(), None
+        report(1.0)
+
+
+@dataclass
+class WholeClock:
+    """Times stages, and tells the share of the whole work that is done."""
+
+    total: float
+    """Sum of the work of all stages."""
+    progress: Progress | None
+    finished: float = 0.0
+    clock: Clock = field(default_factory=lambda: Clock(None))
+
+    def so_far(self) -> dict[str, float]:
+        """Seconds by stage, with those of the one under way."""
+        return self.clock.so_far()
+
+    @contextmanager
+    def stage(self, name: str, work: float) -> Iterator[Callable[[float], None]]:
+        """As `Clock.stage`."""
+
+        def report(done: float) -> None:
+            if self.progress is not None:
+                self.progress(name, min(1.0, (self.finished + done * work) / self.total))
+
+        report(0.0)
+        with self.clock.stage(name, work):
+            yield report
+        self.finished += work
