@@ -165,7 +165,7 @@ def test_a_shining_disk_has_its_form_factor(radius, connected):
         rows = paths.lights.rows.copy()
         rows[:, 17] = 0.0
         paths = replace(paths, lights=paths.lights._replace(rows=rows))
-    film = render.ambient._Film(scene.camera.width, scene.camera.height)
+    film = render.ambient.Film(scene.camera.width, scene.camera.height)
     image = film.expose(paths, np.full((film.tiles, 2), 8192), None, None, None).radiance
     expected = 0.5 * 4.0 * radius**2 / (radius**2 + 1.0)
     found = image[4:6, 5:7, 0].mean()
