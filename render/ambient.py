@@ -317,14 +317,19 @@ def develop_halves(sums: Float32, done: Int, across: int, image: Float32) -> tup
     sums (h w, 2, 3); done (tiles, 2). A half without samples is left out.
     """
     difference = power = 0.0
+    inverse = np.zeros(done.shape)
+    for tile in range(done.shape[0]):
+        for half in range(2):
+            if done[tile, half] > 0:
+                inverse[tile, half] = 1.0 / done[tile, half]
     for row in range(image.shape[0]):
         for column in range(image.shape[1]):
             tile = row // TILE * across + column // TILE
-            first, second = done[tile, 0], done[tile, 1]
+            first, second = inverse[tile, 0], inverse[tile, 1]
             pixel = sums[row * image.shape[1] + column]
             for band in range(3):
-                a = float(pixel[0, band]) / first if first > 0 else 0.0
-                b = float(pixel[1, band]) / second if second > 0 else a
+                a = pixel[0, band] * first
+                b = pixel[1, band] * second if second > 0.0 else a
                 value = 0.5 * (a + b)
                 image[row, column, band] = value
                 difference += (a - b) * (a - b)
