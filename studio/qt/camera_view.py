@@ -240,7 +240,7 @@ class CameraView(QWidget):
 
     def _show_badge(self) -> None:
         shown = self.session.shown
-        if self.is_live and not self.live.ready:
+        if shown is None and not self.live.ready:
             text = "Preparing the live estimate; the very first time this takes half a minute."
         elif shown is None:
             text = "Live estimate: one ray a pixel, no noise. Render for the real image."

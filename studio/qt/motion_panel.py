@@ -205,10 +205,11 @@ class MotionPanel(QWidget):
         top.addWidget(self._button("next", "Step on", lambda: look(self.session.step + 1)))
         top.addWidget(self._button("last", "Last step", lambda: look(self.slider.maximum())))
         top.addWidget(self.slider, 1)
-        bottom.addWidget(self.told, 1)
+        bottom.addStretch(1)
         for widget in (self.open, self.scale, self.run):
             bottom.addWidget(widget)
         inside.addLayout(top)
+        inside.addWidget(self.told)
         inside.addLayout(bottom)
         inside.addStretch(1)
         self.stack = QStackedLayout(self)
