@@ -42,7 +42,7 @@ def unrendered(qtbot):
     view.resize(800, 700)
     view.show()
     qtbot.waitExposed(view)
-    qtbot.waitUntil(lambda: len(live(session).look.placed) > 0, timeout=20000)
+    qtbot.waitUntil(lambda: len(live(session).look.placed) > 0)
     yield view
     view.close()
     live(session).close()

@@ -25,7 +25,7 @@ def panel(qtbot):
 def settle(qtbot, panel):
     """All that was asked for is done."""
     panel.refresh()
-    qtbot.waitUntil(lambda: not panel.busy, timeout=20000)
+    qtbot.waitUntil(lambda: not panel.busy)
 
 
 def type_into(qtbot, box, text):
@@ -122,7 +122,7 @@ def test_many_changes_in_a_row_end_with_the_last_one(qtbot, panel):
     session.developed.connect(lambda: count.append(session.shown.images[0]))
     for i in range(30):
         session.set(("sensor", "exposure_time"), 1e-3 * (1 + i))
-    qtbot.waitUntil(lambda: not panel.busy, timeout=20000)
+    qtbot.waitUntil(lambda: not panel.busy)
     assert len(count) <= 5
     from studio.redevelop import develop_again, development
 

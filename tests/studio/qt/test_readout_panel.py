@@ -23,7 +23,7 @@ def panel_on(qtbot: QtBot) -> ReadoutPanel:
     panel = ReadoutPanel(Session(Document(Project.load(SAMPLE), SAMPLE)))
     qtbot.addWidget(panel)
     panel.show()
-    qtbot.waitUntil(lambda: bool(panel.rows()) and panel.rows()[1].value != "-", timeout=20_000)
+    qtbot.waitUntil(lambda: bool(panel.rows()) and panel.rows()[1].value != "-")
     return panel
 
 

@@ -37,7 +37,7 @@ def press(qtbot, button):
 
 
 def finish(qtbot, panel):
-    qtbot.waitUntil(lambda: panel.runner.job() is None, timeout=20000)
+    qtbot.waitUntil(lambda: panel.runner.job() is None)
 
 
 def long_render(qtbot, panel):
@@ -46,7 +46,7 @@ def long_render(qtbot, panel):
     panel.session.set(("render", "ambient_error"), 2e-4)
     press(qtbot, panel.start_button)
     session = panel.session
-    qtbot.waitUntil(lambda: session.shown is not None and session.shown.frame.ambient is not None, timeout=20000)
+    qtbot.waitUntil(lambda: session.shown is not None and session.shown.frame.ambient is not None)
 
 
 def test_the_image_refines_until_it_is_the_final_one(qtbot, panel):
@@ -78,7 +78,7 @@ def test_cancel_forgets_the_render_and_shows_the_one_before(qtbot, panel):
     panel.session.set(("render", "ambient_samples"), 65536)
     panel.session.set(("render", "ambient_error"), 2e-4)
     press(qtbot, panel.start_button)
-    qtbot.waitUntil(lambda: len(panel.session.renders) == 2, timeout=20000)
+    qtbot.waitUntil(lambda: len(panel.session.renders) == 2)
     press(qtbot, panel.cancel_button)
     finish(qtbot, panel)
     assert len(panel.session.renders) == 1 and panel.session.shown is before

@@ -21,6 +21,7 @@ from studio.project import Project
 from studio.qt import theme
 from studio.qt.session import Session
 from studio.qt.viewport import Viewport
+from studio.templates import template_folder
 
 SAMPLE = Path(__file__).parents[3] / "assets/projects/plane/project.json"
 CAMERA, LASER, PLATE, BOX = (
@@ -261,3 +262,14 @@ def test_a_missing_mesh_is_told_once_and_the_rest_is_shown(viewport: Viewport, q
     qtbot.waitUntil(lambda: viewport.live.look.project is session.project and not viewport.live.is_loading)
     assert len(told) == 1 and told[0][0] == "error" and "lost" in told[0][1]
     assert len(viewport.live.look.placed) == 2
+
+
+@pytest.mark.parametrize("name", ["shiny_weld_seam", "step_block"])
+def test_a_template_is_drawn_with_all_its_meshes(qtbot: QtBot, name: str) -> None:
+    folder = template_folder(name)
+    made = Viewport(Session(Document(Project.load(folder / "project.json"), None, folder)))
+    made.show()
+    qtbot.addWidget(made)
+    qtbot.waitUntil(lambda: not made.live.is_loading and not made._frame_soon and made.view.paints > 0)
+    assert len(made.scene._meshes) == len(made.session.project.scene.visible_objects)
+    made.close()
