@@ -39,6 +39,7 @@ ITEMS = (Camera, Scene, Sensor, RenderSettings, ExtractionSettings, LineLaser, S
 HIDDEN = ("kind", "source", "schema_version", "sha256")
 FINE_UNITS = {(Camera, "pixel_pitch"): "um", (Waist, "radius"): "um", (Divergence, "full_angle"): "mrad"}
 PLAIN = Unit()
+BLANKS = str.maketrans("_-", "  ")
 LABELS = {"T_rig_camera": "Pose on the rig", "T_rig_laser": "Pose on the rig", "T_world_rig": "Pose in the world",
           "T_world_object": "Pose in the world", "T_world_light": "Pose in the world"}  # fmt: skip
 NAMES = {"MeshFile": "Mesh file", "FromMesh": "From the mesh file", "PointLight": "Point", "Waist": "Focused",
@@ -214,10 +215,10 @@ def choice_label(value: Any) -> str:
 
 
 def words(name: str) -> str:
-    """WeldTee, weld_tee -> Weld tee; what is written in capitals stays."""
+    """WeldTee, weld_tee, weld-tee -> Weld tee; what is written in capitals stays."""
     if name.isupper():
         return name
-    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name).replace("_", " ").lower()
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name).translate(BLANKS).lower()
     return spaced[:1].upper() + spaced[1:]
 
 
