@@ -24,7 +24,7 @@ from peers.chart import draw
 from peers.references import reference
 
 FULL, QUICK = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0], [0.5, 1.0, 2.0]
-FIELDS = ("scene", "engine", "run", "seconds", "pixels", "error", "energy", "shift_px")
+FIELDS = ("scene", "engine", "run", "seconds", "pixels", "error", "energy", "shift_px", "shift_v_px")
 
 
 def main() -> None:
@@ -69,6 +69,7 @@ def main() -> None:
                         row["error"] = measure.relative_error(shot.image, known.image, pixels)
                         row["energy"] = measure.energy(shot.image, known.image, pixels)
                         row["shift_px"] = measure.shift(shot.image, known.image, pixels)
+                        row["shift_v_px"] = measure.shift(shot.image.T, known.image.T, pixels.T)
                         mine.append(row)
             rows += mine
             for name in sets:
@@ -87,11 +88,14 @@ def tell(engine: str, pixels: str, rows: list[dict]) -> None:
     if not rows:
         return
     best = min(rows, key=lambda r: r["error"])
-    wrong = "" if abs(best["energy"] - 1) < 0.02 and abs(best["shift_px"]) < 0.1 else "   WRONG"
+    # a line says nothing of where it lies along itself
+    place = (best["shift_px"],) if pixels == "line" else (best["shift_px"], best["shift_v_px"])
+    wrong = "" if abs(best["energy"] - 1) < 0.02 and max(map(abs, place)) < 0.1 else "   WRONG"
+    moved = " ".join(f"{p:+.4f}" for p in place)
     runs = [r for r in rows if r["run"] == rows[0]["run"]]
     errors = " ".join(f"{r['error']:.2%}@{r['seconds']:.3g}s" for r in runs)
     print(
-        f"  {engine:<24} {pixels:<10} energy {best['energy']:.4f}  shift {best['shift_px']:+.4f} px  {errors}{wrong}",
+        f"  {engine:<24} {pixels:<10} energy {best['energy']:.4f}  shift {moved} px  {errors}{wrong}",
         flush=True,
     )
 
