@@ -69,8 +69,8 @@ class DevelopPanel(QWidget):
         self.exposures.setToolTip("Several are fused in electrons, each shorter than the one before by the ratio")
         self.continuous = QCheckBox("on the smoothest chain")
         self.continuous.setToolTip("Of all peaks of a scan line the one that continues the line, or none")
-        self.geometry = QCheckBox("that the laser can have made")
-        self.geometry.setToolTip("On the laser's plane, within its fan and the working volume, no wider than its sheet")
+        self.possible = QCheckBox("that the laser can have made")
+        self.possible.setToolTip("On the laser's plane, within its fan and the working volume, no wider than its sheet")
         self.powers: list[LogField] = []
         self.methods_button = QPushButton()
         self.methods_button.setToolTip("Every chosen method measures the same image")
@@ -115,7 +115,7 @@ class DevelopPanel(QWidget):
         form.addRow("Noise", self.noise)
         form.addRow("Exposures", self.exposures)
         form.addRow("Only peaks", self.continuous)
-        form.addRow("", self.geometry)
+        form.addRow("", self.possible)
         form.addRow("Measure by", self.methods_button)
         layout = QVBoxLayout(self)
         layout.addLayout(form)
@@ -147,7 +147,7 @@ class DevelopPanel(QWidget):
         self.continuous.clicked.connect(
             lambda on: session.set(("extraction", "select"), "continuous" if on else "strongest", "selection")
         )
-        self.geometry.clicked.connect(lambda on: session.set(("extraction", "geometry"), on, "geometric check"))
+        self.possible.clicked.connect(lambda on: session.set(("extraction", "geometry"), on, "geometric check"))
         self.noise.toggled.connect(self.refresh)
         for action in self.methods.values():
             action.toggled.connect(self._methods_changed)
@@ -186,7 +186,7 @@ class DevelopPanel(QWidget):
         self.bits.setCurrentIndex(self.bits.findData(sensor.bits))
         self.exposures.setCurrentIndex(self.exposures.findData(project.extraction.exposures))
         self.continuous.setChecked(project.extraction.select == "continuous")
-        self.geometry.setChecked(project.extraction.geometry)
+        self.possible.setChecked(project.extraction.geometry)
         if len(self.powers) != len(lasers):
             self._make_powers(len(lasers))
         for field, laser in zip(self.powers, lasers, strict=True):

@@ -143,7 +143,7 @@ def test_exposures_and_the_choice_of_peaks_are_the_projects_and_told(qtbot, pane
     session = panel.session
     panel.exposures.setCurrentIndex(2)
     panel.exposures.activated.emit(2)
-    for box in (panel.continuous, panel.geometry):
+    for box in (panel.continuous, panel.possible):
         qtbot.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
     extraction = session.project.extraction
     assert (extraction.exposures, extraction.select, extraction.geometry) == (3, "continuous", True)
@@ -156,4 +156,4 @@ def test_exposures_and_the_choice_of_peaks_are_the_projects_and_told(qtbot, pane
     assert line.candidates is not None and line.valid.mean() > 0.5
     assert "3 exposures fused" in panel.noted.text() and "fan" in panel.noted.text()
     session.document.undo()
-    assert not panel.geometry.isChecked()
+    assert not panel.possible.isChecked()
