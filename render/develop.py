@@ -139,11 +139,6 @@ def expected_electrons(
     return electrons
 
 
-def applies_defocus(scene: Scene, sensor: Sensor) -> bool:
-    """Whether developing blurs by depth: asked for, and the lens is not rendered with its aperture, blurred already."""
-    return sensor.defocus and scene.camera.lens.model == "pinhole"
-
-
 class _Exposure:
     """A frame's light groups with the electrons that each makes per radiance."""
 
@@ -202,7 +197,7 @@ class _Optics:
     def __init__(self, frame: Frame, scene: Scene, sensor: Sensor, threads: int | None) -> None:
         self.camera, self.sensor, self.threads = scene.camera, sensor, threads
         self.diameter = None
-        if applies_defocus(scene, sensor):
+        if sensor.defocus_by(scene.camera.lens.model).startswith("developing"):
             if frame.truth is None:
                 cure = "render the frame with its truth, or switch defocus off"
                 raise InputError(

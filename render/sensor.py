@@ -89,6 +89,12 @@ class Sensor(Model):
             raise ValueError(f"black_level {self.black_level} must be below {2**self.bits - 1} DN ({self.bits} bit)")
         return self
 
+    def defocus_by(self, lens_model: str) -> str:
+        """What blurs out of focus: never two at once. lens_model: as of `render.camera.Lens`."""
+        if lens_model == "thin-lens":
+            return "the rendered lens"
+        return "developing, by depth" if self.defocus else "nothing"
+
     @property
     def dn_per_electron(self) -> float:
         """EMVA's K."""

@@ -24,12 +24,14 @@ from analysis.report.units import (
 )
 from render.laser import Divergence
 from render.material import (
+    BaseMaterial,
     Blend,
     Coated,
     Conductor,
     Emitter,
     FromMesh,
     Glass,
+    GreyTexture,
     Lambertian,
     Material,
     Subsurface,
@@ -155,23 +157,30 @@ def scene_tables(report: ReportInput) -> Tables:
             "Filter": "none"
             if sensor.band_pass is None
             else f"{sensor.band_pass.centre_nm:g} nm, {sensor.band_pass.width_nm:g} nm wide",
+            "Defocus": f"by {sensor.defocus_by(lens.model)}",
         }
     return tables | report.settings
 
 
 def _material(material: Material) -> str:
     """In words, with the numbers that decide how it shines."""
+    if isinstance(material, Blend):
+        return f"{_material(material.base)}; where {material.mask.path} is white, {_material(material.over)}"
+    relief = f", relief of {material.relief.path}" if material.relief is not None else ""
+    return f"{_plain_material(material)}{relief}"
+
+
+def _plain_material(material: BaseMaterial) -> str:
     match material:
-        case Blend():
-            return f"{_material(material.base)}; where {material.mask.path} is white, {_material(material.over)}"
         case Conductor():
             across = "" if material.roughness_across is None else f" along u, {material.roughness_across:g} along v"
-            return f"{material.metal.replace('_', ' ')}, roughness {material.roughness:g}{across}"
+            return f"{material.metal.replace('_', ' ')}, roughness {_numbers(material.roughness)}{across}"
         case Coated():
-            return f"{_albedo(material)} under a coat of index {material.index:g}, roughness {material.roughness:g}"
+            coat = f"a coat of index {material.index:g}, roughness {_numbers(material.roughness)}"
+            return f"{_albedo(material)} under {coat}"
         case Glass():
             what = material.substance.replace("_", " ") if material.index is None else f"index {material.index:g}"
-            return f"transparent, {what}, roughness {material.roughness:g}, tint {_numbers(material.tint)}"
+            return f"transparent, {what}, roughness {_numbers(material.roughness)}, tint {_numbers(material.tint)}"
         case Subsurface():
             return (
                 f"translucent, index {material.index:g}, roughness {material.roughness:g}, mean free path "
@@ -192,7 +201,9 @@ def _albedo(material: Lambertian | Coated | Emitter) -> str:
     return f"albedo {_numbers(material.albedo)}"
 
 
-def _numbers(value: float | tuple[float, ...], factor: float = 1.0) -> str:
+def _numbers(value: float | tuple[float, ...] | GreyTexture, factor: float = 1.0) -> str:
+    if isinstance(value, GreyTexture):
+        return f"of {value.path}"
     return ", ".join(f"{factor * each:g}" for each in (value if isinstance(value, tuple) else (value,)))
 
 

@@ -233,7 +233,9 @@ class DevelopPanel(QWidget):
             start = time.perf_counter()
             images = develop_again(frame, how, noise=noise, cancelled=cancelled)
             seconds = time.perf_counter() - start
-            self._images_ready.emit(render, images, seconds, brightness(images, names))
+            blur = how.project.sensor.defocus_by(how.project.scene.camera.lens.model)
+            told = brightness(images, names) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
+            self._images_ready.emit(render, images, seconds, told)
             return images
 
         def then(images: list[Image]) -> None:

@@ -55,6 +55,8 @@ def test_developing_never_blurs_a_thin_lens_again():
         electrons = expected_electrons(frame, lensed, sensor_of(dark_current=0.0, **switches))
         return np.count_nonzero(electrons[height // 2] > 0.0)
 
+    assert sensor_of(defocus=True).defocus_by("thin-lens") == "the rendered lens"
+    assert sensor_of(defocus=True).defocus_by("pinhole").startswith("developing")
     assert lit_columns("pinhole", defocus=True) > lit_columns("pinhole") == 1
     assert lit_columns("thin-lens", defocus=True) == lit_columns("thin-lens") == 1
 
