@@ -24,6 +24,10 @@ Mask = NDArray[np.uint8]
 WINDOW = 3.0
 CLIPPED = 0.07
 """px^2; clipping breaks the band limit: an error up to 0.1 px at s = 1, rms CLIPPED / s (1x to 100x full well)."""
+NARROWEST = 0.5
+"""px; narrower lines, whose width is not well known from a look, claim no sigma."""
+LOCKED = 0.5
+"""Of sigma: where the pixels decide more than the noise, none is claimed."""
 
 _SATURATED, _AT_BORDER, _TOO_FEW = int(Flag.SATURATED), int(Flag.AT_BORDER), int(Flag.TOO_FEW_PIXELS)
 _NOT_CONVERGED, _OUT_OF_WINDOW = int(Flag.NOT_CONVERGED), int(Flag.OUT_OF_WINDOW)
@@ -89,5 +93,9 @@ def weigh_seeds(
                     count += 1
             out[row, k, 0] = u
             clipped = CLIPPED / seed[WIDTH] if reason == _SATURATED else 0.0
-            out[row, k, 1] = math.sqrt(linear_variance(weight, variance, x, count, correlation) + clipped * clipped)
+            sigma = math.sqrt(linear_variance(weight, variance, x, count, correlation) + clipped * clipped)
+            # sampling locks narrow lines to the pixels by exp(-2 pi^2 s^2) / pi px at most
+            locked = math.exp(-2.0 * (math.pi * seed[WIDTH]) ** 2) / math.pi
+            if seed[WIDTH] > NARROWEST and locked < LOCKED * sigma:
+                out[row, k, 1] = sigma
             out[row, k, 2], out[row, k, 3], out[row, k, 4] = seed[WIDTH], seed[AMPLITUDE], base
