@@ -27,7 +27,18 @@ from analysis.triangulate import triangulate
 from render.camera import Camera
 from render.frame import LaserCurve
 from render.laser import LineLaser
-from render.material import Blend, Coated, Conductor, Lambertian, Texture
+from render.material import (
+    Blend,
+    BumpMap,
+    Coated,
+    Conductor,
+    Emitter,
+    Glass,
+    GreyTexture,
+    Lambertian,
+    Subsurface,
+    Texture,
+)
 from render.motion import LinearStage
 from render.pose import Pose
 from render.scene import Rig, Scene, SceneObject
@@ -306,6 +317,15 @@ def test_colour_limits_are_round_and_hold_nearly_all_errors():
             "stainless steel, roughness 0.15 along u, 0.4 along v",
         ),
         (Coated(index=1.4), "albedo 0.5 under a coat of index 1.4, roughness 0.1"),
+        (Conductor(roughness=GreyTexture(path="worn.png")), "steel, roughness of worn.png"),
+        (Lambertian(relief=BumpMap(path="grain.png")), "diffuse, albedo 0.5, relief of grain.png"),
+        (Glass(roughness=0.1), "transparent, BK7, roughness 0.1, tint 1"),
+        (Glass(index=1.6, tint=(1, 0.9, 0.9)), "transparent, index 1.6, roughness 0, tint 1, 0.9, 0.9"),
+        (
+            Subsurface(mean_free_path=(1e-3, 2e-3, 3e-3)),
+            "translucent, index 1.5, roughness 0.3, mean free path 1, 2, 3 mm, scattering albedo 0.99, anisotropy 0",
+        ),
+        (Emitter(radiance=(3, 2, 1)), "shines with 3, 2, 1 W/(m^2 sr), albedo 0.5"),
         (
             Blend(base=Lambertian(albedo=Texture(path="rust.png")), mask=Texture(path="ground.png")),
             "diffuse, albedo of rust.png; where ground.png is white, steel, roughness 0.15",
