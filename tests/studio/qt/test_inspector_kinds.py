@@ -149,5 +149,5 @@ class TestMenus:
 
     def test_only_items_with_presets_have_the_menu(self, session: Session, inspector: Inspector) -> None:
         shown = {path: (session.select(path), inspector.presets.isVisible())[1]
-                 for path in (LASER, CAMERA, ("sensor",), ("scene", "objects", 0), ())}  # fmt: skip
-        assert list(shown.values()) == [True, True, True, False, False]
+                 for path in (LASER, CAMERA, ("sensor",), ("scene", "objects", 0), ("scene", "motion"), ())}  # fmt: skip
+        assert list(shown.values()) == [True, True, True, True, False, False]
