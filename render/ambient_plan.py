@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.ambient import AmbientImage, Arrays, Film, ambient_images
-from render.bsdf import DIELECTRIC, SMOOTH, SUBSURFACE
+from render.bsdf import DIELECTRIC, SMOOTH
 from render.camera_paths import camera_paths
 from render.lights import PointLight
 from render.material import Emitter
@@ -194,6 +194,4 @@ def _blind_lines(world: World, scene: Scene) -> tuple[str, ...]:
     polished = np.any((rows[:, 0] == DIELECTRIC) & (np.maximum(rows[:, 1], rows[:, 2]) < SMOOTH))
     if polished and any(isinstance(light, PointLight) for light in scene.lights):
         lines.append("left out: light of point lamps by way of polished glass - no path from the camera meets a point")
-    if np.any(rows[:, 0] == SUBSURFACE):
-        lines.append("left out: ambient light scattered below the surface of translucent objects - they look clear")
     return tuple(lines)

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from render.embree import RayScene
 from render.errors import Cancelled
 from render.light_rows import Lights, pack_lights
+from render.medium import MOST_STEPS
 from render.path import shade_diffuse, shade_glossy
 from render.scene import Scene
 from render.sequence import pair_table
-from render.surface import Surface, View, has_gloss
+from render.surface import Surface, View, has_gloss, has_medium
 from render.threads import Cancel
+from render.wander import wander
 from render.wave import Shadows, Wave, add_clear, launch
 from render.world import World
 
@@ -50,7 +52,7 @@ class CameraPaths:
         Their radiance is added to sums (2 m, 4), halves side by side. Raises Cancelled.
         """
         wave, shadows = self._arrays()
-        rays, glossy = self.rays, has_gloss(self.surface)
+        rays, glossy, media = self.rays, has_gloss(self.surface), has_medium(self.surface)
         shade = shade_glossy if glossy else shade_diffuse
         table = pair_table()
         n = launch(self.view, table, self.seed, pixels, first, count, rays.centre, wave)
@@ -58,7 +60,9 @@ class CameraPaths:
         while n > 0:
             if cancelled is not None and cancelled():
                 raise Cancelled
-            triangle, _ = rays.intersect(wave.origin[:n], wave.direction[:n])
+            triangle, distance = rays.intersect(wave.origin[:n], wave.direction[:n])
+            if media:
+                self._walk(wave, n, depth, pixels, triangle, distance, cancelled)
             n, asked = shade(
                 self.surface,
                 self.lights,
@@ -82,6 +86,21 @@ class CameraPaths:
                 add_clear(shadows, blocked, self.limit if depth > 0 else np.inf, sums, tally)
             depth += 1
 
+    def _walk(
+        self, wave: Wave, n: int, depth: int, pixels: Int, triangle: Int, distance: Float32, cancelled: Cancel | None
+    ) -> None:
+        """Take every path within a medium to its boundary."""
+        walking = np.flatnonzero(wave.medium[:n]).astype(np.int32)
+        distance = distance[walking]
+        for step in range(MOST_STEPS):
+            left = wander(walking, distance, self.surface.rows, self.seed, pixels, depth, step, wave, triangle)
+            if not left:
+                break
+            if cancelled is not None and cancelled():
+                raise Cancelled
+            walking = walking[:left]
+            triangle[walking], distance = self.rays.intersect(wave.origin[walking], wave.direction[walking])
+
     def _arrays(self) -> tuple[Wave, Shadows]:
         """Of this thread: fresh ones would cost as much as tracing, in pages that the system must clear."""
         arrays: tuple[Wave, Shadows] | None = getattr(self._scratch, "arrays", None)
@@ -94,6 +113,7 @@ class CameraPaths:
                 density=np.empty(WAVE, np.float32),
                 owner=np.empty(WAVE, np.int32),
                 sample=np.empty(WAVE, np.int32),
+                medium=np.empty(WAVE, np.int32),
             )
             shadows = Shadows(
                 origin=np.empty((m, 3), np.float32),

@@ -18,7 +18,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bsdf import ROW, evaluate, is_boundary, is_diffuse, is_smooth, pdf, sample
+from render.bsdf import ROW, SUBSURFACE, evaluate, is_boundary, is_diffuse, is_smooth, pdf, sample
 from render.interaction import interaction
 from render.light_rows import POINT, SHINING, Lights, chance, light_in_view, pick, shining_point
 from render.sequence import pair
@@ -228,8 +228,9 @@ def _shade_kernel(glossy: bool) -> Any:
                     elif worth > 0.0:
                         for axis in range(3):
                             i[axis] = frame[axis, 0] * t0 + frame[axis, 1] * t1 + frame[axis, 2] * t2
-                        # on one side of the facet and of the normal that is shaded
-                        worth *= abs(i[2]) if i[2] * facing > 0.0 else 0.0
+                        # on one side of the facet and of the normal that is shaded, and not through a medium
+                        open_side = i[2] * facing > 0.0 and (row[0] != SUBSURFACE or i[2] > 0.0)
+                        worth *= abs(i[2]) if open_side else 0.0
                         evaluate(row, rho, o[0], o[1], o[2], i[0], i[1], i[2], f)
                         other = pdf(row, rho, o[0], o[1], o[2], i[0], i[1], i[2])
                     if worth > 0.0 and rows[k, 0] != POINT:
@@ -251,7 +252,7 @@ def _shade_kernel(glossy: bool) -> Any:
                             shadows.light[count, 2] = worth * w2 * f[2] * rows[k, 3]
                             count += 1
             r1, r2 = pair(table, seed, index, s, base)
-            side = surface_offset
+            side, medium = surface_offset, 0
             if diffuse:
                 t0, t1, t2, density = cosine_direction(r1, r2, n0, n1, n2)
                 density *= 1.0 / math.pi
@@ -267,6 +268,9 @@ def _shade_kernel(glossy: bool) -> Any:
                 if facing * leaves <= 0.0:
                     continue
                 side = surface_offset if facing > 0.0 else -surface_offset
+                if row[0] == SUBSURFACE and leaves < 0.0:
+                    # what is met within was connected to nothing
+                    medium, density = slot + 1, -1.0
                 w0, w1, w2 = w0 * f[0], w1 * f[1], w2 * f[2]
             if not w0 + w1 + w2 > 0.0:
                 continue
@@ -303,6 +307,7 @@ def _shade_kernel(glossy: bool) -> Any:
             wave.direction[going, 0], wave.direction[going, 1], wave.direction[going, 2] = t0, t1, t2
             wave.weight[going, 0], wave.weight[going, 1], wave.weight[going, 2] = w0, w1, w2
             wave.density[going], wave.owner[going], wave.sample[going] = density, owner, s
+            wave.medium[going] = medium
             going += 1
         return going, count
 

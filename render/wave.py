@@ -41,6 +41,8 @@ class Wave(NamedTuple):
     """(n,) twice the pixel's place in the chunk, and the half of its samples (0 or 1)."""
     sample: Int
     """(n,) number of the sample in its half."""
+    medium: Int
+    """(n,) one more than the material that the ray is within; 0: in the open."""
 
 
 class Shadows(NamedTuple):
@@ -87,7 +89,7 @@ def launch(
                 wave.origin[n, 0], wave.origin[n, 1], wave.origin[n, 2] = o0 - centre[0], o1 - centre[1], o2 - centre[2]
                 wave.direction[n, 0], wave.direction[n, 1], wave.direction[n, 2] = scale * d0, scale * d1, scale * d2
                 wave.weight[n, 0] = wave.weight[n, 1] = wave.weight[n, 2] = 1.0
-                wave.density[n], wave.owner[n], wave.sample[n] = -1.0, 2 * i + half, s
+                wave.density[n], wave.owner[n], wave.sample[n], wave.medium[n] = -1.0, 2 * i + half, s, 0
                 n += 1
     return n
 
