@@ -59,7 +59,8 @@ def _report_error(error: BaseException, context: click.Context) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter complains when it closes
         return BROKEN_PIPE
     if isinstance(error, (KeyboardInterrupt, Cancelled, click.Abort)):
-        code, text = INTERRUPTED, "interrupted; no file was left half-written"
+        kept = f"; {error}" if isinstance(error, Cancelled) and str(error) else ""
+        code, text = INTERRUPTED, f"interrupted; no file was left half-written{kept}"
     elif isinstance(error, InputError):
         code, text = BAD_INPUT, str(error)
         details = {name: getattr(error, name) for name in ("what", "where", "found", "allowed", "cure")}
@@ -113,6 +114,13 @@ def working(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         click.option("--steps", type=click.IntRange(1), help="Only the first so many frames of a moving scan."),
         click.option("--scale", type=click.FloatRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
+        click.option(
+            "--time-limit",
+            type=click.FloatRange(0.1, 1e9),
+            metavar="SECONDS",
+            help="Time for the light of each frame; it ends then, short of its errors. --resume goes on from there.",
+        ),
+        click.option("--resume", is_flag=True, help="Go on where an earlier scan into the same folder ended."),
         click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Random seed  [default: the project's]."),
         THREADS,
         click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/<name>]."),

@@ -49,11 +49,19 @@ OBJECT_LAYER = "object_id.Y"
 
 
 def write_frame(
-    folder: Path, stem: str, frame: Frame, image: Image | None, scene: Scene, *, sensor: Sensor | None = None
+    folder: Path,
+    stem: str,
+    frame: Frame,
+    image: Image | None,
+    scene: Scene,
+    *,
+    sensor: Sensor | None = None,
+    made_of: dict[str, Any] | None = None,
 ) -> list[Path]:
     """Write stem.exr, stem.png (with an image) and stem.json into the folder; the paths, in that order.
 
-    Characters of the stem and of the lasers' names that do not suit a file or a layer are percent-encoded.
+    made_of: what decides the frame's numbers, for the sidecar. Characters of the stem and of the lasers' names that do
+    not suit a file or a layer are percent-encoded.
     Raises InputError: a file cannot be written, the frame is empty or not of this scene.
     """
     name = safe_name(stem)
@@ -67,6 +75,7 @@ def write_frame(
         **sidecar_record(frame, image, scene, sensor),
         "ambient": frame.ambient is not None,
         "truth": frame.truth is not None,
+        "made_of": made_of,
         "exr_sha256": hashlib.sha256(exr).hexdigest(),
     }
     written.append(_write(folder / f"{name}.json", to_text(record).encode()))

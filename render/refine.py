@@ -105,6 +105,7 @@ def frames(
 ) -> Iterator[Frame]:
     """As `refine`; targets: errors of the laser light, one after the other."""
     limit = Limit(seconds, cancelled, keeps)
+    cancelled = None if cancelled is None else limit.asked
     with clock.stage("acceleration structure", len(world.triangles) * 10):
         check_placement(world, scene, step)
         check_materials(world, scene)

@@ -10,6 +10,7 @@ import hashlib
 import time
 import zipfile
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -154,8 +155,14 @@ def fingerprint(
         "camera, laser, lamp or motion": _digest(repr(rest)),
         "render setting": _digest(repr(settings.model_dump(mode="json", exclude=TARGETS))),
         "step or seed": f"{step}, {seed}",
-        "version of the program": source_key(),
+        "version of the program": _program(),
     }
+
+
+@cache
+def _program() -> str:
+    """Of the kernels as they were when they were loaded."""
+    return source_key()
 
 
 def _digest(*parts: NDArray[Any] | str) -> str:

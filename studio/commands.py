@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from render.errors import InputError
-from studio.console import print_json, print_table, stage_progress
+from studio.console import print_json, print_plan, print_table, stage_progress
 from studio.project import Project, project_file
 from studio.templates import DESCRIPTIONS, new_project, template_folder
 
 if TYPE_CHECKING:
+    from render.frame import Frame
     from studio.inspection import Inspection, LaserView
 
 SAMPLE = "weld_seam"
@@ -54,6 +55,8 @@ def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
         print_json({"ok": True, **found.as_dict()})
         return
     print_table(f"Project {found.name}", _project_rows(project, found))
+    print()
+    print_plan(found.plan)
     for view in found.lasers:
         print()
         print_table(f"Laser {view.name}", _laser_rows(view, found.full_well))
@@ -73,6 +76,8 @@ def run_project(
     as_json: bool,
     measure: bool = True,
     report: bool = True,
+    resume: bool = False,
+    time_limit: float | None = None,
     **extraction: Any,
 ) -> None:
     """`run`, and `render` with `measure` off. extraction: settings in place of the project's, None: the project's."""
@@ -80,9 +85,18 @@ def run_project(
     project = with_extraction(project, extraction)
     folder = out if out is not None else Path(OUTPUT) / folder_name(project.name)
     check_output(folder)
+    from render.refine import plan
+    from studio.light_groups import note
     from studio.scan import run_scan
 
-    with stage_progress(quiet) as progress:
+    shown: list[Frame] = []
+
+    def so_far(stage: str) -> str:
+        return note(stage, shown[-1], project.scene, project.render) if shown else ""
+
+    if not quiet:
+        print_plan(plan(project.scene.scaled(scale), project.render), to_errors=True)
+    with stage_progress(quiet, so_far) as progress:
         done = run_scan(
             project,
             root,
@@ -93,14 +107,19 @@ def run_project(
             image_scale=scale,
             measure=measure,
             report=report,
+            resume=resume,
+            seconds=time_limit,
+            refined=lambda frame: shown.__setitem__(slice(None), [frame]),
             progress=progress,
         )
     if as_json:
         print_json({"ok": True, "folder": str(folder), "files": [str(file) for file in done.files], **done.manifest})
         return
+    if not quiet:
+        _print_light(done.manifest["light"])
     _print_results(done.manifest)
-    for note in done.manifest["notes"]:
-        print(f"warning: {note}")
+    for text in done.manifest["notes"]:
+        print(f"warning: {text}")
     print(f"{len(done.manifest['frames'])} frame(s) in {folder}, {done.manifest['seconds']['all']:.1f} s")
     for file in done.report:
         print(f"report: {file}")
@@ -216,6 +235,12 @@ def _print_reconstruction(result: dict[str, Any], as_json: bool) -> None:
         print(f"{result['points']} points on {result['scan_lines']} scan lines")
     for file in result["files"]:
         print(f"wrote {file}")
+
+
+def _print_light(light: list[dict[str, Any]]) -> None:
+    """Plan and light groups of the first frame; of others only what differs from it in kind."""
+    print_plan(light[0]["plan"])
+    print_table("Light" + (", first frame" if len(light) > 1 else ""), list(light[0]["groups"].items()))
 
 
 def _print_results(result: dict[str, Any]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 StageProgress = Callable[[str, float], None]
+Note = Callable[[str], str]
 REFRESH_SECONDS = 0.1
 PLAIN_WIDTH = 160
 """Columns where there is no terminal to ask."""
@@ -25,15 +27,18 @@ def silent(stage: str, done: float) -> None:
 
 
 @contextmanager
-def stage_progress(quiet: bool = False) -> Iterator[StageProgress]:
-    """Yield progress(stage, done 0..1): a bar with an estimate on a terminal, else a line for every finished stage."""
+def stage_progress(quiet: bool = False, note: Note = lambda stage: "") -> Iterator[StageProgress]:
+    """Yield progress(stage, done 0..1): a bar with an estimate on a terminal, else a line for every finished stage.
+
+    note: what else there is to say of a stage, as it is now.
+    """
     if quiet:
         yield silent
     elif sys.stderr.isatty():
-        with _bars() as report:
+        with _bars(note) as report:
             yield report
     else:
-        yield _lines()
+        yield _lines(note)
 
 
 def print_json(result: dict[str, Any]) -> None:
@@ -56,8 +61,16 @@ def print_table(title: str, rows: Sequence[Sequence[str]], *, header: Sequence[s
     _console(sys.stdout).print(table)
 
 
+def print_plan(lines: Sequence[str], *, to_errors: bool = False) -> None:
+    """What is computed of the light, then what is left out, each with its reason."""
+    stream = sys.stderr if to_errors else sys.stdout
+    print("Plan", file=stream)
+    for line in lines:
+        print(textwrap.fill(line, PLAIN_WIDTH, initial_indent="  ", subsequent_indent="    "), file=stream)
+
+
 @contextmanager
-def _bars() -> Iterator[StageProgress]:
+def _bars(note: Note) -> Iterator[StageProgress]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
@@ -66,6 +79,7 @@ def _bars() -> Iterator[StageProgress]:
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}", style="dim"),
     )
     tasks: dict[str, Any] = {}
     shown: dict[str, float] = {}
@@ -73,18 +87,18 @@ def _bars() -> Iterator[StageProgress]:
 
         def report(stage: str, done: float) -> None:
             if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=1.0)
+                tasks[stage] = bars.add_task(stage, total=1.0, note="")
             elif done <= 0.0 and bars.tasks[tasks[stage]].finished:
                 bars.reset(tasks[stage])  # the same stage of the next frame
             now = time.monotonic()
             if done >= 1.0 or now - shown.get(stage, 0.0) >= REFRESH_SECONDS:
                 shown[stage] = now
-                bars.update(tasks[stage], completed=done)
+                bars.update(tasks[stage], completed=done, note=note(stage))
 
         yield report
 
 
-def _lines() -> StageProgress:
+def _lines(note: Note) -> StageProgress:
     started: dict[str, float] = {}
     told: set[str] = set()
 
@@ -95,7 +109,8 @@ def _lines() -> StageProgress:
             print(f"{stage}: {done:.0%}", file=sys.stderr)
         elif done >= 1.0 and stage in started and stage not in told:  # of many frames the first speaks for all
             told.add(stage)
-            print(f"{stage}: {time.monotonic() - started[stage]:.1f} s", file=sys.stderr)
+            more = note(stage)
+            print(f"{stage}: {time.monotonic() - started[stage]:.1f} s{more and f', {more}'}", file=sys.stderr)
 
     return report
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.ambient_plan import expected_ambient
 from render.camera import Camera
 from render.checks import check_placement
 from render.develop import expected_electrons
@@ -21,7 +22,6 @@ from render.lights import Environment
 from render.material_checks import check_materials, scene_warnings
 from render.motion import NoMotion
 from render.render import render_world
-from render.settings import RenderSettings
 from render.world import build_world
 from studio.project import Project
 
@@ -29,6 +29,8 @@ Float = NDArray[np.float64]
 
 PROBE_ERROR = 0.05
 """Relative error of the light that is rendered to look at; ample for figures that are called about."""
+PROBE_REFLECTED = 0.3
+"""The same of reflected light."""
 WORKING_DISTANCES = np.geomspace(0.01, 100.0, 4001)
 NARROW_PX, WIDE_PX = 0.5, 6.0
 DIM_ELECTRONS = 100.0
@@ -79,6 +81,8 @@ class Inspection:
     full_well: float
     lasers: tuple[LaserView, ...]
     warnings: tuple[str, ...]
+    plan: tuple[str, ...]
+    """Of the light: what a render computes and leaves out, by a pilot of the lasers' reflections."""
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -91,7 +95,8 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
     check_placement(world, scene, 0)
     check_materials(world, scene)
     dark = scene.model_copy(update={"lights": (), "environment": Environment(), "motion": NoMotion()})
-    settings = RenderSettings(laser_error=PROBE_ERROR, truth_images=False)
+    probe = {"laser_error": PROBE_ERROR, "indirect_error": PROBE_REFLECTED, "light_paths": 1 << 20}
+    settings = project.render.model_copy(update={**probe, "truth_images": False})
     frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, threads=threads)
     views = tuple(_laser_view(project, frame, i) for i in range(len(scene.lasers)))
     counts = np.bincount(world.object_id, minlength=len(scene.visible_objects))
@@ -105,6 +110,10 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
         full_well=project.sensor.full_well,
         lasers=views,
         warnings=(*_warnings(project, views), *scene_warnings(world, scene)),
+        plan=(
+            *(line for line in frame.plan.splitlines() if not line.startswith("ambient: none")),
+            *expected_ambient(scene, project.render),
+        ),
     )
 
 

@@ -18,9 +18,11 @@ from render.frame import Frame
 from render.frame_files import write_frame
 from render.world import build_world
 from studio import scan_folder
+from studio.light_groups import group_lines
 from studio.project import Project
 from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
-from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, render_step, scaled, step_world
+from studio.resume import Refined, frame_of_step, made_of, settle
+from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world
 from studio.summary import summarise
 from studio.sweep import Passing, Sweep, Taken
 from studio.warm_up import warm_up
@@ -58,6 +60,9 @@ def run_scan(
     image_scale: float = 1.0,
     measure: bool = True,
     report: bool = True,
+    resume: bool = False,
+    seconds: float | None = None,
+    refined: Refined = lambda frame: None,
     progress: StageProgress = lambda stage, done: None,
     cancelled: Cancel = never,
     each: Callable[[FrameResult], None] = lambda frame: None,
@@ -65,8 +70,11 @@ def run_scan(
     """Scan `project`, whose files are below `root`, into the folder `out`.
 
     steps: only the first so many frames; seed: in place of the project's; measure off: stop after the frames;
-    report off: stop after the points; each: hears of every frame once it is measured.
-    InputError: bad project, mesh or texture, nothing to see, `out` not writable. Cancelled: files so far stay, whole.
+    report off: stop after the points; resume: take the frames that an earlier scan left in `out`, and go on with the
+    one it left unfinished; seconds: time for the light of each frame; refined: hears of every frame as it gets better;
+    each: of every frame once it is measured.
+    InputError: bad project, mesh or texture, nothing to see, `out` not writable. Cancelled: files so far stay, whole,
+    and what was rendered of the frame under way.
     """
     began = time.perf_counter()
     project = scaled(project, image_scale)
@@ -89,6 +97,7 @@ def run_scan(
         files: list[Path] = []
         doubts: dict[str, str] = {}
         names: list[str] = []
+        light: list[dict[str, Any]] = []
         world = first
 
         def take(found: Iterable[tuple[Taken, Passing | None]]) -> None:
@@ -111,15 +120,25 @@ def run_scan(
 
         for step in clock.frames(count):
             world = world if step == 0 else step_world(project, root, step, world)
-            frame = render_step(project, world, step, clock, threads)
+            frame, state = frame_of_step(
+                project, world, step, out, clock, threads, resume=resume, seconds=seconds, refined=refined
+            )
+            light.append(light_record(frame, project))
             for text in frame.warnings:  # in words as at first, though figures change from step to step
                 doubts.setdefault(text.split(",", 1)[0], text)
             images = develop_step(project, frame, clock, threads)
             with clock.stage("writing frames"):
                 stem = scan_folder.frame_stem(step)
                 written = write_frame(
-                    out, stem, frame, together(project, frame, images), project.scene, sensor=project.sensor
+                    out,
+                    stem,
+                    frame,
+                    together(project, frame, images),
+                    project.scene,
+                    sensor=project.sensor,
+                    made_of=made_of(project, state),
                 )
+                settle(project, frame, state)
                 files += written
                 names.append(written[-1].name)
             if sweep is not None:
@@ -136,6 +155,7 @@ def run_scan(
             "image_scale": image_scale,
             "seed": project.seed,
             "notes": notes,
+            "light": light,
         }
         reports: list[Path] = []
         if measure:
@@ -147,6 +167,12 @@ def run_scan(
     result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
     manifest = scan_folder.finish(out, root, result)
     return ScanResult(out, (*files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
+
+
+def light_record(frame: Frame, project: Project) -> dict[str, Any]:
+    """The plan of a frame, and how well each light group is known."""
+    groups = {name: text for _, name, text in group_lines(frame, project.scene, project.render)}
+    return {"plan": frame.plan.splitlines(), "groups": groups}
 
 
 def together(project: Project, frame: Frame, images: list[Image]) -> Image:

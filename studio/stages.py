@@ -17,6 +17,7 @@ from render.errors import Cancelled
 from render.frame import Frame
 from render.motion import NoMotion
 from render.render import render_world
+from render.saved import RenderState
 from render.world import World, build_world
 from studio.expose import expose
 from studio.line import extract_line
@@ -87,8 +88,19 @@ def step_world(project: Project, root: Path, step: int, before: World | None) ->
     return before if before is not None and not objects_move else build_world(project.scene, root, step)
 
 
-def render_step(project: Project, world: World, step: int, clock: Clock, threads: int | None) -> Frame:
-    """Radiance and truth of one step."""
+def render_step(
+    project: Project,
+    world: World,
+    step: int,
+    clock: Clock,
+    threads: int | None,
+    *,
+    cancelled: Cancel | None = None,
+    seconds: float | None = None,
+    state: RenderState | None = None,
+    refined: Callable[[Frame], None] = lambda frame: None,
+) -> Frame:
+    """Radiance and truth of one step; cancelled: in place of the clock's; the rest as in `render_world`."""
     frame = render_world(
         world,
         project.scene,
@@ -98,10 +110,13 @@ def render_step(project: Project, world: World, step: int, clock: Clock, threads
         seed=project.seed,
         threads=threads,
         progress=clock.progress,
-        cancelled=clock.cancelled,
+        cancelled=clock.cancelled if cancelled is None else cancelled,
+        seconds=seconds,
+        state=state,
+        refined=refined,
     )
-    for name, seconds in frame.seconds.items():
-        clock.seconds[name] = clock.seconds.get(name, 0.0) + seconds
+    for name, spent in frame.seconds.items():
+        clock.seconds[name] = clock.seconds.get(name, 0.0) + spent
     return frame
 
 

@@ -1,0 +1,100 @@
+"""Frames of a scan that are rendered, go on, or are there already: what `--resume` and `--time-limit` do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from render.errors import Cancelled, InputError
+from render.frame import Frame
+from render.frame_files import read_frame
+from render.material_checks import scene_warnings
+from render.saved import RenderState, read_state, state_of
+from render.world import World
+from studio import scan_folder
+from studio.interrupt import stop_on_interrupt
+from studio.light_groups import unfinished
+from studio.project import Project
+from studio.stages import Clock, render_step
+from studio.strict_json import read_object
+
+Refined = Callable[[Frame], None]
+
+
+def made_of(project: Project, state: RenderState) -> dict[str, Any]:
+    """What a frame's sidecar says of how it was rendered: another frame is as good only where this is the same."""
+    return {**state.marks, "targets": project.render.model_dump(mode="json"), "axis": project.extraction.axis}
+
+
+def saved_path(out: Path, step: int) -> Path:
+    """The file of an unfinished frame."""
+    return out / f"{scan_folder.frame_stem(step)}.state.npz"
+
+
+def frame_of_step(
+    project: Project,
+    world: World,
+    step: int,
+    out: Path,
+    clock: Clock,
+    threads: int | None,
+    *,
+    resume: bool = False,
+    seconds: float | None = None,
+    refined: Refined = lambda frame: None,
+) -> tuple[Frame, RenderState]:
+    """One frame: found, gone on with or rendered; and its state, for `settle` once the frame is written.
+
+    resume: take what an earlier scan left in `out`. InputError: that is of something else. Cancelled: what was done is
+    kept in a file.
+    """
+    path = saved_path(out, step)
+    state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path)
+    if resume:
+        found = None if path.is_file() else _found(project, world, step, out, state)
+        if found is not None:
+            refined(found)
+            return found, state
+        state = read_state(state)
+    try:
+        with stop_on_interrupt(clock.cancelled) as cancelled:
+            frame = render_step(
+                project,
+                world,
+                step,
+                clock,
+                threads,
+                cancelled=cancelled,
+                seconds=seconds,
+                state=state,
+                refined=refined,
+            )
+    except Cancelled:
+        if state.write():
+            raise Cancelled(f"what was rendered so far is in {path}; --resume goes on from there") from None
+        raise
+    return frame, state
+
+
+def settle(project: Project, frame: Frame, state: RenderState) -> None:
+    """After the frame is written: its state stays only where the frame ended by the time, short of its targets."""
+    if unfinished(frame, project.scene, project.render):
+        state.write()
+    else:
+        state.remove()
+
+
+def _found(project: Project, world: World, step: int, out: Path, state: RenderState) -> Frame | None:
+    """The frame that is there already, rendered in the same way; None: there is none."""
+    sidecar = out / f"{scan_folder.frame_stem(step)}.json"
+    if not sidecar.is_file():
+        return None
+    try:
+        if read_object(sidecar, "frame").get("made_of") != made_of(project, state):
+            return None
+        frame = read_frame(sidecar)
+    except InputError:
+        return None
+    return replace(frame, warnings=scene_warnings(world, project.scene, step))

@@ -1,0 +1,91 @@
+"""A scan that is stopped goes on where it ended, and ends in the same files."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from render.errors import Cancelled, InputError
+from render.frame_files import read_frame
+from studio.interrupt import stop_on_interrupt
+from studio.light_groups import group_lines, unfinished
+from studio.project import Project
+from studio.resume import saved_path
+from studio.scan import run_scan
+from studio.stages import scaled
+from studio.templates import template_folder
+
+FOLDER = template_folder("v_groove")
+
+
+@pytest.fixture(scope="module")
+def project() -> Project:
+    found = Project.load(FOLDER / "project.json")
+    changes = {"transport": "interreflection", "indirect_error": 0.02, "ambient_error": 0.01, "ambient_samples": 16}
+    return found.model_copy(update={"render": found.render.model_copy(update=changes)})
+
+
+def scan(project: Project, out: Path, **options):
+    return run_scan(project, FOLDER, out=out, image_scale=0.05, measure=False, **options)
+
+
+@pytest.fixture(scope="module")
+def whole(project: Project, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("whole")
+    scan(project, out)
+    return out
+
+
+def test_a_stopped_scan_goes_on_to_the_same_frame(project: Project, whole: Path, tmp_path: Path) -> None:
+    reached: list[str] = []
+
+    def stop() -> bool:
+        return "ambient light" in reached
+
+    with pytest.raises(Cancelled, match="--resume"):
+        scan(project, tmp_path, cancelled=stop, progress=lambda stage, done: reached.append(stage))
+    assert saved_path(tmp_path, 0).is_file() and not (tmp_path / "frame_0000.exr").exists()
+    scan(project, tmp_path, resume=True)
+    assert not saved_path(tmp_path, 0).exists()
+    assert (tmp_path / "frame_0000.exr").read_bytes() == (whole / "frame_0000.exr").read_bytes()
+
+
+def test_a_frame_that_is_there_is_taken_as_it_is(project: Project, whole: Path) -> None:
+    before, stages = (whole / "frame_0000.exr").read_bytes(), set()
+    scan(project, whole, resume=True, progress=lambda stage, done: stages.add(stage))
+    assert "reflected laser light" not in stages
+    assert (whole / "frame_0000.exr").read_bytes() == before
+
+
+def test_a_time_limit_leaves_a_frame_and_what_it_takes_to_go_on(project: Project, tmp_path: Path) -> None:
+    endless = project.render.model_copy(update={"indirect_error": 2e-4, "light_paths": 1 << 40, "truth_images": False})
+    slow = project.model_copy(update={"render": endless})
+    done = scan(slow, tmp_path, seconds=0.5)
+    first = read_frame(tmp_path / "frame_0000.json")
+    small = scaled(slow, 0.05)
+    assert unfinished(first, small.scene, small.render) and saved_path(tmp_path, 0).is_file()
+    assert "error" in done.manifest["light"][0]["groups"]["laser, reflected on"]
+    scan(slow, tmp_path, seconds=0.5, resume=True)
+    second = read_frame(tmp_path / "frame_0000.json")
+    assert second.counts["light paths, laser"] > first.counts["light paths, laser"] > 0
+    names = [name for _, name, _ in group_lines(second, small.scene, small.render)]
+    assert names == ["laser, direct", "laser, reflected on", "ambient"]
+
+
+def test_what_is_left_of_another_scene_is_refused(project: Project, tmp_path: Path) -> None:
+    saved_path(tmp_path, 0).write_bytes(b"nothing")
+    with pytest.raises(InputError, match="damaged"):
+        scan(project, tmp_path, resume=True)
+
+
+def test_the_first_interrupt_asks_and_the_second_stops() -> None:
+    with stop_on_interrupt(lambda: False) as cancelled:
+        assert not cancelled()
+        os.kill(os.getpid(), signal.SIGINT)
+        assert cancelled()
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
