@@ -148,6 +148,6 @@ class TestMenus:
         assert session.project == before
 
     def test_only_items_with_presets_have_the_menu(self, session: Session, inspector: Inspector) -> None:
-        shown = {path: (session.select(path), inspector.presets.isVisible())[1]
-                 for path in (LASER, CAMERA, ("sensor",), ("scene", "objects", 0), ("scene", "motion"), ())}  # fmt: skip
+        items = (LASER, CAMERA, ("sensor",), ("scene", "objects", 0), ("scene", "motion"), ())
+        shown = {path: (session.select(path), inspector.presets.isVisible())[1] for path in items}
         assert list(shown.values()) == [True, True, True, True, False, False]
