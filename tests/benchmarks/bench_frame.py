@@ -64,6 +64,14 @@ def main() -> None:
     lit = reference > 0
     error = np.sqrt(np.mean((rough - reference)[lit] ** 2) / np.mean(reference[lit] ** 2))
     print(f"{'  measured error of the first':<38}{error:>9.2%}")
+    pinhole = best(partial(direct_image, *parts, target=0.01, threads=threads))
+    for f_number, focus in ((5.6, 0.8), (1.4, 0.8), (1.4, 1.0)):
+        lens = camera.lens.model_copy(update={"model": "thin-lens", "f_number": f_number, "focus_distance": focus})
+        through = (world, camera.model_copy(update={"lens": lens}), *parts[2:])
+        image = direct_image(*through, target=0.01)
+        seconds = best(partial(direct_image, *through, target=0.01, threads=threads), 3)
+        name = f"  through f/{f_number:g} focused at {focus:g} m"
+        row(name, seconds, "-", f"{seconds / pinhole:.1f} x the pinhole, {image.samples} samples")
     row("exact line", best(lambda: laser_curve(*parts)), "0.1 s")
     row("truth images", best(lambda: truth_images(world, camera, pose), 3), "1 s")
     world.rays.seconds, before = 0.0, world.rays.rays
