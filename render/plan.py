@@ -98,6 +98,8 @@ def choose_plan(
             # nothing in the scene makes such light, or none that the pilot met
             continue
         measured = f"a pilot puts it at {share:.2%} +- {error:.2%} of the direct light in the image"
+        if math.isinf(share):
+            measured = "there is no direct light in the image to compare it with"
         # what may well be more than negligible is computed
         worth = share + 2.0 * error > settings.negligible
         if i <= wanted or (wanted < 0 and worth):
