@@ -25,7 +25,7 @@ ENGINES = {
     "luxcore bidir, halved": ("peers.luxcore_run", "bidir"),
     "luxcore hybrid": ("peers.luxcore_run", "hybrid"),
 }
-GRACE = 240.0
+GRACE = 600.0
 """Seconds a process may take beside its longest budget: loading, compiling, and a machine that does other things."""
 
 
