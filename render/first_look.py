@@ -37,7 +37,7 @@ def look_around(
     """Fill mean and error (n,) of pixels start..stop of (n,) ascending flat indices.
 
     planes (n, 4): q in the middle of the pixel, its change with u and with v, and the radiance in the sheet's middle,
-    0 where no light is seen; middle (n,): the Gaussian's mean over the pixel times that.
+    0 where no light is seen, and then the others are anything; middle (n,): the Gaussian's mean over the pixel times that.
     """
     n = len(pixels)
     # three places in the set that walk along with i: the row before, its own, the row after
@@ -80,8 +80,10 @@ def look_around(
                 j += 1
         error[i] = EDGE_SHARE * worst
         # the mean of u times the Gaussian over the pixel, the pixel taken for a Gaussian of its variance
-        moment = -share * q / (12.0 + planes[i, 1] ** 2 + planes[i, 2] ** 2) if peak > 0.0 else 0.0
-        mean[i] = max(middle[i] + moment * (along_u * planes[i, 1] + along_v * planes[i, 2]), 0.0)
+        mean[i] = middle[i]
+        if peak > 0.0:
+            moment = -share * q / (12.0 + planes[i, 1] ** 2 + planes[i, 2] ** 2)
+            mean[i] = max(middle[i] + moment * (along_u * planes[i, 1] + along_v * planes[i, 2]), 0.0)
 
 
 @numba.njit(nogil=True, cache=True)
