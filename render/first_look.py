@@ -37,7 +37,8 @@ def look_around(
     """Fill mean and error (n,) of pixels start..stop of (n,) ascending flat indices.
 
     planes (n, 4): q in the middle of the pixel, its change with u and with v, and the radiance in the sheet's middle,
-    0 where no light is seen, and then the others are anything; middle (n,): the Gaussian's mean over the pixel times that.
+    0 where no light is seen, and then the others are anything; middle (n,): the Gaussian's mean over the pixel times
+    that.
     """
     n = len(pixels)
     # three places in the set that walk along with i: the row before, its own, the row after
