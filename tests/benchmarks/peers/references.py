@@ -3,7 +3,7 @@
 s1 is integrated here from the formulas alone, with nothing of the renderer: Gauss-Legendre nodes in each pixel. s3 is a
 path trace of the exact ball in float64, s4 particles through it and the plate (`peers.exact_ball`). s2 and s2-shiny are
 our own converged images (`peers.converge`), noise about 0.6 % in the reflections: Mitsuba's particle tracer is no
-reference there. Its fixed offset of ray origins makes the reflections 0.35 % too bright, single regions by up to 1 %, as
+reference there. Its fixed offset of ray origins makes the reflections 0.35 % too bright, some regions by 1 %, as
 its own path tracer and ours agree, and the bead's two rims plainly wrong: their rows are left out for every engine.
 """
 
