@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.camera import Camera
-from render.connect import Take
 from render.emission import PARTS, Fan, aimed_fan, even_fan, fan_span
 from render.errors import Cancelled
 from render.gathered import Gathered
-from render.guide import BINS, Guide, clear_pixels, first_guide, no_guide, share_samples
+from render.guide import BINS, Guide, clear_pixels, first_guide, learn, no_guide, share_samples
+from render.joints import Take
 from render.laser import LineLaser
 from render.light_pass import KINDS, LightPass
 from render.threads import Cancel, Progress, map_chunks, thread_count
@@ -30,8 +30,9 @@ from render.world import World
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
-PASS_PATHS, PASS_SAMPLES = 1 << 14, 1 << 14
-"""Paths from the laser and from the camera in a pass."""
+LEAST_PASS, MOST_PASS = 1 << 13, 1 << 15
+"""Paths from the laser, and as many from the camera, in a pass; a large image is worth longer ones."""
+LOOK_PATHS = 1 << 12
 MOST_DOUBLINGS = 2
 """Of the paths from the laser, where camera paths bring nothing."""
 PILOT_PATHS = 1 << 13
@@ -124,13 +125,16 @@ def indirect_images(
         map_chunks(work, WAVE, 1, min(WAVE, thread_count(threads)), cancelled)
 
     if before is None:
-        # a first look only says where laser and camera should look; what is behind glass only the camera finds
+        # two looks only say where laser and camera should look: the first, by light, where it arrives at all (what is
+        # behind glass only the camera finds), the second, from there, which light matters
         fan = even_fan(low, high)
-        wave(0, PASS_PATHS, fan, first_samples(task, camera), no_guide(camera))
+        wave(0, LOOK_PATHS, fan, first_samples(task, camera), no_guide(camera))
         before = first_knowledge(takes, fan, camera, kinds)
+        learnt = learn_with(takes, before)
+        wave(WAVE, LOOK_PATHS, before.fan, before.samples, before.guide)
+        second_knowledge(before, takes, learnt, camera)
     so_far = before
-    learnt = np.zeros((WAVE, *so_far.knowledge.shape))
-    takes = [take._replace(learnt=learnt[i]) for i, take in enumerate(takes)]
+    learnt = learn_with(takes, so_far)
 
     def image() -> IndirectImage:
         counts = so_far.passes * so_far.paths, round(so_far.dropped), round(so_far.clamped)
@@ -142,12 +146,12 @@ def indirect_images(
 
     while unfinished():
         try:
-            wave(WAVE + so_far.passes, so_far.paths, so_far.fan, so_far.samples, so_far.guide)
+            wave(2 * WAVE + so_far.passes, so_far.paths, so_far.fan, so_far.samples, so_far.guide)
         except Cancelled:
             if so_far.passes and keeps is not None and keeps():
                 yield image()
             raise
-        so_far.add(takes, learnt, clamp)
+        so_far.add(takes, learnt, clamp, threads)
         if keep is not None:
             keep(so_far)
         if progress is not None:
@@ -165,21 +169,43 @@ def indirect_images(
 def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int) -> Gathered:
     """Nothing gathered yet, but where a first look (cleared) says that light is to be found."""
     pixels = camera.width * camera.height
-    radiance, helped = np.zeros(pixels), np.zeros(pixels, np.float32)
     fan = aimed_fan(fan, np.sum([take.found for take in takes], axis=0))
-    for take in takes:
-        radiance += take.image
-        helped += take.helped
-        for sums in (take.image, take.helped, take.dropped):
-            sums[:] = 0.0
-    # where camera paths have little to bring, most of the work is left to those from the laser
-    share = float(helped.sum()) / max(float(radiance.sum()), 1e-300)
-    wanted, paths = PASS_SAMPLES * share, PASS_PATHS * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
-    samples = share_samples(helped, camera.width, wanted)
+    radiance, helped = summed(takes)
+    share = float(helped.sum()) / max(radiance, 1e-300)
+    samples = share_samples(helped, camera.width, LOOK_PATHS * share)
     guide = first_guide(samples, camera)
     knowledge = np.zeros((len(guide.cumulative), BINS))
     nothing = np.zeros(pixels), np.zeros(pixels), np.zeros(pixels, np.float32)
-    return Gathered(kinds, fan, paths, wanted, samples, guide, knowledge, *nothing)
+    return Gathered(kinds, fan, LOOK_PATHS, LOOK_PATHS * share, samples, guide, knowledge, *nothing)
+
+
+def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: Camera) -> None:
+    """Add what a second look (cleared) has found, and set the size of the passes to come."""
+    first.guide = learn(first.guide, learnt, first.knowledge)
+    radiance, helped = summed(takes)
+    # where camera paths have little to bring, most of the work is left to those from the laser
+    share = float(helped.sum()) / max(radiance, 1e-300)
+    size = min(max(1 << (camera.width * camera.height >> 7).bit_length() - 1, LEAST_PASS), MOST_PASS)
+    first.wanted, first.paths = size * share, size * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
+    first.samples = share_samples(helped, camera.width, first.wanted)
+
+
+def summed(takes: list[Take]) -> tuple[float, Float32]:
+    """Radiance over all pixels, and (pixels,) what camera paths could help with, of takes that are cleared."""
+    radiance, helped = 0.0, np.zeros_like(takes[0].helped)
+    for take in takes:
+        radiance += float(take.image.sum())
+        helped += take.helped
+        for sums in (take.image, take.helped, take.dropped):
+            sums[:] = 0.0
+    return radiance, helped
+
+
+def learn_with(takes: list[Take], so_far: Gathered) -> Float:
+    """Give each take (in place) its part of the array that is returned, to learn in."""
+    learnt = np.zeros((WAVE, *so_far.knowledge.shape))
+    takes[:] = [take._replace(learnt=learnt[i]) for i, take in enumerate(takes)]
+    return learnt
 
 
 def indirect_shares(
@@ -215,8 +241,8 @@ def empty_take(pixels: int) -> Take:
 
 
 def first_samples(task: LightPass, camera: Camera) -> Float:
-    """(pixels,) camera paths of the first look: about a pass's, on what the camera sees of mirrors and clear glass."""
+    """(pixels,) camera paths of the first look: few, on what the camera sees of mirrors and clear glass."""
     if not task.clear:
         return np.zeros(camera.width * camera.height)
     samples = clear_pixels(task.world, task.surface, camera, task.view.T_world_camera)
-    return samples * min(1.0, 2 * PASS_SAMPLES / max(float(samples.sum()), 1.0))
+    return samples * min(1.0, LEAST_PASS / max(float(samples.sum()), 1.0))

@@ -10,12 +10,14 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.connect import Take
 from render.emission import Fan
 from render.guide import Guide, learn, share_samples
+from render.joints import Take
+from render.threads import map_chunks
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
+PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -53,18 +55,25 @@ class Gathered:
     whole: bool = True
     """False within `add`: an interruption there leaves half a wave."""
 
-    def add(self, takes: list[Take], learnt: Float, clamp: float | None = None) -> None:
+    def add(self, takes: list[Take], learnt: Float, clamp: float | None = None, threads: int | None = None) -> None:
         """Fold in a wave of passes (cleared), with what it learnt; clamp: most radiance of one pass in one pixel."""
         self.whole = False
         most = math.inf if clamp is None else clamp
+        images, helped = tuple(take.image for take in takes), tuple(take.helped for take in takes)
+        sums = np.zeros((-(-len(self.total) // PIXELS_A_CHUNK), 4))
+
+        def work(start: int, stop: int) -> None:
+            sums[start // PIXELS_A_CHUNK] = gather(
+                images, helped, self.total, self.squares, self.helped, most, start, stop
+            )
+
+        map_chunks(work, len(self.total), PIXELS_A_CHUNK, threads)
+        first, second, clamped, cut = sums.sum(axis=0)
+        self.clamped += float(clamped)
+        self.cut += float(cut)
         for take in takes:
-            first, second, clamped, cut = gather_pass(take.image, self.total, self.squares, most)
-            self.helped += take.helped
-            take.helped[:] = 0.0
             self.dropped += float(take.dropped[0])
             take.dropped[0] = 0.0
-            self.clamped += clamped
-            self.cut += cut
         self.passes += len(takes)
         n = self.passes
         variance = max(second - first / n, 0.0) / (n - 1) / n
@@ -125,23 +134,34 @@ class Gathered:
 
 
 @numba.njit(nogil=True, cache=True)
-def gather_pass(image: Float, total: Float, squares: Float, most: float) -> tuple[float, float, int, float]:
-    """Fold a pass into the running sums and clear it; no pixel of it counts for more than `most`.
+def gather(
+    images: tuple[Float, ...],
+    helped: tuple[Float32, ...],
+    total: Float,
+    squares: Float,
+    total_helped: Float32,
+    most: float,
+    start: int,
+    stop: int,
+) -> tuple[float, float, float, float]:
+    """Fold passes into the running sums over pixels [start, stop), and clear them; none counts for more than `most`.
 
     Returns the sums of total^2 and of squares, the pixels that were cut, and the radiance that this took.
     """
-    first = second = cut = 0.0
-    clamped = 0
-    for j in range(image.shape[0]):
-        value = image[j]
-        if value != 0.0:
-            if value > most:
-                clamped += 1
-                cut += value - most
-                value = most
-            total[j] += value
-            squares[j] += value * value
-            image[j] = 0.0
+    first = second = cut = clamped = 0.0
+    for j in range(start, stop):
+        for k in range(len(images)):
+            value = images[k][j]
+            if value != 0.0:
+                if value > most:
+                    clamped += 1.0
+                    cut += value - most
+                    value = most
+                total[j] += value
+                squares[j] += value * value
+                total_helped[j] += helped[k][j]
+                images[k][j] = 0.0
+                helped[k][j] = 0.0
         first += total[j] * total[j]
         second += squares[j]
     return first, second, clamped, cut

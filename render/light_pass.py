@@ -15,23 +15,18 @@ from numpy.typing import NDArray
 
 from render.camera import Camera
 from render.connect import (
-    Joints,
-    Lit,
-    Take,
     begin_camera,
     begin_light,
-    count_joints,
     join_camera,
     join_laser,
-    join_light,
     joinable,
-    no_joints,
     path_lens_point,
 )
 from render.distortion import tilt_matrix
 from render.emission import SEQUENCE, Fan, Paths, emit
 from render.errors import Cancelled
 from render.guide import Guide, any_clear, draw_counts
+from render.joints import Joints, Lit, Take, count_joints, no_joints
 from render.laser import LineLaser
 from render.lens import chief_ray, lens_direction, lens_position
 from render.material import reflectance_weights
@@ -39,6 +34,7 @@ from render.medium import MOST_STEPS, scatter_inside
 from render.merge import SHRINK, Photons, merge, photons
 from render.pose import invert
 from render.random import uniform
+from render.resample import join_light
 from render.surface import Surface, View
 from render.threads import Cancel
 from render.vertex import (

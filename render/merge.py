@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.bsdf import evaluate
-from render.connect import Take
+from render.joints import Take
 from render.vertex import BACK, CLEAR, LONE, NORMAL, PART, PIXEL, POWER, UNJOINED, material_of
 
 Float = NDArray[np.float64]
