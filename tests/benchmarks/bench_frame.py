@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from render.ambient import ambient_image
+from render.ambient import ambient_image, ambient_images
 from render.curve import laser_curve
 from render.direct import direct_image
 from render.truth import truth_images
@@ -87,6 +87,13 @@ def main() -> None:
         f"{'inside embree':<38}{world.rays.seconds / threads / whole:>9.0%}     bar 50 %     "
         f"{rays / 1e6:.0f} million rays, {rays / whole / 1e6:.1f} million a second"
     )
+    for name, surfaces in (("one surface", 1), ("any number of surfaces", None)):
+        before, start = world.rays.seconds, time.perf_counter()
+        *_, image = ambient_images(world, scene, camera, pose, target=0.01, most=64, surfaces=surfaces, threads=threads)
+        spent = time.perf_counter() - start
+        share = (world.rays.seconds - before) / threads / spent
+        note = f"error {image.error:.2%}, {image.samples:.0f} samples a pixel, {share:.0%} inside embree (bar 60 %)"
+        row(f"ambient light to 1 %, {name}", spent, "-", note)
     print(f"{'peak memory':<38}{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:>9.2f} GB    bar 2 GB")
 
 
