@@ -133,7 +133,7 @@ def fill_presets_menu(menu: QMenu, session: Session) -> None:
         # rich text, so that a tool tip breaks its lines
         _entry(menu, preset.name, "", use).setToolTip(f"<p>{preset.source}</p>")
     if not found:
-        menu.addAction("Select the camera, the sensor or a laser").setEnabled(False)
+        menu.addAction("Select the camera, the sensor, a laser or an object").setEnabled(False)
 
 
 def _exists(session: Session) -> bool:

@@ -312,7 +312,7 @@ class SceneTree(QTreeWidget):
             if path == ():
                 menu.addAction("Rename", self.rename_selection)
             scene_actions.fill_add_menu(menu.addMenu("Add"), session, self)
-        if path in (("scene", "rig", "camera"), ("sensor",)) or path[:-1] == LASERS:
+        if path in (("scene", "rig", "camera"), ("sensor",)) or path[:-1] in (LASERS, OBJECTS):
             scene_actions.fill_presets_menu(menu.addMenu("Presets"), session)
         if path[:1] == ("scene",):
             menu.addSeparator()

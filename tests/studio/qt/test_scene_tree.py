@@ -237,7 +237,7 @@ class TestMenus:
             entry(tree.menu_for((*LASERS, 0)), "Frame in the 3D view").trigger()
 
     def test_a_menu_without_a_fitting_selection_says_so(self, session: Session, tree: SceneTree) -> None:
-        session.select((*OBJECTS, 0))
+        session.select(("scene", "motion"))
         menu = QMenu()
         scene_actions.fill_presets_menu(menu, session)
         assert [action.isEnabled() for action in menu.actions()] == [False]
