@@ -231,6 +231,8 @@ def _print_reconstruction(result: dict[str, Any], as_json: bool) -> None:
         print_json({"ok": True, **result})
         return
     _print_results(result)
+    for told in result["extraction"]:
+        print(told)
     if "flags" in result:
         print(f"{result['points']} points on {result['scan_lines']} scan lines")
     for file in result["files"]:

@@ -15,7 +15,7 @@ from render.frame_files import read_frame
 from render.world import build_world
 from studio import scan_folder
 from studio.project import Project
-from studio.results import measure_frame, now, write_points, write_reports
+from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
 from studio.stages import Clock, develop_step, step_world
 from studio.summary import summarise
 from studio.sweep import Passing, Sweep, Taken
@@ -64,15 +64,16 @@ def reconstruct_folder(
     take(sweep.finish())
     if not results or not project.scene.lasers:
         raise InputError("the scan holds no laser image", where=str(found.folder))
-    files = write_points(out, project, results, clock)
+    files, told = write_points(out, project, results, clock), extraction_notes(results, project)
     if report:
-        notes = [str(note) for note in found.manifest.get("notes", [])]
+        notes = [*told, *(str(note) for note in found.manifest.get("notes", []))]
         created = str(found.manifest.get("created", now()))
         files += write_reports(out, project, first, results, clock, notes=notes, created=created)
     return {
         "name": project.name,
         "files": [str(path) for path in files],
         "results": summarise(results, project.scene),
+        "extraction": told,
         "seconds": clock.seconds,
     }
 

@@ -63,7 +63,7 @@ def reconstruct_images(
         "files": [str(file) for file in files],
         "points": sum(int(one.valid.sum()) for one in points),
         "scan_lines": sum(len(line.u) for line in lines),
-        "notes": list(dict.fromkeys(line.note for line in lines if line.note)),
+        "extraction": list(dict.fromkeys(line.note for line in lines if line.note)),
         "flags": {Flag(int(flag)).name: int(count) for flag, count in zip(flags, counts, strict=True)},
         "seconds": clock.seconds,
     }

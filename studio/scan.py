@@ -145,8 +145,8 @@ def run_scan(
                 take(sweep.add(frame, world, images))
         if sweep is not None:
             take(sweep.finish())
-        notes = extraction_notes(results, project)
-        notes += list(doubts.values())
+        told = extraction_notes(results, project)
+        notes = list(doubts.values())
         notes += [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
         result: dict[str, Any] = {
             "name": project.name,
@@ -155,6 +155,7 @@ def run_scan(
             "image_scale": image_scale,
             "seed": project.seed,
             "notes": notes,
+            "extraction": told,
             "light": light,
         }
         reports: list[Path] = []
@@ -162,7 +163,9 @@ def run_scan(
             files += write_points(out, project, results, clock)
             result["results"] = summarise(results, project.scene)
             if report:
-                reports = write_reports(out, project, first, results, clock, notes=notes, created=result["created"])
+                reports = write_reports(
+                    out, project, first, results, clock, notes=[*told, *notes], created=result["created"]
+                )
     result["report"] = [path.name for path in reports]
     result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
     manifest = scan_folder.finish(out, root, result)

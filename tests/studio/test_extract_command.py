@@ -138,10 +138,10 @@ def test_photographs_of_a_rig_with_its_geometry_and_exposures_and_along_time(tmp
     beyond = ("--geometry", "--select", "continuous", "--farthest", depth - 0.05)
     assert points(names[0], *beyond)["points"] == 0
     near = points(names[0], "--geometry", "--nearest", depth - 0.01, "--farthest", depth + 0.01)
-    assert near["points"] == pytest.approx(whole, rel=0.02) and "fan" in near["notes"][0]
+    assert near["points"] == pytest.approx(whole, rel=0.02) and "fan" in near["extraction"][0]
     checked = call("extract", names[0], *beyond, "--project", tmp_path / "rig.json")
     assert json.loads(checked.stdout)["images"][0]["found"] == 0
     timed = points(*names, "--spacetime")
-    assert timed["notes"] == ["measured along time"] and timed["points"] > 0
+    assert timed["extraction"] == ["measured along time"] and timed["points"] > 0
     too_many = call("reconstruct", *names, names[0], "--project", tmp_path / "rig.json")
     assert too_many.exit_code == 2 and "more images than steps" in too_many.stderr

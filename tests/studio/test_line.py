@@ -81,7 +81,7 @@ def test_a_scan_along_time_takes_the_edges_out_of_the_line(tmp_path: Path):
     render = project.render.model_copy(update={"transport": "direct", "truth_images": False, "laser_error": 0.01})
     project = with_extraction(project.model_copy(update={"scene": scene, "render": render}), spacetime=True)
     done = run_scan(project, template_folder("scan"), out=tmp_path, report=False)
-    assert any("measured along time" in note for note in done.manifest["notes"])
+    assert any("measured along time" in note for note in done.manifest["extraction"])
     own, other = done.manifest["results"][0], done.manifest["results"][1]
     assert own["points"] > 0 and other["method"] == "gaussian"
 
