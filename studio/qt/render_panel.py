@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from html import escape
 from pathlib import Path
 
@@ -23,15 +22,17 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from render.ambient_plan import AMBIENT_ERROR, AMBIENT_SAMPLES, CLAMPED_SAMPLES, DROPPED_SAMPLES
 from render.frame import Frame
-from render.refine import plan, refine
+from render.refine import plan
+from render.saved import RenderState
 from render.threads import Cancel
-from render.world import World, build_world
+from render.world import World
 from studio.jobs import Job, Progress, State
+from studio.light_groups import group_lines, unfinished
 from studio.project import Project
 from studio.qt.history import History
 from studio.qt.jobs import RENDER, JobRunner
+from studio.qt.render_job import can_go_on, carried, render_frames
 from studio.qt.session import Render, Session
 from studio.qt.status import time_left
 from studio.stages import scaled
@@ -60,6 +61,7 @@ class RenderPanel(QWidget):
         self._render: Render | None = None
         self._before: Render | None = None
         self._keep = False
+        self._state = RenderState({})
         self.plan = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
         self.plan.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.laser_error = QDoubleSpinBox(decimals=2, minimum=0.01, maximum=100.0)
@@ -89,6 +91,8 @@ class RenderPanel(QWidget):
         self.scale = QComboBox()
         self.start_button = QPushButton("Render")
         self.start_button.setObjectName("primary")
+        self.continue_button = QPushButton("Continue")
+        self.continue_button.setToolTip("Go on with the shown render, which was stopped before it reached its errors")
         self.pause_button = QPushButton("Pause")
         self.keep_button = QPushButton("Keep")
         self.keep_button.setToolTip("Stop here and keep the image as it is")
@@ -110,6 +114,15 @@ class RenderPanel(QWidget):
 
     # what a person does
 
+    def go_on(self) -> None:
+        """Go on with the shown render where it was stopped."""
+        render = self.session.shown
+        if self._job is not None or render is None or render.final or render.state is None:
+            return
+        self._before, self._keep = render, True
+        self._render = render
+        self._run(render.project, self.session.document.root, render.frame.step, render.world, render.state)
+
     def start(self, image_scale: float | None = None) -> None:
         """Render the project as it is now; one render at a time."""
         if self._job is not None:
@@ -122,14 +135,19 @@ class RenderPanel(QWidget):
         project = scaled(source, image_scale)
         world = self._same_world(project, step)
         self._render, self._before, self._keep = None, session.shown, False
-        refined = self._refined
-
-        def work(progress: Progress, cancelled: Cancel) -> None:
-            render_frames(project, root, step, world, progress, cancelled, refined.emit, lambda: self._keep)
-
         number = max([render.number for render in session.renders], default=0) + 1
         self._template = (number, project, source, image_scale)
         self.errors.clear()
+        self._run(project, root, step, world, RenderState({}))
+
+    def _run(self, project: Project, root: Path, step: int, world: World | None, state: RenderState) -> None:
+        refined, limit, self._state = self._refined, self.limit.value() or None, state
+
+        def work(progress: Progress, cancelled: Cancel) -> None:
+            render_frames(
+                project, root, step, world, progress, cancelled, refined.emit, lambda: self._keep, limit, state
+            )
+
         self._job = self.runner.run(RENDER, "render", work)
         self._show_state()
 
@@ -153,7 +171,8 @@ class RenderPanel(QWidget):
     def cancel(self) -> None:
         """Stop and forget."""
         if self._job is not None:
-            self._keep = False
+            # what was there before it went on stays
+            self._keep = self._render is not None and self._render is self._before
             self._job.cancel()
             self._show_state()
 
@@ -169,7 +188,13 @@ class RenderPanel(QWidget):
         form.addRow("Time limit", self.limit)
         form.addRow("Image", self.scale)
         buttons = QHBoxLayout()
-        for button in (self.start_button, self.pause_button, self.keep_button, self.cancel_button):
+        for button in (
+            self.start_button,
+            self.continue_button,
+            self.pause_button,
+            self.keep_button,
+            self.cancel_button,
+        ):
             buttons.addWidget(button)
         for label in (self.stage, self.errors):
             label.setObjectName("muted")
@@ -207,6 +232,8 @@ class RenderPanel(QWidget):
             lambda i: session.set(("render", "transport"), self.transport.itemData(i), "laser light")
         )
         self.start_button.clicked.connect(lambda: self.start())
+        self.continue_button.clicked.connect(self.go_on)
+        session.renders_changed.connect(self._show_state)
         self.pause_button.clicked.connect(self.pause)
         self.keep_button.clicked.connect(self.keep)
         self.cancel_button.clicked.connect(self.cancel)
@@ -271,7 +298,7 @@ class RenderPanel(QWidget):
             for text in frame.warnings:
                 self.session.message.emit("warning", text)
         else:
-            self._render.frame = frame
+            self._render.frame = carried(frame, self._render.frame)
             self.session.renders_changed.emit()
         self.errors.setText(error_text(self._render))
         self.plan.setText(plan_text(tuple(frame.plan.splitlines())))
@@ -281,17 +308,18 @@ class RenderPanel(QWidget):
             self.bar.setValue(round(1000 * job.done))
             left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
             self.stage.setText(f"{job.stage}   {left}")
-            limit = self.limit.value()
-            if limit and job.seconds > limit and self._render is not None and not job.cancel_asked:
-                self.keep()
 
     def _ended(self, job: Job[None]) -> None:
         if job is not self._job:
             return
         render, self._job = self._render, None
         session = self.session
+        if render is not None:
+            self._state.pause()
+            early = unfinished(render.frame, render.project.scene, render.project.render)
+            render.state = self._state if early or job.state is not State.DONE else None
         if job.state is State.DONE and render is not None:
-            render.final = True
+            render.final = render.state is None
             session.renders_changed.emit()
         elif render is not None and not (self._keep and job.state is State.CANCELLED):
             session.renders = [other for other in session.renders if other is not render]
@@ -306,6 +334,7 @@ class RenderPanel(QWidget):
         job = self._job
         running = job is not None
         self.start_button.setVisible(not running)
+        self.continue_button.setVisible(not running and can_go_on(self.session.shown))
         for button in (self.pause_button, self.keep_button, self.cancel_button):
             button.setVisible(running)
             button.setEnabled(job is not None and not job.cancel_asked)
@@ -316,37 +345,6 @@ class RenderPanel(QWidget):
         if not running:
             self.bar.setValue(0)
             self.stage.clear()
-
-
-def render_frames(
-    project: Project,
-    root: Path,
-    step: int,
-    world: World | None,
-    progress: Progress,
-    cancelled: Cancel,
-    take: Callable[[World, Frame], None],
-    keeps: Cancel,
-) -> None:
-    """Load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled.
-
-    keeps: whether a cancelled render is kept, with all that was done.
-    """
-    if world is None:
-        progress("loading meshes", 0.0)
-        world = build_world(project.scene, root, step)
-    for frame in refine(
-        world,
-        project.scene,
-        settings=project.render,
-        step=step,
-        axis=project.extraction.axis,
-        seed=project.seed,
-        progress=progress,
-        cancelled=cancelled,
-        keeps=keeps,
-    ):
-        take(world, frame)
 
 
 def plan_text(lines: tuple[str, ...]) -> str:
@@ -361,23 +359,5 @@ def plan_text(lines: tuple[str, ...]) -> str:
 
 def error_text(render: Render) -> str:
     """Error so far of every light group, and what it is to become."""
-    target, counts = render.project.render.laser_error, render.frame.counts
-    rows = []
-    for laser in render.project.scene.lasers:
-        error = counts.get(f"relative error, {laser.name}")
-        if error is not None:
-            rows.append(f"{escape(laser.name)}: error {error:.2%}, target {target:.2%}")
-        error = counts.get(f"relative error of reflections, {laser.name}")
-        if error is not None:
-            rows.append(f"{escape(laser.name)}, reflected on: error {error:.1%}")
-    if render.frame.ambient is not None:
-        so_far, settings = counts.get(AMBIENT_SAMPLES, 0.0), render.project.render
-        error = counts.get(AMBIENT_ERROR)
-        known = f"error {error:.2%}, target {settings.ambient_error:.2%}, " if error is not None else ""
-        rows.append(f"ambient: {known}{so_far:.0f} of {settings.ambient_samples} samples")
-        dropped, clamped = counts.get(DROPPED_SAMPLES, 0.0), counts.get(CLAMPED_SAMPLES)
-        if clamped is not None:
-            rows.append(f"ambient, clamped: {clamped:.0f} contributions (biased)")
-        if dropped:
-            rows.append(f"ambient: {dropped:.0f} contributions were no number, and were left out")
-    return "<br>".join(rows)
+    groups = group_lines(render.frame, render.project.scene, render.project.render)
+    return "<br>".join(f"{escape(name)}: {escape(text)}" for _, name, text in groups)

@@ -13,6 +13,7 @@ from PySide6.QtCore import QObject, Signal
 from render.develop import Image
 from render.errors import InputError
 from render.frame import Frame
+from render.saved import RenderState
 from render.world import World
 from studio.document import Document, FieldPath
 from studio.project import Project
@@ -38,6 +39,8 @@ class Render:
     """Time of day, as the history shows it."""
     image_scale: float = 1.0
     """`project` is at this scale."""
+    state: RenderState | None = None
+    """To go on with a render that was stopped early; None: there is nothing to go on from."""
     source: Project | None = None
     """The project at full scale, None: `project` is."""
     images: list[Image] = field(default_factory=list)

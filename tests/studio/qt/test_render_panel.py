@@ -7,6 +7,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit
 
+from render.ambient_plan import AMBIENT_SAMPLES
 from render.render import render_world
 from studio.compare import compare, resampled
 from studio.jobs import State
@@ -106,6 +107,23 @@ def test_a_time_limit_keeps_what_there_is(qtbot, panel):
     press(qtbot, panel.start_button)
     finish(qtbot, panel)
     assert len(panel.session.renders) == 1 and not panel.session.shown.final
+
+
+def test_a_render_that_was_kept_goes_on_from_where_it_was(qtbot, panel):
+    long_render(qtbot, panel)
+    assert not panel.continue_button.isVisible()
+    press(qtbot, panel.keep_button)
+    finish(qtbot, panel)
+    (render,) = panel.session.renders
+    samples = render.frame.counts[AMBIENT_SAMPLES]
+    assert panel.continue_button.isVisible() and render.state is not None
+    press(qtbot, panel.continue_button)
+    qtbot.waitUntil(lambda: render.frame.counts[AMBIENT_SAMPLES] > samples)
+    assert render.frame.ambient is not None
+    # to cancel is to stop there: what was kept before is not lost
+    press(qtbot, panel.cancel_button)
+    finish(qtbot, panel)
+    assert panel.session.renders == [render] and panel.continue_button.isVisible()
 
 
 def test_the_settings_are_edits_of_the_project_that_undo(qtbot, panel):

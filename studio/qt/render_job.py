@@ -1,0 +1,67 @@
+"""What the render panel's job does, apart from the panel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from render.frame import Frame
+from render.refine import refine
+from render.saved import RenderState
+from render.threads import Cancel
+from render.world import World, build_world
+from studio.jobs import Progress
+from studio.project import Project
+from studio.qt.session import Render
+
+
+def render_frames(
+    project: Project,
+    root: Path,
+    step: int,
+    world: World | None,
+    progress: Progress,
+    cancelled: Cancel,
+    take: Callable[[World, Frame], None],
+    keeps: Cancel,
+    seconds: float | None = None,
+    state: RenderState | None = None,
+) -> None:
+    """Load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled.
+
+    keeps: whether a cancelled render is kept, with all that was done. seconds, state: see `refine`.
+    """
+    if world is None:
+        progress("loading meshes", 0.0)
+        world = build_world(project.scene, root, step)
+    for frame in refine(
+        world,
+        project.scene,
+        settings=project.render,
+        step=step,
+        axis=project.extraction.axis,
+        seed=project.seed,
+        progress=progress,
+        cancelled=cancelled,
+        keeps=keeps,
+        seconds=seconds,
+        state=state,
+    ):
+        take(world, frame)
+
+
+def can_go_on(render: Render | None) -> bool:
+    """It was stopped early, and what it takes to go on is there."""
+    return render is not None and not render.final and render.state is not None
+
+
+def carried(frame: Frame, before: Frame) -> Frame:
+    """What a render that goes on has not come to again yet stays as it was."""
+    return replace(
+        frame,
+        laser_indirect=frame.laser_indirect or before.laser_indirect,
+        ambient=before.ambient if frame.ambient is None else frame.ambient,
+        truth=before.truth if frame.truth is None else frame.truth,
+        counts={**before.counts, **frame.counts},
+    )
