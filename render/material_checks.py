@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from render.emission import fan_span
+from render.beam import SHEET_SIGMAS
 from render.errors import InputError
+from render.laser import LineLaser
 from render.material import Emitter
 from render.pose import invert, transform_points
 from render.scene import Scene
@@ -50,14 +51,23 @@ def has_ambient_source(scene: Scene) -> bool:
 def _light_warnings(world: World, scene: Scene, step: int) -> list[str]:
     found = []
     for i, laser in enumerate(scene.lasers):
-        low, high, _ = fan_span(world, laser, scene.T_world_laser(i, step))
-        if high <= low:
+        if not sheet_meets(world, laser, scene.T_world_laser(i, step)):
             found.append(
                 f"scene.rig.lasers[{i}] ({laser.name}): its light meets no object; move or turn the laser or an object"
             )
     if not has_ambient_source(scene) and len(found) == len(scene.lasers):
         found.append("no light reaches the scene: every image is black; add a laser, a lamp or an environment")
     return found
+
+
+def sheet_meets(world: World, laser: LineLaser, T_world_laser: Float) -> bool:
+    """Some triangle may be in a laser's sheet, within its fan and its power but 6e-7; false: certainly none is."""
+    x, y, z = transform_points(invert(T_world_laser), world.vertices).T
+    _, waist, focus, rayleigh, edge = laser.packed()[:5]
+    reach = SHEET_SIGMAS * (rayleigh * z if waist == 0.0 else waist * np.sqrt(1.0 + ((z - focus) / rayleigh) ** 2))
+    # each of these regions is convex: a triangle with all corners in one lies in it
+    outside = np.stack([z <= 0.0, x > reach, x < -reach, y > edge * z, y < -edge * z])
+    return bool(np.any(~np.any(np.all(outside[:, world.triangles], axis=2), axis=0)))
 
 
 @dataclass(frozen=True)

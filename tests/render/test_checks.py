@@ -66,3 +66,5 @@ def test_a_laser_that_lights_nothing_gives_a_dark_image_and_an_empty_line():
     frame = render_world(world_of(scene, moved(primitive_mesh(Box(size_x=0.02, size_y=0.02)), (0.15, 0, 0.9))), scene)
     assert frame.curves[0].index.size == 0
     assert not np.any(frame.laser_direct[0])
+    # the box lies within the fan, beside the sheet
+    assert "lasers[0] (laser): its light meets no object" in frame.warnings[0]
