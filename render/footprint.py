@@ -50,7 +50,7 @@ def _clip(polygon: Float, count: int, plane: Float, out: Float) -> int:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def mark_triangles(
+def triangle_spans(
     start: int,
     stop: int,
     surface: Surface,
@@ -60,15 +60,15 @@ def mark_triangles(
     laser_centre: Float,
     beam: Float,
     blur: float,
-    mask: NDArray[np.uint8],
-    extent: NDArray[np.int64],
-) -> None:
-    """Set mask (h, w) wherever triangles start..stop may show direct light of the laser.
+    height: int,
+) -> Int:
+    """(n, 3) row, first and last column of spans where triangles start..stop may show direct light of the laser.
 
-    extent (4,): widened to the marked rows and columns, first and last of each. blur: px of the blur disc's radius for
-    a difference of 1/m in 1 / depth; 0 for a pinhole.
+    blur: px of the blur disc's radius for a difference of 1/m in 1 / depth; 0 for a pinhole.
     """
-    height, width = mask.shape
+    width = view.width
+    spans = np.empty((256, 3), dtype=np.int32)
+    found = 0
     vertices, triangles, camera_centre = surface.vertices, surface.triangles, view.T_world_camera[:3, 3]
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
@@ -165,11 +165,15 @@ def mark_triangles(
                     left[y], right[y] = min(left[y], column - margin), max(right[y], column + margin)
         for y in range(top, bottom + 1):
             first, last = max(left[y], 0), min(right[y], width - 1)
-            for x in range(first, last + 1):
-                mask[y, x] = 1
-            if first <= last:
-                extent[0], extent[1] = min(extent[0], y), max(extent[1], y)
-                extent[2], extent[3] = min(extent[2], first), max(extent[3], last)
+            if first > last:
+                continue
+            if found == len(spans):
+                more = np.empty((2 * found, 3), dtype=np.int32)
+                more[:found] = spans
+                spans = more
+            spans[found, 0], spans[found, 1], spans[found, 2] = y, first, last
+            found += 1
+    return spans[:found]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -197,21 +201,39 @@ def blur_scale(view: View, height: int) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def marked_pixels(mask: NDArray[np.uint8], extent: NDArray[np.int64]) -> Int:
-    """(h, w) flags, rows and columns (first, last) that hold all set ones -> their ascending flat indices."""
-    width = mask.shape[1]
-    count = 0
-    for y in range(extent[0], extent[1] + 1):
-        for x in range(extent[2], extent[3] + 1):
-            count += mask[y, x]
-    out = np.empty(count, dtype=np.int32)
+def covered_pixels(spans: Int, height: int, width: int) -> Int:
+    """(n, 3) spans, in any order -> ascending flat indices of the pixels that they cover.
+
+    Row by row in a buffer of one row: an image of flags would cost more to clear and to read than all else here.
+    """
+    n = len(spans)
+    begin = np.zeros(height + 1, dtype=np.int64)
+    most = 0
+    for i in range(n):
+        begin[spans[i, 0] + 1] += 1
+        most += spans[i, 2] - spans[i, 1] + 1
+    for y in range(height):
+        begin[y + 1] += begin[y]
+    order, place = np.empty(n, dtype=np.int64), begin[:height].copy()
+    for i in range(n):
+        y = spans[i, 0]
+        order[place[y]] = i
+        place[y] += 1
+    out = np.empty(most, dtype=np.int32)
+    flags = np.zeros(width, dtype=np.bool_)
     k = 0
-    for y in range(extent[0], extent[1] + 1):
-        for x in range(extent[2], extent[3] + 1):
-            if mask[y, x]:
+    for y in range(height):
+        first, last = width, -1
+        for j in range(begin[y], begin[y + 1]):
+            i = order[j]
+            flags[spans[i, 1] : spans[i, 2] + 1] = True
+            first, last = min(first, spans[i, 1]), max(last, spans[i, 2])
+        for x in range(first, last + 1):
+            if flags[x]:
                 out[k] = y * width + x
                 k += 1
-    return out
+                flags[x] = False
+    return out[:k].copy()
 
 
 def reachable_pixels(
@@ -223,23 +245,21 @@ def reachable_pixels(
     threads: int | None = None,
 ) -> NDArray[np.int32]:
     """(n,) flat pixel indices v * width + u, ascending, that may see direct light of the laser."""
-    mask = np.zeros((camera.height, camera.width), dtype=np.uint8)
     T_laser_world, T_camera_laser = invert(T_world_laser), invert(T_world_camera) @ T_world_laser
     view, surface, laser_centre, beam = camera.view(T_world_camera), world.surface, T_world_laser[:3, 3], laser.packed()
     blur = blur_scale(view, camera.height)
 
+    height = camera.height
     # of each chunk its own, so that threads do not meet
-    chunks = -(-len(world.triangles) // TRIANGLES_A_CHUNK)
-    extents = np.tile(np.array([camera.height, -1, camera.width, -1]), (chunks, 1))
+    spans = [np.zeros((0, 3), np.int32)] * -(-len(world.triangles) // TRIANGLES_A_CHUNK)
 
     def work(start: int, stop: int) -> None:
-        extent = extents[start // TRIANGLES_A_CHUNK]
-        mark_triangles(
-            start, stop, surface, view, T_laser_world, T_camera_laser, laser_centre, beam, blur, mask, extent
+        found = triangle_spans(
+            start, stop, surface, view, T_laser_world, T_camera_laser, laser_centre, beam, blur, height
         )
+        spans[start // TRIANGLES_A_CHUNK] = found
 
     map_chunks(work, len(world.triangles), TRIANGLES_A_CHUNK, threads)
-    if not chunks:
+    if not spans:
         return np.zeros(0, np.int32)
-    extent = np.array([extents[:, 0].min(), extents[:, 1].max(), extents[:, 2].min(), extents[:, 3].max()])
-    return marked_pixels(mask, extent)
+    return covered_pixels(spans[0] if len(spans) == 1 else np.concatenate(spans), height, camera.width)
