@@ -24,8 +24,10 @@ Int = NDArray[np.int32]
 
 TILE, BINS = 8, 128
 """Pixels a side of the guide's tiles; parts of the lit curve."""
-SHARES = ((1, 0.6), (9, 0.3), (33, 0.1))
-"""Window in pixels, and the share of the camera paths that goes by it."""
+COARSE = 4
+"""Pixels a side of the cells in which camera paths are spread."""
+WINDOWS = ((3, 0.3), (9, 0.1))
+"""In cells, and the share of the camera paths that is spread over them; the others go by the pixel's own light."""
 LEAST = 1e-3
 LOOK = 4
 """Pixels between the rays that look for glass."""
@@ -49,14 +51,21 @@ def share_samples(image: NDArray[np.float32], width: int, count: float) -> Float
 
     In proportion to the radiance, and to its mean over windows: of a glossy part's pixels light paths find few.
     """
-    shared = np.zeros(len(image))
-    for window, share in SHARES:
-        blurred = image if window == 1 else uniform_filter(image.reshape(-1, width), window, mode="constant").ravel()
-        total = float(blurred.sum(dtype=np.float64))
-        if total > 0.0:
-            shared += blurred * (share * count / total)
-    shared[shared < LEAST] = 0.0
-    return np.minimum(shared, 64.0)
+    total = float(image.sum(dtype=np.float64))
+    if total <= 0.0:
+        return np.zeros(len(image))
+    rows = image.reshape(-1, width)
+    whole = np.zeros((-(-rows.shape[0] // COARSE) * COARSE, -(-width // COARSE) * COARSE), np.float32)
+    whole[: rows.shape[0], :width] = rows
+    cells = whole.reshape(whole.shape[0] // COARSE, COARSE, -1, COARSE).sum(axis=(1, 3))
+    spread = np.zeros_like(cells)
+    for window, share in WINDOWS:
+        spread += uniform_filter(cells, window, mode="constant") * np.float32(share * count / total / COARSE**2)
+    spread[spread < LEAST] = 0.0
+    even = np.repeat(np.repeat(spread, COARSE, axis=0), COARSE, axis=1)[: rows.shape[0], :width]
+    own = (1.0 - sum(share for _, share in WINDOWS)) * count / total
+    shared = rows * np.float32(own) + even
+    return np.minimum(shared, 64.0).astype(np.float64).ravel()
 
 
 def any_clear(surface: Surface) -> bool:
