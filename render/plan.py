@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import operator
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -90,7 +92,13 @@ def choose_plan(
     shares = pilot_shares(world, scene, direct, step=step, seed=seed, cancelled=cancelled)
     names = [rung.name for rung in RUNGS]
     wanted = names.index(settings.transport) if settings.transport in names else -1
-    kinds: int | None = None
+    worth = {}
+    for i, rung in enumerate(RUNGS):
+        share, error = shares[rung.share]
+        # what may well be more than negligible is computed
+        worth[rung.name] = i <= wanted or (wanted < 0 and share + 2.0 * error > settings.negligible)
+    chosen = [rung for rung in RUNGS if worth[rung.name]]
+    kinds = functools.reduce(operator.or_, (rung.kind for rung in chosen), PLAIN) if chosen else None
     lines = [DIRECT]
     for i, rung in enumerate(RUNGS):
         share, error = shares[rung.share]
@@ -100,12 +108,11 @@ def choose_plan(
         measured = f"a pilot puts it at {share:.2%} +- {error:.2%} of the direct light in the image"
         if math.isinf(share):
             measured = "there is no direct light in the image to compare it with"
-        # what may well be more than negligible is computed
-        worth = share + 2.0 * error > settings.negligible
-        if i <= wanted or (wanted < 0 and worth):
-            kinds = (kinds or PLAIN) | rung.kind
+        if worth[rung.name]:
             asked = "asked for; " if wanted >= 0 else ""
             lines.append(f"{rung.name}: {rung.light} - {asked}{measured}")
+        elif kinds is not None and rung.kind & kinds == rung.kind:
+            lines.append(f"{rung.name}: {rung.light} - comes with {chosen[-1].name}; {measured}")
         else:
             why = "not asked for" if wanted >= 0 else f"below the negligible {settings.negligible:.2%}"
             lines.append(f"left out: {rung.light} ({rung.name}) - {measured}, {why}")

@@ -14,6 +14,7 @@ DESCRIPTIONS = {
     "plane": "a tilted plane: the simplest thing with a closed form",
     "sphere": "a sphere on a table: every slope at once",
     "step_block": "five steps of 10 mm: depth linearity",
+    "glass_ball": "a glass ball in the beam, half of the line seen through a plate: caustics",
     "v_groove": "a 90 degree groove: inner corners",
     "scan": "the step block swept by a linear stage, 20 frames",
 }

@@ -9,10 +9,10 @@ import pytest
 
 from render.bidirectional import empty_take
 from render.camera import Camera
-from render.connect import count_joints, no_joints
 from render.emission import even_fan
 from render.gathered import Gathered
 from render.guide import BINS, no_guide
+from render.joints import count_joints, no_joints
 
 CAMERA = Camera(width=4, height=2, fx=4.0, fy=4.0, cx=1.5, cy=0.5)
 

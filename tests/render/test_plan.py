@@ -100,6 +100,8 @@ def test_a_glass_ball_in_the_beam_needs_caustics():
 def test_the_same_seen_through_a_window_needs_merging():
     found = Choice([wall(), ball(), window(0.1)], [GREY, GLASS, GLASS])
     assert "specular-chain" in found.steps() and found.plan.kinds & UNJOINED
+    # what is computed with it is not said to be left out
+    assert found.left_out() == []
     assert found.shares["unjoined"][0] > 0.02
     found.pilot_agrees()
 

@@ -114,6 +114,7 @@ def test_every_template_is_exposed_well_and_can_be_told_in_json(template: str) -
     assert json.loads(json.dumps(view.as_dict(), allow_nan=False))["name"] == view.name
     laser = view.lasers[0]
     # where ground steel mirrors the laser into the camera, no exposure keeps it and the dull plates in range
-    most = 0.03 if template == "shiny_weld_seam" else 0.0
+    # and glass gathers light in spots
+    most = 0.03 if template in ("shiny_weld_seam", "glass_ball") else 0.0
     assert laser.saturated is not None and laser.saturated <= most and laser.peak_electrons is not None
     assert 0.2 * view.full_well < laser.peak_electrons < 0.8 * view.full_well
