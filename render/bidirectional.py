@@ -33,6 +33,8 @@ Float32 = NDArray[np.float32]
 LEAST_PASS, MOST_PASS = 1 << 13, 1 << 15
 """Paths from the laser, and as many from the camera, in a pass; a large image is worth longer ones."""
 LOOK_PATHS = 1 << 12
+UNSEEN = 0.1
+"""Of the camera paths of the first passes, for what may be behind glass besides what was found there."""
 MOST_DOUBLINGS = 2
 """Of the paths from the laser, where camera paths bring nothing."""
 PILOT_PATHS = 1 << 13
@@ -117,10 +119,10 @@ def indirect_images(
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, kinds)
     takes = [empty_take(camera.width * camera.height) for _ in range(WAVE)]
 
-    def wave(first: int, paths: int, fan: Fan, samples: Float, guide: Guide) -> None:
+    def wave(first: int, paths: int, fan: Fan, samples: Float, guide: Guide, hints: Float | None = None) -> None:
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
-                task.run(first + number, paths, fan, samples, guide, takes[number], cancelled)
+                task.run(first + number, paths, fan, samples, guide, takes[number], cancelled, hints)
 
         map_chunks(work, WAVE, 1, min(WAVE, thread_count(threads)), cancelled)
 
@@ -128,11 +130,12 @@ def indirect_images(
         # two looks only say where laser and camera should look: the first, by light, where it arrives at all (what is
         # behind glass only the camera finds), the second, from there, which light matters
         fan = even_fan(low, high)
-        wave(0, LOOK_PATHS, fan, first_samples(task, camera), no_guide(camera))
-        before = first_knowledge(takes, fan, camera, kinds)
+        clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else None
+        wave(0, LOOK_PATHS, fan, first_samples(clear, camera), no_guide(camera), clear)
+        before = first_knowledge(takes, fan, camera, kinds, clear)
         learnt = learn_with(takes, before)
-        wave(WAVE, LOOK_PATHS, before.fan, before.samples, before.guide)
-        second_knowledge(before, takes, learnt, camera)
+        wave(WAVE, LOOK_PATHS, before.fan, before.samples, before.guide, clear)
+        second_knowledge(before, takes, learnt, camera, clear)
     so_far = before
     learnt = learn_with(takes, so_far)
 
@@ -166,12 +169,11 @@ def indirect_images(
     yield image()
 
 
-def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int) -> Gathered:
+def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int, clear: Float | None) -> Gathered:
     """Nothing gathered yet, but where a first look (cleared) says that light is to be found."""
     pixels = camera.width * camera.height
     fan = aimed_fan(fan, np.sum([take.found for take in takes], axis=0))
-    radiance, helped = summed(takes)
-    share = float(helped.sum()) / max(radiance, 1e-300)
+    share, helped = looked(takes, clear)
     samples = share_samples(helped, camera.width, LOOK_PATHS * share)
     guide = first_guide(samples, camera)
     knowledge = np.zeros((len(guide.cumulative), BINS))
@@ -179,26 +181,32 @@ def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int) -> 
     return Gathered(kinds, fan, LOOK_PATHS, LOOK_PATHS * share, samples, guide, knowledge, *nothing)
 
 
-def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: Camera) -> None:
+def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: Camera, clear: Float | None) -> None:
     """Add what a second look (cleared) has found, and set the size of the passes to come."""
     first.guide = learn(first.guide, learnt, first.knowledge)
-    radiance, helped = summed(takes)
     # where camera paths have little to bring, most of the work is left to those from the laser
-    share = float(helped.sum()) / max(radiance, 1e-300)
+    share, helped = looked(takes, clear)
     size = min(max(1 << (camera.width * camera.height >> 7).bit_length() - 1, LEAST_PASS), MOST_PASS)
     first.wanted, first.paths = size * share, size * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
     first.samples = share_samples(helped, camera.width, first.wanted)
+    # what only the camera can find is looked for ever after, however little of it there was
+    first.helped[:] = helped if clear is not None else 0.0
 
 
-def summed(takes: list[Take]) -> tuple[float, Float32]:
-    """Radiance over all pixels, and (pixels,) what camera paths could help with, of takes that are cleared."""
+def looked(takes: list[Take], clear: Float | None) -> tuple[float, Float32]:
+    """What camera paths could help with: its share of the light, and (pixels,) of takes, which are cleared.
+
+    Wherever the camera looks at clear glass, there is a little of it: what is there no light path can tell.
+    """
     radiance, helped = 0.0, np.zeros_like(takes[0].helped)
     for take in takes:
         radiance += float(take.image.sum())
         helped += take.helped
         for sums in (take.image, take.helped, take.dropped):
             sums[:] = 0.0
-    return radiance, helped
+    if clear is not None:
+        helped += clear * (UNSEEN * max(float(helped.sum()), 1e-30) / max(float(clear.sum()), 1.0))
+    return min(float(helped.sum()) / max(radiance, 1e-300), 1.0), helped
 
 
 def learn_with(takes: list[Take], so_far: Gathered) -> Float:
@@ -224,7 +232,8 @@ def indirect_shares(
     if high <= low:
         return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, ALL_KINDS)
-    fan, guide, samples, sums = even_fan(low, high), no_guide(camera), first_samples(task, camera), []
+    clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else None
+    fan, guide, samples, sums = even_fan(low, high), no_guide(camera), first_samples(clear, camera), []
     for number in range(passes):
         take = empty_take(camera.width * camera.height)
         task.run(number, PILOT_PATHS, fan, samples, guide, take, cancelled)
@@ -240,9 +249,8 @@ def empty_take(pixels: int) -> Take:
     return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1))
 
 
-def first_samples(task: LightPass, camera: Camera) -> Float:
+def first_samples(clear: Float | None, camera: Camera) -> Float:
     """(pixels,) camera paths of the first look: few, on what the camera sees of mirrors and clear glass."""
-    if not task.clear:
+    if clear is None:
         return np.zeros(camera.width * camera.height)
-    samples = clear_pixels(task.world, task.surface, camera, task.view.T_world_camera)
-    return samples * min(1.0, LEAST_PASS / max(float(samples.sum()), 1.0))
+    return clear * min(1.0, LEAST_PASS / max(float(clear.sum()), 1.0))

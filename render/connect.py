@@ -29,7 +29,7 @@ from render.joints import JOINS, Joints, adjoint, cast
 from render.lens import lens_point, lens_position, lens_project
 from render.random import uniform
 from render.surface import View
-from render.vertex import BACK, DVC, DVCM, KIND, NUMBER, PART, PIXEL, POWER, local, material_of
+from render.vertex import BACK, DVC, DVCM, KIND, NUMBER, PART, PIXEL, POWER, REFLECTANCE, local, material_of
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -93,6 +93,26 @@ def join_camera(
         cast(joints, n, v, e0, e1, e2, out, far, centre, offset)
         n += 1
     return n
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def hint_at(
+    vertex: Float, state: Float, view: View, height: int, clear: Float, light_paths: int, helped: NDArray[np.float32]
+) -> None:
+    """Add to `helped` (pixels,) what light vertices would look like behind clear glass, were it not to bend light.
+
+    clear (pixels,): not 0 where the camera looks at glass or a mirror. Only says where camera paths are worth while.
+    """
+    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
+    distorted = bool(np.any(view.distortion))
+    for r in range(vertex.shape[0]):
+        v = vertex[r]
+        x, y, area = lens_project(view, tilt, distorted, v[0], v[1], v[2], 0.0, 0.0)
+        if not (area > 0.0 and -0.5 <= x < view.width - 0.5 and -0.5 <= y < height - 0.5):
+            continue
+        pixel = int(math.floor(y + 0.5)) * view.width + int(math.floor(x + 0.5))
+        if clear[pixel] > 0.0:
+            helped[pixel] += state[r, POWER] * v[REFLECTANCE] * area / (math.pi * light_paths)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

@@ -28,7 +28,7 @@ COARSE = 4
 """Pixels a side of the cells in which camera paths are spread."""
 WINDOWS = ((3, 0.3), (9, 0.1))
 """In cells, and the share of the camera paths that is spread over them; the others go by the pixel's own light."""
-LEAST = 1e-3
+LEAST = 1e-6
 LOOK = 4
 """Pixels between the rays that look for glass."""
 FEWEST_TO_LEARN, FLAT = 4.0, 0.2

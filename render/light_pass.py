@@ -17,6 +17,7 @@ from render.camera import Camera
 from render.connect import (
     begin_camera,
     begin_light,
+    hint_at,
     join_camera,
     join_laser,
     joinable,
@@ -125,6 +126,7 @@ class LightPass:
         guide: Guide,
         take: Take,
         cancelled: Cancel | None,
+        hints: Float | None = None,
     ) -> None:
         """Pass `number`: light paths, and camera paths, samples (pixels,) to be expected. Raises Cancelled."""
         seed = self.seed * 1_000_003 + number
@@ -132,6 +134,8 @@ class LightPass:
         for first in range(0, paths, CHUNK_PATHS):
             _stop(cancelled)
             found += self.light(seed, first, min(CHUNK_PATHS, paths - first), paths, fan, samples, take)
+        for _, vertex, state in found if hints is not None else ():
+            hint_at(vertex, state, self.view, self.height, hints, paths, take.helped)
         counts = np.empty(len(samples), np.int32)
         draw_counts(samples, seed ^ CAMERA_SEED, counts)
         pixels = np.flatnonzero(counts).astype(np.int32)
