@@ -13,7 +13,7 @@ from render.lights import Environment
 from render.primitives import primitive_mesh
 from render.shape import Box
 from tests.render.scenes import moved, paper_camera, paper_laser, plane_mesh, scene_of, world_of
-from tests.validation.test_against_mitsuba import projector
+from tests.validation.laser_projector import projector
 
 pytestmark = pytest.mark.validation
 mitsuba = pytest.importorskip("mitsuba", reason="make validate installs it")
