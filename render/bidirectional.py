@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -188,7 +189,7 @@ def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: 
     share, helped = looked(takes, clear)
     size = min(max(1 << (camera.width * camera.height >> 7).bit_length() - 1, LEAST_PASS), MOST_PASS)
     first.wanted, first.paths = size * share, size * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
-    first.samples = share_samples(helped, camera.width, first.wanted)
+    share_samples(helped, camera.width, first.wanted, first.samples)
     # what only the camera can find is looked for ever after, however little of it there was
     first.helped[:] = helped if clear is not None else 0.0
 
@@ -198,15 +199,26 @@ def looked(takes: list[Take], clear: Float | None) -> tuple[float, Float32]:
 
     Wherever the camera looks at clear glass, there is a little of it: what is there no light path can tell.
     """
-    radiance, helped = 0.0, np.zeros_like(takes[0].helped)
+    helped = np.zeros_like(takes[0].helped)
+    radiance = take_out(tuple(take.image for take in takes), tuple(take.helped for take in takes), helped)
     for take in takes:
-        radiance += float(take.image.sum())
-        helped += take.helped
-        for sums in (take.image, take.helped, take.dropped):
-            sums[:] = 0.0
+        take.dropped[:] = 0.0
     if clear is not None:
         helped += clear * (UNSEEN * max(float(helped.sum()), 1e-30) / max(float(clear.sum()), 1.0))
     return min(float(helped.sum()) / max(radiance, 1e-300), 1.0), helped
+
+
+@numba.njit(nogil=True, cache=True)
+def take_out(images: tuple[Float, ...], helped: tuple[Float32, ...], total_helped: Float32) -> float:
+    """Clear images and what was helped of them, adding the latter up (pixels,); returns the radiance of all."""
+    radiance = 0.0
+    for k in range(len(images)):
+        for pixel in range(total_helped.shape[0]):
+            if images[k][pixel] != 0.0 or helped[k][pixel] != 0.0:
+                radiance += images[k][pixel]
+                total_helped[pixel] += helped[k][pixel]
+                images[k][pixel] = helped[k][pixel] = 0.0
+    return radiance
 
 
 def learn_with(takes: list[Take], so_far: Gathered) -> Float:

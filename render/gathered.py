@@ -80,7 +80,7 @@ class Gathered:
         mean_square = max(first / n**2 - variance, 1e-300)
         self.error = math.sqrt(variance / mean_square) if first > 0.0 else 0.0
         if self.doubled:
-            self.samples = share_samples(self.helped, self.guide.width, self.wanted)
+            share_samples(self.helped, self.guide.width, self.wanted, self.samples)
         self.guide = learn(self.guide, learnt, self.knowledge)
         self.whole = True
 

@@ -28,7 +28,7 @@ COARSE = 4
 """Pixels a side of the cells in which camera paths are spread."""
 WINDOWS = ((3, 0.3), (9, 0.1))
 """In cells, and the share of the camera paths that is spread over them; the others go by the pixel's own light."""
-LEAST = 1e-6
+LEAST, MOST_SAMPLES = 1e-6, 64.0
 LOOK = 4
 """Pixels between the rays that look for glass."""
 FEWEST_TO_LEARN, FLAT = 4.0, 0.2
@@ -46,26 +46,49 @@ class Guide(NamedTuple):
     """(n, BINS + 1) distribution over equal parts of the list of light vertices, from 0 to 1."""
 
 
-def share_samples(image: NDArray[np.float32], width: int, count: float) -> Float:
-    """(pixels,) radiance so far -> camera paths to be expected for each pixel, about `count` in all.
+def share_samples(image: NDArray[np.float32], width: int, count: float, samples: Float | None = None) -> Float:
+    """(pixels,) radiance so far -> camera paths to be expected for each pixel, about `count` in all; into `samples`.
 
     In proportion to the radiance, and to its mean over windows: of a glossy part's pixels light paths find few.
     """
-    total = float(image.sum(dtype=np.float64))
+    samples = np.empty(len(image)) if samples is None else samples
+    cells = np.zeros((-(-(len(image) // width) // COARSE), -(-width // COARSE)), np.float32)
+    total = sum_cells(image, width, cells)
     if total <= 0.0:
-        return np.zeros(len(image))
-    rows = image.reshape(-1, width)
-    whole = np.zeros((-(-rows.shape[0] // COARSE) * COARSE, -(-width // COARSE) * COARSE), np.float32)
-    whole[: rows.shape[0], :width] = rows
-    cells = whole.reshape(whole.shape[0] // COARSE, COARSE, -1, COARSE).sum(axis=(1, 3))
+        samples[:] = 0.0
+        return samples
     spread = np.zeros_like(cells)
     for window, share in WINDOWS:
         spread += uniform_filter(cells, window, mode="constant") * np.float32(share * count / total / COARSE**2)
-    spread[spread < LEAST] = 0.0
-    even = np.repeat(np.repeat(spread, COARSE, axis=0), COARSE, axis=1)[: rows.shape[0], :width]
     own = (1.0 - sum(share for _, share in WINDOWS)) * count / total
-    shared = rows * np.float32(own) + even
-    return np.minimum(shared, 64.0).astype(np.float64).ravel()
+    fill_samples(image, width, own, spread, samples)
+    return samples
+
+
+@numba.njit(nogil=True, cache=True)
+def sum_cells(image: NDArray[np.float32], width: int, cells: NDArray[np.float32]) -> float:
+    """Add (pixels,) up in cells of COARSE x COARSE pixels; returns the sum of all."""
+    total = 0.0
+    for row in range(image.shape[0] // width):
+        for column in range(width):
+            value = image[row * width + column]
+            if value != 0.0:
+                cells[row // COARSE, column // COARSE] += value
+                total += value
+    return total
+
+
+@numba.njit(nogil=True, cache=True)
+def fill_samples(
+    image: NDArray[np.float32], width: int, own: float, spread: NDArray[np.float32], samples: Float
+) -> None:
+    """What each pixel's own light and that of its cell's neighbourhood are worth -> samples (pixels,)."""
+    for row in range(image.shape[0] // width):
+        for column in range(width):
+            pixel = row * width + column
+            about = spread[row // COARSE, column // COARSE]
+            value = own * image[pixel] + (about if about >= LEAST else 0.0)
+            samples[pixel] = min(value, MOST_SAMPLES)
 
 
 def any_clear(surface: Surface) -> bool:
