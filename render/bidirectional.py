@@ -32,7 +32,7 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 LEAST_PASS, MOST_PASS = 1 << 13, 1 << 15
-"""Paths from the laser, and as many from the camera, in a pass; a large image is worth longer ones."""
+"""Paths from the laser in a pass, and half of those from the camera; a large image is worth longer ones."""
 LOOK_PATHS = 1 << 12
 UNSEEN = 0.1
 """Of the camera paths of the first passes, for what may be behind glass besides what was found there."""
@@ -188,7 +188,7 @@ def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: 
     # where camera paths have little to bring, most of the work is left to those from the laser
     share, helped = looked(takes, clear)
     size = min(max(1 << (camera.width * camera.height >> 7).bit_length() - 1, LEAST_PASS), MOST_PASS)
-    first.wanted, first.paths = size * share, size * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
+    first.wanted, first.paths = 2 * size * share, size * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
     share_samples(helped, camera.width, first.wanted, first.samples)
     # what only the camera can find is looked for ever after, however little of it there was
     first.helped[:] = helped if clear is not None else 0.0
