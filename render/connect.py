@@ -87,9 +87,8 @@ def join_camera(
             reverse = pdf(row, rgb, i0, i1, i2, o0, o1, o2)
             others = density * (state[r, DVCM] + reverse * state[r, DVC])
             weight = 1.0 / (1.0 + JOINS * samples[pixel] / light_paths * others)
-        back = adjoint(v, o2, i2, out)
         joints.pixel[n], joints.kind[n], joints.part[n] = pixel, int(state[r, KIND]), int(state[r, PART])
-        joints.worth[n] = state[r, POWER] * f[0] * density * weight * back
+        joints.worth[n] = state[r, POWER] * f[0] * density * weight * adjoint(v)
         cast(joints, n, v, e0, e1, e2, out, far, centre, offset)
         n += 1
     return n

@@ -98,7 +98,7 @@ def cast(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def adjoint(v: Float, o2: float, i2: float, out: float) -> float:
+def adjoint(v: Float) -> float:
     """What a shading normal changes for light that leaves by a direction (Veach 1997, eq. 5.20), cosines included.
 
     The factor on  f |cos with the geometric normal|  for light; 1 where both normals agree.
@@ -107,7 +107,7 @@ def adjoint(v: Float, o2: float, i2: float, out: float) -> float:
     if z0 == v[3] and z1 == v[4] and z2 == v[5]:
         return 1.0
     y0, y1, y2 = z1 * x2 - z2 * x1, z2 * x0 - z0 * x2, z0 * x1 - z1 * x0
-    o0, o1 = v[BACK], v[BACK + 1]
+    o0, o1, o2 = v[BACK], v[BACK + 1], v[BACK + 2]
     back = (
         v[3] * (x0 * o0 + y0 * o1 + z0 * o2)
         + v[4] * (x1 * o0 + y1 * o1 + z1 * o2)

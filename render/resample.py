@@ -128,7 +128,7 @@ def join_light(
         material_of(w, rows, light_row, light_rgb)
         b0, b1, b2 = w[BACK], w[BACK + 1], w[BACK + 2]
         left_over = (light_state[j, DVCM] * abs(in_) + state[r, DVCM] * abs(out)) / math.pi
-        worth = total / lit.paths * (square + left_over) / square * adjoint(w, b2, g2, in_)
+        worth = total / lit.paths * (square + left_over) / square * adjoint(w)
         from_camera = pdf(row, rgb, o0, o1, o2, i0, i1, i2) * abs(in_) / square
         from_light = pdf(light_row, light_rgb, b0, b1, b2, g0, g1, g2) * abs(out) / square
         back_light = pdf(light_row, light_rgb, g0, g1, g2, b0, b1, b2)

@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bsdf import DIELECTRIC, EMITTED, EMITTER, LAMBERTIAN, SUBSURFACE
+from render.bsdf import EMITTED, EMITTER, LAMBERTIAN, SUBSURFACE
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -41,19 +41,9 @@ def has_gloss(surface: Surface) -> bool:
     return not bool(np.all(plain & (surface.detail == 0)))
 
 
-def has_glass(surface: Surface) -> bool:
-    """Light passes through some surface: glass, or the boundary of a medium."""
-    return bool(np.any((surface.rows[:, 0] == DIELECTRIC) | (surface.rows[:, 0] == SUBSURFACE)))
-
-
 def has_medium(surface: Surface) -> bool:
     """Light scatters within some object."""
     return bool(np.any(surface.rows[:, 0] == SUBSURFACE))
-
-
-def has_emission(surface: Surface) -> bool:
-    """Some object shines."""
-    return bool(np.any(surface.rows[:, EMITTED : EMITTED + 3] > 0.0))
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

@@ -153,8 +153,3 @@ def _range(values: Float) -> Range | None:
 def _median(values: Float) -> float | None:
     found = _range(values)
     return None if found is None else found.middle
-
-
-def all_readouts(look: Look) -> tuple[Readouts, ...]:
-    """Of every laser."""
-    return tuple(readouts(look, i) for i in range(len(look.scene.lasers)))
