@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from render.camera import Camera
 from render.emission import PARTS, Fan, aimed_fan, even_fan, fan_span
 from render.errors import Cancelled
-from render.gathered import Gathered
+from render.gathered import MOST_PASS, Gathered
 from render.guide import BINS, Guide, clear_pixels, first_guide, learn, no_guide, share_samples
 from render.joints import Take
 from render.laser import LineLaser
@@ -31,13 +31,11 @@ from render.world import World
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
-LEAST_PASS, MOST_PASS = 1 << 13, 1 << 15
-"""Paths from the laser in a pass, and half of those from the camera; a large image is worth longer ones."""
-LOOK_PATHS = 1 << 12
+LEAST_PASS = 1 << 12
+"""Paths from the laser in a first pass, and half of those from the camera; a large image is worth longer ones."""
+LOOK_PATHS = 1 << 11
 UNSEEN = 0.1
 """Of the camera paths of the first passes, for what may be behind glass besides what was found there."""
-MOST_DOUBLINGS = 2
-"""Of the paths from the laser, where camera paths bring nothing."""
 PILOT_PATHS = 1 << 13
 WAVE = 4
 """Passes at a time, whatever the number of threads."""
@@ -132,7 +130,7 @@ def indirect_images(
         # behind glass only the camera finds), the second, from there, which light matters
         fan = even_fan(low, high)
         clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else None
-        wave(0, LOOK_PATHS, fan, first_samples(clear, camera), no_guide(camera), clear)
+        wave(0, LOOK_PATHS, fan, first_samples(clear, camera, 2 * LOOK_PATHS), no_guide(camera), clear)
         before = first_knowledge(takes, fan, camera, kinds, clear)
         learnt = learn_with(takes, before)
         wave(WAVE, LOOK_PATHS, before.fan, before.samples, before.guide, clear)
@@ -141,16 +139,17 @@ def indirect_images(
     learnt = learn_with(takes, so_far)
 
     def image() -> IndirectImage:
-        counts = so_far.passes * so_far.paths, round(so_far.dropped), round(so_far.clamped)
+        counts = so_far.paths, round(so_far.dropped), round(so_far.clamped)
         cut = so_far.cut / so_far.passes / so_far.total.size
         return IndirectImage(so_far.radiance(shape), so_far.error, *counts, cut)
 
     def unfinished() -> bool:
-        return so_far.error > target and so_far.passes * so_far.paths < most_paths
+        return so_far.error > target and so_far.paths < most_paths
 
     while unfinished():
         try:
-            wave(2 * WAVE + so_far.passes, so_far.paths, so_far.fan, so_far.samples, so_far.guide)
+            first = WAVE * (2 + so_far.waves)
+            wave(first, so_far.next_paths, so_far.fan, so_far.samples, so_far.guide)
         except Cancelled:
             if so_far.passes and keeps is not None and keeps():
                 yield image()
@@ -159,10 +158,9 @@ def indirect_images(
         if keep is not None:
             keep(so_far)
         if progress is not None:
-            # the error falls with the root of the passes, at least
-            passes, error = so_far.passes, so_far.error
-            needed = passes * (error / target) ** 2 if math.isfinite(error) else math.inf
-            progress(min(0.99, passes / min(max(needed, 1.0), most_paths / so_far.paths)))
+            # the error falls with the root of the paths, at least
+            done = max((target / so_far.error) ** 2, so_far.paths / most_paths) if so_far.error > 0.0 else 1.0
+            progress(min(0.99, done))
         if enough is not None and enough():
             break
         if so_far.doubled and unfinished():
@@ -175,23 +173,26 @@ def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int, cle
     pixels = camera.width * camera.height
     fan = aimed_fan(fan, np.sum([take.found for take in takes], axis=0))
     share, helped = looked(takes, clear)
-    samples = share_samples(helped, camera.width, LOOK_PATHS * share)
+    samples = share_samples(helped, camera.width, LOOK_PATHS * share, arrived(helped), 1.0)
     guide = first_guide(samples, camera)
     knowledge = np.zeros((len(guide.cumulative), BINS))
-    nothing = np.zeros(pixels), np.zeros(pixels), np.zeros(pixels, np.float32)
-    return Gathered(kinds, fan, LOOK_PATHS, LOOK_PATHS * share, samples, guide, knowledge, *nothing)
+    size = min(max(1 << (pixels >> 8).bit_length() - 1, LEAST_PASS), MOST_PASS)
+    return Gathered(kinds, fan, size, share, samples, guide, knowledge, np.zeros(pixels), np.zeros(pixels, np.float32))
 
 
 def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: Camera, clear: Float | None) -> None:
     """Add what a second look (cleared) has found, and set the size of the passes to come."""
     first.guide = learn(first.guide, learnt, first.knowledge)
-    # where camera paths have little to bring, most of the work is left to those from the laser
-    share, helped = looked(takes, clear)
-    size = min(max(1 << (camera.width * camera.height >> 7).bit_length() - 1, LEAST_PASS), MOST_PASS)
-    first.wanted, first.paths = 2 * size * share, size * 2 ** round(MOST_DOUBLINGS * (1.0 - share))
-    share_samples(helped, camera.width, first.wanted, first.samples)
-    # what only the camera can find is looked for ever after, however little of it there was
-    first.helped[:] = helped if clear is not None else 0.0
+    first.share, helped = looked(takes, clear)
+    share_samples(helped, camera.width, first.wanted, first.samples, float(WAVE))
+    if clear is not None:
+        # what only the camera can find is looked for ever after, however little of it there was
+        first.helped[:] = helped
+
+
+def arrived(helped: Float32) -> Float:
+    """(pixels,) roughly how many light paths of a first look came to each."""
+    return helped.astype(np.float64) * (WAVE * LOOK_PATHS / max(float(helped.sum()), 1e-300))
 
 
 def looked(takes: list[Take], clear: Float | None) -> tuple[float, Float32]:
@@ -245,7 +246,8 @@ def indirect_shares(
         return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, ALL_KINDS)
     clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else None
-    fan, guide, samples, sums = even_fan(low, high), no_guide(camera), first_samples(clear, camera), []
+    samples = first_samples(clear, camera, PILOT_PATHS)
+    fan, guide, sums = even_fan(low, high), no_guide(camera), []
     for number in range(passes):
         take = empty_take(camera.width * camera.height)
         task.run(number, PILOT_PATHS, fan, samples, guide, take, cancelled)
@@ -261,8 +263,8 @@ def empty_take(pixels: int) -> Take:
     return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1))
 
 
-def first_samples(clear: Float | None, camera: Camera) -> Float:
-    """(pixels,) camera paths of the first look: few, on what the camera sees of mirrors and clear glass."""
+def first_samples(clear: Float | None, camera: Camera, count: int) -> Float:
+    """(pixels,) camera paths of a first look: at most `count`, on what the camera sees of mirrors and clear glass."""
     if clear is None:
         return np.zeros(camera.width * camera.height)
-    return clear * min(1.0, LEAST_PASS / max(float(clear.sum()), 1.0))
+    return clear * min(1.0, count / max(float(clear.sum()), 1.0))

@@ -17,33 +17,45 @@ from render.threads import map_chunks
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
+MOST_PASS = 1 << 15
+"""Of the passes' size: what a wave may take is what is lost where it is cancelled."""
+MOST_DOUBLINGS = 2
+"""Of the paths from the laser, where camera paths bring nothing."""
 PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass
 class Gathered:
-    """Sums over the passes, and where the next ones look; changes as passes are added."""
+    """Sums over the waves of passes, and where the next ones look; changes as waves are added.
+
+    The second wave is as large as the first, and each after it as all before together, up to a limit. A wave counts
+    for its size, and its passes, alike and independent, tell how far it may be off.
+    """
 
     kinds: int
     """Of light that is gathered (`render.vertex`)."""
     fan: Fan
-    paths: int
-    """From the laser, a pass."""
-    wanted: float
-    """Camera paths a pass."""
+    size: int
+    """Paths from the laser in a pass of the first wave, and half of those from the camera."""
+    share: float
+    """Of the light, what camera paths could help with."""
     samples: Float
-    """(pixels,) camera paths to be expected for each pixel, a pass."""
+    """(pixels,) camera paths to be expected for each pixel, in a pass of the next wave."""
     guide: Guide
     knowledge: Float
     """(rows of the guide, BINS) behind it."""
     total: Float
-    """(pixels,) sum of the passes' radiance."""
-    squares: Float
-    """(pixels,) sum of its squares."""
+    """(pixels,) sum of the passes' radiance, each as often as it counts."""
     helped: Float32
     """(pixels,) of the sum, what camera paths could help with."""
+    waves: int = 0
     passes: int = 0
+    """How many were added, each as often as it counts."""
+    paths: int = 0
+    """From the laser."""
+    spread: float = 0.0
+    """Variance of `total`, summed over the pixels."""
     error: float = math.inf
     """Relative RMS error of the image so far: sqrt(sum of variances / sum of squares)."""
     dropped: float = 0.0
@@ -51,43 +63,63 @@ class Gathered:
     clamped: float = 0.0
     """Pixels of passes that the clamp has cut."""
     cut: float = 0.0
-    """Radiance that it took, summed over pixels and passes."""
+    """Radiance that it took, summed over pixels and passes, each as often as it counts."""
     whole: bool = True
     """False within `add`: an interruption there leaves half a wave."""
+
+    @property
+    def counts(self) -> int:
+        """What a pass of the next wave counts for: its size, in that of the first."""
+        return min(1 << max(self.waves - 1, 0), max(MOST_PASS // self.size, 1))
+
+    @property
+    def next_paths(self) -> int:
+        """Paths from the laser in a pass of the next wave: more where those from the camera have little to bring."""
+        return self.size * self.counts << round(MOST_DOUBLINGS * (1.0 - self.share))
+
+    @property
+    def wanted(self) -> float:
+        """Paths from the camera in a pass of the next wave."""
+        return 2 * self.size * self.counts * self.share
+
+    @property
+    def doubled(self) -> bool:
+        """The last wave made up half of what there is."""
+        return self.passes & (self.passes - 1) == 0
 
     def add(self, takes: list[Take], learnt: Float, clamp: float | None = None, threads: int | None = None) -> None:
         """Fold in a wave of passes (cleared), with what it learnt; clamp: most radiance of one pass in one pixel."""
         self.whole = False
-        most = math.inf if clamp is None else clamp
+        most, counts, passes = math.inf if clamp is None else clamp, self.counts, len(takes)
         images, helped = tuple(take.image for take in takes), tuple(take.helped for take in takes)
-        sums = np.zeros((-(-len(self.total) // PIXELS_A_CHUNK), 4))
+        sums = np.zeros((-(-len(self.total) // PIXELS_A_CHUNK), 6))
 
         def work(start: int, stop: int) -> None:
-            sums[start // PIXELS_A_CHUNK] = gather(
-                images, helped, self.total, self.squares, self.helped, most, start, stop
-            )
+            found = gather(images, helped, self.total, self.helped, float(counts), most, start, stop)
+            sums[start // PIXELS_A_CHUNK] = found
 
         map_chunks(work, len(self.total), PIXELS_A_CHUNK, threads)
-        first, second, clamped, cut = sums.sum(axis=0)
-        self.clamped += float(clamped)
-        self.cut += float(cut)
+        light, by_camera, squares, spread, clamped, cut = (float(found) for found in sums.sum(axis=0))
+        self.clamped += clamped
+        self.cut += counts * cut
         for take in takes:
             self.dropped += float(take.dropped[0])
             take.dropped[0] = 0.0
-        self.passes += len(takes)
-        n = self.passes
-        variance = max(second - first / n, 0.0) / (n - 1) / n
-        mean_square = max(first / n**2 - variance, 1e-300)
-        self.error = math.sqrt(variance / mean_square) if first > 0.0 else 0.0
-        if self.doubled:
-            share_samples(self.helped, self.guide.width, self.wanted, self.samples)
+        self.paths += passes * self.next_paths
+        self.waves += 1
+        self.passes += passes * counts
+        self.spread += counts**2 * spread
+        if light > 0.0:
+            # the last wave knows it best
+            self.share = min(by_camera / light, 1.0)
+        self.error = math.sqrt(self.spread / max(squares - self.spread, 1e-300)) if squares > 0.0 else 0.0
         self.guide = learn(self.guide, learnt, self.knowledge)
+        self.share_out(self.passes / counts)
         self.whole = True
 
-    @property
-    def doubled(self) -> bool:
-        """The number of passes is a power of two."""
-        return self.passes & (self.passes - 1) == 0
+    def share_out(self, drawn: float) -> None:
+        """Spread the next wave's camera paths over the pixels, after `drawn` times those of `samples`."""
+        share_samples(self.helped, self.guide.width, self.wanted, self.samples, drawn)
 
     def radiance(self, shape: tuple[int, int]) -> Float32:
         """(h, w) the image so far, W/(m^2 sr)."""
@@ -95,37 +127,38 @@ class Gathered:
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
-        numbers = (self.fan.low, self.fan.high, self.wanted, self.error, self.dropped, self.clamped, self.cut)
+        numbers = (self.fan.low, self.fan.high, self.share, self.spread, self.error)
         return {
-            "whole_numbers": np.array((self.kinds, self.paths, self.passes, self.guide.width)),
-            "numbers": np.array(numbers),
+            "whole_numbers": np.array((self.kinds, self.size, self.guide.width, self.waves, self.passes, self.paths)),
+            "numbers": np.array((*numbers, self.dropped, self.clamped, self.cut)),
             "fan": self.fan.cumulative,
             "samples": self.samples,
             "guide_row": self.guide.row,
             "guide": self.guide.cumulative,
             "knowledge": self.knowledge,
             "total": self.total,
-            "squares": self.squares,
             "helped": self.helped,
         }
 
     @classmethod
     def of_arrays(cls, arrays: Arrays) -> Gathered:
         """What `arrays` gave. KeyError, ValueError: something else."""
-        kinds, paths, passes, width = (int(number) for number in arrays["whole_numbers"])
-        low, high, wanted, error, dropped, clamped, cut = (float(number) for number in arrays["numbers"])
+        kinds, size, width, waves, passes, paths = (int(number) for number in arrays["whole_numbers"])
+        low, high, share, spread, error, dropped, clamped, cut = (float(number) for number in arrays["numbers"])
         return cls(
             kinds,
             Fan(low, high, arrays["fan"]),
-            paths,
-            wanted,
+            size,
+            share,
             arrays["samples"],
             Guide(width, arrays["guide_row"], arrays["guide"]),
             arrays["knowledge"],
             arrays["total"],
-            arrays["squares"],
             arrays["helped"],
+            waves,
             passes,
+            paths,
+            spread,
             error,
             dropped,
             clamped,
@@ -138,30 +171,38 @@ def gather(
     images: tuple[Float, ...],
     helped: tuple[Float32, ...],
     total: Float,
-    squares: Float,
     total_helped: Float32,
+    counts: float,
     most: float,
     start: int,
     stop: int,
-) -> tuple[float, float, float, float]:
+) -> tuple[float, float, float, float, float, float]:
     """Fold passes into the running sums over pixels [start, stop), and clear them; none counts for more than `most`.
 
-    Returns the sums of total^2 and of squares, the pixels that were cut, and the radiance that this took.
+    Returns the sums of the passes, of what was helped of them, and of total^2, the variance of the passes' sum, summed
+    over the pixels, how many pixels were cut, and the radiance that this took.
     """
-    first = second = cut = clamped = 0.0
+    light = by_camera = squares = spread = clamped = cut = 0.0
+    passes = len(images)
     for j in range(start, stop):
-        for k in range(len(images)):
+        first = second = 0.0
+        for k in range(passes):
             value = images[k][j]
             if value != 0.0:
                 if value > most:
                     clamped += 1.0
                     cut += value - most
                     value = most
-                total[j] += value
-                squares[j] += value * value
-                total_helped[j] += helped[k][j]
+                first += value
+                second += value * value
                 images[k][j] = 0.0
+            if helped[k][j] != 0.0:
+                by_camera += helped[k][j]
+                total_helped[j] += counts * helped[k][j]
                 helped[k][j] = 0.0
-        first += total[j] * total[j]
-        second += squares[j]
-    return first, second, clamped, cut
+        if first > 0.0:
+            light += first
+            total[j] += counts * first
+            spread += max(passes * second - first * first, 0.0) / (passes - 1)
+        squares += total[j] * total[j]
+    return light, by_camera, squares, spread, clamped, cut

@@ -26,12 +26,17 @@ TILE, BINS = 8, 128
 """Pixels a side of the guide's tiles; parts of the lit curve."""
 COARSE = 4
 """Pixels a side of the cells in which camera paths are spread."""
-WINDOWS = ((3, 0.3), (9, 0.1))
-"""In cells, and the share of the camera paths that is spread over them; the others go by the pixel's own light."""
-LEAST, MOST_SAMPLES = 1e-6, 64.0
+WINDOWS = ((3, 0.7), (9, 0.2), (27, 0.1))
+"""In cells, of the neighbourhood that tells what to expect of a pixel, and their weights."""
+DOUBT = 1.0
+"""Camera paths of its own that a pixel needs to be believed as much as its neighbourhood."""
+WITHIN = 0.15
+"""What a camera path is worth in a pixel that has one in every pass, to that in a pixel where it is left to chance."""
+LEAST, MOST_SAMPLES = 1e-9, 64.0
+"""Least share of all light in a cell worth looking at; most camera paths of a pixel and pass."""
 LOOK = 4
 """Pixels between the rays that look for glass."""
-FEWEST_TO_LEARN, FLAT = 4.0, 0.2
+FEWEST_TO_LEARN, FLAT = 1.0, 0.2
 """Camera paths a pass in a tile that learns; the part of a guide that stays flat."""
 
 
@@ -46,22 +51,26 @@ class Guide(NamedTuple):
     """(n, BINS + 1) distribution over equal parts of the list of light vertices, from 0 to 1."""
 
 
-def share_samples(image: NDArray[np.float32], width: int, count: float, samples: Float | None = None) -> Float:
+def share_samples(
+    image: NDArray[np.float32], width: int, count: float, samples: Float | None = None, drawn: float = 0.0
+) -> Float:
     """(pixels,) radiance so far -> camera paths to be expected for each pixel, about `count` in all; into `samples`.
 
-    In proportion to the radiance, and to its mean over windows: of a glossy part's pixels light paths find few.
+    In proportion to a pixel's radiance as its own paths so far know it, `drawn` times `samples`, and before there are
+    any as its neighbourhood does. What is beyond one path only lessens the spread within the pixel, and is worth less.
     """
-    samples = np.empty(len(image)) if samples is None else samples
+    if samples is None:
+        samples = np.zeros(len(image))
     cells = np.zeros((-(-(len(image) // width) // COARSE), -(-width // COARSE)), np.float32)
     total = sum_cells(image, width, cells)
-    if total <= 0.0:
+    if total <= 0.0 or count <= 0.0:
         samples[:] = 0.0
         return samples
-    spread = np.zeros_like(cells)
+    about = np.zeros_like(cells)
     for window, share in WINDOWS:
-        spread += uniform_filter(cells, window, mode="constant") * np.float32(share * count / total / COARSE**2)
-    own = (1.0 - sum(share for _, share in WINDOWS)) * count / total
-    fill_samples(image, width, own, spread, samples)
+        about += uniform_filter(cells, window, mode="constant") * np.float32(share / COARSE**2)
+    expect(image, width, about, drawn, LEAST * total, samples)
+    scale(samples, count)
     return samples
 
 
@@ -79,16 +88,34 @@ def sum_cells(image: NDArray[np.float32], width: int, cells: NDArray[np.float32]
 
 
 @numba.njit(nogil=True, cache=True)
-def fill_samples(
-    image: NDArray[np.float32], width: int, own: float, spread: NDArray[np.float32], samples: Float
+def expect(
+    image: NDArray[np.float32], width: int, about: NDArray[np.float32], drawn: float, least: float, samples: Float
 ) -> None:
-    """What each pixel's own light and that of its cell's neighbourhood are worth -> samples (pixels,)."""
+    """Radiance that is expected of each pixel, by its own and its cell's neighbourhood -> samples (pixels,)."""
     for row in range(image.shape[0] // width):
         for column in range(width):
             pixel = row * width + column
-            about = spread[row // COARSE, column // COARSE]
-            value = own * image[pixel] + (about if about >= LEAST else 0.0)
-            samples[pixel] = min(value, MOST_SAMPLES)
+            near = about[row // COARSE, column // COARSE]
+            if near <= least:
+                samples[pixel] = 0.0
+                continue
+            known = samples[pixel] * drawn
+            samples[pixel] = (known * image[pixel] + DOUBT * near) / (known + DOUBT)
+
+
+@numba.njit(nogil=True, cache=True)
+def scale(samples: Float, count: float) -> None:
+    """Scale (pixels,) to `count` in all, whereby what exceeds 1 grows more slowly."""
+    factor = count / samples.sum()
+    for _ in range(3):
+        total = 0.0
+        for pixel in range(samples.shape[0]):
+            value = factor * samples[pixel]
+            total += value if value < 1.0 else 1.0 + WITHIN * (value - 1.0)
+        factor *= count / total
+    for pixel in range(samples.shape[0]):
+        value = factor * samples[pixel]
+        samples[pixel] = min(value if value < 1.0 else 1.0 + WITHIN * (value - 1.0), MOST_SAMPLES)
 
 
 def any_clear(surface: Surface) -> bool:

@@ -330,7 +330,10 @@ def pixel_rays(
         pixel = pixels[n]
         column, row = pixel % view.width, pixel // view.width
         u0, v0 = uniform(seed, pixel, 0, 90), uniform(seed, pixel, 0, 91)
-        for sample in range(first[n + 1] - first[n]):
+        count = first[n + 1] - first[n]
+        # where every pass has one, their number need not be known beforehand
+        power = 1.0 / count if samples[pixel] >= 1.0 else 1.0 / samples[pixel]
+        for sample in range(count):
             u = column - 0.5 + (u0 + sample * 0.7548776662466927) % 1.0
             v = row - 0.5 + (v0 + sample * 0.5698402909980532) % 1.0
             x, y, ok = chief_ray(view, tilt, distorted, u, v)
@@ -339,7 +342,7 @@ def pixel_rays(
             d0, d1, d2 = lens_direction(view, x, y, a, b)
             length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2) if ok else math.inf
             direction[r, 0], direction[r, 1], direction[r, 2] = d0 / length, d1 / length, d2 / length
-            state[r, POWER], state[r, DVCM], state[r, DVC] = 1.0 / samples[pixel], 0.0, 0.0
+            state[r, POWER], state[r, DVCM], state[r, DVC] = power, 0.0, 0.0
             state[r, LONE], state[r, CLEAR] = 1.0, 0.0
             state[r, NUMBER], state[r, PIXEL] = first[n] + sample, pixel
             r += 1

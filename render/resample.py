@@ -43,7 +43,7 @@ def join_light(
     ray serves all. What they would have brought is learnt (rows of the guide, BINS) for the passes to come.
     """
     rgb, row, f = np.empty(3), np.empty(rows.shape[1]), np.empty(1)
-    light_rgb, light_row, light_f = np.empty(3), np.empty(rows.shape[1]), np.empty(1)
+    light_rgb, light_row = np.empty(3), np.empty(rows.shape[1])
     promise, chosen = np.empty(MOST_CANDIDATES), np.empty(MOST_CANDIDATES, np.int64)
     light_vertex, light_state = lit.vertex, lit.state
     count = light_vertex.shape[0]
@@ -82,30 +82,11 @@ def join_light(
                 first, last = bin_ * count // BINS, (bin_ + 1) * count // BINS
             j = min(first + int(share * (last - first)), last - 1)
             tries = candidates * chance / (last - first)
-            w = light_vertex[j]
-            chosen[k], promise[k] = j, 0.0
-            e0, e1, e2 = w[0] - v[0], w[1] - v[1], w[2] - v[2]
-            square = e0 * e0 + e1 * e1 + e2 * e2
-            far = math.sqrt(square)
-            e0, e1, e2 = e0 / far, e1 / far, e2 / far
-            out, in_ = v[3] * e0 + v[4] * e1 + v[5] * e2, -(w[3] * e0 + w[4] * e1 + w[5] * e2)
-            i0, i1, i2 = local(v, e0, e1, e2)
-            g0, g1, g2 = local(w, -e0, -e1, -e2)
-            if out * i2 <= 0.0 or in_ * g2 <= 0.0:
-                continue
-            # no straight way through a medium
-            if (row[0] == SUBSURFACE and i2 < 0.0) or (g2 < 0.0 and rows[int(w[MATERIAL]), 0] == SUBSURFACE):
-                continue
-            evaluate(row, rgb, i0, i1, i2, o0, o1, o2, f)
-            if f[0] <= 0.0:
-                continue
-            material_of(w, rows, light_row, light_rgb)
-            evaluate(light_row, light_rgb, w[BACK], w[BACK + 1], w[BACK + 2], g0, g1, g2, light_f)
-            # what the other ways leave of it near a corner, roughly
-            left_over = (light_state[j, DVCM] * abs(in_) + state[r, DVCM] * abs(out)) / math.pi
-            promise[k] = light_state[j, POWER] * f[0] * light_f[0] * abs(i2 * in_) / (square + left_over) / tries
+            chosen[k] = j
+            promise[k] = weigh(v, state[r], row, rgb, light_vertex[j], light_state[j], rows, light_row, light_rgb, f)
+            promise[k] /= tries
             total += promise[k]
-            if known >= 0:
+            if known >= 0 and promise[k] > 0.0:
                 learnt[known, bin_] += promise[k] * promise[k] * tries
         if total <= 0.0:
             continue
@@ -151,3 +132,40 @@ def join_light(
         joints.far[n] = far
         n += 1
     return n
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def weigh(
+    v: Float,
+    v_state: Float,
+    row: Float,
+    rgb: Float,
+    w: Float,
+    w_state: Float,
+    rows: Float,
+    light_row: Float,
+    light_rgb: Float,
+    f: Float,
+) -> float:
+    """What a joint of camera vertex v, of a known material, with light vertex w would bring, were nothing between."""
+    e0, e1, e2 = w[0] - v[0], w[1] - v[1], w[2] - v[2]
+    square = e0 * e0 + e1 * e1 + e2 * e2
+    far = math.sqrt(square)
+    e0, e1, e2 = e0 / far, e1 / far, e2 / far
+    out, in_ = v[3] * e0 + v[4] * e1 + v[5] * e2, -(w[3] * e0 + w[4] * e1 + w[5] * e2)
+    i0, i1, i2 = local(v, e0, e1, e2)
+    g0, g1, g2 = local(w, -e0, -e1, -e2)
+    if out * i2 <= 0.0 or in_ * g2 <= 0.0:
+        return 0.0
+    # no straight way through a medium
+    if (row[0] == SUBSURFACE and i2 < 0.0) or (g2 < 0.0 and rows[int(w[MATERIAL]), 0] == SUBSURFACE):
+        return 0.0
+    evaluate(row, rgb, i0, i1, i2, v[BACK], v[BACK + 1], v[BACK + 2], f)
+    value = f[0]
+    if value <= 0.0:
+        return 0.0
+    material_of(w, rows, light_row, light_rgb)
+    evaluate(light_row, light_rgb, w[BACK], w[BACK + 1], w[BACK + 2], g0, g1, g2, f)
+    # what the other ways leave of it near a corner, roughly
+    left_over = (w_state[DVCM] * abs(in_) + v_state[DVCM] * abs(out)) / math.pi
+    return w_state[POWER] * value * f[0] * abs(i2 * in_) / (square + left_over)
