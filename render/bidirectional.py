@@ -12,16 +12,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from render.camera import Camera
 from render.emission import PARTS, Fan, aimed_fan, even_fan, fan_span
 from render.errors import Cancelled
-from render.gathered import MOST_PASS, Gathered
-from render.guide import BINS, Guide, clear_pixels, first_guide, learn, no_guide, share_samples
-from render.joints import Take
+from render.gathered import MOST_PASS, Gathered, gather_takes
+from render.guide import BINS, Guide, clear_pixels, first_guide, learn, no_guide, pixels_looked_at, share_samples
+from render.joints import BLOCK, Take
 from render.laser import LineLaser
 from render.light_pass import KINDS, LightPass
 from render.threads import Cancel, Progress, map_chunks, thread_count
@@ -119,9 +118,11 @@ def indirect_images(
     takes = [empty_take(camera.width * camera.height) for _ in range(WAVE)]
 
     def wave(first: int, paths: int, fan: Fan, samples: Float, guide: Guide, hints: Float | None = None) -> None:
+        looked_at = pixels_looked_at(samples)
+
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
-                task.run(first + number, paths, fan, samples, guide, takes[number], cancelled, hints)
+                task.run(first + number, paths, fan, samples, looked_at, guide, takes[number], cancelled, hints)
 
         map_chunks(work, WAVE, 1, min(WAVE, thread_count(threads)), cancelled)
 
@@ -201,25 +202,14 @@ def looked(takes: list[Take], clear: Float | None) -> tuple[float, Float32]:
     Wherever the camera looks at clear glass, there is a little of it: what is there no light path can tell.
     """
     helped = np.zeros_like(takes[0].helped)
-    radiance = take_out(tuple(take.image for take in takes), tuple(take.helped for take in takes), helped)
+    light, by_camera, *_ = gather_takes(takes, np.zeros(len(helped)), helped)
     for take in takes:
         take.dropped[:] = 0.0
     if clear is not None:
-        helped += clear * (UNSEEN * max(float(helped.sum()), 1e-30) / max(float(clear.sum()), 1.0))
-    return min(float(helped.sum()) / max(radiance, 1e-300), 1.0), helped
-
-
-@numba.njit(nogil=True, cache=True)
-def take_out(images: tuple[Float, ...], helped: tuple[Float32, ...], total_helped: Float32) -> float:
-    """Clear images and what was helped of them, adding the latter up (pixels,); returns the radiance of all."""
-    radiance = 0.0
-    for k in range(len(images)):
-        for pixel in range(total_helped.shape[0]):
-            if images[k][pixel] != 0.0 or helped[k][pixel] != 0.0:
-                radiance += images[k][pixel]
-                total_helped[pixel] += helped[k][pixel]
-                images[k][pixel] = helped[k][pixel] = 0.0
-    return radiance
+        unseen = UNSEEN * max(by_camera, 1e-30)
+        helped += clear * (unseen / max(float(clear.sum()), 1.0))
+        by_camera += unseen
+    return min(by_camera / max(light, 1e-300), 1.0), helped
 
 
 def learn_with(takes: list[Take], so_far: Gathered) -> Float:
@@ -247,10 +237,11 @@ def indirect_shares(
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, ALL_KINDS)
     clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else None
     samples = first_samples(clear, camera, PILOT_PATHS)
+    looked_at = pixels_looked_at(samples)
     fan, guide, sums = even_fan(low, high), no_guide(camera), []
     for number in range(passes):
         take = empty_take(camera.width * camera.height)
-        task.run(number, PILOT_PATHS, fan, samples, guide, take, cancelled)
+        task.run(number, PILOT_PATHS, fan, samples, looked_at, guide, take, cancelled)
         plain, bent, sunk, both, unjoined = take.sums
         sums.append((plain, bent, unjoined, sunk + both))
     mean, error = np.mean(sums, axis=0), np.std(sums, axis=0, ddof=1) / math.sqrt(passes)
@@ -260,7 +251,8 @@ def indirect_shares(
 def empty_take(pixels: int) -> Take:
     """Nothing yet, and no guide to learn for."""
     zeros = np.zeros(KINDS), np.zeros(PARTS), np.zeros((0, BINS))
-    return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1))
+    touched = np.zeros(-(-pixels // BLOCK), np.bool_)
+    return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)
 
 
 def first_samples(clear: Float | None, camera: Camera, count: int) -> Float:

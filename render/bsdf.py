@@ -49,14 +49,20 @@ def is_boundary(row: Array) -> bool:
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def is_smooth(row: Array) -> bool:
     """The material scatters into single directions only."""
-    return (row[0] == CONDUCTOR or row[0] == DIELECTRIC) and max(row[1], row[2]) < SMOOTH
+    return mirrors(row[0], row[1], row[2])
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def specular_share(row: Array, rgb: Array, cosine: float) -> float:
+def mirrors(kind: float, ax: float, ay: float) -> bool:
+    """A boundary or metal of this roughness scatters into single directions only."""
+    return kind in (CONDUCTOR, DIELECTRIC) and max(ax, ay) < SMOOTH
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def specular_share(eta: float, reflectance: float, cosine: float) -> float:
     """Probability with which a coat's reflection is sampled rather than its base."""
-    reflected, _ = dielectric(cosine, row[3])
-    base = (1.0 - reflected) * (rgb[0] + rgb[1] + rgb[2]) / 3.0
+    reflected, _ = dielectric(cosine, eta)
+    base = (1.0 - reflected) * reflectance
     return reflected / (reflected + base) if reflected + base > 0.0 else 1.0
 
 
@@ -64,53 +70,64 @@ def specular_share(row: Array, rgb: Array, cosine: float) -> float:
 def evaluate(
     row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, f: Array
 ) -> None:
-    """f(o, i) in 1/sr, without the cosine -> f (3,) for each band, or (1,) for the first; 0 for the delta parts."""
-    f[:] = 0.0
-    if oz == 0.0 or iz == 0.0 or is_smooth(row):
-        return
-    if is_boundary(row):
-        value = rough_dielectric(row, ox, oy, oz, ix, iy, iz)
-        for band in range(f.shape[0]):
-            f[band] = value * rgb[band]
-        return
+    """f(o, i) in 1/sr, without the cosine -> f (3,) for each band; 0 for the delta parts."""
+    facets, cosine, base = lobes(row[0], row[1], row[2], row[3], ox, oy, oz, ix, iy, iz)
+    for band in range(f.shape[0]):
+        f[band] = in_band(row[0], facets, cosine, base, rgb[band], row[4 + band], row[7 + band], row[10])
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def lobes(
+    kind: float, ax: float, ay: float, eta: float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
+) -> tuple[float, float, float]:
+    """What of f(o, i) is alike in all bands: facets, 1/sr, their cosine with o, and the diffuse base, 1/sr."""
+    if oz == 0.0 or iz == 0.0 or mirrors(kind, ax, ay):
+        return 0.0, 0.0, 0.0
+    if kind in (DIELECTRIC, SUBSURFACE):
+        return rough_dielectric(eta, ax, ay, ox, oy, oz, ix, iy, iz), 0.0, 0.0
     if oz * iz < 0.0:
-        return
-    if oz < 0.0:
-        oz, iz = -oz, -iz
-    if is_diffuse(row):
-        for band in range(f.shape[0]):
-            f[band] = rgb[band] / math.pi
-        return
-    ax, ay = row[1], row[2]
+        return 0.0, 0.0, 0.0
+    oz, iz = abs(oz), abs(iz)
+    if kind in (LAMBERTIAN, EMITTER):
+        return 0.0, 0.0, 1.0 / math.pi
     hx, hy, hz = ox + ix, oy + iy, oz + iz
     length = math.sqrt(hx * hx + hy * hy + hz * hz)
     hx, hy, hz = hx / length, hy / length, hz / length
     cosine = ox * hx + oy * hy + oz * hz
     shadowed = 1.0 + smith_lambda(ox, oy, oz, ax, ay) + smith_lambda(ix, iy, iz, ax, ay)
     facets = density(hx, hy, hz, ax, ay) / (4.0 * oz * iz * shadowed)
-    if row[0] == CONDUCTOR:
-        for band in range(f.shape[0]):
-            f[band] = rgb[band] * facets * conductor(cosine, row[4 + band], row[7 + band])
-        return
-    # coat: its own reflection, and the base seen through it twice, with the light that the coat sends back to the base
-    coat, _ = dielectric(cosine, row[3])
-    enters, _ = dielectric(iz, row[3])
-    leaves, _ = dielectric(oz, row[3])
-    through = (1.0 - enters) * (1.0 - leaves) / (row[3] * row[3])
-    for band in range(f.shape[0]):
-        base = rgb[band] * through / (math.pi * (1.0 - rgb[band] * row[10]))
-        f[band] = coat * facets + base
+    if kind == CONDUCTOR:
+        return facets, cosine, 0.0
+    # coat: its own reflection, and the base seen through it twice
+    coat, _ = dielectric(cosine, eta)
+    enters, _ = dielectric(iz, eta)
+    leaves, _ = dielectric(oz, eta)
+    return coat * facets, cosine, (1.0 - enters) * (1.0 - leaves) / (eta * eta * math.pi)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def rough_dielectric(row: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
+def in_band(
+    kind: float, facets: float, cosine: float, base: float, reflectance: float, n: float, k: float, internal: float
+) -> float:
+    """f(o, i) of `lobes` in one band, 1/sr."""
+    if kind == CONDUCTOR:
+        return reflectance * facets * conductor(cosine, n, k) if facets > 0.0 else 0.0
+    if kind == COATED:
+        # a coat sends part of the light back to its base
+        return facets + reflectance * base / (1.0 - reflectance * internal)
+    return reflectance * (facets + base)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def rough_dielectric(
+    index: float, ax: float, ay: float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
+) -> float:
     """f(o, i) of a rough glass boundary, o the direction light is followed from (Walter et al. 2007, eqs. 20, 21).
 
     Refraction carries no (eta_o / eta_i)^2: what is transported is power, as both kinds of path here need it.
     """
-    ax, ay = row[1], row[2]
     # index beyond the boundary, as seen from o's side, over that before it
-    eta = row[3] if oz > 0.0 else 1.0 / row[3]
+    eta = index if oz > 0.0 else 1.0 / index
     if oz < 0.0:
         oz, iz = -oz, -iz
     if iz > 0.0:
@@ -139,11 +156,28 @@ def rough_dielectric(row: Array, ox: float, oy: float, oz: float, ix: float, iy:
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def pdf(row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
     """Density of `sample` for i given o, 1/sr; 0 for the delta parts."""
-    if oz == 0.0 or iz == 0.0 or is_smooth(row):
+    return sampled(row[0], row[1], row[2], row[3], (rgb[0] + rgb[1] + rgb[2]) / 3.0, ox, oy, oz, ix, iy, iz)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def sampled(
+    kind: float,
+    ax: float,
+    ay: float,
+    index: float,
+    reflectance: float,
+    ox: float,
+    oy: float,
+    oz: float,
+    ix: float,
+    iy: float,
+    iz: float,
+) -> float:
+    """Density of `sample`, reflectance the mean over its bands."""
+    if oz == 0.0 or iz == 0.0 or mirrors(kind, ax, ay):
         return 0.0
-    ax, ay = row[1], row[2]
-    if is_boundary(row):
-        eta = row[3] if oz > 0.0 else 1.0 / row[3]
+    if kind in (DIELECTRIC, SUBSURFACE):
+        eta = index if oz > 0.0 else 1.0 / index
         if oz < 0.0:
             oz, iz = -oz, -iz
         if iz > 0.0:
@@ -166,18 +200,17 @@ def pdf(row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: 
         return (1.0 - reflected) * visible * eta * eta * abs(ih) / (oh + eta * ih) ** 2
     if oz * iz < 0.0:
         return 0.0
-    if oz < 0.0:
-        oz, iz = -oz, -iz
-    if is_diffuse(row):
+    oz, iz = abs(oz), abs(iz)
+    if kind in (LAMBERTIAN, EMITTER):
         return iz / math.pi
     hx, hy, hz = ox + ix, oy + iy, oz + iz
     length = math.sqrt(hx * hx + hy * hy + hz * hz)
     hx, hy, hz = hx / length, hy / length, hz / length
     cosine = ox * hx + oy * hy + oz * hz
     facets = visible_density(ox, oy, oz, hx, hy, hz, ax, ay) / (4.0 * cosine) if cosine > 0.0 else 0.0
-    if row[0] == CONDUCTOR:
+    if kind == CONDUCTOR:
         return facets
-    share = specular_share(row, rgb, oz)
+    share = specular_share(index, reflectance, oz)
     return share * facets + (1.0 - share) * iz / math.pi
 
 
@@ -250,7 +283,7 @@ def sample(
         for band in range(weight.shape[0]):
             weight[band] = rgb[band] * ratio * conductor(oh, row[4 + band], row[7 + band])
         return -1.0 if smooth else pdf(row, rgb, ox, oy, z, x, y, w)
-    if row[0] == COATED and choice < specular_share(row, rgb, z):
+    if row[0] == COATED and choice < specular_share(row[3], (rgb[0] + rgb[1] + rgb[2]) / 3.0, z):
         hx, hy, hz = sample_normal(ox, oy, z, ax, ay, r1, r2)
         oh = ox * hx + oy * hy + z * hz
         x, y, w = 2.0 * oh * hx - ox, 2.0 * oh * hy - oy, 2.0 * oh * hz - z

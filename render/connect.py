@@ -22,14 +22,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.beam import irradiance
-from render.bsdf import evaluate, pdf
 from render.distortion import tilt_matrix
 from render.emission import Fan, emitted_density
-from render.joints import JOINS, Joints, adjoint, cast
+from render.joints import BLOCK, JOINS, Joints, Take, adjoint, cast
 from render.lens import lens_point, lens_position, lens_project
 from render.random import uniform
 from render.surface import View
-from render.vertex import BACK, DVC, DVCM, KIND, NUMBER, PART, PIXEL, POWER, REFLECTANCE, local, material_of
+from render.vertex import (
+    BACK,
+    DVC,
+    DVCM,
+    KIND,
+    NUMBER,
+    PART,
+    PIXEL,
+    POWER,
+    REFLECTANCE,
+    chance,
+    local,
+    mirror_at,
+    scattered,
+)
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -54,12 +67,11 @@ def join_camera(
     """Join light vertices (n, .) to the camera -> joints, to be divided by the light paths. Returns their number."""
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
-    rgb, row, f = np.empty(3), np.empty(rows.shape[1]), np.empty(1)
     a = b = 0.0
     n = 0
     for r in range(vertex.shape[0]):
         v = vertex[r]
-        if material_of(v, rows, row, rgb):
+        if mirror_at(v, rows):
             continue
         if view.lens[0] > 0.0:
             number = int(state[r, NUMBER])
@@ -77,28 +89,26 @@ def join_camera(
         if out * i2 <= 0.0:
             continue
         o0, o1, o2 = v[BACK], v[BACK + 1], v[BACK + 2]
-        evaluate(row, rgb, o0, o1, o2, i0, i1, i2, f)
-        if f[0] <= 0.0:
+        f = scattered(v, rows, o0, o1, o2, i0, i1, i2)
+        if f <= 0.0:
             continue
         density = area * abs(out)
         weight = 1.0
         joints.helped[n] = state[r, DVCM] > 0.0 or state[r, DVC] > 0.0
         if samples[pixel] > 0.0 and joints.helped[n]:
-            reverse = pdf(row, rgb, i0, i1, i2, o0, o1, o2)
+            reverse = chance(v, rows, i0, i1, i2, o0, o1, o2)
             others = density * (state[r, DVCM] + reverse * state[r, DVC])
             weight = 1.0 / (1.0 + JOINS * samples[pixel] / light_paths * others)
         joints.pixel[n], joints.kind[n], joints.part[n] = pixel, int(state[r, KIND]), int(state[r, PART])
-        joints.worth[n] = state[r, POWER] * f[0] * density * weight * adjoint(v)
+        joints.worth[n] = state[r, POWER] * f * density * weight * adjoint(v)
         cast(joints, n, v, e0, e1, e2, out, far, centre, offset)
         n += 1
     return n
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def hint_at(
-    vertex: Float, state: Float, view: View, height: int, clear: Float, light_paths: int, helped: NDArray[np.float32]
-) -> None:
-    """Add to `helped` (pixels,) what light vertices would look like behind clear glass, were it not to bend light.
+def hint_at(vertex: Float, state: Float, view: View, height: int, clear: Float, light_paths: int, take: Take) -> None:
+    """Add to `take.helped` what light vertices would look like behind clear glass, were it not to bend light.
 
     clear (pixels,): not 0 where the camera looks at glass or a mirror. Only says where camera paths are worth while.
     """
@@ -111,7 +121,8 @@ def hint_at(
             continue
         pixel = int(math.floor(y + 0.5)) * view.width + int(math.floor(x + 0.5))
         if clear[pixel] > 0.0:
-            helped[pixel] += state[r, POWER] * v[REFLECTANCE] * area / (math.pi * light_paths)
+            take.touched[pixel // BLOCK] = True
+            take.helped[pixel] += state[r, POWER] * v[REFLECTANCE] * area / (math.pi * light_paths)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -178,14 +189,13 @@ def join_laser(
     l0 = -(m[0, 0] * m[0, 3] + m[1, 0] * m[1, 3] + m[2, 0] * m[2, 3])
     l1 = -(m[0, 1] * m[0, 3] + m[1, 1] * m[1, 3] + m[2, 1] * m[2, 3])
     l2 = -(m[0, 2] * m[0, 3] + m[1, 2] * m[1, 3] + m[2, 2] * m[2, 3])
-    rgb, row, f = np.empty(3), np.empty(rows.shape[1]), np.empty(1)
     n = 0
     for r in range(vertex.shape[0]):
         v = vertex[r]
         light, density = laser_light(v, m, beam, fan)
         if light <= 0.0:
             continue
-        if material_of(v, rows, row, rgb):
+        if mirror_at(v, rows):
             continue
         e0, e1, e2 = l0 - v[0], l1 - v[1], l2 - v[2]
         far = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
@@ -195,23 +205,28 @@ def join_laser(
         if out * i2 <= 0.0:
             continue
         o0, o1, o2 = v[BACK], v[BACK + 1], v[BACK + 2]
-        evaluate(row, rgb, i0, i1, i2, o0, o1, o2, f)
-        if f[0] <= 0.0:
+        f = scattered(v, rows, i0, i1, i2, o0, o1, o2)
+        if f <= 0.0:
             continue
-        others = density * (state[r, DVCM] + pdf(row, rgb, i0, i1, i2, o0, o1, o2) * state[r, DVC])
+        others = density * (state[r, DVCM] + chance(v, rows, i0, i1, i2, o0, o1, o2) * state[r, DVC])
         joints.pixel[n], joints.kind[n], joints.part[n] = int(state[r, PIXEL]), int(state[r, KIND]), -1
         joints.helped[n] = True
-        joints.worth[n] = state[r, POWER] * f[0] * light * abs(i2 / out) / (1.0 + JOINS * others)
+        joints.worth[n] = state[r, POWER] * f * light * abs(i2 / out) / (1.0 + JOINS * others)
         cast(joints, n, v, e0, e1, e2, out, far, centre, offset)
         n += 1
     return n
 
 
-@numba.njit(nogil=True, cache=True)
-def joinable(vertex: Float, rows: Float) -> NDArray[np.bool_]:
-    """(n,) whether vertices scatter into more than single directions."""
-    rgb, row = np.empty(3), np.empty(rows.shape[1])
-    out = np.empty(vertex.shape[0], np.bool_)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def joinable(vertex: Float, state: Float, rows: Float) -> tuple[Float, Float]:
+    """Copies of the vertices (n, .) and states of which joints can be made: all but mirrors and clear glass."""
+    kept, kept_state = np.empty(vertex.shape), np.empty(state.shape)
+    n = 0
     for r in range(vertex.shape[0]):
-        out[r] = not material_of(vertex[r], rows, row, rgb)
-    return out
+        if not mirror_at(vertex[r], rows):
+            for c in range(vertex.shape[1]):
+                kept[n, c] = vertex[r, c]
+            for c in range(state.shape[1]):
+                kept_state[n, c] = state[r, c]
+            n += 1
+    return kept[:n], kept_state[:n]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from render.emission import Fan
 from render.guide import Guide, learn, share_samples
-from render.joints import Take
+from render.joints import BLOCK, Take
 from render.threads import map_chunks
 
 Float = NDArray[np.float64]
@@ -49,6 +49,8 @@ class Gathered:
     """(pixels,) sum of the passes' radiance, each as often as it counts."""
     helped: Float32
     """(pixels,) of the sum, what camera paths could help with."""
+    squares: float = 0.0
+    """Sum of `total` squared."""
     waves: int = 0
     passes: int = 0
     """How many were added, each as often as it counts."""
@@ -91,15 +93,10 @@ class Gathered:
         """Fold in a wave of passes (cleared), with what it learnt; clamp: most radiance of one pass in one pixel."""
         self.whole = False
         most, counts, passes = math.inf if clamp is None else clamp, self.counts, len(takes)
-        images, helped = tuple(take.image for take in takes), tuple(take.helped for take in takes)
-        sums = np.zeros((-(-len(self.total) // PIXELS_A_CHUNK), 6))
-
-        def work(start: int, stop: int) -> None:
-            found = gather(images, helped, self.total, self.helped, float(counts), most, start, stop)
-            sums[start // PIXELS_A_CHUNK] = found
-
-        map_chunks(work, len(self.total), PIXELS_A_CHUNK, threads)
-        light, by_camera, squares, spread, clamped, cut = (float(found) for found in sums.sum(axis=0))
+        light, by_camera, squares, spread, clamped, cut = gather_takes(
+            takes, self.total, self.helped, float(counts), most, threads
+        )
+        self.squares += squares
         self.clamped += clamped
         self.cut += counts * cut
         for take in takes:
@@ -112,7 +109,7 @@ class Gathered:
         if light > 0.0:
             # the last wave knows it best
             self.share = min(by_camera / light, 1.0)
-        self.error = math.sqrt(self.spread / max(squares - self.spread, 1e-300)) if squares > 0.0 else 0.0
+        self.error = math.sqrt(self.spread / max(self.squares - self.spread, 1e-300)) if self.squares > 0.0 else 0.0
         self.guide = learn(self.guide, learnt, self.knowledge)
         self.share_out(self.passes / counts)
         self.whole = True
@@ -127,7 +124,7 @@ class Gathered:
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
-        numbers = (self.fan.low, self.fan.high, self.share, self.spread, self.error)
+        numbers = (self.fan.low, self.fan.high, self.share, self.squares, self.spread, self.error)
         return {
             "whole_numbers": np.array((self.kinds, self.size, self.guide.width, self.waves, self.passes, self.paths)),
             "numbers": np.array((*numbers, self.dropped, self.clamped, self.cut)),
@@ -144,7 +141,7 @@ class Gathered:
     def of_arrays(cls, arrays: Arrays) -> Gathered:
         """What `arrays` gave. KeyError, ValueError: something else."""
         kinds, size, width, waves, passes, paths = (int(number) for number in arrays["whole_numbers"])
-        low, high, share, spread, error, dropped, clamped, cut = (float(number) for number in arrays["numbers"])
+        low, high, share, squares, spread, error, dropped, clamped, cut = (float(n) for n in arrays["numbers"])
         return cls(
             kinds,
             Fan(low, high, arrays["fan"]),
@@ -155,6 +152,7 @@ class Gathered:
             arrays["knowledge"],
             arrays["total"],
             arrays["helped"],
+            squares,
             waves,
             passes,
             paths,
@@ -166,10 +164,31 @@ class Gathered:
         )
 
 
+def gather_takes(
+    takes: list[Take],
+    total: Float,
+    helped: Float32,
+    counts: float = 1.0,
+    most: float = math.inf,
+    threads: int | None = None,
+) -> tuple[float, ...]:
+    """Fold passes into running sums (pixels,), as `gather` does."""
+    images, parts = tuple(take.image for take in takes), tuple(take.helped for take in takes)
+    touched = tuple(take.touched for take in takes)
+    sums = np.zeros((-(-len(total) // PIXELS_A_CHUNK), 6))
+
+    def work(start: int, stop: int) -> None:
+        sums[start // PIXELS_A_CHUNK] = gather(images, parts, touched, total, helped, counts, most, start, stop)
+
+    map_chunks(work, len(total), PIXELS_A_CHUNK, threads)
+    return tuple(float(found) for found in sums.sum(axis=0))
+
+
 @numba.njit(nogil=True, cache=True)
 def gather(
     images: tuple[Float, ...],
     helped: tuple[Float32, ...],
+    touched: tuple[NDArray[np.bool_], ...],
     total: Float,
     total_helped: Float32,
     counts: float,
@@ -179,30 +198,39 @@ def gather(
 ) -> tuple[float, float, float, float, float, float]:
     """Fold passes into the running sums over pixels [start, stop), and clear them; none counts for more than `most`.
 
-    Returns the sums of the passes, of what was helped of them, and of total^2, the variance of the passes' sum, summed
-    over the pixels, how many pixels were cut, and the radiance that this took.
+    Returns the sums of the passes, of what was helped of them, by how much the sum of total^2 grew, the variance of the
+    passes' sum, summed over the pixels, how many pixels were cut, and the radiance that this took.
     """
     light = by_camera = squares = spread = clamped = cut = 0.0
     passes = len(images)
-    for j in range(start, stop):
-        first = second = 0.0
+    for block in range(start // BLOCK, (stop + BLOCK - 1) // BLOCK):
+        found = False
         for k in range(passes):
-            value = images[k][j]
-            if value != 0.0:
-                if value > most:
-                    clamped += 1.0
-                    cut += value - most
-                    value = most
-                first += value
-                second += value * value
-                images[k][j] = 0.0
-            if helped[k][j] != 0.0:
-                by_camera += helped[k][j]
-                total_helped[j] += counts * helped[k][j]
-                helped[k][j] = 0.0
-        if first > 0.0:
-            light += first
-            total[j] += counts * first
-            spread += max(passes * second - first * first, 0.0) / (passes - 1)
-        squares += total[j] * total[j]
+            found |= touched[k][block]
+            touched[k][block] = False
+        if not found:
+            continue
+        for j in range(block * BLOCK, min((block + 1) * BLOCK, stop)):
+            first = second = 0.0
+            for k in range(passes):
+                value = images[k][j]
+                if value != 0.0:
+                    if value > most:
+                        clamped += 1.0
+                        cut += value - most
+                        value = most
+                    first += value
+                    second += value * value
+                    images[k][j] = 0.0
+                if helped[k][j] != 0.0:
+                    by_camera += helped[k][j]
+                    total_helped[j] += counts * helped[k][j]
+                    helped[k][j] = 0.0
+            if first > 0.0:
+                before = total[j]
+                light += first
+                total[j] += counts * first
+                squares += total[j] * total[j] - before * before
+                if passes > 1:
+                    spread += max(passes * second - first * first, 0.0) / (passes - 1)
     return light, by_camera, squares, spread, clamped, cut

@@ -32,7 +32,7 @@ DOUBT = 1.0
 """Camera paths of its own that a pixel needs to be believed as much as its neighbourhood."""
 WITHIN = 0.15
 """What a camera path is worth in a pixel that has one in every pass, to that in a pixel where it is left to chance."""
-LEAST, MOST_SAMPLES = 1e-9, 64.0
+LEAST, MOST_SAMPLES = 1e-8, 64.0
 """Least share of all light in a cell worth looking at; most camera paths of a pixel and pass."""
 LOOK = 4
 """Pixels between the rays that look for glass."""
@@ -70,8 +70,13 @@ def share_samples(
     for window, share in WINDOWS:
         about += uniform_filter(cells, window, mode="constant") * np.float32(share / COARSE**2)
     expect(image, width, about, drawn, LEAST * total, samples)
-    scale(samples, count)
+    scale(samples, pixels_looked_at(samples), count)
     return samples
+
+
+def pixels_looked_at(samples: Float) -> Int:
+    """(n,) the pixels that may have camera paths, in order."""
+    return np.flatnonzero(samples).astype(np.int32)
 
 
 @numba.njit(nogil=True, cache=True)
@@ -104,16 +109,19 @@ def expect(
 
 
 @numba.njit(nogil=True, cache=True)
-def scale(samples: Float, count: float) -> None:
-    """Scale (pixels,) to `count` in all, whereby what exceeds 1 grows more slowly."""
-    factor = count / samples.sum()
+def scale(samples: Float, looked_at: Int, count: float) -> None:
+    """Scale samples (pixels,) to `count` in all, whereby what exceeds 1 grows more slowly."""
+    total = 0.0
+    for pixel in looked_at:
+        total += samples[pixel]
+    factor = count / total
     for _ in range(3):
         total = 0.0
-        for pixel in range(samples.shape[0]):
+        for pixel in looked_at:
             value = factor * samples[pixel]
             total += value if value < 1.0 else 1.0 + WITHIN * (value - 1.0)
         factor *= count / total
-    for pixel in range(samples.shape[0]):
+    for pixel in looked_at:
         value = factor * samples[pixel]
         samples[pixel] = min(value if value < 1.0 else 1.0 + WITHIN * (value - 1.0), MOST_SAMPLES)
 
@@ -172,7 +180,19 @@ def learn(guide: Guide, learnt: Float, knowledge: Float) -> Guide:
 
 
 @numba.njit(nogil=True, cache=True)
-def draw_counts(samples: Float, seed: int, counts: Int) -> None:
-    """How many camera paths this pass has for each pixel: `samples` up to a whole number, by chance."""
-    for pixel in range(samples.shape[0]):
-        counts[pixel] = int(samples[pixel] + uniform(seed, pixel, 0, 92)) if samples[pixel] > 0.0 else 0
+def draw_paths(samples: Float, looked_at: Int, seed: int) -> tuple[Int, Int]:
+    """The pixels with camera paths in a pass, and (n + 1,) the number of each one's first path.
+
+    As many as `samples` says up to a whole number, by chance.
+    """
+    pixels, starts = np.empty(looked_at.shape[0], np.int32), np.empty(looked_at.shape[0] + 1, np.int32)
+    n = drawn = 0
+    starts[0] = 0
+    for pixel in looked_at:
+        count = int(samples[pixel] + uniform(seed, pixel, 0, 92))
+        if count > 0:
+            pixels[n] = pixel
+            drawn += count
+            n += 1
+            starts[n] = drawn
+    return pixels[:n], starts[: n + 1]

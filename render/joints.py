@@ -19,6 +19,10 @@ JOINS = 32.0
 """What one resampled joint among many candidates counts for, in joints to a single random vertex."""
 
 
+BLOCK = 64
+"""Pixels that are looked at or skipped together where passes are added up."""
+
+
 class Joints(NamedTuple):
     """(n,) pixel and worth of joints; (n, 3) origins (scene-centred), directions and (n,) length of shadow rays."""
 
@@ -49,6 +53,8 @@ class Take(NamedTuple):
     """As in `join_light`."""
     dropped: Float
     """(1,) joints whose worth was no number, infinite or negative."""
+    touched: NDArray[np.bool_]
+    """(pixels / BLOCK,) where there may be something in `image` or `helped`."""
 
 
 class Lit(NamedTuple):
@@ -126,6 +132,7 @@ def count_joints(joints: Joints, blocked: NDArray[np.bool_], count: int, scale: 
                 take.dropped[0] += 1.0
                 continue
             take.image[joints.pixel[j]] += worth
+            take.touched[joints.pixel[j] // BLOCK] = True
             take.sums[joints.kind[j]] += worth
             if joints.helped[j]:
                 take.helped[joints.pixel[j]] += worth

@@ -24,9 +24,9 @@ from render.connect import (
     path_lens_point,
 )
 from render.distortion import tilt_matrix
-from render.emission import SEQUENCE, Fan, Paths, emit
+from render.emission import Fan, Paths, emit
 from render.errors import Cancelled
-from render.guide import Guide, any_clear, draw_counts
+from render.guide import Guide, any_clear, draw_paths
 from render.joints import Joints, Lit, Take, count_joints, no_joints
 from render.laser import LineLaser
 from render.lens import chief_ray, lens_direction, lens_position
@@ -63,7 +63,7 @@ Int = NDArray[np.int32]
 
 CHUNK_PATHS = 1 << 13
 """Short enough to be cancelled within a tenth of a second."""
-CANDIDATES, LATER_CANDIDATES = 6, 2
+CANDIDATES, LATER_CANDIDATES = 8, 2
 """Light vertices weighed against each other at the first surface that the camera sees, and at those after it."""
 CAMERA_SEED = 0x5DEECE66D
 KINDS = 5
@@ -123,28 +123,30 @@ class LightPass:
         paths: int,
         fan: Fan,
         samples: Float,
+        looked_at: Int,
         guide: Guide,
         take: Take,
         cancelled: Cancel | None,
         hints: Float | None = None,
     ) -> None:
-        """Pass `number`: light paths, and camera paths, samples (pixels,) to be expected. Raises Cancelled."""
+        """Pass `number`: light paths, and camera paths, samples (pixels,) to be expected. Raises Cancelled.
+
+        looked_at: the pixels that may have a camera path, in order.
+        """
         seed = self.seed * 1_000_003 + number
+        pixels, starts = draw_paths(samples, looked_at, seed ^ CAMERA_SEED)
         found: list[tuple[int, Float, Float]] = []
         for first in range(0, paths, CHUNK_PATHS):
             _stop(cancelled)
-            found += self.light(seed, first, min(CHUNK_PATHS, paths - first), paths, fan, samples, take)
+            joined = len(pixels) > 0 or hints is not None
+            found += self.light(seed, first, min(CHUNK_PATHS, paths - first), paths, fan, samples, take, joined)
         for _, vertex, state in found if hints is not None else ():
-            hint_at(vertex, state, self.view, self.height, hints, paths, take.helped)
-        counts = np.empty(len(samples), np.int32)
-        draw_counts(samples, seed ^ CAMERA_SEED, counts)
-        pixels = np.flatnonzero(counts).astype(np.int32)
+            hint_at(vertex, state, self.view, self.height, hints, paths, take)
         if not len(pixels):
             return
         merged = self.photons(found, number, paths) if self.clear and self.kinds & UNJOINED else None
         near = _lit([part for part in found if part[0] == 0], True, paths)
         later = _lit([part for part in found if part[0] > 0], False, paths)
-        starts = np.concatenate(([0], np.cumsum(counts[pixels]))).astype(np.int32)
         chunks = np.searchsorted(starts, np.arange(0, starts[-1] + CHUNK_PATHS, CHUNK_PATHS))
         for a, b in pairwise(np.minimum(chunks, len(pixels))):
             _stop(cancelled)
@@ -163,15 +165,14 @@ class LightPass:
             )
 
     def light(
-        self, seed: int, first: int, count: int, paths: int, fan: Fan, samples: Float, take: Take
+        self, seed: int, first: int, count: int, paths: int, fan: Fan, samples: Float, take: Take, wanted: bool
     ) -> list[tuple[int, Float, Float]]:
-        """Trace light paths, join them to the camera; their joinable vertices and states, by depth."""
+        """Trace light paths, join them to the camera; if wanted their joinable vertices and states, by depth."""
         rays, rows = self.world.rays, self.surface.rows
         start = np.array([uniform(seed, 0, dimension, 99) for dimension in range(5)])
         long = np.empty((2, count), np.int64)
         emitted = Paths(np.empty((count, 3)), np.empty((count, 3)), np.empty(count), long[0], long[1])
         emit(first, paths, start, fan, self.reach, self.beam, self.T_world_laser, emitted)
-        first_numbers = (start[2:] + np.arange(paths)[:, None] * SEQUENCE[2:]) % 1.0
         origin, direction = emitted.origin, emitted.direction
         state = np.zeros((count, STATE))
         state[:, POWER], state[:, LONE], state[:, NUMBER] = emitted.power, 1.0, emitted.number
@@ -200,15 +201,15 @@ class LightPass:
                     joints,
                 )
                 self.count(joints, joined, 1.0 / paths, take)
-            keep = joinable(vertex, rows)
-            kept.append((depth, vertex[keep], state[keep]))
+            if wanted:
+                kept.append((depth, *joinable(vertex, state, rows)))
             n = scatter(
                 vertex,
                 state,
                 rows,
                 seed,
                 depth,
-                first_numbers,
+                start[2:],
                 True,
                 self.kinds,
                 rays.surface_offset,
@@ -238,7 +239,7 @@ class LightPass:
         origin, direction, state = np.empty((count, 3)), np.empty((count, 3)), np.zeros((count, STATE))
         pixel_rays(self.view, pixels, samples, starts, seed, origin, direction, state)
         joints = no_joints(count)
-        unused = np.zeros((0, 3))
+        unused = np.zeros(3)
         for depth in range(MOST_BOUNCES):
             vertex, state = self.meet(seed, depth, origin, direction, state)
             if not len(vertex):

@@ -15,9 +15,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bsdf import evaluate
-from render.joints import Take
-from render.vertex import BACK, CLEAR, LONE, NORMAL, PART, PIXEL, POWER, UNJOINED, material_of
+from render.joints import BLOCK, Take
+from render.vertex import BACK, CLEAR, LONE, NORMAL, PART, PIXEL, POWER, UNJOINED, mirror_at, scattered
 
 Float = NDArray[np.float64]
 Long = NDArray[np.int64]
@@ -53,7 +52,6 @@ def photons(vertex: Float, state: Float, radius: float, paths: int) -> Photons:
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def merge(vertex: Float, state: Float, rows: Float, light: Photons, take: Take) -> None:
     """Add what the photons about each camera vertex bring."""
-    rgb, row, f = np.empty(3), np.empty(rows.shape[1]), np.empty(1)
     radius = 0.5 * light.size
     share = 1.0 / (math.pi * radius * radius * light.paths)
     count = light.cell.shape[0]
@@ -61,7 +59,7 @@ def merge(vertex: Float, state: Float, rows: Float, light: Photons, take: Take) 
         if state[r, LONE] == 0.0 or state[r, CLEAR] == 0.0:
             continue
         v = vertex[r]
-        if material_of(v, rows, row, rgb):
+        if mirror_at(v, rows):
             continue
         # the two cells along each axis that the sphere can reach
         a = [int(math.floor((v[axis] - light.corner[axis]) / light.size - 0.5)) for axis in range(3)]
@@ -78,8 +76,8 @@ def merge(vertex: Float, state: Float, rows: Float, light: Photons, take: Take) 
                 if d0 * d0 + d1 * d1 + d2 * d2 < radius * radius:
                     alike = v[NORMAL] * w[NORMAL] + v[NORMAL + 1] * w[NORMAL + 1] + v[NORMAL + 2] * w[NORMAL + 2]
                     if alike > 0.7:
-                        evaluate(row, rgb, w[BACK], w[BACK + 1], w[BACK + 2], v[BACK], v[BACK + 1], v[BACK + 2], f)
-                        value = light.power[j] * f[0]
+                        f = scattered(v, rows, w[BACK], w[BACK + 1], w[BACK + 2], v[BACK], v[BACK + 1], v[BACK + 2])
+                        value = light.power[j] * f
                         if not 0.0 <= value < math.inf:
                             take.dropped[0] += 1.0
                             j += 1
@@ -91,6 +89,8 @@ def merge(vertex: Float, state: Float, rows: Float, light: Photons, take: Take) 
         if not 0.0 <= worth < math.inf:
             take.dropped[0] += 1.0
         elif worth > 0.0:
-            take.image[int(state[r, PIXEL])] += worth
-            take.helped[int(state[r, PIXEL])] += worth
+            pixel = int(state[r, PIXEL])
+            take.image[pixel] += worth
+            take.helped[pixel] += worth
+            take.touched[pixel // BLOCK] = True
             take.sums[UNJOINED] += worth

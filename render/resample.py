@@ -8,11 +8,25 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bsdf import SUBSURFACE, evaluate, pdf
+from render.bsdf import SUBSURFACE
 from render.guide import BINS, TILE, Guide
 from render.joints import Joints, Lit, adjoint
 from render.random import uniform
-from render.vertex import BACK, DVC, DVCM, KIND, MATERIAL, NUMBER, PART, PIXEL, POWER, local, material_of
+from render.vertex import (
+    BACK,
+    DVC,
+    DVCM,
+    KIND,
+    MATERIAL,
+    NUMBER,
+    PART,
+    PIXEL,
+    POWER,
+    chance,
+    local,
+    mirror_at,
+    scattered,
+)
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -42,8 +56,6 @@ def join_light(
     bring, and one of them is chosen in that proportion (resampled importance sampling, Talbot et al. 2005); its shadow
     ray serves all. What they would have brought is learnt (rows of the guide, BINS) for the passes to come.
     """
-    rgb, row, f = np.empty(3), np.empty(rows.shape[1]), np.empty(1)
-    light_rgb, light_row = np.empty(3), np.empty(rows.shape[1])
     promise, chosen = np.empty(MOST_CANDIDATES), np.empty(MOST_CANDIDATES, np.int64)
     light_vertex, light_state = lit.vertex, lit.state
     count = light_vertex.shape[0]
@@ -53,7 +65,7 @@ def join_light(
         return 0
     for r in range(vertex.shape[0]):
         v = vertex[r]
-        if material_of(v, rows, row, rgb):
+        if mirror_at(v, rows):
             continue
         o0, o1, o2 = v[BACK], v[BACK + 1], v[BACK + 2]
         number = int(state[r, NUMBER])
@@ -62,29 +74,23 @@ def join_light(
         if guided:
             pixel = int(state[r, PIXEL])
             known = guide.row[pixel // guide.width // TILE, pixel % guide.width // TILE]
-        total = 0.0
+        total, bin_ = 0.0, 0
         for k in range(candidates):
             share = (k + shift) / candidates
             shift += 0.6180339887498949
             shift -= math.floor(shift)
-            bin_, first, last, chance = 0, 0, count, 1.0
+            first, last, expected = 0, count, 1.0
             if known >= 0:
-                low, high = 0, BINS - 1
-                while low < high:
-                    middle = (low + high) // 2
-                    if guide.cumulative[known, middle + 1] <= share:
-                        low = middle + 1
-                    else:
-                        high = middle
-                bin_ = low
-                chance = guide.cumulative[known, bin_ + 1] - guide.cumulative[known, bin_]
-                share = (share - guide.cumulative[known, bin_]) / chance
+                # the shares ascend
+                while bin_ < BINS - 1 and guide.cumulative[known, bin_ + 1] <= share:
+                    bin_ += 1
+                expected = guide.cumulative[known, bin_ + 1] - guide.cumulative[known, bin_]
+                share = (share - guide.cumulative[known, bin_]) / expected
                 first, last = bin_ * count // BINS, (bin_ + 1) * count // BINS
             j = min(first + int(share * (last - first)), last - 1)
-            tries = candidates * chance / (last - first)
+            tries = candidates * expected / (last - first)
             chosen[k] = j
-            promise[k] = weigh(v, state[r], row, rgb, light_vertex[j], light_state[j], rows, light_row, light_rgb, f)
-            promise[k] /= tries
+            promise[k] = weigh(v, state[r], light_vertex[j], light_state[j], rows) / tries
             total += promise[k]
             if known >= 0 and promise[k] > 0.0:
                 learnt[known, bin_] += promise[k] * promise[k] * tries
@@ -106,14 +112,13 @@ def join_light(
         out, in_ = v[3] * e0 + v[4] * e1 + v[5] * e2, -(w[3] * e0 + w[4] * e1 + w[5] * e2)
         i0, i1, i2 = local(v, e0, e1, e2)
         g0, g1, g2 = local(w, -e0, -e1, -e2)
-        material_of(w, rows, light_row, light_rgb)
         b0, b1, b2 = w[BACK], w[BACK + 1], w[BACK + 2]
         left_over = (light_state[j, DVCM] * abs(in_) + state[r, DVCM] * abs(out)) / math.pi
         worth = total / lit.paths * (square + left_over) / square * adjoint(w)
-        from_camera = pdf(row, rgb, o0, o1, o2, i0, i1, i2) * abs(in_) / square
-        from_light = pdf(light_row, light_rgb, b0, b1, b2, g0, g1, g2) * abs(out) / square
-        back_light = pdf(light_row, light_rgb, g0, g1, g2, b0, b1, b2)
-        back_camera = pdf(row, rgb, i0, i1, i2, o0, o1, o2)
+        from_camera = chance(v, rows, o0, o1, o2, i0, i1, i2) * abs(in_) / square
+        from_light = chance(w, rows, b0, b1, b2, g0, g1, g2) * abs(out) / square
+        back_light = chance(w, rows, g0, g1, g2, b0, b1, b2)
+        back_camera = chance(v, rows, i0, i1, i2, o0, o1, o2)
         others = from_camera * (light_state[j, DVCM] + back_light * light_state[j, DVC])
         others += from_light * (state[r, DVCM] + back_camera * state[r, DVC])
         joints.pixel[n], joints.part[n] = int(state[r, PIXEL]), int(light_state[j, PART])
@@ -135,19 +140,8 @@ def join_light(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def weigh(
-    v: Float,
-    v_state: Float,
-    row: Float,
-    rgb: Float,
-    w: Float,
-    w_state: Float,
-    rows: Float,
-    light_row: Float,
-    light_rgb: Float,
-    f: Float,
-) -> float:
-    """What a joint of camera vertex v, of a known material, with light vertex w would bring, were nothing between."""
+def weigh(v: Float, v_state: Float, w: Float, w_state: Float, rows: Float) -> float:
+    """What a joint of camera vertex v with light vertex w would bring, were nothing between."""
     e0, e1, e2 = w[0] - v[0], w[1] - v[1], w[2] - v[2]
     square = e0 * e0 + e1 * e1 + e2 * e2
     far = math.sqrt(square)
@@ -158,14 +152,12 @@ def weigh(
     if out * i2 <= 0.0 or in_ * g2 <= 0.0:
         return 0.0
     # no straight way through a medium
-    if (row[0] == SUBSURFACE and i2 < 0.0) or (g2 < 0.0 and rows[int(w[MATERIAL]), 0] == SUBSURFACE):
+    if (i2 < 0.0 and rows[int(v[MATERIAL]), 0] == SUBSURFACE) or (g2 < 0.0 and rows[int(w[MATERIAL]), 0] == SUBSURFACE):
         return 0.0
-    evaluate(row, rgb, i0, i1, i2, v[BACK], v[BACK + 1], v[BACK + 2], f)
-    value = f[0]
+    value = scattered(v, rows, i0, i1, i2, v[BACK], v[BACK + 1], v[BACK + 2])
     if value <= 0.0:
         return 0.0
-    material_of(w, rows, light_row, light_rgb)
-    evaluate(light_row, light_rgb, w[BACK], w[BACK + 1], w[BACK + 2], g0, g1, g2, f)
+    value *= scattered(w, rows, w[BACK], w[BACK + 1], w[BACK + 2], g0, g1, g2)
     # what the other ways leave of it near a corner, roughly
     left_over = (w_state[DVCM] * abs(in_) + v_state[DVCM] * abs(out)) / math.pi
-    return w_state[POWER] * value * f[0] * abs(i2 * in_) / (square + left_over)
+    return w_state[POWER] * value * abs(i2 * in_) / (square + left_over)

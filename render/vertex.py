@@ -23,7 +23,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.bsdf import SUBSURFACE, is_smooth, pdf, sample
+from render.bsdf import SUBSURFACE, in_band, lobes, mirrors, sample, sampled
+from render.emission import SEQUENCE
 from render.interaction import interaction
 from render.random import uniform
 from render.surface import Surface
@@ -38,6 +39,8 @@ POWER, DVCM, DVC, LONE, CLEAR, NUMBER, PIXEL, KIND, MEDIUM, PART = 0, 1, 2, 3, 4
 STATE = 10
 PLAIN, BENT, SUNK, UNJOINED = 0, 1, 2, 4
 """Kinds of light: through clear glass or off a mirror, through a medium, and found by merging alone."""
+SURFACE = 11
+"""Columns of a material's row that say how its surface scatters."""
 MOST_BOUNCES = 64
 ROULETTE_AFTER = 3
 """Surfaces met before a path may be ended by chance."""
@@ -104,14 +107,25 @@ def interact(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def material_of(v: Float, rows: Float, row: Float, rgb: Float) -> bool:
-    """The material of a vertex -> row, rgb (3,); returns whether it scatters into single directions only."""
+def mirror_at(v: Float, rows: Float) -> bool:
+    """A vertex scatters into single directions only."""
+    return mirrors(rows[int(v[MATERIAL]), 0], v[ALPHA], v[ALPHA + 1])
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def scattered(v: Float, rows: Float, o0: float, o1: float, o2: float, i0: float, i1: float, i2: float) -> float:
+    """f(o, i) at a vertex, 1/sr (`render.bsdf`)."""
     slot = int(v[MATERIAL])
-    for c in range(row.shape[0]):
-        row[c] = rows[slot, c]
-    row[1], row[2] = v[ALPHA], v[ALPHA + 1]
-    rgb[0] = rgb[1] = rgb[2] = v[REFLECTANCE]
-    return is_smooth(row)
+    kind = rows[slot, 0]
+    facets, cosine, base = lobes(kind, v[ALPHA], v[ALPHA + 1], rows[slot, 3], o0, o1, o2, i0, i1, i2)
+    return in_band(kind, facets, cosine, base, v[REFLECTANCE], rows[slot, 4], rows[slot, 7], rows[slot, 10])
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def chance(v: Float, rows: Float, o0: float, o1: float, o2: float, i0: float, i1: float, i2: float) -> float:
+    """Density with which a vertex sends a path from o to i, 1/sr (`render.bsdf`)."""
+    slot = int(v[MATERIAL])
+    return sampled(rows[slot, 0], v[ALPHA], v[ALPHA + 1], rows[slot, 3], v[REFLECTANCE], o0, o1, o2, i0, i1, i2)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
@@ -138,24 +152,30 @@ def scatter(
 ) -> int:
     """Draw each path's next ray -> origin, direction (n, 3); state is moved up to match. Returns how many go on.
 
-    kinds: the light that is wanted; other paths end. first (n, 3): the numbers that decide light's first scattering;
-    later ones are drawn. Radiance, which paths from the camera carry, changes with the square of the refractive index;
-    power does not. Shading normals: Veach (1997), 5.3.
+    kinds: the light that is wanted; other paths end. first (3,): where the sequences start that decide light's first
+    scattering; later ones are drawn. Radiance, which paths from the camera carry, changes with the square of the
+    refractive index; power does not. Shading normals: Veach (1997), 5.3.
     """
-    rgb, row, i, f = np.empty(3), np.empty(rows.shape[1]), np.empty(3), np.empty(1)
+    rgb, row, i, f = np.empty(3), np.empty(SURFACE), np.empty(3), np.empty(1)
     going = 0
     for r in range(vertex.shape[0]):
         v = vertex[r]
-        smooth = material_of(v, rows, row, rgb)
+        smooth = mirror_at(v, rows)
         number = int(state[r, NUMBER])
         if depth == 0 and from_light:
-            choice, r1, r2 = first[number, 0], first[number, 1], first[number, 2]
+            choice = (first[0] + number * SEQUENCE[2]) % 1.0
+            r1, r2 = (first[1] + number * SEQUENCE[3]) % 1.0, (first[2] + number * SEQUENCE[4]) % 1.0
         else:
             choice = uniform(seed, number, depth, 0)
             r1, r2 = uniform(seed, number, depth, 1), uniform(seed, number, depth, 2)
         o0, o1, o2 = v[BACK], v[BACK + 1], v[BACK + 2]
         if smooth and not kinds & BENT:
             continue
+        slot = int(v[MATERIAL])
+        for c in range(SURFACE):
+            row[c] = rows[slot, c]
+        row[1], row[2] = v[ALPHA], v[ALPHA + 1]
+        rgb[0] = rgb[1] = rgb[2] = v[REFLECTANCE]
         density = sample(row, rgb, o0, o1, o2, choice, r1, r2, i, f)
         if density == 0.0:
             continue
@@ -199,7 +219,7 @@ def scatter(
         if smooth:
             dvcm, dvc = 0.0, dvc * cosine
         else:
-            reverse = pdf(row, rgb, i[0], i[1], i[2], o0, o1, o2)
+            reverse = chance(v, rows, i[0], i[1], i[2], o0, o1, o2)
             dvcm, dvc = 1.0 / density, cosine / density * (dvcm + reverse * dvc)
         side = surface_offset if out > 0.0 else -surface_offset
         origin[going, 0], origin[going, 1], origin[going, 2] = (

@@ -233,11 +233,11 @@ def flux_of(parts, samples, passes=16):
     low, high, reach = fan_span(world, laser, T_world_laser)
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, 3, ALL_KINDS)
     pixels = camera.width * camera.height
-    expected = np.full(pixels, samples / pixels)
+    expected, looked_at = np.full(pixels, samples / pixels), np.arange(pixels if samples else 0, dtype=np.int32)
     sums = []
     for number in range(passes):
         take = empty_take(pixels)
-        task.run(number, 1 << 14, even_fan(low, high), expected, no_guide(camera), take, None)
+        task.run(number, 1 << 14, even_fan(low, high), expected, looked_at, no_guide(camera), take, None)
         sums.append(take.image.sum())
     return np.mean(sums), np.std(sums, ddof=1) / math.sqrt(passes)
 
@@ -267,7 +267,7 @@ def test_a_deep_medium_reflects_as_chandrasekhar_says(albedo):
     assert (low, high) == pytest.approx((0.0, 1.0))
     task = LightPass.of(world, camera, beam, T_world_camera, T_world_laser, reach, 3, ALL_KINDS)
     pixels, paths = camera.width * camera.height, 1 << 13
-    found = task.light(7, 0, paths, paths, even_fan(low, high), np.zeros(pixels), empty_take(pixels))
+    found = task.light(7, 0, paths, paths, even_fan(low, high), np.zeros(pixels), empty_take(pixels), True)
     caught = sum(state[vertex[:, MATERIAL] == 1, POWER].sum() for _, vertex, state in found)
     (h_laser,) = chandrasekhar_h(albedo, (abs(T_world_laser[2, 2]),))
     expected = 1.0 - math.sqrt(1.0 - albedo) * h_laser

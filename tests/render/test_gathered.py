@@ -26,7 +26,7 @@ def passes(*images):
     takes = []
     for image in images:
         take = empty_take(len(image))
-        take.image[:] = image
+        take.image[:], take.touched[:] = image, True
         takes.append(take)
     return takes
 

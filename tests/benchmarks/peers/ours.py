@@ -70,7 +70,7 @@ def conductor(m: scenes.Material):
 
 DIRECT_ERRORS = (0.05, 0.01, 0.001, 0.0002)
 """Asked of s1, which has nothing but direct light, one render each."""
-DIRECT_BELOW = 0.005
+DIRECT_BELOW = 0.01
 """Asked of the direct light under reflections, whose own error is watched."""
 
 
