@@ -41,6 +41,8 @@ CONVERGENCE = 0.75
 """Power of the samples with which the error is taken to fall; 0.5 would be that of independent ones."""
 GROWTH = 4.0
 """Most by which a pass multiplies the samples."""
+IMAGE_ROWS = 8
+"""Rows of tiles that a thread makes an image of at a time."""
 GROUP = 256
 """Chunks between two moments at which an unfinished pass may be kept."""
 
@@ -96,7 +98,7 @@ def ambient_images(
         yield from _passes(film, paths, target, most, threads, cancelled, progress)
     except Cancelled:
         if keeps is not None and keeps() and np.all(film.done.sum(axis=1) > 0):
-            yield film.image()
+            yield film.image(threads)
         raise
 
 
@@ -117,7 +119,7 @@ def _passes(
         yield film.expose(paths, np.broadcast_to([1, 0], (film.tiles, 2)), threads, cancelled, progress)
         return
     if film.errors:
-        yield film.image()
+        yield film.image(threads, cancelled)
     for level in range(1, min(PILOT, most // 2) + 1):
         wanted, done = float(level), next(known, None)
         if done is None:
@@ -226,17 +228,23 @@ class Film:
         finally:
             # in the order of the chunks, whichever thread was first
             self.tally = self.tally + tallies.sum(axis=0)
-        image = self.image()
+        image = self.image(threads, cancelled)
         self.errors.append(image.error)
         if self.keep is not None:
             self.keep(self)
         return image
 
-    def image(self) -> AmbientImage:
-        """Of the samples so far."""
+    def image(self, threads: int | None = None, cancelled: Cancel | None = None) -> AmbientImage:
+        """Of the samples so far. Raises Cancelled."""
         pixels_of = self._size_of(np.arange(self.tiles))
         image = np.empty((self.height, self.width, 3), np.float32)
-        difference, power = develop_halves(self.sums, self.done, self.across, image)
+        parts = np.zeros((self.down, 2))
+
+        def work(start: int, stop: int) -> None:
+            parts[start] = develop_halves(self.sums, self.done, self.across, image, start, stop)
+
+        map_chunks(work, self.down, IMAGE_ROWS, threads, cancelled)
+        difference, power = (float(part) for part in parts.sum(axis=0))
         halves = bool(np.all(self.done > 0))
         variance = difference / 4.0
         error = math.sqrt(variance / max(power - variance, 1e-3 * power)) if power > 0.0 else 0.0
@@ -311,21 +319,18 @@ def _chunks(rays: NDArray[np.int64], most: int) -> list[Int]:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def develop_halves(sums: Float32, done: Int, across: int, image: Float32) -> tuple[float, float]:
-    """The mean of both halves -> image (h, w, 3); sums over it of their squared difference, and of its square.
+def develop_halves(sums: Float32, done: Int, across: int, image: Float32, start: int, stop: int) -> tuple[float, float]:
+    """The mean of both halves -> image (h, w, 3), rows of tiles start .. stop; the sums over these of the halves'
+    squared difference, and of the image's square.
 
     sums (h w, 2, 3); done (tiles, 2). A half without samples is left out.
     """
     difference = power = 0.0
-    inverse = np.zeros(done.shape)
-    for tile in range(done.shape[0]):
-        for half in range(2):
-            if done[tile, half] > 0:
-                inverse[tile, half] = 1.0 / done[tile, half]
-    for row in range(image.shape[0]):
+    for row in range(start * TILE, min(stop * TILE, image.shape[0])):
         for column in range(image.shape[1]):
             tile = row // TILE * across + column // TILE
-            first, second = inverse[tile, 0], inverse[tile, 1]
+            first = 1.0 / done[tile, 0] if done[tile, 0] > 0 else 0.0
+            second = 1.0 / done[tile, 1] if done[tile, 1] > 0 else 0.0
             pixel = sums[row * image.shape[1] + column]
             for band in range(3):
                 a = pixel[0, band] * first

@@ -110,7 +110,7 @@ class Gathered:
             # the last wave knows it best
             self.share = min(by_camera / light, 1.0)
         self.error = math.sqrt(self.spread / max(self.squares - self.spread, 1e-300)) if self.squares > 0.0 else 0.0
-        self.guide = learn(self.guide, learnt, self.knowledge)
+        self.guide = learn(self.guide, learnt, self.knowledge, threads)
         self.share_out(self.passes / counts)
         self.whole = True
 

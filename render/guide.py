@@ -6,6 +6,8 @@ every try is weighed by that.
 
 from __future__ import annotations
 
+import math
+from functools import partial
 from typing import NamedTuple
 
 import numba
@@ -17,6 +19,7 @@ from render.bsdf import is_smooth
 from render.camera import Camera
 from render.random import uniform
 from render.surface import Surface
+from render.threads import map_chunks
 from render.world import World
 
 Float = NDArray[np.float64]
@@ -36,6 +39,8 @@ LEAST, MOST_SAMPLES = 1e-8, 64.0
 """Least share of all light in a cell worth looking at; most camera paths of a pixel and pass."""
 LOOK = 4
 """Pixels between the rays that look for glass."""
+GUIDE_ROWS = 1024
+"""That a thread does at a time."""
 FEWEST_TO_LEARN, FLAT = 1.0, 0.2
 """Camera paths a pass in a tile that learns; the part of a guide that stays flat."""
 
@@ -152,31 +157,61 @@ def no_guide(camera: Camera) -> Guide:
 def first_guide(samples: Float, camera: Camera) -> Guide:
     """A guide, flat so far, for the tiles with enough camera paths to learn from."""
     tiles = no_guide(camera).row
-    whole = np.zeros((tiles.shape[0] * TILE, tiles.shape[1] * TILE))
-    whole[: camera.height, : camera.width] = samples.reshape(camera.height, camera.width)
-    found = whole.reshape(tiles.shape[0], TILE, tiles.shape[1], TILE).sum(axis=(1, 3)) >= FEWEST_TO_LEARN
-    count = int(found.sum())
-    tiles[found] = np.arange(count)
+    count = number_tiles(samples, camera.width, tiles)
     cumulative = np.repeat(np.linspace(0.0, 1.0, BINS + 1)[None], count, axis=0)
     return Guide(camera.width, tiles, cumulative)
 
 
-def learn(guide: Guide, learnt: Float, knowledge: Float) -> Guide:
-    """Fold what the passes of a wave learnt (cleared) into `knowledge`; the guide that follows from it.
+@numba.njit(nogil=True, cache=True)
+def number_tiles(samples: Float, width: int, tiles: Int) -> int:
+    """Number the tiles with enough camera paths to learn from; returns how many they are."""
+    down, across = tiles.shape
+    height, count = samples.shape[0] // width, 0
+    paths = np.empty(across)
+    for i in range(down):
+        paths[:] = 0.0
+        for row in range(i * TILE, min((i + 1) * TILE, height)):
+            for column in range(width):
+                paths[column // TILE] += samples[row * width + column]
+        for j in range(across):
+            if paths[j] >= FEWEST_TO_LEARN:
+                tiles[i, j] = count
+                count += 1
+    return count
+
+
+def learn(guide: Guide, learnt: Float, knowledge: Float, threads: int | None = None) -> Guide:
+    """Fold what the passes of a wave learnt (cleared) into `knowledge`; the guide that follows from it."""
+    cumulative = np.empty((len(knowledge), BINS + 1))
+    map_chunks(partial(learn_rows, learnt, knowledge, cumulative), len(knowledge), GUIDE_ROWS, threads)
+    return guide._replace(cumulative=cumulative)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def learn_rows(learnt: Float, knowledge: Float, cumulative: Float, start: int, stop: int) -> None:
+    """Rows start .. stop of `learn`.
 
     The best density is the root of the mean square of what is found; a part stays flat, for what was not found yet.
     """
-    knowledge += np.nan_to_num(learnt.sum(axis=0), nan=0.0, posinf=0.0)
-    learnt[:] = 0.0
-    density = np.sqrt(knowledge)
-    density = 0.5 * density + 0.25 * (np.roll(density, 1, axis=1) + np.roll(density, -1, axis=1))
-    total = density.sum(axis=1, keepdims=True)
-    density = (1.0 - FLAT) * np.divide(
-        density, total, out=np.full_like(density, 1.0 / BINS), where=total > 0.0
-    ) + FLAT / BINS
-    cumulative = np.concatenate([np.zeros((len(density), 1)), np.cumsum(density, axis=1)], axis=1)
-    cumulative /= cumulative[:, -1:]
-    return guide._replace(cumulative=cumulative)
+    root = np.empty(BINS)
+    for row in range(start, stop):
+        whole = 0.0
+        for i in range(BINS):
+            found = 0.0
+            for k in range(learnt.shape[0]):
+                found += learnt[k, row, i]
+                learnt[k, row, i] = 0.0
+            if math.isfinite(found):
+                knowledge[row, i] += found
+            root[i] = math.sqrt(knowledge[row, i])
+            whole += root[i]
+        cumulative[row, 0] = 0.0
+        for i in range(BINS):
+            near = 0.5 * root[i] + 0.25 * (root[i - 1] + root[(i + 1) % BINS])
+            density = near / whole if whole > 0.0 else 1.0 / BINS
+            cumulative[row, i + 1] = cumulative[row, i] + (1.0 - FLAT) * density + FLAT / BINS
+        for i in range(1, BINS + 1):
+            cumulative[row, i] /= cumulative[row, BINS]
 
 
 @numba.njit(nogil=True, cache=True)

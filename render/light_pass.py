@@ -137,19 +137,20 @@ class LightPass:
         pixels, starts = draw_paths(samples, looked_at, seed ^ CAMERA_SEED)
         found: list[tuple[int, Float, Float]] = []
         for first in range(0, paths, CHUNK_PATHS):
-            _stop(cancelled)
             joined = len(pixels) > 0 or hints is not None
-            found += self.light(seed, first, min(CHUNK_PATHS, paths - first), paths, fan, samples, take, joined)
+            count = min(CHUNK_PATHS, paths - first)
+            found += self.light(seed, first, count, paths, fan, samples, take, joined, cancelled)
         for _, vertex, state in found if hints is not None else ():
+            _stop(cancelled)
             hint_at(vertex, state, self.view, self.height, hints, paths, take)
         if not len(pixels):
             return
+        _stop(cancelled)
         merged = self.photons(found, number, paths) if self.clear and self.kinds & UNJOINED else None
         near = _lit([part for part in found if part[0] == 0], True, paths)
         later = _lit([part for part in found if part[0] > 0], False, paths)
         chunks = np.searchsorted(starts, np.arange(0, starts[-1] + CHUNK_PATHS, CHUNK_PATHS))
         for a, b in pairwise(np.minimum(chunks, len(pixels))):
-            _stop(cancelled)
             self.eye(
                 seed ^ CAMERA_SEED,
                 pixels[a:b],
@@ -162,12 +163,25 @@ class LightPass:
                 fan,
                 guide,
                 take,
+                cancelled,
             )
 
     def light(
-        self, seed: int, first: int, count: int, paths: int, fan: Fan, samples: Float, take: Take, wanted: bool
+        self,
+        seed: int,
+        first: int,
+        count: int,
+        paths: int,
+        fan: Fan,
+        samples: Float,
+        take: Take,
+        wanted: bool,
+        cancelled: Cancel | None = None,
     ) -> list[tuple[int, Float, Float]]:
-        """Trace light paths, join them to the camera; if wanted their joinable vertices and states, by depth."""
+        """Trace light paths, join them to the camera; if wanted their joinable vertices and states, by depth.
+
+        Raises Cancelled.
+        """
         rays, rows = self.world.rays, self.surface.rows
         start = np.array([uniform(seed, 0, dimension, 99) for dimension in range(5)])
         long = np.empty((2, count), np.int64)
@@ -180,6 +194,7 @@ class LightPass:
         joints = no_joints(count)
         kept = []
         for depth in range(MOST_BOUNCES):
+            _stop(cancelled)
             vertex, state = self.meet(seed, depth, origin, direction, state)
             if not len(vertex):
                 break
@@ -232,8 +247,12 @@ class LightPass:
         fan: Fan,
         guide: Guide,
         take: Take,
+        cancelled: Cancel | None,
     ) -> None:
-        """Trace camera paths of pixels numbered from `starts`; join them to the laser and to light vertices."""
+        """Trace camera paths of pixels numbered from `starts`; join them to the laser and to light vertices.
+
+        Raises Cancelled.
+        """
         rays, rows = self.world.rays, self.surface.rows
         count = int(starts[-1] - starts[0])
         origin, direction, state = np.empty((count, 3)), np.empty((count, 3)), np.zeros((count, STATE))
@@ -241,6 +260,7 @@ class LightPass:
         joints = no_joints(count)
         unused = np.zeros(3)
         for depth in range(MOST_BOUNCES):
+            _stop(cancelled)
             vertex, state = self.meet(seed, depth, origin, direction, state)
             if not len(vertex):
                 break

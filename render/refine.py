@@ -6,7 +6,9 @@ The last frame holds the same numbers, bit for bit, as `render_world` gives for 
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +18,8 @@ from render.ambient_plan import choose_ambient, expected_ambient, has_ambient, p
 from render.checks import check_placement
 from render.curve import laser_curve
 from render.direct import direct_image
+from render.embree import RayScene
+from render.errors import Cancelled
 from render.frame import Axis, Frame, LaserCurve
 from render.lens_plan import lens_lines
 from render.material_checks import check_materials, scene_warnings
@@ -33,6 +37,8 @@ Float32 = NDArray[np.float32]
 Progress = Callable[[str, float], None]
 """progress(what is being done, share of the whole 0..1)."""
 
+LOOK_SECONDS = 0.02
+"""Between two looks whether the user cancelled."""
 QUICK_ERROR = 0.05
 """Relative error of the laser light in the first frame."""
 
@@ -108,9 +114,10 @@ def frames(
     cancelled = None if cancelled is None else limit.asked
     with clock.stage("acceleration structure", len(world.triangles) * 10):
         check_placement(world, scene, step)
+        _stop(cancelled)
         check_materials(world, scene)
         warnings = scene_warnings(world, scene, step)
-        rays = world.rays
+        rays = _rays(world, cancelled)
     ray_start, embree_start = rays.rays, rays.seconds
     frame = Frame(step, (), None, (), None, "\n".join(plan(scene, settings)), warnings=warnings)
 
@@ -176,6 +183,30 @@ def frames(
             ):
                 frame = told(replace(frame, ambient=image.radiance), **counts)
                 yield frame
+
+
+def _rays(world: World, cancelled: Cancel | None) -> RayScene:
+    """The scene for ray queries. Raises Cancelled, and leaves embree, which cannot stop halfway, to end alone."""
+    if cancelled is None or "rays" in vars(world):
+        return world.rays
+    built: Future[RayScene] = Future()
+
+    def build() -> None:
+        try:
+            built.set_result(world.rays)
+        except BaseException as error:
+            built.set_exception(error)
+
+    threading.Thread(target=build, name="embree", daemon=True).start()
+    while not built.done():
+        _stop(cancelled)
+        wait((built,), LOOK_SECONDS)
+    return built.result()
+
+
+def _stop(cancelled: Cancel | None) -> None:
+    if cancelled is not None and cancelled():
+        raise Cancelled
 
 
 def _curves(world: World, scene: Scene, step: int, axis: Axis, threads: int | None) -> Iterator[LaserCurve]:
