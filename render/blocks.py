@@ -54,7 +54,9 @@ def crossing_in_blocks(vertices: Float, triangles: Int, boxes: Float, T_laser_ob
         if count + BLOCK > capacity:
             capacity *= 2
             more = np.empty(capacity, dtype=np.int32)
-            more[:count] = out[:count]
+            # numba takes two seconds longer to compile a slice
+            for i in range(count):
+                more[i] = out[i]
             out = more
         for t in range(first_triangle, last_triangle):
             ahead = 0

@@ -66,8 +66,11 @@ def cut_triangles(
     for k in range(crossing.shape[0]):
         t = crossing[k]
         a, b, c = vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]
-        normal = np.cross(b - a, c - a)
-        to_camera, to_laser = np.dot(normal, camera - a), np.dot(normal, laser - a)
+        nx = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
+        ny = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
+        nz = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        to_camera = nx * (camera[0] - a[0]) + ny * (camera[1] - a[1]) + nz * (camera[2] - a[2])
+        to_laser = nx * (laser[0] - a[0]) + ny * (laser[1] - a[1]) + nz * (laser[2] - a[2])
         if not to_camera * to_laser > 0.0:
             continue
         end = 0
@@ -199,10 +202,14 @@ def scan_line_crossings(
                         capacity *= 2
                         values_more = np.empty((capacity, 4))
                         index_more, owner_more = np.empty(capacity, dtype=np.int32), np.empty(capacity, dtype=np.int32)
-                        values_more[:count], index_more[:count], owner_more[:count] = values, index, owner
+                        for i in range(count):
+                            index_more[i], owner_more[i] = index[i], owner[i]
+                            for axis in range(4):
+                                values_more[i, axis] = values[i, axis]
                         values, index, owner = values_more, index_more, owner_more
                     values[count, 0] = position
-                    values[count, 1:] = point
+                    for axis in range(3):
+                        values[count, 1 + axis] = point[axis]
                     index[count], owner[count] = line, s
                     count += 1
             ta, line_a = tb, line_b

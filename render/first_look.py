@@ -92,7 +92,8 @@ def gather_first(
     values: Float, occluded: NDArray[np.bool_], sample: Int, count: int, planes: Float, middle: Float
 ) -> None:
     """Radiance of each pixel (n,) from its one ray; one in the shade has no radiance in the sheet's middle either."""
-    middle[:] = values[:, 0]
+    for i in range(len(middle)):
+        middle[i] = values[i, 0]
     for j in range(count):
         if occluded[j]:
             middle[sample[j]] = planes[sample[j], 3] = 0.0

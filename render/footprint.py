@@ -115,8 +115,8 @@ def triangle_spans(
         planes[4] = np.array([0.0, 0.0, 1.0, -1e-9])
         m = T_camera_laser[2]
         planes[5] = np.array([m[0], m[1], m[2], m[3] - 1e-6])
-        front[:3] = corners
-        count = 3
+        count = len(corners)
+        front[:count] = corners
         for plane in range(6):
             count = _clip(front, count, planes[plane], back)
             front, back = back, front

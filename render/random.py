@@ -47,7 +47,7 @@ def _mix(state: np.uint64) -> np.uint64:
     return state ^ (state >> _S31)
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, inline="always")
 def bits(seed: int, index: int, sample: int, dimension: int) -> np.uint64:
     """64 random bits, a pure function of the four counters."""
     key = _mix(np.uint64(seed) + _GOLDEN)
@@ -56,7 +56,7 @@ def bits(seed: int, index: int, sample: int, dimension: int) -> np.uint64:
     return _mix(place ^ (draw * _GOLDEN))
 
 
-@numba.njit(nogil=True, cache=True)
+@numba.njit(nogil=True, cache=True, inline="always")
 def uniform(seed: int, index: int, sample: int, dimension: int) -> float:
     """A float64 in [0, 1), flat."""
     return np.int64(bits(seed, index, sample, dimension) >> _S11) * 2.0**-53

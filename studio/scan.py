@@ -25,11 +25,10 @@ from studio.resume import Refined, frame_of_step, made_of, settle
 from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world
 from studio.summary import summarise
 from studio.sweep import Passing, Sweep, Taken
-from studio.warm_up import warm_up
+from studio.warm_up import PREPARING, needed, warm_up
 
 __all__ = ["Measurement", "ScanResult", "run_scan"]
 
-PREPARING = "preparing kernels (compiled on the first run)"
 IMAGES_KEPT = 16
 """Of a long scan only so many images stay in memory for the report, evenly spread."""
 
@@ -91,7 +90,7 @@ def run_scan(
             first = build_world(project.scene, root, 0)
         scan_folder.begin(out, project)
         with clock.stage(PREPARING):
-            warm_up(clock, threads)
+            warm_up(needed(project), progress, cancelled)
         results: list[FrameResult] = []
         shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
         files: list[Path] = []

@@ -1,24 +1,164 @@
-"""The whole scan on a tiny scene, in memory: compiles every kernel, or loads it, and proves the installation."""
+"""Compiles every kernel, or loads it from its cache, by asking of tiny scenes what the program asks of large ones.
+
+That takes most of a minute where the cache is empty, a second where it is not. It happens once in the life of the
+program, step by step on a thread of its own: whoever waits can be cancelled at once, which a compiler cannot.
+"""
 
 from __future__ import annotations
 
-from render.world import build_world
+import gc
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, wait
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from render.camera import Camera, Lens
+from render.errors import Cancelled
+from render.laser import LineLaser
+from render.lights import Environment, PointLight, RectangleLight
+from render.material import Conductor, Emitter, Glass, Lambertian, Material, Subsurface
+from render.pose import Pose
+from render.scene import Rig, Scene, SceneObject
+from render.sensor import Sensor, SpectralCurve
+from render.settings import RenderSettings
+from render.shape import Box, Plane
+from render.threads import Cancel
 from studio.project import Project
-from studio.results import measure_frame
-from studio.stages import Clock, develop_step, render_step, scaled
 from studio.templates import template_folder
 
+if TYPE_CHECKING:
+    from studio.stages import StageProgress
+
+PREPARING = "preparing kernels (compiled on the first run)"
 TEMPLATE, IMAGE_SCALE = "plane", 0.05
+LOOK_SECONDS = 0.02
+"""Between two looks whether somebody who waits was cancelled."""
+COLLECTED = (20_000, 20, 20)
+"""Thresholds of the search for garbage meanwhile."""
+CAMERA = Camera(width=64, height=48, fx=100.0, fy=100.0, cx=31.5, cy=23.5)
+LASER = LineLaser(T_rig_laser=Pose(translation=(0.1, 0.0, 0.0), rotation=(0.0, -0.2, 0.0)))
+PLATE = SceneObject(name="plate", shape=Plane(), T_world_object=Pose(translation=(0.0, 0.0, 0.5)))
+SENSOR = Sensor(efficiency=(SpectralCurve(wavelength_nm=(400.0, 700.0), value=(0.5, 0.5)),))
 
 
-def warm_up(clock: Clock, threads: int | None = None) -> None:
-    """Run the tilted plane at 122 x 102 px. Raises whatever is broken."""
+_ends: dict[str, Future[None]] = {}
+_lock, _turn = threading.Lock(), threading.Lock()
+
+
+def warm_up(steps: Iterable[str], progress: StageProgress, cancelled: Cancel) -> None:
+    """Wait until the kernels of some of STEPS are there. Raises Cancelled, and whatever is found to be broken."""
+    names = tuple(steps)
+    for name in names:
+        with _lock:
+            if name not in _ends:
+                _ends[name] = Future()
+                # no daemon: the program may not end while a compiler works in it
+                threading.Thread(target=_run, args=(name,), name=f"warm-up {name}").start()
+    for i, name in enumerate(names):
+        while not _ends[name].done():
+            if cancelled():
+                raise Cancelled
+            progress(PREPARING, i / len(names))
+            wait((_ends[name],), LOOK_SECONDS)
+        _ends[name].result()
+
+
+def needed(project: Project) -> tuple[str, ...]:
+    """The steps whose kernels a render of a project, and what is measured in it, may need."""
+    plain = all(isinstance(item.material, Lambertian) for item in project.scene.visible_objects)
+    more = () if plain and project.render.transport == "direct" else ("light",)
+    return ("scan", *more) if project.scene.camera.lens.model == "pinhole" else ("scan", *more, "lens")
+
+
+def _run(name: str) -> None:
+    with _turn:
+        before = gc.get_threshold()
+        # a compiler leaves much garbage, and looking for it as often as usual takes a tenth of its time
+        gc.set_threshold(*COLLECTED)
+        try:
+            STEPS[name](_program_ends)
+            _ends[name].set_result(None)
+        except BaseException as error:
+            _ends[name].set_exception(error)
+        finally:
+            gc.set_threshold(*before)
+
+
+def _program_ends() -> bool:
+    """Nobody is left to wait."""
+    return not threading.main_thread().is_alive()
+
+
+def look(cancelled: Cancel) -> None:
+    """All that panels ask of a look."""
+    from studio import sketch
+    from studio.preview import Preview
+    from studio.readouts import readouts
+
+    scene = Scene(rig=Rig(camera=CAMERA, lasers=(LASER,)), objects=(PLATE,))
+    made = Preview(1).look(Project(scene=scene, sensor=SENSOR), Path())
+    readouts(made, 0)
+    made.image(1.0)
+    sketch.frustum(scene)
+
+
+def scan(cancelled: Cancel) -> None:
+    """The whole scan of the tilted plane at 122 x 102 px, in memory, with its pictures. Raises whatever is broken."""
+    from render.tone import pyramid
+    from render.world import build_world
+    from studio.results import measure_frame
+    from studio.stages import Clock, develop_step, render_step, scaled
+    from studio.views import picture, views
+
     folder = template_folder(TEMPLATE)
     project = scaled(Project.load(folder / "project.json"), IMAGE_SCALE)
-    quiet = Clock(progress=lambda stage, done: None, cancelled=clock.cancelled)
+    clock = Clock(progress=lambda stage, done: None, cancelled=cancelled)
     world = build_world(project.scene, folder, 0)
-    frame = render_step(project, world, 0, quiet, threads)
-    images = develop_step(project, frame, quiet, threads)
-    found = measure_frame(project, frame, world, images, quiet, threads, keep=False)
+    frame = render_step(project, world, 0, clock, None)
+    images = develop_step(project, frame, clock, None)
+    for view in views(project.scene, frame):
+        made = picture(view, project.scene, frame, images, True)
+        if made is not None:
+            pyramid(made)
+    found = measure_frame(project, frame, world, images, clock, None, keep=False)
     if not found.lasers[0].extractions[0].points.valid.any():
         raise RuntimeError("the warm-up scan found no point: the installation is damaged")
+
+
+def light(cancelled: Cancel) -> None:
+    """Every kind of light: reflected, through glass, below surfaces, of lamps and shining objects."""
+    _render(CAMERA, cancelled, "subsurface")
+
+
+def lens(cancelled: Cancel) -> None:
+    """A lens that blurs."""
+    blurred = CAMERA.model_copy(update={"lens": Lens(model="thin-lens", focus_distance=0.4)})
+    _render(blurred, cancelled, "direct")
+
+
+def _render(camera: Camera, cancelled: Cancel, transport: str) -> None:
+    """A glass pane, a metal and a wax block before a plate, under all sorts of lamps; few paths."""
+
+    from render.render import render_world
+    from render.world import build_world
+
+    wax = Subsurface(mean_free_path=0.01, scattering_albedo=0.5)
+    materials: tuple[Material, ...] = (Glass(), Conductor(), wax, Emitter())
+    blocks = []
+    for i, material in enumerate(materials):
+        shape, pose = Box(size_x=0.04, size_y=0.04, size_z=0.02), Pose(translation=(0.05 * i - 0.05, 0.0, 0.45))
+        blocks.append(SceneObject(name=material.kind, shape=shape, material=material, T_world_object=pose))
+    lamps = PointLight(), RectangleLight(T_world_light=Pose(translation=(0.0, -0.3, 0.0)))
+    scene = Scene(
+        rig=Rig(camera=camera, lasers=(LASER,)),
+        objects=(PLATE, *blocks),
+        lights=lamps,
+        environment=Environment(radiance=(1.0, 1.0, 1.0)),
+    )
+    few = {"transport": transport, "light_paths": 1, "ambient_samples": 2, "laser_error": 0.1}
+    settings = RenderSettings().model_copy(update=few)
+    render_world(build_world(scene, Path()), scene, settings=settings, cancelled=cancelled)
+
+
+STEPS: dict[str, Callable[[Cancel], None]] = {"look": look, "scan": scan, "light": light, "lens": lens}

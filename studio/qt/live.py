@@ -8,24 +8,15 @@ Moves are answered at once; meshes that are not loaded yet are left out of the l
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from render.camera import Camera
-from render.laser import LineLaser
-from render.pose import Pose
-from render.scene import Rig, Scene, SceneObject
-from render.sensor import Sensor, SpectralCurve
-from render.shape import Plane
+from render.scene import SceneObject
 from render.threads import Cancel
-from studio import sketch
 from studio.jobs import Progress
 from studio.preview import Look, Preview
-from studio.project import Project
 from studio.qt.jobs import JobRunner
 from studio.qt.session import Session
-from studio.readouts import readouts
+from studio.warm_up import warm_up
 
 LANE = "load meshes"
 
@@ -126,7 +117,7 @@ class Live(QObject):
                 progress(item.name, i / len(triangles_first))
                 preview.load(item, root)
             if not ready and not cancelled():
-                warm_up()
+                warm_up(("look",), progress, cancelled)
             return items
 
         self.loading.emit(True)
@@ -149,16 +140,3 @@ class Live(QObject):
         self.preview = Preview()
         self._told.clear()
         self._timer.start()
-
-
-def warm_up() -> None:
-    """Ask all that panels ask of a look, of a tiny scene, so that the kernels are compiled or read from their cache."""
-    laser = LineLaser(T_rig_laser=Pose(translation=(0.1, 0.0, 0.0), rotation=(0.0, -0.2, 0.0)))
-    camera = Camera(width=64, height=48, fx=100.0, fy=100.0, cx=31.5, cy=23.5)
-    plate = SceneObject(name="plate", shape=Plane(), T_world_object=Pose(translation=(0.0, 0.0, 0.5)))
-    sensor = Sensor(efficiency=(SpectralCurve(wavelength_nm=(400.0, 700.0), value=(0.5, 0.5)),))
-    scene = Scene(rig=Rig(camera=camera, lasers=(laser,)), objects=(plate,))
-    look = Preview(1).look(Project(scene=scene, sensor=sensor), Path())
-    readouts(look, 0)
-    look.image(1.0)
-    sketch.frustum(scene)

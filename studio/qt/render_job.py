@@ -14,6 +14,7 @@ from render.world import World, build_world
 from studio.jobs import Progress
 from studio.project import Project
 from studio.qt.session import Render
+from studio.warm_up import needed, warm_up
 
 
 def render_frames(
@@ -28,10 +29,11 @@ def render_frames(
     seconds: float | None = None,
     state: RenderState | None = None,
 ) -> None:
-    """Load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled.
+    """Prepare kernels, load what is not loaded and refine; every frame goes to `take`. Raises InputError, Cancelled.
 
     keeps: whether a cancelled render is kept, with all that was done. seconds, state: see `refine`.
     """
+    warm_up(needed(project), lambda stage, done: progress(stage, 0.0), cancelled)
     if world is None:
         progress("loading meshes", 0.0)
         world = build_world(project.scene, root, step)

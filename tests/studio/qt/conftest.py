@@ -55,12 +55,9 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def kernels() -> None:
     """Compiled, or read from their cache, before any window asks for them: a compiler cannot be cancelled."""
-    from studio import warm_up
-    from studio.qt import live
-    from studio.stages import Clock
+    from studio.warm_up import STEPS, warm_up
 
-    live.warm_up()
-    warm_up.warm_up(Clock(progress=lambda stage, done: None, cancelled=lambda: False))
+    warm_up(STEPS, lambda stage, done: None, lambda: False)
 
 
 @pytest.fixture(autouse=True)

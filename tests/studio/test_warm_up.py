@@ -1,0 +1,134 @@
+"""After the warm-up nothing is compiled: what renders, measures and draws is there, whatever the scene is made of."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from render.errors import Cancelled
+from studio import warm_up
+from studio.project import Project
+from studio.templates import DESCRIPTIONS, template_folder
+
+ROOT = Path(__file__).resolve().parents[2]
+CHILD = """
+import importlib, json, pkgutil, sys
+from pathlib import Path
+from numba.core.dispatcher import Dispatcher
+import analysis, render
+from studio.project import Project
+from studio.stages import scaled
+from studio.warm_up import needed, warm_up
+
+def quietly(stage, done): pass
+
+def never(): return False
+
+def kernels():
+    # every kernel of both rooms, by name: signatures that are there
+    found = {}
+    for room in (render, analysis):
+        for module in pkgutil.walk_packages(room.__path__, room.__name__ + "."):
+            for name, value in vars(importlib.import_module(module.name)).items():
+                if isinstance(value, Dispatcher):
+                    found[f"{value.py_func.__module__}.{value.py_func.__qualname__}"] = value
+    return found
+
+def read():
+    return {name: set(map(str, kernel.signatures)) for name, kernel in kernels().items()}
+
+from render.material import Subsurface
+from studio.scan import run_scan
+late = {}
+for folder in map(Path, sys.argv[2:]):
+    project = scaled(Project.load(folder / "project.json"), 0.03)
+    if folder.name == "sphere":
+        # what no template has: wax, and a lens that blurs
+        scene, camera = project.scene, project.scene.camera
+        camera = camera.model_copy(update={"lens": camera.lens.model_copy(update={"model": "thin-lens"})})
+        objects = tuple(
+            item.model_copy(update={"material": Subsurface()}) if item.shape.kind == "sphere" else item
+            for item in scene.objects
+        )
+        scene = scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": camera}), "objects": objects})
+        project = project.model_copy(update={"scene": scene})
+    warm_up(needed(project), quietly, never)
+    before = read()
+    run_scan(project, folder, out=Path(sys.argv[1], folder.name), steps=1, report=False, seconds=0.5)
+    late[folder.name] = sorted(name for name, there in read().items() if there - before.get(name, set()))
+print(json.dumps({"late": late, "kernels": len(read())}))
+"""
+
+
+def test_nothing_is_compiled_or_loaded_after_the_warm_up(tmp_path):
+    """No kernel of render and analysis, whatever its name, meets types in a scan that the warm-up has not shown it."""
+    names = ("scan", "weld_seam", "shiny_weld_seam", "glass_ball", "sphere")
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, str(tmp_path), *(str(template_folder(name)) for name in names)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert told["kernels"] > 150
+    assert told["late"] == {name: [] for name in names}
+
+
+def test_every_template_needs_all_but_the_lens():
+    for name in DESCRIPTIONS:
+        project = Project.load(template_folder(name) / "project.json")
+        assert warm_up.needed(project) == ("scan", "light")
+    direct = project.model_copy(update={"render": project.render.model_copy(update={"transport": "direct"})})
+    assert warm_up.needed(direct) == ("scan",)
+
+
+@pytest.fixture
+def slow_step(monkeypatch):
+    """A step that takes until it is let go, and how often it has run."""
+    go, runs = threading.Event(), []
+
+    def step(cancelled):
+        runs.append(1)
+        go.wait(20.0)
+
+    monkeypatch.setitem(warm_up.STEPS, "slow", step)
+    yield go, runs
+    go.set()
+    warm_up._ends.pop("slow", None)
+
+
+def test_who_waits_is_told_and_cancelled_at_once_and_a_step_runs_once(slow_step):
+    go, runs = slow_step
+    told, asked = [], []
+
+    def cancelled():
+        asked.append(time.perf_counter())
+        return len(asked) > 3
+
+    with pytest.raises(Cancelled):
+        warm_up.warm_up(("slow",), lambda stage, done: told.append(stage), cancelled)
+    assert time.perf_counter() - asked[-1] < 0.1
+    assert set(told) == {warm_up.PREPARING} and "compiled" in warm_up.PREPARING
+    go.set()
+    warm_up.warm_up(("slow",), lambda stage, done: None, lambda: False)
+    warm_up.warm_up(("slow",), lambda stage, done: pytest.fail("it is done"), lambda: False)
+    assert len(runs) == 1
+
+
+def test_what_is_broken_is_told_to_all_who_wait(monkeypatch):
+    def broken(cancelled):
+        raise RuntimeError("the installation is damaged")
+
+    monkeypatch.setitem(warm_up.STEPS, "broken", broken)
+    for _ in range(2):
+        with pytest.raises(RuntimeError, match="damaged"):
+            warm_up.warm_up(("broken",), lambda stage, done: None, lambda: False)
+    warm_up._ends.pop("broken", None)
