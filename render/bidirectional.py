@@ -19,7 +19,18 @@ from render.camera import Camera
 from render.emission import PARTS, Fan, aimed_fan, even_fan, fan_span
 from render.errors import Cancelled
 from render.gathered import MOST_PASS, Gathered, gather_takes
-from render.guide import BINS, Guide, clear_pixels, first_guide, learn, no_guide, pixels_looked_at, share_samples
+from render.guide import (
+    BINS,
+    NOWHERE,
+    Guide,
+    clear_pixels,
+    first_guide,
+    learn,
+    look_behind,
+    no_guide,
+    pixels_looked_at,
+    share_samples,
+)
 from render.joints import BLOCK, Take
 from render.laser import LineLaser
 from render.light_pass import KINDS, LightPass
@@ -29,12 +40,11 @@ from render.world import World
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
+Bool = NDArray[np.bool_]
 
 LEAST_PASS = 1 << 12
 """Paths from the laser in a first pass, and half of those from the camera; a large image is worth longer ones."""
 LOOK_PATHS = 1 << 11
-UNSEEN = 0.1
-"""Of the camera paths of the first passes, for what may be behind glass besides what was found there."""
 PILOT_PATHS = 1 << 13
 WAVE = 4
 """Passes at a time, whatever the number of threads."""
@@ -103,7 +113,7 @@ def indirect_images(
 ) -> Iterator[IndirectImage]:
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
-    An image at every doubling of the passes, and the final one. The error is that of the whole image: sqrt(sum of
+    An image at every doubling of the paths, and the final one. The error is that of the whole image: sqrt(sum of
     variances / sum of squares); `most_paths`, or `enough` (the time is over), ends it in any case. kinds: of light,
     besides plain interreflection (`render.vertex`). clamp: most radiance of one pass in one pixel, W/(m^2 sr); biased.
     before: go on from there, to the same image bit for bit as without interruption. keep: told of what to go on from
@@ -117,7 +127,7 @@ def indirect_images(
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, kinds)
     takes = [empty_take(camera.width * camera.height) for _ in range(WAVE)]
 
-    def wave(first: int, paths: int, fan: Fan, samples: Float, guide: Guide, hints: Float | None = None) -> None:
+    def wave(first: int, paths: int, fan: Fan, samples: Float, guide: Guide, hints: Bool | None = None) -> None:
         looked_at = pixels_looked_at(samples)
 
         def work(start: int, stop: int) -> None:
@@ -130,23 +140,25 @@ def indirect_images(
         # two looks only say where laser and camera should look: the first, by light, where it arrives at all (what is
         # behind glass only the camera finds), the second, from there, which light matters
         fan = even_fan(low, high)
-        clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else None
-        wave(0, LOOK_PATHS, fan, first_samples(clear, camera, 2 * LOOK_PATHS), no_guide(camera), clear)
+        clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else NOWHERE
+        hints = clear if task.clear else None
+        wave(0, LOOK_PATHS, fan, first_samples(clear, camera, 8 * LOOK_PATHS), no_guide(camera), hints)
         before = first_knowledge(takes, fan, camera, kinds, clear)
         learnt = learn_with(takes, before)
-        wave(WAVE, LOOK_PATHS, before.fan, before.samples, before.guide, clear)
-        second_knowledge(before, takes, learnt, camera, clear)
+        wave(WAVE, LOOK_PATHS, before.fan, before.samples, before.guide, hints)
+        second_knowledge(before, takes, learnt, camera)
     so_far = before
     learnt = learn_with(takes, so_far)
 
     def image() -> IndirectImage:
         counts = so_far.paths, round(so_far.dropped), round(so_far.clamped)
-        cut = so_far.cut / so_far.passes / so_far.total.size
+        cut = so_far.cut / so_far.weight / so_far.total.size
         return IndirectImage(so_far.radiance(shape), so_far.error, *counts, cut)
 
     def unfinished() -> bool:
         return so_far.error > target and so_far.paths < most_paths
 
+    shown = so_far.paths
     while unfinished():
         try:
             first = WAVE * (2 + so_far.waves)
@@ -164,31 +176,35 @@ def indirect_images(
             progress(min(0.99, done))
         if enough is not None and enough():
             break
-        if so_far.doubled and unfinished():
+        if so_far.paths >= 2 * shown and unfinished():
+            shown = so_far.paths
             yield image()
     yield image()
 
 
-def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int, clear: Float | None) -> Gathered:
+def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int, clear: Bool) -> Gathered:
     """Nothing gathered yet, but where a first look (cleared) says that light is to be found."""
     pixels = camera.width * camera.height
     fan = aimed_fan(fan, np.sum([take.found for take in takes], axis=0))
-    share, helped = looked(takes, clear)
+    share, helped = looked(takes)
     samples = share_samples(helped, camera.width, LOOK_PATHS * share, arrived(helped), 1.0)
+    look_behind(samples, clear, LOOK_PATHS)
     guide = first_guide(samples, camera)
     knowledge = np.zeros((len(guide.cumulative), BINS))
     size = min(max(1 << (pixels >> 8).bit_length() - 1, LEAST_PASS), MOST_PASS)
-    return Gathered(kinds, fan, size, share, samples, guide, knowledge, np.zeros(pixels), np.zeros(pixels, np.float32))
+    sums = np.zeros(pixels), np.zeros(pixels, np.float32)
+    return Gathered(kinds, fan, size, share, clear, samples, guide, knowledge, *sums)
 
 
-def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: Camera, clear: Float | None) -> None:
+def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: Camera) -> None:
     """Add what a second look (cleared) has found, and set the size of the passes to come."""
     first.guide = learn(first.guide, learnt, first.knowledge)
-    first.share, helped = looked(takes, clear)
-    share_samples(helped, camera.width, first.wanted, first.samples, float(WAVE))
-    if clear is not None:
-        # what only the camera can find is looked for ever after, however little of it there was
+    first.share, helped = looked(takes)
+    if len(first.clear):
+        # where something may be behind glass is not forgotten when the first passes find nothing there
         first.helped[:] = helped
+    share_samples(helped, camera.width, first.wanted, first.samples, float(WAVE))
+    look_behind(first.samples, first.clear, first.wanted)
 
 
 def arrived(helped: Float32) -> Float:
@@ -196,20 +212,13 @@ def arrived(helped: Float32) -> Float:
     return helped.astype(np.float64) * (WAVE * LOOK_PATHS / max(float(helped.sum()), 1e-300))
 
 
-def looked(takes: list[Take], clear: Float | None) -> tuple[float, Float32]:
-    """What camera paths could help with: its share of the light, and (pixels,) of takes, which are cleared.
-
-    Wherever the camera looks at clear glass, there is a little of it: what is there no light path can tell.
-    """
+def looked(takes: list[Take]) -> tuple[float, Float32]:
+    """What camera paths could help with: its share of the light, and (pixels,) of takes, which are cleared."""
     helped = np.zeros_like(takes[0].helped)
     light, by_camera, *_ = gather_takes(takes, np.zeros(len(helped)), helped)
     for take in takes:
         take.dropped[:] = 0.0
-    if clear is not None:
-        unseen = UNSEEN * max(by_camera, 1e-30)
-        helped += clear * (unseen / max(float(clear.sum()), 1.0))
-        by_camera += unseen
-    return min(by_camera / max(light, 1e-300), 1.0), helped
+    return min(by_camera / light, 1.0) if light > 0.0 else 1.0, helped
 
 
 def learn_with(takes: list[Take], so_far: Gathered) -> Float:
@@ -235,7 +244,7 @@ def indirect_shares(
     if high <= low:
         return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, ALL_KINDS)
-    clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else None
+    clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else NOWHERE
     samples = first_samples(clear, camera, PILOT_PATHS)
     looked_at = pixels_looked_at(samples)
     fan, guide, sums = even_fan(low, high), no_guide(camera), []
@@ -255,8 +264,9 @@ def empty_take(pixels: int) -> Take:
     return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)
 
 
-def first_samples(clear: Float | None, camera: Camera, count: int) -> Float:
+def first_samples(clear: Bool, camera: Camera, count: int) -> Float:
     """(pixels,) camera paths of a first look: at most `count`, on what the camera sees of mirrors and clear glass."""
-    if clear is None:
-        return np.zeros(camera.width * camera.height)
-    return clear * min(1.0, count / max(float(clear.sum()), 1.0))
+    samples = np.zeros(camera.width * camera.height)
+    if len(clear):
+        samples[clear] = min(1.0, count / max(int(clear.sum()), 1))
+    return samples

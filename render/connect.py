@@ -107,10 +107,12 @@ def join_camera(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def hint_at(vertex: Float, state: Float, view: View, height: int, clear: Float, light_paths: int, take: Take) -> None:
+def hint_at(
+    vertex: Float, state: Float, view: View, height: int, clear: NDArray[np.bool_], light_paths: int, take: Take
+) -> None:
     """Add to `take.helped` what light vertices would look like behind clear glass, were it not to bend light.
 
-    clear (pixels,): not 0 where the camera looks at glass or a mirror. Only says where camera paths are worth while.
+    clear (pixels,): where the camera looks at glass or a mirror. Only says where camera paths are worth while.
     """
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
@@ -120,7 +122,7 @@ def hint_at(vertex: Float, state: Float, view: View, height: int, clear: Float, 
         if not (area > 0.0 and -0.5 <= x < view.width - 0.5 and -0.5 <= y < height - 0.5):
             continue
         pixel = int(math.floor(y + 0.5)) * view.width + int(math.floor(x + 0.5))
-        if clear[pixel] > 0.0:
+        if clear[pixel]:
             take.touched[pixel // BLOCK] = True
             take.helped[pixel] += state[r, POWER] * v[REFLECTANCE] * area / (math.pi * light_paths)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.emission import Fan
-from render.guide import Guide, learn, share_samples
+from render.guide import Guide, learn, look_behind, share_samples
 from render.joints import BLOCK, Take
 from render.threads import map_chunks
 
@@ -21,6 +21,10 @@ MOST_PASS = 1 << 15
 """Of the passes' size: what a wave may take is what is lost where it is cancelled."""
 MOST_DOUBLINGS = 2
 """Of the paths from the laser, where camera paths bring nothing."""
+LEAST_SHARE = 0.1
+"""Of the light, to be looked for from the camera wherever it looks at glass."""
+LATER = 1.5
+"""Power of their size with which waves weigh: 1 were best, were the first to look where the last do."""
 PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
 
@@ -29,8 +33,8 @@ Arrays = dict[str, NDArray[Any]]
 class Gathered:
     """Sums over the waves of passes, and where the next ones look; changes as waves are added.
 
-    The second wave is as large as the first, and each after it as all before together, up to a limit. A wave counts
-    for its size, and its passes, alike and independent, tell how far it may be off.
+    The second wave is as large as the first, and each after it as all before together, up to a limit. Later ones know
+    better where to look, so a wave weighs more than its size; its passes, alike and independent, tell its scatter.
     """
 
     kinds: int
@@ -40,20 +44,24 @@ class Gathered:
     """Paths from the laser in a pass of the first wave, and half of those from the camera."""
     share: float
     """Of the light, what camera paths could help with."""
+    clear: NDArray[np.bool_]
+    """(pixels,) where the camera looks at a mirror or clear glass; (0,): there is none."""
     samples: Float
     """(pixels,) camera paths to be expected for each pixel, in a pass of the next wave."""
     guide: Guide
     knowledge: Float
     """(rows of the guide, BINS) behind it."""
     total: Float
-    """(pixels,) sum of the passes' radiance, each as often as it counts."""
+    """(pixels,) weighted sum of the passes' radiance."""
     helped: Float32
     """(pixels,) of the sum, what camera paths could help with."""
     squares: float = 0.0
     """Sum of `total` squared."""
     waves: int = 0
     passes: int = 0
-    """How many were added, each as often as it counts."""
+    """Added so far, in those of the first wave."""
+    weight: float = 0.0
+    """Of all passes."""
     paths: int = 0
     """From the laser."""
     spread: float = 0.0
@@ -65,70 +73,68 @@ class Gathered:
     clamped: float = 0.0
     """Pixels of passes that the clamp has cut."""
     cut: float = 0.0
-    """Radiance that it took, summed over pixels and passes, each as often as it counts."""
+    """Radiance that it took, weighted sum over pixels and passes."""
     whole: bool = True
     """False within `add`: an interruption there leaves half a wave."""
 
     @property
-    def counts(self) -> int:
-        """What a pass of the next wave counts for: its size, in that of the first."""
+    def growth(self) -> int:
+        """Size of the next wave's passes, in that of the first's."""
         return min(1 << max(self.waves - 1, 0), max(MOST_PASS // self.size, 1))
 
     @property
     def next_paths(self) -> int:
         """Paths from the laser in a pass of the next wave: more where those from the camera have little to bring."""
-        return self.size * self.counts << round(MOST_DOUBLINGS * (1.0 - self.share))
+        return self.size * self.growth << round(MOST_DOUBLINGS * (1.0 - self.share))
 
     @property
     def wanted(self) -> float:
         """Paths from the camera in a pass of the next wave."""
-        return 2 * self.size * self.counts * self.share
-
-    @property
-    def doubled(self) -> bool:
-        """The last wave made up half of what there is."""
-        return self.passes & (self.passes - 1) == 0
+        return 2 * self.size * self.growth * self.share
 
     def add(self, takes: list[Take], learnt: Float, clamp: float | None = None, threads: int | None = None) -> None:
         """Fold in a wave of passes (cleared), with what it learnt; clamp: most radiance of one pass in one pixel."""
         self.whole = False
-        most, counts, passes = math.inf if clamp is None else clamp, self.counts, len(takes)
-        light, by_camera, squares, spread, clamped, cut = gather_takes(
-            takes, self.total, self.helped, float(counts), most, threads
-        )
+        most, growth, passes = math.inf if clamp is None else clamp, self.growth, len(takes)
+        weight = growth**LATER
+        found = gather_takes(takes, self.total, self.helped, weight, most, threads)
+        light, by_camera, squares, spread, clamped, cut = found
         self.squares += squares
         self.clamped += clamped
-        self.cut += counts * cut
+        self.cut += weight * cut
         for take in takes:
             self.dropped += float(take.dropped[0])
             take.dropped[0] = 0.0
         self.paths += passes * self.next_paths
         self.waves += 1
-        self.passes += passes * counts
-        self.spread += counts**2 * spread
+        self.passes += passes * growth
+        self.weight += passes * weight
+        self.spread += weight**2 * spread
         if light > 0.0:
-            # the last wave knows it best
-            self.share = min(by_camera / light, 1.0)
+            # the last wave knows it best; but it does not know what it did not look for
+            self.share = min(max(by_camera / light, LEAST_SHARE if len(self.clear) else 0.0), 1.0)
         self.error = math.sqrt(self.spread / max(self.squares - self.spread, 1e-300)) if self.squares > 0.0 else 0.0
         self.guide = learn(self.guide, learnt, self.knowledge, threads)
-        self.share_out(self.passes / counts)
+        self.share_out(self.passes / growth)
         self.whole = True
 
     def share_out(self, drawn: float) -> None:
         """Spread the next wave's camera paths over the pixels, after `drawn` times those of `samples`."""
         share_samples(self.helped, self.guide.width, self.wanted, self.samples, drawn)
+        look_behind(self.samples, self.clear, self.wanted)
 
     def radiance(self, shape: tuple[int, int]) -> Float32:
         """(h, w) the image so far, W/(m^2 sr)."""
-        return (self.total / self.passes).astype(np.float32).reshape(shape)
+        return (self.total / self.weight).astype(np.float32).reshape(shape)
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
-        numbers = (self.fan.low, self.fan.high, self.share, self.squares, self.spread, self.error)
+        numbers = (self.fan.low, self.fan.high, self.share, self.squares, self.weight, self.spread, self.error)
         return {
             "whole_numbers": np.array((self.kinds, self.size, self.guide.width, self.waves, self.passes, self.paths)),
             "numbers": np.array((*numbers, self.dropped, self.clamped, self.cut)),
             "fan": self.fan.cumulative,
+            "clear": self.clear,
             "samples": self.samples,
             "guide_row": self.guide.row,
             "guide": self.guide.cumulative,
@@ -141,12 +147,14 @@ class Gathered:
     def of_arrays(cls, arrays: Arrays) -> Gathered:
         """What `arrays` gave. KeyError, ValueError: something else."""
         kinds, size, width, waves, passes, paths = (int(number) for number in arrays["whole_numbers"])
-        low, high, share, squares, spread, error, dropped, clamped, cut = (float(n) for n in arrays["numbers"])
+        low, high, share, squares, *rest = (float(n) for n in arrays["numbers"])
+        weight, spread, error, dropped, clamped, cut = rest
         return cls(
             kinds,
             Fan(low, high, arrays["fan"]),
             size,
             share,
+            arrays["clear"],
             arrays["samples"],
             Guide(width, arrays["guide_row"], arrays["guide"]),
             arrays["knowledge"],
@@ -155,6 +163,7 @@ class Gathered:
             squares,
             waves,
             passes,
+            weight,
             paths,
             spread,
             error,
@@ -168,7 +177,7 @@ def gather_takes(
     takes: list[Take],
     total: Float,
     helped: Float32,
-    counts: float = 1.0,
+    weight: float = 1.0,
     most: float = math.inf,
     threads: int | None = None,
 ) -> tuple[float, ...]:
@@ -178,7 +187,7 @@ def gather_takes(
     sums = np.zeros((-(-len(total) // PIXELS_A_CHUNK), 6))
 
     def work(start: int, stop: int) -> None:
-        sums[start // PIXELS_A_CHUNK] = gather(images, parts, touched, total, helped, counts, most, start, stop)
+        sums[start // PIXELS_A_CHUNK] = gather(images, parts, touched, total, helped, weight, most, start, stop)
 
     map_chunks(work, len(total), PIXELS_A_CHUNK, threads)
     return tuple(float(found) for found in sums.sum(axis=0))
@@ -191,7 +200,7 @@ def gather(
     touched: tuple[NDArray[np.bool_], ...],
     total: Float,
     total_helped: Float32,
-    counts: float,
+    weight: float,
     most: float,
     start: int,
     stop: int,
@@ -224,12 +233,12 @@ def gather(
                     images[k][j] = 0.0
                 if helped[k][j] != 0.0:
                     by_camera += helped[k][j]
-                    total_helped[j] += counts * helped[k][j]
+                    total_helped[j] += weight * helped[k][j]
                     helped[k][j] = 0.0
             if first > 0.0:
                 before = total[j]
                 light += first
-                total[j] += counts * first
+                total[j] += weight * first
                 squares += total[j] * total[j] - before * before
                 if passes > 1:
                     spread += max(passes * second - first * first, 0.0) / (passes - 1)

@@ -24,6 +24,10 @@ from render.world import World
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int32]
+Bool = NDArray[np.bool_]
+
+NOWHERE: Bool = np.zeros(0, np.bool_)
+"""Nothing is clear."""
 
 TILE, BINS = 8, 128
 """Pixels a side of the guide's tiles; parts of the lit curve."""
@@ -37,6 +41,8 @@ WITHIN = 0.15
 """What a camera path is worth in a pixel that has one in every pass, to that in a pixel where it is left to chance."""
 LEAST, MOST_SAMPLES = 1e-8, 64.0
 """Least share of all light in a cell worth looking at; most camera paths of a pixel and pass."""
+UNSEEN = 0.1
+"""Of the camera paths, for what may be behind glass besides what was found there."""
 LOOK = 4
 """Pixels between the rays that look for glass."""
 GUIDE_ROWS = 1024
@@ -136,16 +142,24 @@ def any_clear(surface: Surface) -> bool:
     return any(is_smooth(row) for row in surface.rows)
 
 
-def clear_pixels(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> Float:
-    """(pixels,) 1 where the camera looks at a mirror or clear glass, to the nearest few pixels; otherwise 0."""
+def clear_pixels(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> Bool:
+    """(pixels,) whether the camera looks at a mirror or clear glass, to the nearest few pixels."""
     v, u = np.mgrid[0 : camera.height : LOOK, 0 : camera.width : LOOK]
     rays, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float64))
     hit = world.rays.from_point(T_world_camera[:3, 3], (rays @ T_world_camera[:3, :3].T).astype(np.float32))
     smooth = np.array([is_smooth(row) for row in surface.rows])
     hit = np.where(known, hit, -1)
     found = np.where(hit >= 0, smooth[world.object_id[hit]] | (surface.second[world.object_id[hit]] >= 0), False)
-    found = maximum_filter(found.reshape(v.shape).astype(np.float64), 3)
-    return np.kron(found, np.ones((LOOK, LOOK)))[: camera.height, : camera.width].ravel()
+    found = maximum_filter(found.reshape(v.shape), 3)
+    return np.kron(found, np.ones((LOOK, LOOK), np.bool_))[: camera.height, : camera.width].ravel()
+
+
+def look_behind(samples: Float, clear: Bool, count: float) -> None:
+    """Leave a part of (pixels,) samples, `count` in all, to clear pixels alike: no light path tells what is there."""
+    behind = int(clear.sum())
+    if behind:
+        samples *= 1.0 - UNSEEN
+        samples[clear] += UNSEEN * count / behind
 
 
 def no_guide(camera: Camera) -> Guide:

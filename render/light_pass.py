@@ -127,7 +127,7 @@ class LightPass:
         guide: Guide,
         take: Take,
         cancelled: Cancel | None,
-        hints: Float | None = None,
+        hints: NDArray[np.bool_] | None = None,
     ) -> None:
         """Pass `number`: light paths, and camera paths, samples (pixels,) to be expected. Raises Cancelled.
 

@@ -10,8 +10,8 @@ import pytest
 from render.bidirectional import empty_take
 from render.camera import Camera
 from render.emission import even_fan
-from render.gathered import Gathered
-from render.guide import BINS, no_guide
+from render.gathered import LATER, Gathered
+from render.guide import BINS, NOWHERE, no_guide
 from render.joints import count_joints, no_joints
 
 CAMERA = Camera(width=4, height=2, fx=4.0, fy=4.0, cx=1.5, cy=0.5)
@@ -19,7 +19,7 @@ CAMERA = Camera(width=4, height=2, fx=4.0, fy=4.0, cx=1.5, cy=0.5)
 
 def nothing(pixels=8, size=100):
     arrays = np.zeros((0, BINS)), np.zeros(pixels), np.zeros(pixels, np.float32)
-    return Gathered(0, even_fan(0.0, 1.0), size, 0.0, np.zeros(pixels), no_guide(CAMERA), *arrays)
+    return Gathered(0, even_fan(0.0, 1.0), size, 0.0, NOWHERE, np.zeros(pixels), no_guide(CAMERA), *arrays)
 
 
 def passes(*images):
@@ -53,30 +53,33 @@ def test_the_error_is_that_of_the_mean_of_the_passes():
     assert so_far.error == pytest.approx(math.sqrt(variance.sum() / (np.sum(mean**2) - variance.sum())), rel=1e-9)
 
 
-def test_waves_count_for_their_size_and_the_error_is_the_scatter_of_what_they_add_up_to():
+def test_later_waves_weigh_more_and_the_error_is_the_scatter_of_what_they_add_up_to():
     rng = np.random.default_rng(8)
     renders, errors = [], []
     for _ in range(300):
         so_far = nothing()
         for _ in range(4):
-            # a pass that counts for more is that much less noisy
-            images = 5.0 + rng.standard_normal((4, 8)) / math.sqrt(so_far.counts)
+            # the larger a pass, the less noisy
+            images = 5.0 + rng.standard_normal((4, 8)) / math.sqrt(so_far.growth)
             so_far.add(passes(*images), np.zeros((4, 0, BINS)))
-        assert (so_far.passes, so_far.counts, so_far.paths) == (32, 8, 4 * 8 * 100 << 2)
+        assert (so_far.passes, so_far.growth, so_far.paths) == (32, 8, 4 * 8 * 100 << 2)
         renders.append(so_far.radiance((2, 4)).ravel())
         errors.append(so_far.error * 5.0)
     scatter = np.std(renders, axis=0, ddof=1)
+    sizes = np.array([1.0, 1.0, 2.0, 4.0])
+    weights = sizes**LATER
+    expected = math.sqrt(np.sum(weights**2 / sizes) / 4) / weights.sum()
     # the standard error of 2400 values' scatter is 1.4 %
-    assert np.sqrt(np.mean(scatter**2)) == pytest.approx(1.0 / math.sqrt(32), rel=0.06)
-    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(1.0 / math.sqrt(32), rel=0.06)
+    assert np.sqrt(np.mean(scatter**2)) == pytest.approx(expected, rel=0.06)
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(expected, rel=0.06)
 
 
 def test_waves_grow_up_to_a_limit():
-    so_far, counts = nothing(size=1 << 13), []
+    so_far, sizes = nothing(size=1 << 13), []
     for _ in range(6):
-        counts.append(so_far.counts)
+        sizes.append(so_far.growth)
         so_far.add(passes(np.ones(8), np.ones(8)), np.zeros((2, 0, BINS)))
-    assert counts == [1, 1, 2, 4, 4, 4]
+    assert sizes == [1, 1, 2, 4, 4, 4]
 
 
 def test_the_clamp_takes_what_it_says_and_nothing_is_clamped_unasked():
