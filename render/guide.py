@@ -19,10 +19,11 @@ from render.bsdf import is_smooth
 from render.camera import Camera
 from render.random import uniform
 from render.surface import Surface
-from render.threads import map_chunks
+from render.threads import Cancel, map_chunks
 from render.world import World
 
 Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 Bool = NDArray[np.bool_]
 
@@ -45,8 +46,8 @@ UNSEEN = 0.1
 """Of the camera paths, for what may be behind glass besides what was found there."""
 LOOK = 4
 """Pixels between the rays that look for glass."""
-GUIDE_ROWS = 1024
-"""That a thread does at a time."""
+CELL_ROWS, GUIDE_ROWS, PIXELS_A_CHUNK = 16, 1024, 1 << 18
+"""Rows of cells, of the guide, and pixels that a thread does at a time."""
 FEWEST_TO_LEARN, FLAT = 1.0, 0.2
 """Camera paths a pass in a tile that learns; the part of a guide that stays flat."""
 
@@ -63,25 +64,35 @@ class Guide(NamedTuple):
 
 
 def share_samples(
-    image: NDArray[np.float32], width: int, count: float, samples: Float | None = None, drawn: float = 0.0
+    image: Float32,
+    width: int,
+    count: float,
+    samples: Float | None = None,
+    drawn: float = 0.0,
+    threads: int | None = None,
+    cancelled: Cancel | None = None,
 ) -> Float:
     """(pixels,) radiance so far -> camera paths to be expected for each pixel, about `count` in all; into `samples`.
 
     In proportion to a pixel's radiance as its own paths so far know it, `drawn` times `samples`, and before there are
     any as its neighbourhood does. What is beyond one path only lessens the spread within the pixel, and is worth less.
+    Raises Cancelled.
     """
     if samples is None:
         samples = np.zeros(len(image))
     cells = np.zeros((-(-(len(image) // width) // COARSE), -(-width // COARSE)), np.float32)
-    total = sum_cells(image, width, cells)
+    sums = np.zeros(len(cells))
+    map_chunks(partial(sum_cells, image, width, cells, sums), len(cells), CELL_ROWS, threads, cancelled)
+    total = float(sums.sum())
     if total <= 0.0 or count <= 0.0:
         samples[:] = 0.0
         return samples
     about = np.zeros_like(cells)
     for window, share in WINDOWS:
         about += uniform_filter(cells, window, mode="constant") * np.float32(share / COARSE**2)
-    expect(image, width, about, drawn, LEAST * total, samples)
-    scale(samples, pixels_looked_at(samples), count)
+    work = partial(expect, image, width, about, drawn, LEAST * total, samples)
+    map_chunks(work, len(cells), CELL_ROWS, threads, cancelled)
+    scale(samples, pixels_looked_at(samples), count, threads)
     return samples
 
 
@@ -91,50 +102,73 @@ def pixels_looked_at(samples: Float) -> Int:
 
 
 @numba.njit(nogil=True, cache=True)
-def sum_cells(image: NDArray[np.float32], width: int, cells: NDArray[np.float32]) -> float:
-    """Add (pixels,) up in cells of COARSE x COARSE pixels; returns the sum of all."""
-    total = 0.0
-    for row in range(image.shape[0] // width):
+def sum_cells(image: Float32, width: int, cells: Float32, sums: Float, start: int, stop: int) -> None:
+    """Add (pixels,) up in cells of COARSE x COARSE pixels, and the rows start .. stop of these in sums."""
+    for row in range(start * COARSE, min(stop * COARSE, image.shape[0] // width)):
         for column in range(width):
             value = image[row * width + column]
             if value != 0.0:
                 cells[row // COARSE, column // COARSE] += value
-                total += value
-    return total
+                sums[row // COARSE] += value
 
 
 @numba.njit(nogil=True, cache=True)
 def expect(
-    image: NDArray[np.float32], width: int, about: NDArray[np.float32], drawn: float, least: float, samples: Float
+    image: Float32,
+    width: int,
+    about: Float32,
+    drawn: float,
+    least: float,
+    samples: Float,
+    start: int,
+    stop: int,
 ) -> None:
-    """Radiance that is expected of each pixel, by its own and its cell's neighbourhood -> samples (pixels,)."""
-    for row in range(image.shape[0] // width):
+    """Radiance that is expected of each pixel, by its own and its cell's neighbourhood -> samples (pixels,).
+
+    In rows start .. stop of cells.
+    """
+    for row in range(start * COARSE, min(stop * COARSE, image.shape[0] // width)):
         for column in range(width):
             pixel = row * width + column
             near = about[row // COARSE, column // COARSE]
             if near <= least:
-                samples[pixel] = 0.0
+                if samples[pixel] != 0.0:
+                    samples[pixel] = 0.0
                 continue
             known = samples[pixel] * drawn
             samples[pixel] = (known * image[pixel] + DOUBT * near) / (known + DOUBT)
 
 
-@numba.njit(nogil=True, cache=True)
-def scale(samples: Float, looked_at: Int, count: float) -> None:
+def scale(samples: Float, looked_at: Int, count: float, threads: int | None = None) -> None:
     """Scale samples (pixels,) to `count` in all, whereby what exceeds 1 grows more slowly."""
-    total = 0.0
-    for pixel in looked_at:
-        total += samples[pixel]
-    factor = count / total
+    sums = np.zeros(-(-len(looked_at) // PIXELS_A_CHUNK))
+
+    def total(factor: float) -> float:
+        map_chunks(partial(sum_scaled, samples, looked_at, factor, sums), len(looked_at), PIXELS_A_CHUNK, threads)
+        return float(sums.sum())
+
+    factor = count / total(0.0)
     for _ in range(3):
-        total = 0.0
-        for pixel in looked_at:
-            value = factor * samples[pixel]
-            total += value if value < 1.0 else 1.0 + WITHIN * (value - 1.0)
-        factor *= count / total
-    for pixel in looked_at:
-        value = factor * samples[pixel]
-        samples[pixel] = min(value if value < 1.0 else 1.0 + WITHIN * (value - 1.0), MOST_SAMPLES)
+        factor *= count / total(factor)
+    map_chunks(partial(set_scaled, samples, looked_at, factor), len(looked_at), PIXELS_A_CHUNK, threads)
+
+
+@numba.njit(nogil=True, cache=True)
+def sum_scaled(samples: Float, looked_at: Int, factor: float, sums: Float, start: int, stop: int) -> None:
+    """The sum over looked_at[start .. stop], scaled, or as it is where the factor is 0, into the chunk's place."""
+    total = 0.0
+    for i in range(start, stop):
+        value = samples[looked_at[i]] * (factor if factor > 0.0 else 1.0)
+        total += value if value < 1.0 or factor == 0.0 else 1.0 + WITHIN * (value - 1.0)
+    sums[start // PIXELS_A_CHUNK] = total
+
+
+@numba.njit(nogil=True, cache=True)
+def set_scaled(samples: Float, looked_at: Int, factor: float, start: int, stop: int) -> None:
+    """Scale the pixels looked_at[start .. stop]."""
+    for i in range(start, stop):
+        value = factor * samples[looked_at[i]]
+        samples[looked_at[i]] = min(value if value < 1.0 else 1.0 + WITHIN * (value - 1.0), MOST_SAMPLES)
 
 
 def any_clear(surface: Surface) -> bool:
