@@ -126,22 +126,9 @@ def rough_dielectric(
 
     Refraction carries no (eta_o / eta_i)^2: what is transported is power, as both kinds of path here need it.
     """
-    # index beyond the boundary, as seen from o's side, over that before it
-    eta = index if oz > 0.0 else 1.0 / index
-    if oz < 0.0:
-        oz, iz = -oz, -iz
-    if iz > 0.0:
-        hx, hy, hz = ox + ix, oy + iy, oz + iz
-    else:
-        hx, hy, hz = ox + eta * ix, oy + eta * iy, oz + eta * iz
-    length = math.sqrt(hx * hx + hy * hy + hz * hz)
-    if length == 0.0:
-        return 0.0
-    if hz < 0.0:
-        length = -length
-    hx, hy, hz = hx / length, hy / length, hz / length
+    eta, oz, iz, hx, hy, hz = facet_between(index, ox, oy, oz, ix, iy, iz)
     oh, ih = ox * hx + oy * hy + oz * hz, ix * hx + iy * hy + iz * hz
-    if oh * oz <= 0.0 or ih * iz <= 0.0:
+    if oh <= 0.0 or ih * iz <= 0.0:
         return 0.0
     reflected, _ = dielectric(oh, eta)
     d = density(hx, hy, hz, ax, ay)
@@ -151,6 +138,27 @@ def rough_dielectric(
     jacobian = (oh + eta * ih) ** 2
     masking = 1.0 / ((1.0 + shadow_o) * (1.0 + shadow_i))
     return (1.0 - reflected) * d * masking * eta * eta * abs(oh * ih) / (oz * abs(iz) * jacobian)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def facet_between(
+    index: float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
+) -> tuple[float, float, float, float, float, float]:
+    """The boundary's facet that turns light between o and i, seen from o's side.
+
+    Returns the index beyond it over that before, oz and iz turned so that oz > 0, and its normal, 0 if there is none.
+    """
+    eta = index if oz > 0.0 else 1.0 / index
+    if oz < 0.0:
+        oz, iz = -oz, -iz
+    bent = 1.0 if iz > 0.0 else eta
+    hx, hy, hz = ox + bent * ix, oy + bent * iy, oz + bent * iz
+    length = math.sqrt(hx * hx + hy * hy + hz * hz)
+    if length == 0.0:
+        return eta, oz, iz, 0.0, 0.0, 0.0
+    if hz < 0.0:
+        length = -length
+    return eta, oz, iz, hx / length, hy / length, hz / length
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -177,19 +185,7 @@ def sampled(
     if oz == 0.0 or iz == 0.0 or mirrors(kind, ax, ay):
         return 0.0
     if kind in (DIELECTRIC, SUBSURFACE):
-        eta = index if oz > 0.0 else 1.0 / index
-        if oz < 0.0:
-            oz, iz = -oz, -iz
-        if iz > 0.0:
-            hx, hy, hz = ox + ix, oy + iy, oz + iz
-        else:
-            hx, hy, hz = ox + eta * ix, oy + eta * iy, oz + eta * iz
-        length = math.sqrt(hx * hx + hy * hy + hz * hz)
-        if length == 0.0:
-            return 0.0
-        if hz < 0.0:
-            length = -length
-        hx, hy, hz = hx / length, hy / length, hz / length
+        eta, oz, iz, hx, hy, hz = facet_between(index, ox, oy, oz, ix, iy, iz)
         oh, ih = ox * hx + oy * hy + oz * hz, ix * hx + iy * hy + iz * hz
         if oh <= 0.0 or ih * iz <= 0.0:
             return 0.0

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from render.beam import irradiance
 from render.distortion import tilt_matrix
 from render.emission import Fan, emitted_density
-from render.joints import BLOCK, JOINS, Joints, Take, adjoint, cast
+from render.joints import BLOCK, JOINS, Joints, Take, cast
 from render.lens import lens_point, lens_position, lens_project
 from render.random import uniform
 from render.surface import View
@@ -38,6 +38,7 @@ from render.vertex import (
     PIXEL,
     POWER,
     REFLECTANCE,
+    adjoint,
     chance,
     local,
     mirror_at,
@@ -76,10 +77,9 @@ def join_camera(
         if view.lens[0] > 0.0:
             number = int(state[r, NUMBER])
             a, b = lens_point(view.lens[0], uniform(seed, number, depth, 8), uniform(seed, number, depth, 9))
-        x, y, area = lens_project(view, tilt, distorted, v[0], v[1], v[2], a, b)
-        if not (area > 0.0 and -0.5 <= x < view.width - 0.5 and -0.5 <= y < height - 0.5):
+        pixel, area = pixel_of(view, tilt, distorted, height, v, a, b)
+        if pixel < 0:
             continue
-        pixel = int(math.floor(y + 0.5)) * view.width + int(math.floor(x + 0.5))
         c0, c1, c2 = lens_position(view, a, b)
         e0, e1, e2 = c0 - v[0], c1 - v[1], c2 - v[2]
         far = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
@@ -118,13 +118,21 @@ def hint_at(
     distorted = bool(np.any(view.distortion))
     for r in range(vertex.shape[0]):
         v = vertex[r]
-        x, y, area = lens_project(view, tilt, distorted, v[0], v[1], v[2], 0.0, 0.0)
-        if not (area > 0.0 and -0.5 <= x < view.width - 0.5 and -0.5 <= y < height - 0.5):
+        pixel, area = pixel_of(view, tilt, distorted, height, v, 0.0, 0.0)
+        if pixel < 0:
             continue
-        pixel = int(math.floor(y + 0.5)) * view.width + int(math.floor(x + 0.5))
         if clear[pixel]:
             take.touched[pixel // BLOCK] = True
             take.helped[pixel] += state[r, POWER] * v[REFLECTANCE] * area / (math.pi * light_paths)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def pixel_of(view: View, tilt: Float, distorted: bool, height: int, v: Float, a: float, b: float) -> tuple[int, float]:
+    """The pixel that sees a vertex through lens point (a, b), -1 if none, and `lens_project`'s area."""
+    x, y, area = lens_project(view, tilt, distorted, v[0], v[1], v[2], a, b)
+    if not (area > 0.0 and -0.5 <= x < view.width - 0.5 and -0.5 <= y < height - 0.5):
+        return -1, 0.0
+    return int(math.floor(y + 0.5)) * view.width + int(math.floor(x + 0.5)), area
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

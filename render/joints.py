@@ -9,8 +9,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.vertex import BACK
-
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
@@ -101,25 +99,6 @@ def cast(
         joints.origin[j, axis] = v[axis] - centre[axis] + side * v[3 + axis]
     joints.direction[j, 0], joints.direction[j, 1], joints.direction[j, 2] = d0, d1, d2
     joints.far[j] = far
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def adjoint(v: Float) -> float:
-    """What a shading normal changes for light that leaves by a direction (Veach 1997, eq. 5.20), cosines included.
-
-    The factor on  f |cos with the geometric normal|  for light; 1 where both normals agree.
-    """
-    z0, z1, z2, x0, x1, x2 = v[6], v[7], v[8], v[9], v[10], v[11]
-    if z0 == v[3] and z1 == v[4] and z2 == v[5]:
-        return 1.0
-    y0, y1, y2 = z1 * x2 - z2 * x1, z2 * x0 - z0 * x2, z0 * x1 - z1 * x0
-    o0, o1, o2 = v[BACK], v[BACK + 1], v[BACK + 2]
-    back = (
-        v[3] * (x0 * o0 + y0 * o1 + z0 * o2)
-        + v[4] * (x1 * o0 + y1 * o1 + z1 * o2)
-        + v[5] * (x2 * o0 + y2 * o1 + z2 * o2)
-    )
-    return abs(o2 / back)
 
 
 @numba.njit(nogil=True, cache=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from render.bsdf import SUBSURFACE
 from render.guide import BINS, TILE, Guide
-from render.joints import Joints, Lit, adjoint
+from render.joints import Joints, Lit
 from render.random import uniform
 from render.vertex import (
     BACK,
@@ -22,6 +22,7 @@ from render.vertex import (
     PART,
     PIXEL,
     POWER,
+    adjoint,
     chance,
     local,
     mirror_at,
