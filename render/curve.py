@@ -311,7 +311,7 @@ def visible(
     clear = np.empty(len(points), dtype=np.bool_)
 
     def work(start: int, stop: int) -> None:
-        clear[start:stop] = ~rays.occluded(origins[start:stop], directions[start:stop], far[start:stop])
+        clear[start:stop] = ~rays.occluded(origins[start:stop], directions[start:stop], far[start:stop], coherent=True)
 
     map_chunks(work, len(points), CHUNK // 4, threads)
     return clear

@@ -9,15 +9,17 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import embreex.rtcore_scene
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
+
+from render.packets import Packets, intersect_packets, occluded_packets
 
 Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
@@ -28,6 +30,12 @@ WHOLE = 1 << 16
 """Triangles that it is given at once otherwise: below, nobody sees the pause."""
 CHUNK = 1 << 16
 """Rays a call: long enough to hide Python's share, short enough to share work and to cancel."""
+
+
+FAR = 1e37
+"""How far rays go that have no end, as embreex has it."""
+_VERSION, _NATIVE = 0, {4: 32, 8: 33, 16: 34}
+"""RTC_DEVICE_PROPERTY_VERSION, and RTC_DEVICE_PROPERTY_NATIVE_RAY4_SUPPORTED and so on."""
 
 
 class RayScene:
@@ -50,7 +58,7 @@ class RayScene:
         in_pieces = gently or len(triangles) > WHOLE
         pieces = range(0, len(triangles), PIECE if in_pieces else max(len(triangles), 1))
         self._meshes = [self._add(shifted, triangles, start, len(pieces) == 1, pieces.step) for start in pieces]
-        self._starts = np.array(pieces, dtype=np.int32)
+        self._starts = np.array([*pieces, 0], dtype=np.int32)
         self._lock = threading.Lock()
         self.seconds = 0.0
         self.rays = 0
@@ -58,28 +66,56 @@ class RayScene:
         # commits it where that could not: must happen before any thread traces
         self._scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
 
-    def intersect(self, origins: Float32, directions: Float32, far: Float32 | None = None) -> tuple[Int32, Float32]:
-        """(n, 3) origins (scene-centred), directions, (n,) far (changed in place) -> triangle or -1, distance."""
+    @cached_property
+    def _packets(self) -> Packets | None:
+        return packets_of(self._scene) if packets_work() else None
+
+    def intersect(
+        self, origins: Float32, directions: Float32, far: Float32 | None = None, *, coherent: bool = False
+    ) -> tuple[Int32, Float32]:
+        """(n, 3) origins (scene-centred), directions, (n,) far (changed in place) -> triangle or -1, distance.
+
+        coherent: each ray goes much as those before and after it, and many are traced at once. The same hits.
+        """
         _check(origins, directions, far)
         with self._timed(len(origins)):
+            if coherent and self._packets is not None:
+                return self._intersect_packets(self._packets, origins, directions, far)
             hit = self._scene.run(origins, directions, dists=far, output=True)
-        triangle = hit["primID"]
+        triangle: Int32 = hit["primID"]
         if len(self._meshes) > 1:
-            found = triangle >= 0
-            triangle[found] += self._starts[hit["geomID"][found]]
+            # a miss is -1 in both, and the last of `_starts` is 0
+            triangle += self._starts[hit["geomID"]]
         return triangle, hit["tfar"]
 
     def from_point(self, origin: NDArray[np.float64], directions: Float32) -> Int32:
-        """World origin (3,), (n, 3) directions -> (n,) first triangle or -1."""
+        """World origin (3,), (n, 3) directions, neighbours much alike -> (n,) first triangle or -1."""
         start = (origin - self.centre).astype(np.float32)
-        return self.intersect(np.broadcast_to(start, directions.shape), directions)[0]
+        return self.intersect(np.broadcast_to(start, directions.shape), directions, coherent=True)[0]
 
-    def occluded(self, origins: Float32, directions: Float32, far: Float32) -> NDArray[np.bool_]:
+    def occluded(
+        self, origins: Float32, directions: Float32, far: Float32, *, coherent: bool = False
+    ) -> NDArray[np.bool_]:
         """(n, 3) origins (scene-centred), directions, (n,) far (overwritten) -> (n,) something is hit before far."""
         _check(origins, directions, far)
         with self._timed(len(origins)):
+            if coherent and self._packets is not None:
+                blocked = np.empty(len(origins), np.bool_)
+                occluded_packets(self._packets, origins, directions, far, blocked)
+                return blocked
             hit = self._scene.run(origins, directions, dists=far, query="OCCLUDED")
         return np.asarray(hit == 0)
+
+    def _intersect_packets(
+        self, packets: Packets, origins: Float32, directions: Float32, far: Float32 | None
+    ) -> tuple[Int32, Float32]:
+        triangle = np.empty(len(directions), np.int32)
+        if far is None:
+            far = np.full(len(directions), FAR, np.float32)
+        # of one point; copied, since for what cannot be written to kernels would be compiled again
+        origins = origins[:1].copy() if origins.strides[0] == 0 else np.ascontiguousarray(origins)
+        intersect_packets(packets, origins, np.ascontiguousarray(directions), far, self._starts, triangle)
+        return triangle, far
 
     def _add(self, vertices: Float32, triangles: Int32, start: int, whole: bool, count: int) -> TriangleMesh:
         if whole:
@@ -98,25 +134,52 @@ class RayScene:
 
 
 def commit(scene: EmbreeScene) -> bool:
-    """Build the scene's tree without holding the interpreter, as embreex would; False: embreex has to do it.
-
-    The pointer to embree's scene is where embreex's own `rtcore_scene.pxd` says, against which other extensions are
-    compiled: first in the object, then `is_committed`. That this is so is tried out before it is believed.
-    """
-    first = object.__basicsize__
-    if type(scene).__basicsize__ != first + ctypes.sizeof(_SceneFields):
+    """Build the scene's tree without holding the interpreter, as embreex would; False: embreex has to do it."""
+    fields, build = _fields_of(scene), _library()
+    if fields is None or build is None or not fields.scene:
         return False
-    fields = _SceneFields.from_address(id(scene) + first)
-    for value in (1, 0):
-        scene.is_committed = value
-        if fields.is_committed != value:
-            return False
-    build = _rtc_commit_scene()
-    if build is None or not fields.scene:
-        return False
-    build(fields.scene)
+    build.rtcCommitScene(fields.scene)
     scene.is_committed = 1
     return True
+
+
+@lru_cache(maxsize=1)
+def packets_work() -> bool:
+    """Embree's functions for many rays find what embreex finds: tried out once, on three triangles."""
+    scene = EmbreeScene(robust=True)
+    corners = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [0, 0, 2], [2, 0, 2], [0, 2, 2]], np.float32)
+    meshes = [TriangleMesh(scene, corners, np.array(some, np.int32)) for some in ([[0, 1, 2]], [[1, 2, 0], [3, 4, 5]])]
+    towards = np.array([[x, y, 1.0] for x in np.linspace(-0.1, 1.0, 7) for y in np.linspace(-0.1, 1.0, 5)], np.float32)
+    origins, far = np.zeros_like(towards), np.full(len(towards), 1.5, np.float32)
+    hit = scene.run(origins, towards, output=True)
+    shadow = scene.run(origins, towards, dists=far.copy(), query="OCCLUDED") == 0
+    packets = packets_of(scene)
+    if packets is None or not meshes:
+        return False
+    triangle, blocked = np.empty(len(towards), np.int32), np.empty(len(towards), np.bool_)
+    distance = np.full(len(towards), FAR, np.float32)
+    intersect_packets(packets, origins, towards, distance, np.zeros(3, np.int32), triangle)
+    occluded_packets(packets, origins, towards, far, blocked)
+    return (
+        bool(np.array_equal(triangle >= 0, hit["primID"] >= 0))
+        and bool(np.allclose(distance, hit["tfar"]))
+        and bool(np.array_equal(blocked, shadow))
+    )
+
+
+def packets_of(scene: EmbreeScene, widths: tuple[int, ...] = (16, 8, 4)) -> Packets | None:
+    """Embree's functions for as many rays as the processor does at once, for a committed scene; None: not to be had."""
+    fields, library = _fields_of(scene), _library()
+    if fields is None or library is None or not fields.scene:
+        return None
+    device = library.rtcGetSceneDevice(fields.scene)
+    version = library.rtcGetDeviceProperty(device, _VERSION)
+    native = [width for width in widths if library.rtcGetDeviceProperty(device, _NATIVE[width]) > 0]
+    library.rtcReleaseDevice(device)
+    if version // 10000 != 4 or not native:
+        return None
+    functions = (getattr(library, f"{name}{native[0]}") for name in ("rtcIntersect", "rtcOccluded"))
+    return Packets(native[0], fields.scene, *(ctypes.cast(one, ctypes.c_void_p).value or 0 for one in functions))
 
 
 class _SceneFields(ctypes.Structure):
@@ -125,14 +188,37 @@ class _SceneFields(ctypes.Structure):
     _fields_ = (("scene", ctypes.c_void_p), ("is_committed", ctypes.c_int), ("device", ctypes.c_void_p))
 
 
+def _fields_of(scene: EmbreeScene) -> _SceneFields | None:
+    """What is in the object, or None if it is not as expected.
+
+    The pointer to embree's scene is where embreex's own `rtcore_scene.pxd` says, against which other extensions are
+    compiled: first in the object, then `is_committed`. That this is so is tried out before it is believed.
+    """
+    first = object.__basicsize__
+    if type(scene).__basicsize__ != first + ctypes.sizeof(_SceneFields):
+        return None
+    fields, before = _SceneFields.from_address(id(scene) + first), scene.is_committed
+    for value in (1 - before, before):
+        scene.is_committed = value
+        if fields.is_committed != value:
+            return None
+    return fields
+
+
 @lru_cache(maxsize=1)
-def _rtc_commit_scene() -> Callable[[int], None] | None:
-    """Embree's own function, from the library that embreex is linked with; ctypes lets the interpreter go meanwhile."""
+def _library() -> ctypes.CDLL | None:
+    """Embree itself, the library that embreex is linked with; ctypes lets the interpreter go while it works."""
     try:
-        found = ctypes.CDLL(embreex.rtcore_scene.__file__).rtcCommitScene
+        found = ctypes.CDLL(embreex.rtcore_scene.__file__)
+        for name, result, arguments in (
+            ("rtcCommitScene", None, [ctypes.c_void_p]),
+            ("rtcGetSceneDevice", ctypes.c_void_p, [ctypes.c_void_p]),
+            ("rtcReleaseDevice", None, [ctypes.c_void_p]),
+            ("rtcGetDeviceProperty", ctypes.c_ssize_t, [ctypes.c_void_p, ctypes.c_int]),
+        ):
+            getattr(found, name).restype, getattr(found, name).argtypes = result, arguments
     except (OSError, AttributeError):
         return None
-    found.argtypes, found.restype = [ctypes.c_void_p], None
     return found
 
 

@@ -191,7 +191,7 @@ def _trace(views: list[_View], normalised: Float, far: Float32, triangle: Int, o
             continue
         rays = view.item.body.rays
         origin = np.broadcast_to((view.T_object_camera[:3, 3] - rays.centre).astype(np.float32), (len(some), 3))
-        hit, distance = rays.intersect(origin, view.directions(normalised[some]), far[some])
+        hit, distance = rays.intersect(origin, view.directions(normalised[some]), far[some], coherent=True)
         found = np.flatnonzero(hit >= 0)
         chosen = some[found]
         far[chosen], triangle[chosen], owner[chosen] = distance[found], hit[found], k

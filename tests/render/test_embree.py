@@ -48,7 +48,7 @@ def test_the_tree_is_built_without_the_interpreter_and_by_embreex_where_that_can
     assert scene.run(origin, towards).tolist() == [0, -1]
     del mesh
 
-    monkeypatch.setattr(embree, "_rtc_commit_scene", lambda: None)
+    monkeypatch.setattr(embree, "_library", lambda: None)
     assert not commit(EmbreeScene(robust=True))
     scene = ball()
     assert (scene.intersect(np.zeros((8, 3), np.float32), np.ones((8, 3), np.float32))[0] >= 0).all()
@@ -91,3 +91,51 @@ def test_cancelling_stops_between_chunks_and_errors_come_through(threads):
 
     with pytest.raises(KeyError):
         map_chunks(fails, 100, 10, threads)
+
+
+def many(count, seed=3):
+    """Rays of which neighbours go much the same way, some of them nowhere."""
+    random = np.random.default_rng(seed)
+    u, v = np.meshgrid(np.linspace(-0.6, 0.6, count), np.linspace(-0.6, 0.6, count))
+    directions = np.stack([u, v, np.ones_like(u)], axis=-1).reshape(-1, 3).astype(np.float32)
+    directions += random.normal(scale=1e-3, size=directions.shape).astype(np.float32)
+    directions[random.random(len(directions)) < 0.05] = 0.0
+    return np.tile(np.float32((0.01, -0.02, -0.3)), (len(directions), 1)), directions
+
+
+@pytest.mark.parametrize("width", (4, 8, 16))
+def test_many_rays_at_a_time_hit_what_each_hits_alone(monkeypatch, width):
+    # in pieces: several meshes
+    mesh = primitive_mesh(Sphere(radius=0.1, segments=256))
+    scene = RayScene(mesh.vertices, np.random.default_rng(1).permutation(mesh.triangles), gently=True)
+    packets = embree.packets_of(scene._scene, (width,))
+    assert embree.packets_work() and packets is not None and packets.width == width
+    monkeypatch.setattr(scene, "_packets", packets)
+    origins, directions = many(101)
+    alone, together = scene.intersect(origins, directions), scene.intersect(origins, directions, coherent=True)
+    assert np.count_nonzero(alone[0] >= 0) > 2000 and np.count_nonzero(alone[0] < 0) > 2000
+    assert ((alone[0] >= 0) == (together[0] >= 0)).all()
+    assert np.mean(alone[0] == together[0]) > 0.999  # a ray through an edge may name either side
+    np.testing.assert_allclose(together[1], alone[1], rtol=1e-5)
+    assert np.array_equal(scene.from_point(scene.centre + origins[0].astype(float), directions), together[0])
+
+    # a limit short of the near side, between the sides, beyond
+    far = np.random.default_rng(2).choice(np.float32((0.1, 0.25, 0.5)), len(directions))
+    blocked = scene.occluded(origins, directions, far.copy())
+    assert np.array_equal(scene.occluded(origins, directions, far.copy(), coherent=True), blocked)
+    assert 1000 < np.count_nonzero(blocked) < 2000
+    hit, distance = scene.intersect(origins, directions, far.copy(), coherent=True)
+    assert np.array_equal(hit >= 0, blocked) and np.array_equal(distance[hit < 0], far[hit < 0])
+
+
+def test_without_embrees_own_functions_each_ray_is_traced_alone(monkeypatch):
+    origins, directions = many(40)
+    together = ball().intersect(origins, directions, coherent=True)
+    monkeypatch.setattr(embree, "packets_work", lambda: False)
+    scene = ball()
+    assert scene._packets is None
+    alone = scene.intersect(origins, directions, coherent=True)
+    assert np.array_equal(alone[0], together[0]) and np.allclose(alone[1], together[1], rtol=1e-6)
+    monkeypatch.undo()
+    monkeypatch.setattr(embree, "_library", lambda: None)
+    assert embree.packets_of(scene._scene) is None
