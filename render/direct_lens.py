@@ -82,18 +82,3 @@ def gather_aperture(
         # beside an edge the picture may be far from the truth: a radiance stays one
         if corrected > 0.0:
             mean[i] = corrected
-
-
-def worst_enough(error: Float, allowed: float) -> NDArray[np.bool_]:
-    """The fewest pixels of standard errors (n,) whose refinement brings the sum of all variances below `allowed`.
-
-    Through an aperture a finer level costs four times as much where noise, not edges, decides, and is seldom needed
-    everywhere.
-    """
-    variance = error**2
-    order = np.argsort(variance)[::-1]
-    gained = np.cumsum(variance[order]) * (1.0 - 4.0**-1.125)
-    needed = int(np.searchsorted(gained, float(np.sum(variance)) - allowed)) + 1
-    chosen = np.zeros(len(error), dtype=np.bool_)
-    chosen[order[:needed]] = True
-    return chosen

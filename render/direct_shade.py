@@ -97,10 +97,11 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
         directions: Float32,
         far: Float32,
         sample: Int,
-    ) -> int:
+    ) -> tuple[int, int]:
         """Unoccluded radiance of each ray's cell and whole pixel -> values (n, 2), and the shadow rays that decide.
 
-        Returns how many shadow rays were written; `sample` says whose each is. With an aperture, lens (n, 2) are the
+        Returns how many shadow rays were written; `sample` says whose each is; and how many rays were left out since
+        their radiance is no number, infinite or negative. With an aperture, lens (n, 2) are the
         rays' points of it, and planes (n, 5) take q in the middle of the pixel and its change with u, v, a and b;
         without one planes (n, 4), unless empty, take what `render.first_look` needs.
         """
@@ -111,7 +112,7 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
         o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
         emitter, _ = sheet_sigma(0.0, beam)
         to_light, to_camera, point, normal, rgb = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-        count = 0
+        count = dropped = 0
         half = 0.5 / cells
         looking = not aperture and planes.shape[0] > 0
         for r in range(triangle.shape[0]):
@@ -221,7 +222,9 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
                 point[0], point[1], point[2] = p0, p1, p2
                 normal[0], normal[1], normal[2] = side * n0, side * n1, side * n2
                 radiance = power * scattered(surface, t, point, normal, to_camera, to_light, weights)
-            if radiance <= 0.0:
+            light = radiance * (in_cell + in_pixel)
+            if not 0.0 < light < np.inf:
+                dropped += light != 0.0
                 continue
             values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
             if looking:
@@ -234,7 +237,7 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
             far[count] = distance
             sample[count] = r
             count += 1
-        return count
+        return count, dropped
 
     return shade
 
@@ -245,27 +248,45 @@ shade_diffuse_lens, shade_glossy_lens = _shade_kernel(False, True), _shade_kerne
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def gather(
-    values: Float, occluded: NDArray[np.bool_], sample: Int, count: int, cells: int, mean: Float, error: Float
+    values: Float,
+    occluded: NDArray[np.bool_],
+    sample: Int,
+    count: int,
+    cells: int,
+    mean: Float,
+    error: Float,
+    jump: Float,
 ) -> None:
-    """Sum the visible cells of each pixel -> mean (n,), and the standard error that the predictions' spread implies."""
+    """Sum the visible cells of each pixel -> mean (n,), the standard error that the predictions' spread implies, and
+    the range of these predictions.
+    """
     for j in range(count):
         if occluded[j]:
             values[sample[j], 0] = values[sample[j], 1] = 0.0
     n = cells * cells
     for i in range(mean.shape[0]):
         total = first = second = 0.0
-        for cell in range(n):
-            total += values[i * n + cell, 0]
-            first += values[i * n + cell, 1]
-            second += values[i * n + cell, 1] ** 2
-        mean[i] = total / n
-        # jittered sampling of an edge or a slope: the variance falls with the 3/2 power of the number of cells
+        low, high = np.inf, 0.0
+        for r in range(i * n, i * n + n):
+            total += values[r, 0]
+            first += values[r, 1]
+            second += values[r, 1] ** 2
+            low, high = min(low, values[r, 1]), max(high, values[r, 1])
+        mean[i], jump[i] = total / n, high - low
         spread = max(second / n - (first / n) ** 2, 0.0) * n / (n - 1)
+        # an edge that cuts off a corner of area p crosses the cells of a length of 2 sqrt(p), of a variance of 1/6 each
+        spread = max(spread, jump[i] * math.sqrt(spread) / 3.0)
+        # jittered sampling of an edge or a slope: the variance falls with the 3/2 power of the number of cells
         error[i] = math.sqrt(spread) / n**0.75
 
 
 @numba.njit(nogil=True, cache=True)
-def place(pixels: Int, mean: Float, image: Float32) -> None:
-    """Write each pixel's radiance (n,) into the flat image: here, since the first touch of its memory is not free."""
+def place(pixels: Int, mean: Float, image: Float32) -> int:
+    """Write each pixel's radiance (n,) into the flat image, 0 where it is none; returns in how many it is none."""
+    dropped = 0
     for i in range(pixels.shape[0]):
-        image[pixels[i]] = mean[i]
+        if 0.0 <= mean[i] < np.inf:
+            image[pixels[i]] = mean[i]
+        else:
+            dropped += 1
+    return dropped

@@ -244,6 +244,7 @@ def _lasers(
         counts[f"relative error, {laser.name}"] = image.error
         counts[f"lit pixels, {laser.name}"] = image.pixels
         counts[f"samples, {laser.name}"] = image.samples
+        counts[f"dropped contributions of direct light, {laser.name}"] = image.dropped
     return tuple(images), counts
 
 

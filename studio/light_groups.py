@@ -19,7 +19,9 @@ def group_lines(frame: Frame, scene: Scene, settings: RenderSettings) -> list[tu
     for i, laser in enumerate(scene.lasers):
         error = frame.counts.get(f"relative error, {laser.name}")
         if error is not None:
-            found.append((LASER, f"{laser.name}, direct", f"error {error:.2%}, target {settings.laser_error:.2%}"))
+            parts = [f"error {error:.2%}, target {settings.laser_error:.2%}"]
+            parts += _left_out(frame.counts.get(f"dropped contributions of direct light, {laser.name}"))
+            found.append((LASER, f"{laser.name}, direct", ", ".join(parts)))
         text = _reflected(frame, laser, i, settings)
         if text:
             found.append((REFLECTED, f"{laser.name}, reflected on", text))
@@ -61,9 +63,7 @@ def _reflected(frame: Frame, laser: LineLaser, index: int, settings: RenderSetti
     clamped = frame.counts.get(f"clamped contributions, {laser.name}")
     if clamped is not None:
         parts.append(f"clamped {clamped:.0f} times (biased)")
-    dropped = frame.counts.get(f"dropped contributions, {laser.name}")
-    if dropped:
-        parts.append(f"{dropped:.0f} contributions were no number, and were left out")
+    parts += _left_out(frame.counts.get(f"dropped contributions, {laser.name}"))
     return ", ".join(parts)
 
 
@@ -74,6 +74,9 @@ def _ambient(frame: Frame, settings: RenderSettings) -> str:
     parts.append(f"{counts.get(AMBIENT_SAMPLES, 0.0):.0f} of {settings.ambient_samples} samples")
     if CLAMPED_SAMPLES in counts:
         parts.append(f"clamped {counts[CLAMPED_SAMPLES]:.0f} contributions (biased)")
-    if counts.get(DROPPED_SAMPLES):
-        parts.append(f"{counts[DROPPED_SAMPLES]:.0f} contributions were no number, and were left out")
+    parts += _left_out(counts.get(DROPPED_SAMPLES))
     return ", ".join(parts)
+
+
+def _left_out(dropped: float | None) -> list[str]:
+    return [f"{dropped:.0f} contributions were no number, and were left out"] if dropped else []

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,6 +7,7 @@ import pytest
 from render.beam import irradiance_at
 from render.curve import laser_curve
 from render.direct import direct_image
+from render.direct_shade import place
 from render.footprint import reachable_pixels
 from render.laser import Waist
 from render.material import Lambertian
@@ -154,3 +156,29 @@ def test_albedo_scales_the_line_and_follows_the_wavelength():
     assert image(0.9, 450.0) == pytest.approx(image(0.3, 450.0) * 3, rel=1e-5)
     assert image((0.9, 0.2, 0.1), 650.0) == pytest.approx(image(0.9, 650.0), rel=1e-6)
     assert image((0.9, 0.2, 0.1), 450.0) == pytest.approx(image(0.1, 450.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("bad", (math.nan, math.inf, -1.0))
+def test_what_is_no_radiance_is_left_out_and_counted(bad):
+    _, parts = setting([plane_mesh((0.2, 0, 1), 0.9)])
+    good = direct_image(*parts)
+    assert good.dropped == 0
+    # texels that no file could hold, in a tenth of the wall
+    mesh = plane_mesh((0.2, 0, 1), 0.9)
+    texture = np.full((10, 10, 3), 0.5, np.float32)
+    texture[5] = bad
+    textured = replace(
+        parts[0],
+        uv=5.0 * mesh.vertices[mesh.triangles][:, :, :2].astype(np.float32),
+        textures=texture.ravel(),
+        texture_shape=np.array([[0, 10, 10]], np.int32),
+    )
+    image = direct_image(textured, *parts[1:])
+    assert image.dropped > 0 and math.isfinite(image.error)
+    assert np.isfinite(image.radiance).all() and image.radiance.min() >= 0.0
+    lit = good.radiance > 0.1 * good.radiance.max()
+    kept = image.radiance[lit] > 0.0
+    assert 0.5 < np.mean(kept) < 0.95
+    mean, pixels = np.array([bad, 2.0]), np.array([1, 2], np.int32)
+    flat = np.zeros(4, np.float32)
+    assert place(pixels, mean, flat) == 1 and flat.tolist() == [0.0, 0.0, 2.0, 0.0]

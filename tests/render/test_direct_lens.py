@@ -8,7 +8,6 @@ from render.beam import irradiance_at
 from render.camera import Lens
 from render.curve import laser_curve
 from render.direct import direct_image
-from render.direct_lens import worst_enough
 from render.footprint import reachable_pixels
 from render.laser import Divergence
 from render.material import Conductor
@@ -177,11 +176,3 @@ def test_a_closed_aperture_is_a_pinhole_on_metal_too():
         images.append(direct_image(world, *parts[1:], target=1e-3).radiance)
     assert images[0].max() > 0
     assert np.abs(images[1] - images[0]).max() < 2e-3 * images[0].max()
-
-
-def test_only_as_many_pixels_are_refined_as_the_target_needs():
-    error = np.array([3.0, 0.1, 2.0, 1.0, 0.1])
-    left = 4.0**-1.125
-    assert worst_enough(error, 9.0 * left + 5.05).tolist() == [True, False, False, False, False]
-    assert worst_enough(error, 13.0 * left + 1.05).tolist() == [True, False, True, False, False]
-    assert worst_enough(error, 0.0).all()
