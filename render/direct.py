@@ -3,8 +3,8 @@
 A pixel is seen by one ray first (`render.first_look`). Where that is not enough (edges, shadows, strong curvature,
 texture) it is divided into n x n cells with one jittered ray each (`render.direct_shade`). Each ray also predicts its
 whole pixel; the spread of these predictions is the error estimate, from which `render.division` tells how many cells
-each pixel needs for the image's error to be below the target, until it is. Through a thin lens each ray has its own point of the aperture, and
-`render.direct_lens` takes the noise of that away.
+each pixel needs for the image's error to be below the target, until it is. Through a thin lens each ray has its own
+point of the aperture, and `render.direct_lens` takes the noise of that away.
 """
 
 from __future__ import annotations

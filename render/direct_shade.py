@@ -194,8 +194,10 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
                 in_pixel = about_over_aperture(middle, qu * 0.5, qv * 0.5, view.lens[0] * math.hypot(qa, qb))
                 planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3], planes[r, 4] = middle, qu, qv, qa, qb
             else:
-                in_pixel = about_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
-                if looking:
+                if not looking:
+                    in_pixel = about_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
+                else:
+                    in_pixel = in_cell
                     planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3] = q, qu, qv, 0.0
             if in_cell == 0.0 and in_pixel == 0.0:
                 continue

@@ -1,10 +1,10 @@
-"""Work in chunks on a thread pool. Results never depend on the number of threads: a chunk writes its own slice."""
+"""Work in chunks on threads. Results never depend on the number of threads: a chunk writes its own slice."""
 
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
 
 from render.errors import Cancelled
 
@@ -27,28 +27,47 @@ def map_chunks(
     cancelled: Cancel | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Call work(start, stop) over range(count) in chunks. Raises Cancelled between chunks; progress gets 0..1."""
+    """Call work(start, stop) over range(count) in chunks. Raises Cancelled between chunks; progress gets 0..1.
+
+    The calling thread works as well, and alone it tells progress: a pool that it waits for would cost a short call more
+    than its work.
+    """
     starts = range(0, count, chunk)
-    workers = min(thread_count(threads), len(starts))
+    lock, left = threading.Lock(), iter(starts)
+    done = 0
+    failed: list[BaseException] = []
 
-    def one(start: int) -> None:
-        if cancelled is not None and cancelled():
-            raise Cancelled
-        work(start, min(start + chunk, count))
+    def some(told: Progress | None) -> None:
+        nonlocal done
+        while True:
+            with lock:
+                start = None if failed else next(left, None)
+            if start is None:
+                return
+            if cancelled is not None and cancelled():
+                raise Cancelled
+            work(start, min(start + chunk, count))
+            with lock:
+                done += 1
+            if told is not None:
+                told(done / len(starts))
 
-    if workers <= 1:
-        for done, start in enumerate(starts, 1):
-            one(start)
-            if progress is not None:
-                progress(done / len(starts))
-        return
-    with ThreadPoolExecutor(workers) as pool:
-        futures = [pool.submit(one, start) for start in starts]
+    def helper() -> None:
         try:
-            for done, future in enumerate(as_completed(futures), 1):
-                future.result()
-                if progress is not None:
-                    progress(done / len(starts))
-        except BaseException:
-            pool.shutdown(wait=True, cancel_futures=True)
-            raise
+            some(None)
+        except BaseException as error:
+            failed.append(error)
+
+    helpers = [threading.Thread(target=helper) for _ in range(min(thread_count(threads), len(starts)) - 1)]
+    for thread in helpers:
+        thread.start()
+    try:
+        some(progress)
+    except BaseException as error:
+        failed.append(error)
+    for thread in helpers:
+        thread.join()
+    if failed:
+        raise failed[0]
+    if helpers and progress is not None:
+        progress(1.0)
