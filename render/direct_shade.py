@@ -113,6 +113,8 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
         emitter, _ = sheet_sigma(0.0, beam)
         to_light, to_camera, point, normal, rgb = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
         count = dropped = 0
+        facet = -1
+        a0 = a1 = a2 = n0 = n1 = n2 = area = height_laser = 0.0
         half = 0.5 / cells
         looking = not aperture and planes.shape[0] > 0
         for r in range(triangle.shape[0]):
@@ -123,19 +125,22 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
             x, y = normalised[r, 0], normalised[r, 1]
             if t < 0 or x != x:
                 continue
-            ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
-            ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
-            ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
-            n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
-            length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-            if length == 0.0:
+            if t != facet:
+                # rays of a pixel mostly meet one triangle
+                facet = t
+                ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+                a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
+                ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
+                ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
+                n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+                area = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+                n0, n1, n2 = n0 / area, n1 / area, n2 / area
+                height_laser = n0 * (laser_centre[0] - a0) + n1 * (laser_centre[1] - a1) + n2 * (laser_centre[2] - a2)
+            if area == 0.0:
                 continue
-            n0, n1, n2 = n0 / length, n1 / length, n2 / length
             if aperture:
                 o0, o1, o2 = lens_position(view, lens[r, 0], lens[r, 1])
             height_camera = n0 * (o0 - a0) + n1 * (o1 - a1) + n2 * (o2 - a2)
-            height_laser = n0 * (laser_centre[0] - a0) + n1 * (laser_centre[1] - a1) + n2 * (laser_centre[2] - a2)
             if not height_camera * height_laser > 0.0:
                 continue
             side = 1.0 if height_camera > 0.0 else -1.0
