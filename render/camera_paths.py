@@ -60,7 +60,9 @@ class CameraPaths:
         while n > 0:
             if cancelled is not None and cancelled():
                 raise Cancelled
-            triangle, distance = rays.intersect(wave.origin[:n], wave.direction[:n])
+            # only rays of neighbouring pixels go much the same way, and those from where they meet a surface to a lamp
+            side_by_side = depth == 0
+            triangle, distance = rays.intersect(wave.origin[:n], wave.direction[:n], coherent=side_by_side)
             if media:
                 self._walk(wave, n, depth, pixels, triangle, distance, cancelled)
             n, asked = shade(
@@ -82,7 +84,9 @@ class CameraPaths:
                 tally,
             )
             if asked:
-                blocked = rays.occluded(shadows.origin[:asked], shadows.direction[:asked], shadows.far[:asked])
+                blocked = rays.occluded(
+                    shadows.origin[:asked], shadows.direction[:asked], shadows.far[:asked], coherent=side_by_side
+                )
                 add_clear(shadows, blocked, self.limit if depth > 0 else np.inf, sums, tally)
             depth += 1
 
