@@ -19,7 +19,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from render.packets import Packets, intersect_packets, occluded_packets
+from render.packets import Packets, buffer, intersect_packets, occluded_packets
 
 Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
@@ -101,7 +101,8 @@ class RayScene:
         with self._timed(len(origins)):
             if coherent and self._packets is not None:
                 blocked = np.empty(len(origins), np.bool_)
-                occluded_packets(self._packets, origins, directions, far, blocked)
+                room = buffer(self._packets.width)
+                occluded_packets(self._packets, room, origins, directions, far, blocked)
                 return blocked
             hit = self._scene.run(origins, directions, dists=far, query="OCCLUDED")
         return np.asarray(hit == 0)
@@ -114,7 +115,8 @@ class RayScene:
             far = np.full(len(directions), FAR, np.float32)
         # of one point; copied, since for what cannot be written to kernels would be compiled again
         origins = origins[:1].copy() if origins.strides[0] == 0 else np.ascontiguousarray(origins)
-        intersect_packets(packets, origins, np.ascontiguousarray(directions), far, self._starts, triangle)
+        room = buffer(packets.width)
+        intersect_packets(packets, room, origins, np.ascontiguousarray(directions), far, self._starts, triangle)
         return triangle, far
 
     def _add(self, vertices: Float32, triangles: Int32, start: int, whole: bool, count: int) -> TriangleMesh:
@@ -158,8 +160,9 @@ def packets_work() -> bool:
         return False
     triangle, blocked = np.empty(len(towards), np.int32), np.empty(len(towards), np.bool_)
     distance = np.full(len(towards), FAR, np.float32)
-    intersect_packets(packets, origins, towards, distance, np.zeros(3, np.int32), triangle)
-    occluded_packets(packets, origins, towards, far, blocked)
+    room = buffer(packets.width)
+    intersect_packets(packets, room, origins, towards, distance, np.zeros(3, np.int32), triangle)
+    occluded_packets(packets, room, origins, towards, far, blocked)
     return (
         bool(np.array_equal(triangle >= 0, hit["primID"] >= 0))
         and bool(np.allclose(distance, hit["tfar"]))

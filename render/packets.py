@@ -47,68 +47,82 @@ def _call(typing: Any, function: Any, valid: Any, scene: Any, rays: Any, argumen
     return types.void(*[types.int64] * 5), generate
 
 
-@numba.njit(nogil=True, cache=True)
-def _aligned(words: int) -> Float32:
-    """So many float32 at a multiple of 64 bytes."""
-    raw = np.zeros(words + 16, np.float32)
+class Buffer(NamedTuple):
+    """Room for one packet, at a multiple of 64 bytes, and which of its rays are some, with both addresses."""
+
+    values: Float32
+    words: NDArray[np.uint32]
+    """The same memory."""
+    valid: Int32
+    values_at: int
+    valid_at: int
+
+
+def buffer(width: int) -> Buffer:
+    """For one call: threads may not share it. Made here, since numba is slow to compile slices."""
+    raw = np.zeros(25 * width + 16, np.float32)
     skip = (-raw.ctypes.data % 64) // 4
-    return raw[skip : skip + words]
+    values, valid = raw[skip : skip + 24 * width], raw[skip + 24 * width : skip + 25 * width].view(np.int32)
+    return Buffer(values, values.view(np.uint32), valid, values.ctypes.data, valid.ctypes.data)
 
 
 @numba.njit(nogil=True, cache=True)
-def _fill(
-    packet: Float32, words: NDArray[np.uint32], valid: Int32, width: int, first: int, origins: Float32, towards: Float32
-) -> int:
+def _fill(to: Buffer, width: int, first: int, origins: Float32, towards: Float32, far: Float32) -> int:
     """Rays from `first` on into a packet; origins (n, 3) or (1, 3). Returns how many."""
     count = min(width, towards.shape[0] - first)
     shared = origins.shape[0] == 1
     for j in range(width):
-        valid[j] = -1 if j < count else 0
+        to.valid[j] = -1 if j < count else 0
         r = first + min(j, count - 1)
         for axis in range(3):
-            packet[axis * width + j] = origins[0 if shared else r, axis]
-            packet[(4 + axis) * width + j] = towards[r, axis]
+            to.values[axis * width + j] = origins[0 if shared else r, axis]
+            to.values[(4 + axis) * width + j] = towards[r, axis]
+        to.values[8 * width + j] = far[r]
         # from where, time, mask, id, flags
-        packet[3 * width + j] = packet[7 * width + j] = 0.0
-        words[9 * width + j] = _NONE
-        words[10 * width + j] = words[11 * width + j] = 0
+        to.values[3 * width + j] = to.values[7 * width + j] = 0.0
+        to.words[9 * width + j] = _NONE
+        to.words[10 * width + j] = to.words[11 * width + j] = 0
     return count
 
 
 @numba.njit(nogil=True, cache=True)
 def intersect_packets(
-    packets: Packets, origins: Float32, directions: Float32, far: Float32, starts: Int32, triangle: Int32
+    packets: Packets,
+    room: Buffer,
+    origins: Float32,
+    directions: Float32,
+    far: Float32,
+    starts: Int32,
+    triangle: Int32,
 ) -> None:
     """First hits of (n,) rays -> triangle (n,), or -1, and far (n,), in place; starts (m,) of each mesh's triangles."""
     width = packets.width
-    packet, valid = _aligned(24 * width), _aligned(width).view(np.int32)
-    words = packet.view(np.uint32)
     for first in range(0, directions.shape[0], width):
-        count = _fill(packet, words, valid, width, first, origins, directions)
+        count = _fill(room, width, first, origins, directions, far)
         for j in range(width):
-            packet[8 * width + j] = far[first + min(j, count - 1)]
-            # Ng, u, v, the triangle, its mesh, its instance
-            words[18 * width + j] = words[19 * width + j] = _NONE
-        _call(packets.intersect, valid.ctypes.data, packets.scene, packet.ctypes.data, packets.arguments)
+            # after Ng, u, v: the triangle, its mesh, its instance
+            room.words[18 * width + j] = room.words[19 * width + j] = _NONE
+        _call(packets.intersect, room.valid_at, packets.scene, room.values_at, packets.arguments)
         for j in range(count):
-            far[first + j] = packet[8 * width + j]
-            mesh = words[18 * width + j]
-            triangle[first + j] = -1 if mesh == _NONE else np.int32(words[17 * width + j]) + starts[np.int64(mesh)]
+            far[first + j] = room.values[8 * width + j]
+            mesh = room.words[18 * width + j]
+            triangle[first + j] = -1 if mesh == _NONE else np.int32(room.words[17 * width + j]) + starts[np.int64(mesh)]
 
 
 @numba.njit(nogil=True, cache=True)
 def occluded_packets(
-    packets: Packets, origins: Float32, directions: Float32, far: Float32, blocked: NDArray[np.bool_]
+    packets: Packets,
+    room: Buffer,
+    origins: Float32,
+    directions: Float32,
+    far: Float32,
+    blocked: NDArray[np.bool_],
 ) -> None:
     """Whether anything is hit before far (n,) -> blocked (n,)."""
     width = packets.width
-    packet, valid = _aligned(12 * width), _aligned(width).view(np.int32)
-    words = packet.view(np.uint32)
     for first in range(0, directions.shape[0], width):
-        count = _fill(packet, words, valid, width, first, origins, directions)
-        for j in range(width):
-            packet[8 * width + j] = far[first + min(j, count - 1)]
-        _call(packets.occluded, valid.ctypes.data, packets.scene, packet.ctypes.data, packets.arguments)
+        count = _fill(room, width, first, origins, directions, far)
+        _call(packets.occluded, room.valid_at, packets.scene, room.values_at, packets.arguments)
         for j in range(count):
             # minus infinity
-            blocked[first + j] = packet[8 * width + j] < 0.0
+            blocked[first + j] = room.values[8 * width + j] < 0.0
