@@ -6,6 +6,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -90,7 +91,7 @@ def run_scan(
             first = build_world(project.scene, root, 0)
         scan_folder.begin(out, project)
         with clock.stage(PREPARING):
-            warm_up(needed(project), progress, cancelled)
+            warm_up(chain(*needed(project)), progress, cancelled)
         results: list[FrameResult] = []
         shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
         files: list[Path] = []

@@ -17,7 +17,7 @@ from render.camera import Camera, Lens
 from render.errors import Cancelled
 from render.laser import LineLaser
 from render.lights import Environment, PointLight, RectangleLight
-from render.material import Conductor, Emitter, Glass, Lambertian, Material, Subsurface
+from render.material import Conductor, Emitter, Glass, Material, Subsurface
 from render.pose import Pose
 from render.scene import Rig, Scene, SceneObject
 from render.sensor import Sensor, SpectralCurve
@@ -28,7 +28,10 @@ from studio.project import Project
 from studio.templates import template_folder
 
 if TYPE_CHECKING:
-    from studio.stages import StageProgress
+    from render.develop import Image
+    from render.frame import Frame
+    from render.world import World
+    from studio.stages import Clock, StageProgress
 
 PREPARING = "preparing kernels (compiled on the first run)"
 TEMPLATE, IMAGE_SCALE = "plane", 0.05
@@ -39,22 +42,29 @@ COLLECTED = (20_000, 20, 20)
 CAMERA = Camera(width=64, height=48, fx=100.0, fy=100.0, cx=31.5, cy=23.5)
 LASER = LineLaser(T_rig_laser=Pose(translation=(0.1, 0.0, 0.0), rotation=(0.0, -0.2, 0.0)))
 PLATE = SceneObject(name="plate", shape=Plane(), T_world_object=Pose(translation=(0.0, 0.0, 0.5)))
+WAX = Subsurface(mean_free_path=0.01, scattering_albedo=0.5)
 SENSOR = Sensor(efficiency=(SpectralCurve(wavelength_nm=(400.0, 700.0), value=(0.5, 0.5)),))
 
 
 _ends: dict[str, Future[None]] = {}
-_lock, _turn = threading.Lock(), threading.Lock()
+_lock = threading.Lock()
+
+
+def begin(steps: Iterable[str]) -> None:
+    """Start on some of STEPS, after those that were started before."""
+    for name in steps:
+        with _lock:
+            if name not in _ends:
+                _ends[name] = Future()
+                before = list(_ends.values())[:-1]
+                # no daemon: the program may not end while a compiler works in it
+                threading.Thread(target=_run, args=(name, before), name=f"warm-up {name}").start()
 
 
 def warm_up(steps: Iterable[str], progress: StageProgress, cancelled: Cancel) -> None:
     """Wait until the kernels of some of STEPS are there. Raises Cancelled, and whatever is found to be broken."""
     names = tuple(steps)
-    for name in names:
-        with _lock:
-            if name not in _ends:
-                _ends[name] = Future()
-                # no daemon: the program may not end while a compiler works in it
-                threading.Thread(target=_run, args=(name,), name=f"warm-up {name}").start()
+    begin(names)
     for i, name in enumerate(names):
         while not _ends[name].done():
             if cancelled():
@@ -64,25 +74,24 @@ def warm_up(steps: Iterable[str], progress: StageProgress, cancelled: Cancel) ->
         _ends[name].result()
 
 
-def needed(project: Project) -> tuple[str, ...]:
-    """The steps whose kernels a render of a project, and what is measured in it, may need."""
-    plain = all(isinstance(item.material, Lambertian) for item in project.scene.visible_objects)
-    more = () if plain and project.render.transport == "direct" else ("light",)
-    return ("scan", *more) if project.scene.camera.lens.model == "pinhole" else ("scan", *more, "lens")
+def needed(project: Project) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The steps whose kernels the line of a project needs, and those of what is drawn and measured after it."""
+    pinhole = project.scene.camera.lens.model == "pinhole"
+    return ("draw",) if pinhole else ("draw", "lens"), ("scan", "light")
 
 
-def _run(name: str) -> None:
-    with _turn:
-        before = gc.get_threshold()
-        # a compiler leaves much garbage, and looking for it as often as usual takes a tenth of its time
-        gc.set_threshold(*COLLECTED)
-        try:
-            STEPS[name](_program_ends)
-            _ends[name].set_result(None)
-        except BaseException as error:
-            _ends[name].set_exception(error)
-        finally:
-            gc.set_threshold(*before)
+def _run(name: str, before: list[Future[None]]) -> None:
+    wait(before)
+    thresholds = gc.get_threshold()
+    # a compiler leaves much garbage, and looking for it as often as usual takes a tenth of its time
+    gc.set_threshold(*COLLECTED)
+    try:
+        STEPS[name](_program_ends)
+        _ends[name].set_result(None)
+    except BaseException as error:
+        _ends[name].set_exception(error)
+    finally:
+        gc.set_threshold(*thresholds)
 
 
 def _program_ends() -> bool:
@@ -103,48 +112,57 @@ def look(cancelled: Cancel) -> None:
     sketch.frustum(scene)
 
 
-def scan(cancelled: Cancel) -> None:
-    """The whole scan of the tilted plane at 122 x 102 px, in memory, with its pictures. Raises whatever is broken."""
-    from render.tone import pyramid
-    from render.world import build_world
-    from studio.results import measure_frame
-    from studio.stages import Clock, develop_step, render_step, scaled
-    from studio.views import picture, views
+def draw(cancelled: Cancel) -> None:
+    """The line on the tilted plane at 122 x 102 px, in memory, with its pictures."""
+    _drawn(cancelled)
 
-    folder = template_folder(TEMPLATE)
-    project = scaled(Project.load(folder / "project.json"), IMAGE_SCALE)
-    clock = Clock(progress=lambda stage, done: None, cancelled=cancelled)
-    world = build_world(project.scene, folder, 0)
-    frame = render_step(project, world, 0, clock, None)
-    images = develop_step(project, frame, clock, None)
-    for view in views(project.scene, frame):
-        made = picture(view, project.scene, frame, images, True)
-        if made is not None:
-            pyramid(made)
+
+def scan(cancelled: Cancel) -> None:
+    """The same, measured by every method. Raises whatever is broken."""
+    from studio.results import measure_frame
+
+    project, frame, world, images, clock = _drawn(cancelled)
     found = measure_frame(project, frame, world, images, clock, None, keep=False)
     if not found.lasers[0].extractions[0].points.valid.any():
         raise RuntimeError("the warm-up scan found no point: the installation is damaged")
 
 
+def _drawn(cancelled: Cancel) -> tuple[Project, Frame, World, list[Image], Clock]:
+    from render.world import build_world
+    from studio.stages import Clock, develop_step, render_step, scaled
+
+    folder = template_folder(TEMPLATE)
+    project = scaled(Project.load(folder / "project.json"), IMAGE_SCALE)
+    line = project.scene.model_copy(update={"lights": (), "environment": Environment()})
+    direct = project.render.model_copy(update={"transport": "direct", "truth_images": False})
+    project = project.model_copy(update={"scene": line, "render": direct})
+    clock = Clock(progress=lambda stage, done: None, cancelled=cancelled)
+    world = build_world(project.scene, folder, 0)
+    frame = render_step(project, world, 0, clock, None)
+    images = develop_step(project, frame, clock, None)
+    _show(project.scene, frame, images)
+    return project, frame, world, images, clock
+
+
 def light(cancelled: Cancel) -> None:
-    """Every kind of light: reflected, through glass, below surfaces, of lamps and shining objects."""
+    """Every kind of light: of lamps and shining objects, reflected, through glass, below surfaces."""
     _render(CAMERA, cancelled, "subsurface")
+    _render(CAMERA, cancelled, "subsurface", Glass(), Conductor(), WAX, Emitter())
 
 
 def lens(cancelled: Cancel) -> None:
-    """A lens that blurs."""
+    """The line by way of a lens that blurs, on plain and on shiny surfaces."""
     blurred = CAMERA.model_copy(update={"lens": Lens(model="thin-lens", focus_distance=0.4)})
     _render(blurred, cancelled, "direct")
+    _render(blurred, cancelled, "direct", Conductor())
 
 
-def _render(camera: Camera, cancelled: Cancel, transport: str) -> None:
-    """A glass pane, a metal and a wax block before a plate, under all sorts of lamps; few paths."""
-
+def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Material) -> None:
+    """A plate, and blocks of some materials before it, under all sorts of lamps, by few paths."""
     from render.render import render_world
     from render.world import build_world
+    from studio.expose import expose
 
-    wax = Subsurface(mean_free_path=0.01, scattering_albedo=0.5)
-    materials: tuple[Material, ...] = (Glass(), Conductor(), wax, Emitter())
     blocks = []
     for i, material in enumerate(materials):
         shape, pose = Box(size_x=0.04, size_y=0.04, size_z=0.02), Pose(translation=(0.05 * i - 0.05, 0.0, 0.45))
@@ -158,7 +176,25 @@ def _render(camera: Camera, cancelled: Cancel, transport: str) -> None:
     )
     few = {"transport": transport, "light_paths": 1, "ambient_samples": 2, "laser_error": 0.1}
     settings = RenderSettings().model_copy(update=few)
-    render_world(build_world(scene, Path()), scene, settings=settings, cancelled=cancelled)
+    frame = render_world(build_world(scene, Path()), scene, settings=settings, cancelled=cancelled)
+    _show(scene, frame, [expose(Project(scene=scene, sensor=SENSOR), frame, [1.0], 0)])
 
 
-STEPS: dict[str, Callable[[Cancel], None]] = {"look": look, "scan": scan, "light": light, "lens": lens}
+def _show(scene: Scene, frame: Frame, images: list[Image]) -> None:
+    """Every picture of a frame."""
+    from render.tone import pyramid
+    from studio.views import picture, views
+
+    for view in views(scene, frame):
+        made = picture(view, scene, frame, images, True)
+        if made is not None:
+            pyramid(made)
+
+
+STEPS: dict[str, Callable[[Cancel], None]] = {
+    "look": look,
+    "draw": draw,
+    "lens": lens,
+    "scan": scan,
+    "light": light,
+}

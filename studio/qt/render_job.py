@@ -14,7 +14,7 @@ from render.world import World, build_world
 from studio.jobs import Progress
 from studio.project import Project
 from studio.qt.session import Render
-from studio.warm_up import needed, warm_up
+from studio.warm_up import begin, needed, warm_up
 
 
 def render_frames(
@@ -33,7 +33,9 @@ def render_frames(
 
     keeps: whether a cancelled render is kept, with all that was done. seconds, state: see `refine`.
     """
-    warm_up(needed(project), lambda stage, done: progress(stage, 0.0), cancelled)
+    for_line, for_all = needed(project)
+    warm_up(for_line, lambda stage, done: progress(stage, 0.0), cancelled)
+    begin(for_all)
     if world is None:
         progress("loading meshes", 0.0)
         world = build_world(project.scene, root, step)
@@ -51,6 +53,8 @@ def render_frames(
         state=state,
     ):
         take(world, frame)
+        # the line is there before the kernels of all other light
+        warm_up(for_all, lambda stage, done: progress(stage, 0.0), cancelled)
 
 
 def can_go_on(render: Render | None) -> bool:

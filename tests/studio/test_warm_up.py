@@ -59,7 +59,7 @@ for folder in map(Path, sys.argv[2:]):
         )
         scene = scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": camera}), "objects": objects})
         project = project.model_copy(update={"scene": scene})
-    warm_up(needed(project), quietly, never)
+    warm_up(sum(needed(project), ()), quietly, never)
     before = read()
     run_scan(project, folder, out=Path(sys.argv[1], folder.name), steps=1, report=False, seconds=0.5)
     late[folder.name] = sorted(name for name, there in read().items() if there - before.get(name, set()))
@@ -82,12 +82,15 @@ def test_nothing_is_compiled_or_loaded_after_the_warm_up(tmp_path):
     assert told["late"] == {name: [] for name in names}
 
 
-def test_every_template_needs_all_but_the_lens():
+def test_a_lens_that_blurs_is_prepared_where_there_is_one():
     for name in DESCRIPTIONS:
-        project = Project.load(template_folder(name) / "project.json")
-        assert warm_up.needed(project) == ("scan", "light")
-    direct = project.model_copy(update={"render": project.render.model_copy(update={"transport": "direct"})})
-    assert warm_up.needed(direct) == ("scan",)
+        assert warm_up.needed(Project.load(template_folder(name) / "project.json"))[0] == ("draw",)
+    project = Project.load(template_folder("plane") / "project.json")
+    camera = project.scene.camera
+    camera = camera.model_copy(update={"lens": camera.lens.model_copy(update={"model": "thin-lens"})})
+    scene = project.scene.model_copy(update={"rig": project.scene.rig.model_copy(update={"camera": camera})})
+    for_line, for_all = warm_up.needed(project.model_copy(update={"scene": scene}))
+    assert for_line == ("draw", "lens") and {*for_line, *for_all, "look"} == set(warm_up.STEPS)
 
 
 @pytest.fixture
