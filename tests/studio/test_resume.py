@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -73,6 +74,10 @@ def test_a_time_limit_leaves_a_frame_and_what_it_takes_to_go_on(project: Project
     assert second.counts["light paths, laser"] > first.counts["light paths, laser"] > 0
     names = [name for _, name, _ in group_lines(second, small.scene, small.render)]
     assert names == ["laser, direct", "laser, reflected on", "ambient"]
+    assert second.counts["dropped contributions of direct light, laser"] == 0
+    bad = replace(second, counts={**second.counts, "dropped contributions of direct light, laser": 3})
+    texts = [text for _, _, text in group_lines(bad, small.scene, small.render)]
+    assert "3 contributions were no number" in texts[0] and not any("no number" in text for text in texts[1:])
 
 
 def test_what_is_left_of_another_scene_is_refused(project: Project, tmp_path: Path) -> None:
