@@ -56,6 +56,8 @@ EDGE_ORDER, APERTURE_ORDER = 3.0, 2.25
 """Powers of the cells a side with which the variance falls: of an edge, and of one seen through an aperture."""
 MISSED, MISSED_ORDER = 0.3, 5.0
 """Of the jump at an edge: the error of a pixel beside, a corner of which may be beyond it between its rays."""
+BETWEEN = 0.35
+"""Of the radiance, over the square of the cells: the RMS area beyond an edge along a pixel's border that no ray met."""
 SAME_BLUR = 0.2
 """Of the error of a pixel seen through an aperture: its neighbours', whose few rays may agree by chance, is no less."""
 
@@ -125,7 +127,10 @@ def direct_image(
             map_chunks(task.look, n, max(1024, math.ceil(n / 4)), threads)
         samples += rays
         cells = wanted
-        doubt_beside(task.error, task.doubt, APERTURE_ORDER if aperture else MISSED_ORDER, cells, pixels, camera.width)
+        doubts = (
+            (task.doubt, APERTURE_ORDER, task.mean, 0.0) if aperture else (task.doubt, MISSED_ORDER, task.mean, BETWEEN)
+        )
+        doubt_beside(task.error, *doubts, cells, pixels, camera.width)
         count, power, variance = tally(task.mean, task.error)
         signal = math.sqrt(power / max(count, 1))
         relative = math.sqrt(variance / count) / signal if count else 0.0

@@ -115,16 +115,19 @@ def graded(wanted: Int, cells: Int, pixels: Int, width: int) -> Int:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def doubt_beside(error: Float, doubt: Float, order: float, cells: Int, pixels: Int, width: int) -> None:
+def doubt_beside(
+    error: Float, doubt: Float, order: float, mean: Float, between: float, cells: Int, pixels: Int, width: int
+) -> None:
     """Raise the errors (n,) of pixels whose own rays may have missed what those of their neighbours have met.
 
     doubt (n,): the error that each of the ascending flat pixel indices (n,) expects of a neighbour with one cell; it
-    falls with the power order / 2 of the neighbour's own cells (n,).
+    falls with the power order / 2 of the neighbour's own cells (n,). between: of the radiance of a pixel beside one
+    that is wholly dark: the edge between the two may lie within either, closer to their border than any ray.
     """
     n = len(pixels)
     start = np.zeros(3, np.int64)
     for i in range(n):
-        if doubt[i] <= 0.0:
+        if doubt[i] <= 0.0 and mean[i] <= 0.0:
             continue
         for row in range(3):
             low = pixels[i] + (row - 1) * width - 1
@@ -135,4 +138,9 @@ def doubt_beside(error: Float, doubt: Float, order: float, cells: Int, pixels: I
             while j < n and pixels[j] <= low + 2:
                 if cells[j] > 1:
                     error[j] = max(error[j], doubt[i] * float(cells[j]) ** (-0.5 * order))
+                if mean[j] == 0.0 and mean[i] > 0.0 and (row == 1 or pixels[j] == low + 1):
+                    if cells[j] > 1:
+                        error[j] = max(error[j], between * mean[i] / float(cells[j]) ** 2)
+                    if cells[i] > 1:
+                        error[i] = max(error[i], between * mean[i] / float(cells[i]) ** 2)
                 j += 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -75,6 +76,21 @@ def test_beside_an_edge_pixels_with_few_rays_are_in_doubt():
     pixels = np.array([11, 12, 13, 22, 35], np.int32)
     error = np.array([0.0, 0.01, 0.5, 0.0, 0.0])
     cells = np.array([2, 4, 2, 1, 2], np.int32)
-    doubt_beside(error, np.array([0.0, 0.64, 0.0, 0.0, 0.0]), 4.0, cells, pixels, 10)
+    doubt = np.array([0.0, 0.64, 0.0, 0.0, 0.0])
+    doubt_beside(error, doubt, 4.0, np.zeros(5), 0.35, cells, pixels, 10)
     # a pixel of one ray has been looked at with its neighbours before, and one further off is not concerned
     assert error == pytest.approx([0.16, 0.04, 0.5, 0.0, 0.0])
+
+
+def test_an_edge_that_no_ray_met_may_lie_on_either_side_of_the_border():
+    """Against a sweep of an edge parallel to the border over both pixels, the rays jittered in their cells."""
+    random = np.random.default_rng(3)
+    for cells in (2, 4, 8):
+        pixels = np.array([11, 12, 31], np.int32)
+        error, mean = np.zeros(3), np.array([2.0, 0.0, 1.0])
+        doubt_beside(error, np.zeros(3), 4.0, mean, 0.35, np.full(3, cells, np.int32), pixels, 10)
+        assert error[0] == error[1] > 0.0 and error[2] == 0.0
+        # the depth of the last row of cells, where alone an edge can hide
+        depth = random.random(200_000) / cells
+        missed = np.all(random.random((len(depth), cells)) / cells > depth[:, None], axis=1)
+        assert error[0] / 2.0 == pytest.approx(math.sqrt(np.mean(missed * depth**2)), rel=0.15)
