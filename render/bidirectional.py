@@ -245,9 +245,16 @@ def indirect_shares(
         return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, ALL_KINDS)
     clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else NOWHERE
-    samples = first_samples(clear, camera, PILOT_PATHS)
-    looked_at = pixels_looked_at(samples)
     fan, guide, sums = even_fan(low, high), no_guide(camera), []
+    take = empty_take(camera.width * camera.height)
+    samples = first_samples(clear, camera, PILOT_PATHS)
+    if task.clear:
+        # what is seen through glass may be small, and is worth a look of its own
+        task.run(passes, LOOK_PATHS, fan, samples, pixels_looked_at(samples), guide, take, cancelled, clear)
+        _, helped = looked([take])
+        samples = share_samples(helped, camera.width, PILOT_PATHS, arrived(helped), 1.0)
+        look_behind(samples, clear, PILOT_PATHS)
+    looked_at = pixels_looked_at(samples)
     for number in range(passes):
         take = empty_take(camera.width * camera.height)
         task.run(number, PILOT_PATHS, fan, samples, looked_at, guide, take, cancelled)

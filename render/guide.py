@@ -17,6 +17,7 @@ from scipy.ndimage import maximum_filter, uniform_filter
 
 from render.bsdf import is_smooth
 from render.camera import Camera
+from render.clear_edges import find_edges
 from render.random import uniform
 from render.surface import Surface
 from render.threads import Cancel, map_chunks
@@ -181,10 +182,11 @@ def clear_pixels(world: World, surface: Surface, camera: Camera, T_world_camera:
     v, u = np.mgrid[0 : camera.height : LOOK, 0 : camera.width : LOOK]
     rays, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float64))
     hit = world.rays.from_point(T_world_camera[:3, 3], (rays @ T_world_camera[:3, :3].T).astype(np.float32))
-    smooth = np.array([is_smooth(row) for row in surface.rows])
-    hit = np.where(known, hit, -1)
-    found = np.where(hit >= 0, smooth[world.object_id[hit]] | (surface.second[world.object_id[hit]] >= 0), False)
-    found = maximum_filter(found.reshape(v.shape), 3)
+    clear = np.array([is_smooth(row) for row in surface.rows]) | (surface.second >= 0)
+    found = ((hit >= 0) & known & clear[world.object_id[hit]]).reshape(v.shape)
+    # a part too thin for these rays is no farther than that from its edges
+    find_edges(world, clear, camera, T_world_camera, LOOK, found)
+    found = maximum_filter(found, 3)
     return np.kron(found, np.ones((LOOK, LOOK), np.bool_))[: camera.height, : camera.width].ravel()
 
 
