@@ -75,12 +75,12 @@ class RayScene:
     ) -> tuple[Int32, Float32]:
         """(n, 3) origins (scene-centred), directions, (n,) far (changed in place) -> triangle or -1, distance.
 
-        coherent: each ray goes much as those before and after it, and many are traced at once. The same hits.
+        coherent: each ray goes much as those before and after it, which is quicker. The same hits.
         """
         _check(origins, directions, far)
         with self._timed(len(origins)):
-            if coherent and self._packets is not None:
-                return self._intersect_packets(self._packets, origins, directions, far)
+            if self._packets is not None:
+                return self._intersect_packets(_for(self._packets, coherent), origins, directions, far)
             hit = self._scene.run(origins, directions, dists=far, output=True)
         triangle: Int32 = hit["primID"]
         if len(self._meshes) > 1:
@@ -99,10 +99,11 @@ class RayScene:
         """(n, 3) origins (scene-centred), directions, (n,) far (overwritten) -> (n,) something is hit before far."""
         _check(origins, directions, far)
         with self._timed(len(origins)):
-            if coherent and self._packets is not None:
+            if self._packets is not None:
                 blocked = np.empty(len(origins), np.bool_)
-                room = buffer(self._packets.width)
-                occluded_packets(self._packets, room, origins, directions, far, blocked)
+                room, origins = buffer(self._packets.width), np.ascontiguousarray(origins)
+                packets = _for(self._packets, coherent)
+                occluded_packets(packets, room, origins, np.ascontiguousarray(directions), far, blocked)
                 return blocked
             hit = self._scene.run(origins, directions, dists=far, query="OCCLUDED")
         return np.asarray(hit == 0)
@@ -143,6 +144,10 @@ def commit(scene: EmbreeScene) -> bool:
     build.rtcCommitScene(fields.scene)
     scene.is_committed = 1
     return True
+
+
+def _for(packets: Packets, coherent: bool) -> Packets:
+    return packets._replace(arguments=packets.coherent) if coherent else packets
 
 
 @lru_cache(maxsize=1)

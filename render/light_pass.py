@@ -310,7 +310,9 @@ class LightPass:
         if not len(origin):
             return vertex, state
         rays, rows = self.world.rays, self.surface.rows
-        triangle, distance = rays.intersect((origin - rays.centre).astype(np.float32), direction.astype(np.float32))
+        start, towards = (origin - rays.centre).astype(np.float32), direction.astype(np.float32)
+        # a chunk's first rays lie side by side in the image, or in the sheet
+        triangle, distance = rays.intersect(start, towards, coherent=depth == 0)
         walking = np.flatnonzero(state[:, MEDIUM]).astype(np.int32)
         distance = distance[walking]
         for step in range(MOST_STEPS):

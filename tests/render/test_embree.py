@@ -103,28 +103,30 @@ def many(count, seed=3):
     return np.tile(np.float32((0.01, -0.02, -0.3)), (len(directions), 1)), directions
 
 
+@pytest.mark.parametrize("coherent", (False, True))
 @pytest.mark.parametrize("width", (4, 8, 16))
-def test_many_rays_at_a_time_hit_what_each_hits_alone(monkeypatch, width):
+def test_many_rays_at_a_time_hit_what_each_hits_alone(monkeypatch, width, coherent):
     # in pieces: several meshes
     mesh = primitive_mesh(Sphere(radius=0.1, segments=256))
     scene = RayScene(mesh.vertices, np.random.default_rng(1).permutation(mesh.triangles), gently=True)
     packets = embree.packets_of(scene._scene, (width,))
     assert embree.packets_work() and packets is not None and packets.width == width
-    monkeypatch.setattr(scene, "_packets", packets)
     origins, directions = many(101)
-    alone, together = scene.intersect(origins, directions), scene.intersect(origins, directions, coherent=True)
+    # a limit short of the near side, between the sides, beyond
+    far = np.random.default_rng(2).choice(np.float32((0.1, 0.25, 0.5)), len(directions))
+    monkeypatch.setattr(scene, "_packets", None)
+    alone, blocked = scene.intersect(origins, directions), scene.occluded(origins, directions, far.copy())
+    monkeypatch.setattr(scene, "_packets", packets)
+    together = scene.intersect(origins, directions, coherent=coherent)
     assert np.count_nonzero(alone[0] >= 0) > 2000 and np.count_nonzero(alone[0] < 0) > 2000
     assert ((alone[0] >= 0) == (together[0] >= 0)).all()
     assert np.mean(alone[0] == together[0]) > 0.999  # a ray through an edge may name either side
     np.testing.assert_allclose(together[1], alone[1], rtol=1e-5)
     assert np.array_equal(scene.from_point(scene.centre + origins[0].astype(float), directions), together[0])
 
-    # a limit short of the near side, between the sides, beyond
-    far = np.random.default_rng(2).choice(np.float32((0.1, 0.25, 0.5)), len(directions))
-    blocked = scene.occluded(origins, directions, far.copy())
-    assert np.array_equal(scene.occluded(origins, directions, far.copy(), coherent=True), blocked)
+    assert np.array_equal(scene.occluded(origins, directions, far.copy(), coherent=coherent), blocked)
     assert 1000 < np.count_nonzero(blocked) < 2000
-    hit, distance = scene.intersect(origins, directions, far.copy(), coherent=True)
+    hit, distance = scene.intersect(origins, directions, far.copy(), coherent=coherent)
     assert np.array_equal(hit >= 0, blocked) and np.array_equal(distance[hit < 0], far[hit < 0])
 
 
