@@ -228,10 +228,10 @@ def test_a_caustic_seen_past_and_through_the_ball_that_makes_it(tmp_path):
     same_flux("caustic", ~glass * indirect, ~glass * everything)
     # only merging finds it
     same_flux("caustic through glass", glass * indirect, glass * everything)
-    same_pixels("all light", blocks(indirect), blocks(everything), 20)
+    same_pixels("all light", blocks(indirect), blocks(everything), 12)
 
 
 def blocks(images):
-    """Sums over 4 x 4 pixels: merging blurs by a pixel, and the map of the wall has texels."""
+    """Sums over 6 x 6 pixels: merging blurs by a pixel, and the map of the wall has texels."""
     count, height, width = images.shape
-    return images.reshape(count, height // 4, 4, width // 4, 4).sum(axis=(2, 4))
+    return images.reshape(count, height // 6, 6, width // 6, 6).sum(axis=(2, 4))
