@@ -12,6 +12,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 
 os.environ.setdefault("QT_API", "pyside6")
@@ -36,6 +37,7 @@ from studio.qt.render_panel import RenderPanel
 from studio.qt.session import Session
 from studio.redevelop import develop_again, development, measure_again
 from studio.views import picture, views
+from studio.warm_up import needed, warm_up
 
 PROJECT = Path(__file__).parents[2] / "assets/projects/weld_seam/project.json"
 TICK_MS = 16
@@ -99,6 +101,8 @@ def main() -> None:
     world = build_world(project.scene, root)
     # ambient light to infinity, so that there is time to look
     long = project.render.model_copy(update={"ambient_samples": 65536, "ambient_error": 2e-4})
+
+    warm_up(chain(*needed(project)), lambda stage, done: None, lambda: False)
 
     def render(progress, cancelled):  # type: ignore[no-untyped-def]
         world.__dict__.pop("rays", None)
