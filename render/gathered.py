@@ -125,7 +125,13 @@ class Gathered:
 
     def radiance(self, shape: tuple[int, int]) -> Float32:
         """(h, w) the image so far, W/(m^2 sr)."""
-        return (self.total / self.weight).astype(np.float32).reshape(shape)
+        mean = np.empty(len(self.total), np.float32)
+
+        def work(start: int, stop: int) -> None:
+            np.divide(self.total[start:stop], self.weight, out=mean[start:stop], casting="same_kind")
+
+        map_chunks(work, len(mean), PIXELS_A_CHUNK)
+        return mean.reshape(shape)
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
