@@ -16,7 +16,7 @@ from studio.jobs import Progress
 from studio.preview import Look, Preview
 from studio.qt.jobs import JobRunner
 from studio.qt.session import Session
-from studio.warm_up import begin, warm_up
+from studio.warm_up import warm_up
 
 LANE = "load meshes"
 
@@ -111,7 +111,6 @@ class Live(QObject):
         triangles_first = sorted(items, key=lambda item: item.shape.kind == "file")
 
         def work(progress: Progress, cancelled: Cancel) -> list[SceneObject]:
-            begin(("look",))
             for i, item in enumerate(triangles_first):
                 if cancelled():
                     break

@@ -34,6 +34,8 @@ def render_frames(
     keeps: whether a cancelled render is kept, with all that was done. seconds, state: see `refine`.
     """
     for_line, for_all = needed(project)
+    # what the live picture waits for goes first
+    begin(("look",))
     warm_up(for_line, lambda stage, done: progress(stage, 0.0), cancelled)
     begin(for_all)
     if world is None:
