@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from render.camera import Camera
 from render.emission import PARTS, Fan, aimed_fan, even_fan, fan_span
 from render.errors import Cancelled
-from render.gathered import MOST_PASS, PIXELS_A_CHUNK, Gathered, gather_takes
+from render.gathered import MOST_PASS, Gathered, gather_takes
 from render.guide import (
     BINS,
     NOWHERE,
@@ -125,7 +125,7 @@ def indirect_images(
         yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0)
         return
     task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, kinds)
-    takes = [empty_take(camera.width * camera.height, threads, cancelled) for _ in range(WAVE)]
+    takes = [empty_take(camera.width * camera.height) for _ in range(WAVE)]
 
     def wave(first: int, paths: int, fan: Fan, samples: Float, guide: Guide, hints: Bool | None = None) -> None:
         looked_at = pixels_looked_at(samples)
@@ -256,7 +256,7 @@ def indirect_shares(
         look_behind(samples, clear, PILOT_PATHS)
     looked_at = pixels_looked_at(samples)
     for number in range(passes):
-        take = empty_take(camera.width * camera.height, None, cancelled)
+        take = empty_take(camera.width * camera.height)
         task.run(number, PILOT_PATHS, fan, samples, looked_at, guide, take, cancelled)
         plain, bent, sunk, both, unjoined = take.sums
         sums.append((plain, bent, unjoined, sunk + both))
@@ -264,19 +264,11 @@ def indirect_shares(
     return Shares(*((float(m), float(e)) for m, e in zip(mean, error, strict=True)))
 
 
-def empty_take(pixels: int, threads: int | None = None, cancelled: Cancel | None = None) -> Take:
-    """Nothing yet, and no guide to learn for. Raises Cancelled."""
-    image, helped = np.empty(pixels), np.empty(pixels, np.float32)
-
-    def clear(start: int, stop: int) -> None:
-        # here and not at the first joints, for which the system would have to find all of it at once
-        image[start:stop] = 0.0
-        helped[start:stop] = 0.0
-
-    map_chunks(clear, pixels, PIXELS_A_CHUNK, threads, cancelled)
+def empty_take(pixels: int) -> Take:
+    """Nothing yet, and no guide to learn for; of the images the system finds room only where light arrives."""
     zeros = np.zeros(KINDS), np.zeros(PARTS), np.zeros((0, BINS))
     touched = np.zeros(-(-pixels // BLOCK), np.bool_)
-    return Take(image, helped, *zeros, np.zeros(1), touched)
+    return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)
 
 
 def first_samples(clear: Bool, camera: Camera, count: int) -> Float:
