@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from render.camera import Camera
 from render.emission import PARTS, Fan, aimed_fan, even_fan, fan_span
 from render.errors import Cancelled
-from render.gathered import MOST_PASS, Gathered, gather_takes
+from render.gathered import MOST_CAMERA_PASS, MOST_PASS, Gathered, gather_takes
 from render.guide import (
     BINS,
     NOWHERE,
@@ -193,7 +193,7 @@ def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int, cle
     knowledge = np.zeros((len(guide.cumulative), BINS))
     size = min(max(1 << (pixels >> 8).bit_length() - 1, LEAST_PASS), MOST_PASS)
     sums = np.zeros(pixels), np.zeros(pixels, np.float32)
-    return Gathered(kinds, fan, size, share, clear, samples, guide, knowledge, *sums)
+    return Gathered(kinds, fan, size, 1, share, clear, samples, guide, knowledge, *sums)
 
 
 def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: Camera) -> None:
@@ -203,6 +203,8 @@ def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: 
     if len(first.clear):
         # where something may be behind glass is not forgotten when the first passes find nothing there
         first.helped[:] = helped
+    # a wide glow is best known by passes with a path for each of its pixels
+    first.most = max((MOST_CAMERA_PASS // 2 if first.share > 0.5 else MOST_PASS) // first.size, 1)
     share_samples(helped, camera.width, first.wanted, first.samples, float(WAVE))
     look_behind(first.samples, first.clear, first.wanted)
 

@@ -18,7 +18,8 @@ from render.threads import map_chunks
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 MOST_PASS = 1 << 15
-"""Of the passes' size: what a wave may take is what is lost where it is cancelled."""
+MOST_CAMERA_PASS = 1 << 18
+"""Paths a pass: what a wave may take is what is lost where it is cancelled."""
 MOST_DOUBLINGS = 2
 """Of the paths from the laser, where camera paths bring nothing."""
 LEAST_SHARE = 0.1
@@ -42,6 +43,8 @@ class Gathered:
     fan: Fan
     size: int
     """Paths from the laser in a pass of the first wave, and half of those from the camera."""
+    most: int
+    """Limit of the growth of passes (`growth`)."""
     share: float
     """Of the light, what camera paths could help with."""
     clear: NDArray[np.bool_]
@@ -80,12 +83,12 @@ class Gathered:
     @property
     def growth(self) -> int:
         """Size of the next wave's passes, in that of the first's."""
-        return min(1 << max(self.waves - 1, 0), max(MOST_PASS // self.size, 1))
+        return min(1 << max(self.waves - 1, 0), self.most)
 
     @property
     def next_paths(self) -> int:
         """Paths from the laser in a pass of the next wave: more where those from the camera have little to bring."""
-        return self.size * self.growth << round(MOST_DOUBLINGS * (1.0 - self.share))
+        return min(self.size * self.growth, MOST_PASS) << round(MOST_DOUBLINGS * (1.0 - self.share))
 
     @property
     def wanted(self) -> float:
@@ -137,7 +140,9 @@ class Gathered:
         """As a file holds it."""
         numbers = (self.fan.low, self.fan.high, self.share, self.squares, self.weight, self.spread, self.error)
         return {
-            "whole_numbers": np.array((self.kinds, self.size, self.guide.width, self.waves, self.passes, self.paths)),
+            "whole_numbers": np.array(
+                (self.kinds, self.size, self.most, self.guide.width, self.waves, self.passes, self.paths)
+            ),
             "numbers": np.array((*numbers, self.dropped, self.clamped, self.cut)),
             "fan": self.fan.cumulative,
             "clear": self.clear,
@@ -152,13 +157,14 @@ class Gathered:
     @classmethod
     def of_arrays(cls, arrays: Arrays) -> Gathered:
         """What `arrays` gave. KeyError, ValueError: something else."""
-        kinds, size, width, waves, passes, paths = (int(number) for number in arrays["whole_numbers"])
+        kinds, size, most, width, waves, passes, paths = (int(number) for number in arrays["whole_numbers"])
         low, high, share, squares, *rest = (float(n) for n in arrays["numbers"])
         weight, spread, error, dropped, clamped, cut = rest
         return cls(
             kinds,
             Fan(low, high, arrays["fan"]),
             size,
+            most,
             share,
             arrays["clear"],
             arrays["samples"],

@@ -17,9 +17,19 @@ from render.joints import count_joints, no_joints
 CAMERA = Camera(width=4, height=2, fx=4.0, fy=4.0, cx=1.5, cy=0.5)
 
 
-def nothing(pixels=8, size=100):
+def nothing(pixels=8, size=100, most=8):
     arrays = np.zeros((0, BINS)), np.zeros(pixels), np.zeros(pixels, np.float32)
-    return Gathered(0, even_fan(0.0, 1.0), size, 0.0, NOWHERE, np.zeros(pixels), no_guide(CAMERA), *arrays)
+    return Gathered(
+        0,
+        even_fan(0.0, 1.0),
+        size,
+        4 if size > 100 else 1 << 20,
+        0.0,
+        NOWHERE,
+        np.zeros(pixels),
+        no_guide(CAMERA),
+        *arrays,
+    )
 
 
 def passes(*images):
@@ -75,7 +85,7 @@ def test_later_waves_weigh_more_and_the_error_is_the_scatter_of_what_they_add_up
 
 
 def test_waves_grow_up_to_a_limit():
-    so_far, sizes = nothing(size=1 << 13), []
+    so_far, sizes = nothing(size=1 << 13, most=4), []
     for _ in range(6):
         sizes.append(so_far.growth)
         so_far.add(passes(np.ones(8), np.ones(8)), np.zeros((2, 0, BINS)))
