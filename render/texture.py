@@ -59,8 +59,10 @@ def load_texture(path: Path, *, srgb: bool, scale: float, where: str) -> Float32
 def decode_texture(data: bytes, *, srgb: bool, scale: float, where: str) -> Float32:
     """As `load_texture`, from an image file's bytes."""
     import cv2
-    from PIL import Image
+    from PIL import Image, ImageFile
 
+    # WeasyPrint, once a report was made, has Pillow take cut images for whole ones
+    ImageFile.LOAD_TRUNCATED_IMAGES = False
     allowed = "a whole PNG, JPEG, TIFF, BMP or WebP image of 8 or 16 bit"
     try:
         # Pillow tells the size before decoding and refuses a cut image; OpenCV keeps 16 bit.

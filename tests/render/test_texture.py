@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageFile
 
 import render.texture
 from render.errors import InputError
@@ -76,7 +76,9 @@ def test_a_texture_that_is_absent_or_a_folder_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["png", "jpg", "tiff", "bmp"])
-def test_an_image_cut_short_anywhere_is_told(tmp_path: Path, suffix: str) -> None:
+def test_an_image_cut_short_anywhere_is_told(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # as WeasyPrint leaves it
+    monkeypatch.setattr(ImageFile, "LOAD_TRUNCATED_IMAGES", True)
     path = tmp_path / f"a.{suffix}"
     Image.fromarray(np.random.default_rng(5).integers(0, 256, (40, 40, 3), dtype=np.uint8)).save(path)
     data = path.read_bytes()
