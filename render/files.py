@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import secrets
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
@@ -62,6 +63,56 @@ def inside(root: Path, relative: str, where: str) -> Path:
     if not resolved.is_relative_to(base):
         raise InputError("the path leaves the project folder", where=where, found=relative, allowed=allowed, cure=cure)
     return resolved
+
+
+def read_bytes(path: Path, most: int, what: str = "file") -> bytes:
+    """The bytes of a regular file of at most `most` bytes; its size is looked at before anything is read.
+
+    InputError: missing, a folder, a device or a pipe, larger than that, or not readable.
+    """
+    where = str(path)
+    try:
+        # a pipe that nobody writes to would block the opening itself
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        try:
+            _check_regular(os.fstat(descriptor), most, what, where)
+            with open(descriptor, "rb", closefd=False) as file:
+                data = file.read(most + 1)  # it may have grown since
+        finally:
+            os.close(descriptor)
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"there is no such {what}", where=where) from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"the {what} cannot be read", where=where, found=reason) from None
+    if len(data) > most:
+        raise InputError(f"the {what} is too big", where=where, found=f"over {most} bytes", allowed=f"{most} bytes")
+    return data
+
+
+def check_regular(path: Path, most: int, what: str = "file") -> None:
+    """InputError: `path` is no regular file of at most `most` bytes. For readers that open the file themselves."""
+    try:
+        _check_regular(os.stat(path), most, what, str(path))
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"there is no such {what}", where=str(path)) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"the {what} cannot be read", where=str(path), found=reason) from None
+
+
+def _check_regular(status: os.stat_result, most: int, what: str, where: str) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise InputError(f"a folder, not a {what}", where=where)
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(f"the {what} is not a regular file", where=where, found="a device or a pipe")
+    if status.st_size > most:
+        found = f"{status.st_size} bytes"
+        raise InputError(f"the {what} is too big", where=where, found=found, allowed=f"{most} bytes")
 
 
 def sha256(path: Path) -> str:

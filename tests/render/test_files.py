@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from render.errors import InputError
-from render.files import atomic_write, inside, sha256
+from render.files import atomic_write, check_regular, inside, read_bytes, sha256
 
 
 def test_a_written_file_appears_whole_with_its_folder(tmp_path: Path) -> None:
@@ -121,3 +121,25 @@ def test_sha256_is_that_of_the_bytes(tmp_path: Path) -> None:
     assert sha256(tmp_path / "a") == hashlib.sha256(b"laser" * 100_000).hexdigest()
     with pytest.raises(InputError, match="cannot be read"):
         sha256(tmp_path / "absent")
+
+
+def test_a_regular_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
+    (tmp_path / "data").write_bytes(b"12345")
+    assert read_bytes(tmp_path / "data", 5) == b"12345"
+    check_regular(tmp_path / "data", 5)
+    with pytest.raises(InputError, match=r"data: the image is too big; found 5 bytes; allowed: 4 bytes"):
+        read_bytes(tmp_path / "data", 4, "image")
+
+
+def test_pipes_devices_folders_and_names_without_a_file_are_refused_before_they_are_opened(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")  # nobody ever writes to it: a plain open would wait for ever
+    for path, problem in (
+        (tmp_path / "pipe", "not a regular file"),
+        (Path("/dev/zero"), "not a regular file"),
+        (tmp_path, "a folder, not a mesh"),
+        (tmp_path / "none", "there is no such mesh"),
+        (tmp_path / "a\0b", "cannot be read"),
+    ):
+        for refuse in (read_bytes, check_regular):
+            with pytest.raises(InputError, match=problem):
+                refuse(path, 10, "mesh")
