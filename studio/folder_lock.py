@@ -52,10 +52,11 @@ def hold(folder: Path, *, reading: bool = False) -> Iterator[None]:
     try:
         yield
     finally:
-        if lock.is_locked:
-            if os.name != "nt":  # a waiter that opened the file before sees that it has no name any more
+        try:
+            if lock.is_locked and os.name != "nt":  # who opened the file before sees that it has no name any more
                 with suppress(OSError):
                     path.unlink()
+        finally:
             lock.release()
 
 
@@ -76,7 +77,7 @@ def _holder(path: Path) -> str:
     """Who holds a lock, for a person."""
     try:
         said: dict[str, Any] = json.loads(read_bytes(path, LONGEST))
-        words = f"{said['command']} (process {said['pid']} on {said['host']}, since {said['since']})"
+        words = f"process {said['pid']} on {said['host']}, since {said['since']}: {said['command']}"
     except (InputError, ValueError, KeyError, TypeError):  # just begun, or the system keeps a lock from being read
         return "a program that does not say which"
     return "".join(letter if letter.isprintable() else "?" for letter in words)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -13,8 +13,10 @@ from render.scene import Scene
 from studio.carry import named_files
 from studio.mesh_import import side_files
 
-MOST_NAMED = 4
-"""Changed files that a message names one by one."""
+MOST_NAMED = 6
+"""Things that a message names one by one."""
+SHOWN = 16
+"""Digits of a hash in a message."""
 
 
 def input_files(scene: Scene, root: Path) -> dict[str, Path]:
@@ -49,18 +51,26 @@ def input_hashes(scene: Scene, root: Path) -> dict[str, str]:
 
 def check_unchanged(recorded: Mapping[str, str], scene: Scene, root: Path, *, cure: str) -> None:
     """InputError: the input files below `root` are not those of the record; it names them with both hashes."""
-    now = input_hashes(scene, root)
-    told = [
-        f"{name}: {now.get(name, 'no such file')}, then {recorded.get(name, 'no such file')}"
-        for name in sorted({*now, *recorded})
-        if now.get(name) != recorded.get(name)
-    ]
+    told = changed_files(recorded, input_hashes(scene, root))
     if told:
-        more = f"; and {len(told) - MOST_NAMED} more" if len(told) > MOST_NAMED else ""
         raise InputError(
-            "input files have changed since the scan",
+            f"input files have changed since the scan: {listed(told)}",
             where=str(root),
-            found="SHA-256 of " + "; ".join(told[:MOST_NAMED]) + more,
             allowed="the files that the frames were rendered from, which are also the truth that points are held to",
             cure=cure,
         )
+
+
+def changed_files(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
+    """The files whose hashes differ, each with both."""
+    return [
+        f"{name} (SHA-256 now {now.get(name, 'of no file')[:SHOWN]}, then {then.get(name, 'of no file')[:SHOWN]})"
+        for name in sorted({*then, *now})
+        if then.get(name) != now.get(name)
+    ]
+
+
+def listed(told: Sequence[str]) -> str:
+    """The first few of them, and how many more there are."""
+    more = [f"{len(told) - MOST_NAMED} more"] if len(told) > MOST_NAMED else []
+    return "; ".join([*told[:MOST_NAMED], *more])

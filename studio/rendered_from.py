@@ -12,12 +12,11 @@ from render.errors import InputError
 from render.saved import TARGETS
 from render.scene import Scene
 from render.settings import RenderSettings
+from studio.inputs import changed_files, listed
 from studio.project import Project
 from studio.redevelop import light_path
 from studio.strict_json import brief
 
-MOST_NAMED = 6
-"""Differences that a message names one by one."""
 Record = dict[str, Any]
 
 
@@ -83,19 +82,12 @@ def check_rendered_from(
     """InputError: a frame with such a record is not of this project and these input files; it names what differs."""
     told = differences(record, project, resume=resume)
     recorded = record.get("inputs")
-    recorded = recorded if isinstance(recorded, dict) else {}
-    told += [
-        f"SHA-256 of {name}: {recorded.get(name, 'no such file')} in the frames, {inputs.get(name, 'no such file')} now"
-        for name in sorted({*recorded, *inputs})
-        if recorded.get(name) != inputs.get(name)
-    ]
+    told += changed_files(recorded if isinstance(recorded, dict) else {}, inputs)
     if not told:
         return
-    more = f"; and {len(told) - MOST_NAMED} more" if len(told) > MOST_NAMED else ""
     raise InputError(
-        "the frames were rendered from something else",
+        f"the frames were rendered from something else: {listed(told)}",
         where=where,
-        found="; ".join(told[:MOST_NAMED]) + more,
         allowed="the same scene and input files"
         if resume
         else "the same scene; sensor, laser power, a pinhole's lens and extraction may differ",

@@ -19,7 +19,7 @@ from typing import Any, TypeGuard
 from render.errors import InputError
 from render.files import atomic_write, inside, sha256, unfinished_write
 from studio.folder_lock import hold
-from studio.inputs import check_unchanged
+from studio.inputs import check_unchanged, listed
 from studio.own_files import check_replaceable, is_own
 from studio.project import Project
 from studio.rendered_from import check_rendered_from, differences, made_of
@@ -234,10 +234,10 @@ def _edited(folder: Path, project: Project, frames: Iterable[Path]) -> InputErro
         record = read_object(sidecar, "frame").get("made_of")
         told = differences(record if isinstance(record, dict) else {}, project)
         break
+    what = listed(told) or "other settings of sensor or extraction, or other spelling"
     return InputError(
-        "the project of the scan has been edited since",
+        f"the project of the scan has been edited since: {what}",
         where=str(folder / PROJECT),
-        found="; ".join(told) or "other settings of sensor or extraction, or other spelling",
         allowed="the project as it was run",
         cure="undo the change; other settings for the same frames are given with reconstruct --project",
     )
