@@ -59,7 +59,23 @@ def is_own(path: Path) -> bool:
 
 
 def check_replaceable(paths: Iterable[Path], reads: Iterable[Path] = ()) -> None:
-    """InputError: writing to `paths` would replace a file that this program did not write, or one that it `reads`."""
+    """InputError: writing to `paths` would replace a file that this program did not write, or one that it `reads`.
+
+    A folder in the way is told in the same words, before anything is computed.
+    """
+    paths = list(paths)
+    check_not_read(paths, reads)
+    for path in paths:
+        if os.path.lexists(path) and not is_own(path):
+            raise InputError(
+                "a result would replace a file that this program did not write",
+                where=str(path),
+                cure="choose another folder for results, or move the file away",
+            )
+
+
+def check_not_read(paths: Iterable[Path], reads: Iterable[Path]) -> None:
+    """InputError: one of `paths` is one of the files that are read, if by another name."""
     sources = {identity: file for file in reads if (identity := _identity(file)) is not None}
     for path in paths:
         if (identity := _identity(path)) in sources:
@@ -67,13 +83,7 @@ def check_replaceable(paths: Iterable[Path], reads: Iterable[Path] = ()) -> None
                 "a result would replace a file that is read",
                 where=str(path),
                 found=str(sources[identity]),
-                cure="choose another folder with --out",
-            )
-        if os.path.lexists(path) and not path.is_dir() and not is_own(path):
-            raise InputError(
-                "a result would replace a file that this program did not write",
-                where=str(path),
-                cure="choose another folder with --out, or move the file away",
+                cure="choose another folder for results",
             )
 
 
