@@ -192,6 +192,7 @@ def measuring(found: ScanFolder, root: Path, out: Path) -> Iterator[None]:
                     raise InputError("the output folder holds another scan", where=str(out / name), cure=cure)
         reads = [inside(root, name, "input files") for name in found.inputs]
         check_replaceable([out / name for name in (*POINTS, *REPORT)], reads)
+        _remove_unfinished(out)
         yield
 
 
@@ -272,7 +273,12 @@ def _clear(folder: Path, count: int, reads: list[Path], *, keep_frames: bool) ->
     _check_project(folder, reads)
     for name in gone:
         (folder / name).unlink(missing_ok=True)
-    for name in names:  # nobody writes here but this program, so these are of one that was killed
+    _remove_unfinished(folder)
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove what killed programs left of files that they were writing; this one alone writes there now."""
+    for name in os.listdir(folder):
         target = unfinished_write(name)
         if target is not None and (FRAME.fullmatch(target) or target in (MANIFEST, PROJECT, *POINTS, *REPORT)):
             (folder / name).unlink(missing_ok=True)

@@ -51,5 +51,5 @@ def scan(file: Path, out: Path, **options) -> ScanResult:
 
 def contents(folder: Path) -> dict[str, bytes]:
     """The bytes of all that a scan makes again alike: not its times."""
-    names = sorted(path.name for path in folder.iterdir())
+    names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     return {name: (folder / name).read_bytes() for name in names if name.endswith((".exr", ".png", ".ply", ".csv"))}

@@ -172,6 +172,7 @@ def test_points_measured_again_are_the_manifest_s_or_it_tells_of_none(made: Path
             assert there == points[results[0]["method"]], n
         measure("gaussian")
         assert {name: data for name, data in contents(out).items() if name.startswith("points")} == points["gaussian"]
+        assert [path.name for path in out.iterdir() if path.name.startswith(".")] == [], n
 
 
 def test_a_project_is_saved_or_as_it_was_wherever_the_program_is_killed(made: Path, tmp_path: Path) -> None:
