@@ -23,15 +23,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from itertools import chain  # noqa: E402
-
 import main  # noqa: E402
 from render.errors import InputError  # noqa: E402
 from studio import scan_folder  # noqa: E402
 from studio.document import replaced  # noqa: E402
 from studio.project import Project  # noqa: E402
-from studio.warm_up import needed, warm_up  # noqa: E402
-from tests.studio.small_scan import SCALE, contents, small_project  # noqa: E402
+from tests.studio.small_scan import SCALE, contents, scan, small_project  # noqa: E402
 
 POWERS = {"weak": 0.001, "strong": 0.01}
 OPTIONS = ("--scale", str(SCALE), "--threads", "1", "--quiet")
@@ -96,12 +93,19 @@ def kill(work: Callable[[], int], seconds: float) -> bool:
     return True
 
 
+def kind_of(words: tuple[object, ...]) -> str:
+    """Commands that take about as long."""
+    return f"{words[0]} {'--no-report' in words} {'--resume' in words}"
+
+
 class Kills:
     """The folders, and the scans that no kill met."""
 
     def __init__(self, folder: Path, chance: random.Random) -> None:
         self.folder, self.chance, self.out, self.log = folder, chance, folder / "out", folder / "log.txt"
-        self.files, self.wholes, self.seconds = {}, {}, {}
+        self.files: dict[str, Path] = {}
+        self.wholes: dict[tuple[str, str], dict[str, bytes]] = {}
+        self.seconds: dict[str, float] = {}
         for name, power in POWERS.items():
             file = small_project(folder / name)
             replaced(Project.load(file), ("scene", "rig", "lasers", 0, "power"), power).save(file)
@@ -109,23 +113,31 @@ class Kills:
         gaussian = replaced(Project.load(self.files["weak"]), ("extraction", "method"), "gaussian")
         for kind in ("run", "render"):
             for name, file in self.files.items():
-                start = time.monotonic()
-                self.expect(0, kind, file, "--out", folder / f"{kind} {name}", *OPTIONS)
-                self.seconds[kind] = time.monotonic() - start
+                self.end(kind, file, "--out", folder / f"{kind} {name}", *OPTIONS)
                 self.wholes[kind, name] = contents(folder / f"{kind} {name}")
         ran = scan_folder.open_folder(folder / "run weak").project
         self.gaussian = folder / "weak" / "gaussian.json"
         ran.model_copy(update={"extraction": gaussian.extraction}).save(self.gaussian)
-        start = time.monotonic()
-        shutil.copytree(folder / "run weak", self.out)
-        self.expect(0, "reconstruct", self.out, "--project", self.gaussian, "--threads", "1", "--quiet")
-        self.seconds["reconstruct"] = time.monotonic() - start
+        self.begin_with("run weak")
+        self.end("reconstruct", self.out, "--project", self.gaussian, "--threads", "1", "--quiet")
         self.wholes["reconstruct", "weak"] = contents(self.out)
 
-    def expect(self, code: int, *words: object) -> None:
-        found = finish(command(self.log, *words))
-        if found != code:
-            raise WrongError(f"{' '.join(map(str, words))}: exit {found}, not {code}\n{self.log.read_text()}")
+    def end(self, *words: object) -> None:
+        """Let a command end, and note how long it takes as busy as the machine is now. WrongError: not with exit 0."""
+        began = time.monotonic()
+        code = finish(command(self.log, *words))
+        if code != 0:
+            raise WrongError(f"{' '.join(map(str, words))}: exit {code}\n{self.log.read_text()}")
+        self.seconds[kind_of(words)] = time.monotonic() - began
+
+    def kill(self, *words: object) -> bool:
+        """At a random moment; False: it ended before."""
+        kind = kind_of(words)
+        began = time.monotonic()
+        met = kill(command(self.log, *words), self.chance.uniform(0.0, 1.1) * self.seconds.get(kind, 1.0))
+        if not met:
+            self.seconds[kind] = time.monotonic() - began
+        return met
 
     def same(self, kind: str, name: str, *, ended: bool = True) -> None:
         """WrongError: other bytes, or, where a program ended of itself, hidden files."""
@@ -149,15 +161,14 @@ class Kills:
         self.begin_with(before)
         without = ("--no-report",) if kind == "run" and self.chance.random() < 0.8 else ()  # which takes longest
         words = (kind, self.files[name], "--out", self.out, *OPTIONS, *without)
-        lasts = self.seconds["run" if kind == "run" and not without else "render"]
-        met = kill(command(self.log, *words), self.chance.uniform(0.0, 1.1) * lasts)
+        met = self.kill(*words)
         while met and self.chance.random() < 0.3:
-            met = kill(command(self.log, *words, "--resume"), self.chance.uniform(0.0, 1.1) * lasts)
-        state = self.state([self.wholes[key] for key in self.wholes])
+            met = self.kill(*words, "--resume")
+        state = self.state()
         if finish(command(self.log, *words, "--resume")) != 0:
             self.check_reason()
             state += ", refused to go on with it"
-            self.expect(0, *words)
+            self.end(*words)
         self.same(kind, name)
         return state
 
@@ -165,12 +176,12 @@ class Kills:
         """Kill a measurement of a finished scan."""
         self.begin_with("run weak")
         words = ("reconstruct", self.out, "--project", self.gaussian, "--threads", "1", "--quiet")
-        kill(command(self.log, *words), self.chance.uniform(0.0, 1.1) * self.seconds["reconstruct"])
+        self.kill(*words)
         found = scan_folder.open_folder(self.out)
         results = found.manifest.get("results")
         if results is not None:
             self.same("run" if results[0]["method"] == "likelihood" else "reconstruct", "weak", ended=False)
-        self.expect(0, *words)
+        self.end(*words)
         self.same("reconstruct", "weak")
         return "whole" if results is not None else "frames whole, not measured"
 
@@ -193,7 +204,7 @@ class Kills:
             raise WrongError(f"{file} is neither version")
         return "whole"
 
-    def state(self, wholes: list[dict[str, bytes]]) -> str:
+    def state(self) -> str:
         """What the folder says of itself. WrongError: it calls whole what is not."""
         if not self.out.exists():
             return "nothing yet"
@@ -203,7 +214,7 @@ class Kills:
             if "did not finish" not in str(error):
                 raise WrongError(str(error)) from None
             return "unfinished"
-        if contents(self.out) not in wholes:
+        if contents(self.out) not in self.wholes.values():
             raise WrongError("a finished scan of other bytes")
         return "whole"
 
@@ -243,7 +254,8 @@ def judged(count: int, seed: int) -> int:
     folder = Path(tempfile.mkdtemp(prefix="kills-"))
     seen: Counter[str] = Counter()
     try:
-        warm_up(chain(*needed(Project.load(small_project(folder / "warm")))), lambda stage, done: None, lambda: False)
+        # loads all that the children need, which share it
+        scan(small_project(folder / "warm"), folder / "warm out", report=True)
         kills = Kills(folder, random.Random(seed))
         compile_kills = count // 50
         kinds: list[Callable[[], str]] = [
