@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import secrets
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
 
 from render.errors import InputError
+
+TEMPORARY = re.compile(r"\.(?P<stem>.+)\.[0-9a-f]{8}(?P<suffix>(\.[^.]*)?)")
 
 
 @contextmanager
@@ -45,6 +49,15 @@ def atomic_write(path: Path | str) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             temporary.unlink()
+
+
+def unfinished_write(name: str) -> str | None:
+    """The file's name that a temporary file of `atomic_write` was to get; None: the name is of no such file.
+
+    A program that is killed leaves one behind; whoever knows that nobody writes there any more may remove it.
+    """
+    found = TEMPORARY.fullmatch(name)
+    return found["stem"] + found["suffix"] if found else None
 
 
 def inside(root: Path, relative: str, where: str) -> Path:
@@ -116,7 +129,8 @@ def _check_regular(status: os.stat_result, most: int, what: str, where: str) -> 
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file's bytes, 64 lower-case hexadecimal digits. InputError: the file cannot be read."""
+    """SHA-256 of a regular file's bytes, 64 lower-case hexadecimal digits. InputError: it is none, or not readable."""
+    check_regular(path, sys.maxsize)
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

@@ -10,6 +10,7 @@ import contextlib
 import datetime
 import json
 import os
+import re
 import secrets
 import shutil
 from dataclasses import dataclass
@@ -45,7 +46,9 @@ class Recovery:
     @property
     def is_draft(self) -> bool:
         """Its files are in a draft's folder, which goes with it."""
-        return self.root.parent == self.file.parent.absolute()
+        # by its whole path, as `Autosave.draft` makes it: a damaged file may name any folder, also by ".."
+        draft = re.escape(str(self.file.with_suffix("").absolute())) + r"-\d+"
+        return re.fullmatch(draft, str(self.root)) is not None
 
     def discard(self) -> None:
         """It was opened, or is not wanted."""

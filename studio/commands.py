@@ -21,9 +21,14 @@ SAMPLE = "weld_seam"
 OUTPUT = "scan-output"
 
 
+def chosen_file(path: Path | None) -> Path:
+    """The project file at a path (itself, or the one in a folder), or the sample's."""
+    return project_file(path if path is not None else template_folder(SAMPLE))
+
+
 def load_project(path: Path | None) -> tuple[Project, Path]:
     """The project at a path (a file, or a folder with one project), or the sample; and its folder."""
-    file = project_file(path if path is not None else template_folder(SAMPLE))
+    file = chosen_file(path)
     return Project.load(file), file.parent
 
 
@@ -81,8 +86,8 @@ def run_project(
     **extraction: Any,
 ) -> None:
     """`run`, and `render` with `measure` off. extraction: settings in place of the project's, None: the project's."""
-    project, root = load_project(path)
-    project = with_extraction(project, extraction)
+    file = chosen_file(path)
+    project, root = with_extraction(Project.load(file), extraction), file.parent
     folder = out if out is not None else Path(OUTPUT) / folder_name(project.name)
     check_output(folder)
     from render.refine import plan
@@ -111,6 +116,7 @@ def run_project(
             seconds=time_limit,
             refined=lambda frame: shown.__setitem__(slice(None), [frame]),
             progress=progress,
+            source=file,
         )
     if as_json:
         print_json({"ok": True, "folder": str(folder), "files": [str(file) for file in done.files], **done.manifest})

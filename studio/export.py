@@ -16,6 +16,8 @@ from render.files import atomic_write
 from render.frame import Frame
 from render.frame_files import write_frame
 from render.world import World, build_world
+from studio.inputs import input_files
+from studio.own_files import check_not_read, check_replaceable
 from studio.project import Project
 from studio.results import now, report_input
 from studio.stages import Measurement
@@ -43,6 +45,7 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     """One .html or .pdf file, by the suffix. InputError: nothing is measured, or the file cannot be written."""
     from analysis.report.write import render_page, write_report
 
+    _spare_inputs(what, [path])
     data = report_input(what.project, _first_world(what), [frame_result(what)], {}, notes=(), created=now())
     if path.suffix.lower() != ".pdf":
         with atomic_write(path) as temporary:
@@ -56,7 +59,10 @@ def export_report(path: Path, what: Exported) -> list[Path]:
 
 
 def export_frame(path: Path, what: Exported) -> list[Path]:
-    """EXR with PNG and JSON beside it. InputError: a file cannot be written."""
+    """EXR with PNG and JSON beside it. InputError: a file cannot be written, or one beside it is no frame's."""
+    _spare_inputs(what, [path])
+    beside = [path.with_suffix(suffix) for suffix in (".exr", ".png", ".json")]
+    check_replaceable([file for file in beside if file != path], input_files(what.project.scene, what.root).values())
     image = what.images[0] if len(what.images) == 1 else None
     return write_frame(path.parent, path.stem, what.frame, image, what.rendered.scene, sensor=what.project.sensor)
 
@@ -70,6 +76,7 @@ def export_image(path: Path, what: Exported) -> list[Path]:
     written = []
     for i, image in enumerate(what.images):
         target = path if len(what.images) == 1 else path.with_stem(f"{path.stem}_{i + 1}")
+        _spare_inputs(what, [target])
         done, encoded = cv2.imencode(".png", image.pixels)
         if not done:
             raise InputError("the image cannot be encoded", where=str(target))
@@ -81,6 +88,7 @@ def export_image(path: Path, what: Exported) -> list[Path]:
 
 def export_points(path: Path, what: Exported) -> list[Path]:
     """.ply or .csv, by the suffix: the points of all lasers by the project's method."""
+    _spare_inputs(what, [path])
     write = write_csv if path.suffix.lower() == ".csv" else write_ply
     write(path, merge(point_clouds(what)))
     return [path]
@@ -104,6 +112,11 @@ def frame_result(what: Exported) -> FrameResult:
         lasers.append(LaserResult(curve, extractions, what.images[i].pixels if i < len(what.images) else None))
     frame = what.frame
     return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=frame.seconds, counts=frame.counts)
+
+
+def _spare_inputs(what: Exported, targets: Sequence[Path]) -> None:
+    """InputError: a target is a mesh or a texture of the project."""
+    check_not_read(targets, input_files(what.project.scene, what.root).values())
 
 
 def _best(what: Exported) -> Sequence[Measurement]:

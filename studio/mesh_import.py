@@ -89,6 +89,8 @@ def side_files(file: Path) -> list[str]:
 
 def _words_after(file: Path, keyword: str) -> list[str]:
     """The last word of each line that begins with a keyword."""
+    if not file.is_file():
+        return []
     pattern = re.compile(rf"\s*{keyword}\s+(?:.*\s)?(\S+)\s*", re.IGNORECASE)
     try:
         with open(file, encoding="utf-8", errors="replace") as lines:

@@ -25,6 +25,7 @@ from analysis.line.subtract import subtract_off
 from render.errors import InputError
 from render.files import atomic_write
 from studio.line import tell
+from studio.own_files import LINE_COLUMNS, check_replaceable
 from studio.reconstruct import MAX_IMAGE_BYTES, read_image
 
 SCARCE, PLENTY = 0.25, 0.5
@@ -34,7 +35,6 @@ PLATEAU = 32
 """Pixels of one number that a sensor's limit makes, and chance does not."""
 SATURATED_SHARE = 0.5
 """Of the scan lines; an exposure with more of them is no base to estimate noise from."""
-COLUMNS = ("scan_line", "rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "flag")
 
 
 def load_photograph(path: Path) -> NDArray[Any]:
@@ -215,7 +215,7 @@ def write_line(path: Path, line: Line) -> None:
     """One row of the table for each scan line and peak: where it is, or the reason why there is none. Units: px, e-."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    writer.writerow(LINE_COLUMNS)
     along, across = (line.u, line.v) if line.axis == "rows" else (line.v, line.u)
     numbers = (along, across, line.sigma_u, line.width, line.amplitude, line.background, line.chi2)
     for i in range(line.u.shape[0]):
@@ -253,11 +253,15 @@ def summary(path: Path, line: Line, table: Path) -> dict[str, Any]:
 
 
 def table_path(path: Path, out: Path | None, taken: set[Path], what: str = "line") -> Path:
-    """Where an image's table goes: beside it or in `out`; a number tells images of one name apart."""
+    """Where an image's table goes: beside it or in `out`; a number tells images of one name apart.
+
+    InputError: a file of that name is there which is no such table.
+    """
     folder, number = out if out is not None else path.parent, 1
     target = folder / f"{path.stem}_{what}.csv"
     while target in taken:
         number += 1
         target = folder / f"{path.stem}_{number}_{what}.csv"
+    check_replaceable([target])
     taken.add(target)
     return target

@@ -83,7 +83,7 @@ def project_file(path: Path) -> Path:
     """The project file meant by a path: itself, or the only project in a folder. InputError: none, or several."""
     if not path.is_dir():
         return path
-    found = sorted(path.glob("*.json"))
+    found = sorted(file for file in path.glob("*.json") if not file.name.startswith("."))  # no half-written ones
     named = [file for file in found if file.name == "project.json"] or found
     if len(named) != 1:
         names = ", ".join(file.name for file in named[:5]) or "none"

@@ -15,6 +15,7 @@ from render.frame_files import read_frame
 from render.world import build_world
 from studio import scan_folder
 from studio.project import Project
+from studio.redevelop import development
 from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
 from studio.stages import Clock, develop_step, step_world
 from studio.summary import summarise
@@ -35,9 +36,27 @@ def reconstruct_folder(
 ) -> dict[str, Any]:
     """Develop, extract and triangulate the frames of a scan anew; `project` may have another sensor or extraction.
 
-    Writes points and, where asked for, the report into `out`. InputError: frames missing or not of this project.
+    Writes points and, where asked for, the report into `out`. InputError: frames missing or damaged, `project` differs
+    in what the frames fix, or as `scan_folder.measuring`.
     """
+    scan_folder.check_measures(found, project)
+    with scan_folder.measuring(found, root, out):
+        return _measured(found, project, root, out, clock, report=report, threads=threads)
+
+
+def _measured(
+    found: scan_folder.ScanFolder,
+    asked: Project,
+    root: Path,
+    out: Path,
+    clock: Clock,
+    *,
+    report: bool,
+    threads: int | None,
+) -> dict[str, Any]:
     results: list[FrameResult] = []
+    how = development(found.project, asked)
+    project = how.project
     with clock.stage("loading meshes"):
         first = world = build_world(project.scene, root, 0)
     sweep = Sweep(project)
@@ -52,6 +71,7 @@ def reconstruct_folder(
     for n in clock.frames(len(found.frames)):
         path = found.frames[n]
         with clock.stage("reading frames"):
+            scan_folder.check_frame(found, path)
             frame = read_frame(path)
         if not 0 <= frame.step < project.scene.frame_count:
             allowed = f"0 to {project.scene.frame_count - 1}"
@@ -59,20 +79,27 @@ def reconstruct_folder(
                 "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
             )
         world = step_world(project, root, frame.step, None if frame.step == 0 else world)
-        images = develop_step(project, frame, clock, threads)
+        images = develop_step(project, frame, clock, threads, how.laser_power)
         take(sweep.add(frame, world, images))
     take(sweep.finish())
     if not results or not project.scene.lasers:
         raise InputError("the scan holds no laser image", where=str(found.folder))
-    files, told = write_points(out, project, results, clock), extraction_notes(results, project)
-    if report:
-        notes = [*told, *(str(note) for note in found.manifest.get("notes", []))]
-        created = str(found.manifest.get("created", now()))
-        files += write_reports(out, project, first, results, clock, notes=notes, created=created)
+    told = extraction_notes(results, project)
+    with scan_folder.replacing(found, out) as measured:
+        files = write_points(out, project, results, clock)
+        measured |= {"results": summarise(results, project.scene), "extraction": told}
+        if (asked.sensor, asked.extraction) != (found.project.sensor, found.project.extraction):
+            measured["measured_with"] = asked.model_dump(mode="json", include={"sensor", "extraction"})
+        if report:
+            notes = [*told, *(str(note) for note in found.manifest.get("notes", []))]
+            created = str(found.manifest.get("created", now()))
+            reports = write_reports(out, project, first, results, clock, notes=notes, created=created)
+            measured["report"] = [path.name for path in reports]
+            files += reports
     return {
-        "name": project.name,
+        "name": asked.name,
         "files": [str(path) for path in files],
-        "results": summarise(results, project.scene),
+        "results": measured["results"],
         "extraction": told,
         "seconds": clock.seconds,
     }

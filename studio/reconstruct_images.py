@@ -17,6 +17,7 @@ from analysis.line.extract import extract
 from analysis.line.result import Flag, Line
 from render.errors import InputError
 from studio.line import tell, working_volume
+from studio.own_files import check_replaceable
 from studio.photographs import extract_series, load_photograph, naming
 from studio.project import Project
 from studio.stages import Clock, triangulate_line
@@ -35,7 +36,8 @@ def reconstruct_images(
     """Points of one laser in photographs; noise is estimated from them, and there is no truth to compare with.
 
     times: the images are exposures of one scene, so long; else they are the steps of the project's motion, in order.
-    InputError: an image cannot be read or is not of the camera's size, no such laser, more images than steps.
+    InputError: an image cannot be read or is not of the camera's size, no such laser, more images than steps,
+    a file in the way that is none of these results.
     """
     lasers = project.scene.lasers
     if not 0 <= laser < len(lasers):
@@ -43,6 +45,8 @@ def reconstruct_images(
     if not times and len(paths) > project.scene.frame_count:
         found, allowed = f"{len(paths)} images", f"{project.scene.frame_count}, the steps of the project's motion"
         raise InputError("there are more images than steps", where=str(paths[-1]), found=found, allowed=allowed)
+    files = [out / f"{paths[0].stem}.ply", out / f"{paths[0].stem}.csv"]
+    check_replaceable(files, paths)
     with clock.stage("line extraction"):
         if times:
             _sized(paths[0], project)
@@ -54,7 +58,6 @@ def reconstruct_images(
         points = [triangulate_line(project, line, laser, step) for step, line in enumerate(lines)]
     with clock.stage("writing points"):
         columns = merge([cloud(one, None, laser, step, project.scene) for step, one in enumerate(points)])
-        files = [out / f"{paths[0].stem}.ply", out / f"{paths[0].stem}.csv"]
         write_ply(files[0], columns)
         write_csv(files[1], columns)
     flags, counts = np.unique(np.concatenate([line.flag[:, 0] for line in lines]), return_counts=True)

@@ -41,10 +41,10 @@ def is_stale(rendered: Project, now: Project) -> bool:
         return True
     # a laser that was off left no light to scale
     lit = any(a.power == 0.0 < b.power for a, b in zip(before.lasers, scene.lasers, strict=True))
-    return lit or _light_path(before) != _light_path(scene)
+    return lit or light_path(before) != light_path(scene)
 
 
-def _light_path(scene: Scene) -> Scene:
+def light_path(scene: Scene) -> Scene:
     """The scene without what developing decides, and without names."""
     lens = scene.camera.lens
     # a thin lens is rendered through its aperture; all else of it only scales the light

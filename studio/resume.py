@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from render.errors import Cancelled, InputError
 from render.frame import Frame
@@ -17,15 +16,11 @@ from studio import scan_folder
 from studio.interrupt import stop_on_interrupt
 from studio.light_groups import unfinished
 from studio.project import Project
+from studio.rendered_from import made_of
 from studio.stages import Clock, render_step
 from studio.strict_json import read_object
 
 Refined = Callable[[Frame], None]
-
-
-def made_of(project: Project, state: RenderState) -> dict[str, Any]:
-    """What a frame's sidecar says of how it was rendered: another frame is as good only where this is the same."""
-    return {**state.marks, "targets": project.render.model_dump(mode="json"), "axis": project.extraction.axis}
 
 
 def saved_path(out: Path, step: int) -> Path:
@@ -37,7 +32,7 @@ def frame_of_step(
     project: Project,
     world: World,
     step: int,
-    out: Path,
+    scan: scan_folder.Begun,
     clock: Clock,
     threads: int | None,
     *,
@@ -47,13 +42,13 @@ def frame_of_step(
 ) -> tuple[Frame, RenderState]:
     """One frame: found, gone on with or rendered; and its state, for `settle` once the frame is written.
 
-    resume: take what an earlier scan left in `out`. InputError: that is of something else. Cancelled: what was done is
-    kept in a file.
+    resume: take what an earlier scan left in the folder. InputError: that is of something else. Cancelled: what was
+    done is kept in a file.
     """
-    path = saved_path(out, step)
+    path = saved_path(scan.folder, step)
     state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path)
     if resume:
-        found = None if path.is_file() else _found(project, world, step, out, state)
+        found = None if path.is_file() else _found(project, world, step, scan, state)
         if found is not None:
             refined(found)
             return found, state
@@ -86,13 +81,13 @@ def settle(project: Project, frame: Frame, state: RenderState) -> None:
         state.remove()
 
 
-def _found(project: Project, world: World, step: int, out: Path, state: RenderState) -> Frame | None:
+def _found(project: Project, world: World, step: int, scan: scan_folder.Begun, state: RenderState) -> Frame | None:
     """The frame that is there already, rendered in the same way; None: there is none."""
-    sidecar = out / f"{scan_folder.frame_stem(step)}.json"
+    sidecar = scan.folder / f"{scan_folder.frame_stem(step)}.json"
     if not sidecar.is_file():
         return None
     try:
-        if read_object(sidecar, "frame").get("made_of") != made_of(project, state):
+        if read_object(sidecar, "frame").get("made_of") != made_of(project, state.marks, scan.inputs):
             return None
         frame = read_frame(sidecar)
     except InputError:

@@ -17,21 +17,8 @@ from analysis.line.ridges import find_ridges
 from analysis.line.settings import ExtractionSettings
 from analysis.line.subtract import subtract_off
 from render.files import atomic_write
+from studio.own_files import RIDGE_COLUMNS
 from studio.photographs import check_light, load_photograph, naming, table_path
-
-COLUMNS = (
-    "line",
-    "u",
-    "v",
-    "sigma",
-    "normal_u",
-    "normal_v",
-    "width",
-    "amplitude",
-    "background",
-    "significance",
-    "flag",
-)
 
 
 def ridges_of_file(
@@ -53,7 +40,7 @@ def ridges_of_file(
         found = find_ridges(image, settings=settings, noise=noise, threads=threads)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    writer.writerow(RIDGE_COLUMNS)
     numbers = np.column_stack(
         (found.u, found.v, found.sigma_u, found.normal, found.width, found.amplitude, found.background)
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -19,10 +20,12 @@ from render.frame import Frame
 from render.frame_files import write_frame
 from render.world import build_world
 from studio import scan_folder
+from studio.inputs import input_hashes
 from studio.light_groups import group_lines
 from studio.project import Project
+from studio.rendered_from import made_of
 from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
-from studio.resume import Refined, frame_of_step, made_of, settle
+from studio.resume import Refined, frame_of_step, settle
 from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world
 from studio.summary import summarise
 from studio.sweep import Passing, Sweep, Taken
@@ -66,15 +69,16 @@ def run_scan(
     progress: StageProgress = lambda stage, done: None,
     cancelled: Cancel = never,
     each: Callable[[FrameResult], None] = lambda frame: None,
+    source: Path | None = None,
 ) -> ScanResult:
     """Scan `project`, whose files are below `root`, into the folder `out`.
 
     steps: only the first so many frames; seed: in place of the project's; measure off: stop after the frames;
     report off: stop after the points; resume: take the frames that an earlier scan left in `out`, and go on with the
     one it left unfinished; seconds: time for the light of each frame; refined: hears of every frame as it gets better;
-    each: of every frame once it is measured.
-    InputError: bad project, mesh or texture, nothing to see, `out` not writable. Cancelled: files so far stay, whole,
-    and what was rendered of the frame under way.
+    each: of every frame once it is measured; source: the project's file, which is never written to.
+    InputError: bad project, mesh or texture, nothing to see, or as `scan_folder.begin` and `finish`. Cancelled: files
+    so far stay, whole, and what was rendered of the frame under way.
     """
     began = time.perf_counter()
     project = scaled(project, image_scale)
@@ -85,11 +89,15 @@ def run_scan(
     sweep = Sweep(project) if measure else None
     count = min(steps or project.scene.frame_count, project.scene.frame_count)
     clock = Clock(progress, cancelled)
-    with warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as caught, ExitStack() as held:
         warnings.simplefilter("always", UserWarning)
         with clock.stage("loading meshes"):
+            inputs = input_hashes(project.scene, root)
             first = build_world(project.scene, root, 0)
-        scan_folder.begin(out, project)
+        reads = [] if source is None else [source]
+        scan = held.enter_context(
+            scan_folder.begin(out, project, root, inputs, count=count, resume=resume, reads=reads)
+        )
         with clock.stage(PREPARING):
             warm_up(chain(*needed(project)), progress, cancelled)
         results: list[FrameResult] = []
@@ -121,7 +129,7 @@ def run_scan(
         for step in clock.frames(count):
             world = world if step == 0 else step_world(project, root, step, world)
             frame, state = frame_of_step(
-                project, world, step, out, clock, threads, resume=resume, seconds=seconds, refined=refined
+                project, world, step, scan, clock, threads, resume=resume, seconds=seconds, refined=refined
             )
             light.append(light_record(frame, project))
             for text in frame.warnings:  # in words as at first, though figures change from step to step
@@ -136,7 +144,7 @@ def run_scan(
                     together(project, frame, images),
                     project.scene,
                     sensor=project.sensor,
-                    made_of=made_of(project, state),
+                    made_of=made_of(project, state.marks, inputs),
                 )
                 settle(project, frame, state)
                 files += written
@@ -166,9 +174,9 @@ def run_scan(
                 reports = write_reports(
                     out, project, first, results, clock, notes=[*told, *notes], created=result["created"]
                 )
-    result["report"] = [path.name for path in reports]
-    result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
-    manifest = scan_folder.finish(out, root, result)
+        result["report"] = [path.name for path in reports]
+        result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
+        manifest = scan_folder.finish(scan, result)
     return ScanResult(out, (*files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
 
 

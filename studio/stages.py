@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -120,12 +120,18 @@ def render_step(
     return frame
 
 
-def develop_step(project: Project, frame: Frame, clock: Clock, threads: int | None) -> list[Image]:
-    """One image for each laser: they fire one after the other, so that no line hides another."""
+def develop_step(
+    project: Project, frame: Frame, clock: Clock, threads: int | None, laser_power: Sequence[float] | None = None
+) -> list[Image]:
+    """One image for each laser: they fire one after the other, so that no line hides another.
+
+    laser_power: W of each, in place of the scene's, which the frame was rendered with.
+    """
     scene, images = project.scene, []
+    powers = [laser.power for laser in scene.lasers] if laser_power is None else laser_power
     with clock.stage("sensor"):
         for i in range(len(scene.lasers)):
-            power = [laser.power if i == k else 0.0 for k, laser in enumerate(scene.lasers)]
+            power = [value if i == k else 0.0 for k, value in enumerate(powers)]
             images.append(expose(project, frame, power, i, threads=threads))
     return images
 

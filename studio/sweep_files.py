@@ -14,6 +14,7 @@ from analysis.line.settings import ExtractionSettings
 from analysis.line.spacetime import passage
 from render.errors import InputError
 from render.files import atomic_write
+from studio.own_files import check_replaceable
 from studio.photographs import load_photograph
 
 
@@ -46,6 +47,7 @@ def passage_of_files(
     }
     target = (out if out is not None else paths[0].parent) / f"{paths[0].stem}_passage.exr"
     layers = {name: np.ascontiguousarray(values, dtype=np.float32) for name, values in channels.items()}
+    check_replaceable([target], paths)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with atomic_write(target) as temporary:
         OpenEXR.File(header, layers).write(str(temporary))

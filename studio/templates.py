@@ -1,12 +1,18 @@
-"""New projects from the ones that come with the program; nothing that is there is overwritten unasked."""
+"""New projects from the ones that come with the program; nothing that is there is overwritten unasked.
+
+All files are written beside the folder first, so that a full disk leaves no part of a project behind.
+"""
 
 from __future__ import annotations
 
+import os
+import secrets
+import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from render.errors import InputError
-from render.files import atomic_write
 
 DESCRIPTIONS = {
     "weld_seam": "the founding paper's rig over a single-bevel tee joint",
@@ -56,7 +62,30 @@ def new_project(template: str, folder: Path, *, force: bool = False) -> NewProje
             where=str(there[0]),
             cure="choose another folder, or overwrite it with --force",
         )
-    for file, target in pairs:
-        with atomic_write(target) as temporary:
-            temporary.write_bytes(file.read_bytes())
+    _copy(source, folder, [file.relative_to(source) for file, _ in pairs])
     return NewProject(project=folder / PROJECT_NAME, files=tuple(target for _, target in pairs))
+
+
+def _copy(source: Path, folder: Path, names: Sequence[Path]) -> None:
+    """The files into a folder, all or none. InputError: they cannot be written."""
+    target = Path(os.path.realpath(folder))
+    staged = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    try:
+        for name in names:
+            (staged / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source / name, staged / name)
+        if not target.exists():
+            staged.rename(target)
+            return
+        for name in sorted(names, key=lambda name: name == Path(PROJECT_NAME)):  # the project when its files are there
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(staged / name, target / name)
+    except OSError as error:
+        raise InputError(
+            "the project cannot be written",
+            where=str(folder),
+            found=error.strerror or error,
+            cure="choose a folder that you may write to and that has free space",
+        ) from None
+    finally:
+        shutil.rmtree(staged, ignore_errors=True)

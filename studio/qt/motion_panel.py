@@ -111,6 +111,7 @@ class MotionPanel(QWidget):
             session.message.emit("warning", "Something is being rendered: wait for it, or cancel it first")
             return None
         project, root, scale = session.project, session.document.root, SCALES[self.scale.currentText()]
+        source = session.document.path
 
         def each(frame: FrameResult) -> None:
             clouds = [
@@ -138,6 +139,7 @@ class MotionPanel(QWidget):
                 cancelled=cancelled,
                 each=each,
                 report=report,
+                source=source,
             )
 
         self.open.hide()

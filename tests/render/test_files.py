@@ -119,7 +119,7 @@ def test_a_neighbour_whose_name_begins_alike_is_outside(tmp_path: Path) -> None:
 def test_sha256_is_that_of_the_bytes(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"laser" * 100_000)
     assert sha256(tmp_path / "a") == hashlib.sha256(b"laser" * 100_000).hexdigest()
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="no such file"):
         sha256(tmp_path / "absent")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -195,6 +196,29 @@ def test_a_draft_without_work_is_swept_away(tmp_path: Path) -> None:
     end_without_closing(program)
     sweep(tmp_path)
     assert not folder.exists()
+
+
+@pytest.mark.parametrize("root", ["..", "{stem}-0/..", "{stem}-0/../..", "other-0", ".", "{stem}-0/sub", "{stem}-x"])
+def test_a_recovery_file_that_names_another_folder_takes_none_with_it(
+    root: str, document: Document, tmp_path: Path
+) -> None:
+    kept = tmp_path / "state" / "kept"
+    program = Autosave(kept)
+    program.draft()
+    document.set(("seed",), 5)
+    program.keep(document)
+    end_without_closing(program)
+    stem = program.file.stem
+    for folder in (f"{stem}-0/sub", "other-0", f"{stem}-x"):
+        (kept / folder).mkdir()
+    data = json.loads(program.file.read_text())
+    data["root"] = f"{kept}/{root.format(stem=stem)}"
+    program.file.write_text(json.dumps(data))
+    before = {path for path in tmp_path.rglob("*") if path.is_dir()}
+    (left,) = find(kept)
+    assert not left.is_draft
+    left.discard()
+    assert {path for path in tmp_path.rglob("*") if path.is_dir()} == before
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"format": "blazer-recovery", "format_version": 99}', "\x00\xff"])

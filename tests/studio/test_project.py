@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import errno
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -111,9 +113,30 @@ class TestTemplates:
         new_project("plane", tmp_path, force=True)
         assert Project.load(made.project).name
 
+    @pytest.mark.parametrize("there", [False, True])
+    def test_a_full_disk_leaves_no_half_of_a_project(
+        self, there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        target = tmp_path / "made"
+        if there:
+            target.mkdir()
+        copied, copy = [], shutil.copyfile
+
+        def full(source: Path, destination: Path) -> None:
+            if copied:
+                raise OSError(errno.ENOSPC, "No space left on device", str(destination))
+            copied.append(copy(source, destination))
+
+        monkeypatch.setattr(shutil, "copyfile", full)
+        with pytest.raises(InputError, match="made: the project cannot be written; found No space"):
+            new_project("weld_seam", target)
+        assert copied and [*tmp_path.rglob("*")] == ([target] if there else [])
+
     def test_a_folder_with_one_project_stands_for_it(self, tmp_path: Path) -> None:
         made = new_project("plane", tmp_path)
-        assert project_file(tmp_path) == made.project
+        (tmp_path / ".other.0123abcd.json").write_text("left by a program that was killed")
+        made.project.rename(tmp_path / "part.json")
+        assert project_file(tmp_path) == tmp_path / "part.json"
         with pytest.raises(InputError, match="does not hold one project"):
             project_file(tmp_path.parent)
 

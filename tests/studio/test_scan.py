@@ -205,8 +205,8 @@ class TestStopping:
 
 class TestDamagedFolders:
     @pytest.mark.parametrize(
-        "text", ["", "{", "[]", "{}", '{"format": "blazer-scan", "format_version": 2}',
-                 '{"format": "blazer-scan", "format_version": 1, "frames": [1], "project_folder": "."}']
+        "text", ["", "{", "[]", "{}", '{"format": "blazer-scan", "format_version": 3}',
+                 '{"format": "blazer-scan", "format_version": 2, "frames": [1], "project_folder": "."}']
     )  # fmt: skip
     def test_a_damaged_manifest_is_refused(self, text: str, tmp_path: Path) -> None:
         (tmp_path / "scan.json").write_text(text)
