@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.bidirectional import indirect_images, indirect_shares
-from render.laser import LineLaser
+from render.counts import (
+    INDIRECT_CLAMPED,
+    INDIRECT_CUT,
+    INDIRECT_DROPPED,
+    INDIRECT_ERROR,
+    LIGHT_PATHS,
+    Counts,
+)
 from render.lens_plan import lens_lines
 from render.saved import RenderState
 from render.scene import Scene
@@ -120,11 +127,6 @@ def choose_plan(
     return Plan(kinds, (*lines, *clamped, *tail))
 
 
-def indirect_error(laser: LineLaser) -> str:
-    """Key of `Frame.counts`: the relative RMS error so far of a laser's indirect light."""
-    return f"relative error of reflections, {laser.name}"
-
-
 def indirect_light(
     world: World,
     scene: Scene,
@@ -139,7 +141,7 @@ def indirect_light(
     keeps: Cancel | None = None,
     enough: Callable[[int], Cancel | None] = lambda left: None,
     state: RenderState | None = None,
-) -> Iterator[tuple[tuple[Float32, ...], dict[str, float]]]:
+) -> Iterator[tuple[tuple[Float32, ...], Counts]]:
     """Ever better indirect radiance of each laser as the plan says (dark until its turn), and `Frame.counts` of it.
 
     enough: given how many lasers are left to be done, what ends the next one (`indirect_images`). state: to go on from,
@@ -147,7 +149,7 @@ def indirect_light(
     """
     count = len(scene.lasers) if plan.kinds is not None else 0
     images = [np.zeros((scene.camera.height, scene.camera.width), np.float32)] * count
-    counts: dict[str, float] = {}
+    counts: Counts = {}
     for i, laser in enumerate(scene.lasers[:count]):
         for image in indirect_images(
             world,
@@ -169,12 +171,12 @@ def indirect_light(
             keep=None if state is None else partial(state.keep_laser, i),
         ):
             images[i] = image.radiance
-            counts[indirect_error(laser)] = image.error
-            counts[f"light paths, {laser.name}"] = image.paths
-            counts[f"dropped contributions, {laser.name}"] = image.dropped
+            counts[INDIRECT_ERROR.of(i)] = image.error
+            counts[LIGHT_PATHS.of(i)] = image.paths
+            counts[INDIRECT_DROPPED.of(i)] = image.dropped
             if settings.laser_clamp is not None:
-                counts[f"clamped contributions, {laser.name}"] = image.clamped
-                counts[f"mean radiance taken by the clamp, {laser.name}"] = image.cut
+                counts[INDIRECT_CLAMPED.of(i)] = image.clamped
+                counts[INDIRECT_CUT.of(i)] = image.cut
             yield tuple(images), dict(counts)
 
 

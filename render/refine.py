@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from render.ambient_plan import choose_ambient, expected_ambient, has_ambient, planned_images
 from render.checks import check_placement
+from render.counts import DIRECT_DROPPED, DIRECT_ERROR, DIRECT_SAMPLES, EMBREE_SECONDS, LIT_PIXELS, RAYS, Counts
 from render.curve import laser_curve
 from render.direct import direct_image
 from render.embree import RayScene
@@ -121,9 +122,9 @@ def frames(
     ray_start, embree_start = rays.rays, rays.seconds
     frame = Frame(step, (), None, (), None, "\n".join(plan(scene, settings)), warnings=warnings)
 
-    def told(frame: Frame, **counts: float) -> Frame:
-        so_far = {"rays": rays.rays - ray_start, "seconds in embree, all threads": rays.seconds - embree_start}
-        return replace(frame, seconds=clock.so_far(), counts={**frame.counts, **counts, **so_far})
+    def told(frame: Frame, counts: Counts | None = None) -> Frame:
+        so_far = {RAYS: float(rays.rays - ray_start), EMBREE_SECONDS: rays.seconds - embree_start}
+        return replace(frame, seconds=clock.so_far(), counts={**frame.counts, **(counts or {}), **so_far})
 
     pixels, lit = scene.camera.width * scene.camera.height, has_ambient(scene)
     with clock.stage("exact line", 0):
@@ -131,7 +132,7 @@ def frames(
     for target in targets:
         with clock.stage("laser light", _laser_work(pixels, scene, target)) as report:
             direct, counts = _lasers(world, scene, step, target, seed, threads, report, cancelled)
-        frame = told(replace(frame, laser_direct=direct, curves=curves), **counts)
+        frame = told(replace(frame, laser_direct=direct, curves=curves), counts)
         yield frame
     with clock.stage("reflected laser light", _indirect_work(pixels, settings)) as report:
         chosen = choose_plan(world, scene, settings, direct, step=step, seed=seed, cancelled=cancelled)
@@ -150,7 +151,7 @@ def frames(
             enough=lambda left: limit.share(left + lit),
             state=state,
         ):
-            frame = told(replace(frame, laser_indirect=indirect), **counts)
+            frame = told(replace(frame, laser_indirect=indirect), counts)
             yield frame
     if not (frame.laser_indirect or settings.truth_images or lit):
         # nothing is left to do but to say so
@@ -181,7 +182,7 @@ def frames(
                     keep=None if state is None else state.keep_film,
                 )
             ):
-                frame = told(replace(frame, ambient=image.radiance), **counts)
+                frame = told(replace(frame, ambient=image.radiance), counts)
                 yield frame
 
 
@@ -224,9 +225,10 @@ def _lasers(
     threads: int | None,
     report: Callable[[float], None],
     cancelled: Cancel | None,
-) -> tuple[tuple[Float32, ...], dict[str, float]]:
+) -> tuple[tuple[Float32, ...], Counts]:
     """The direct light of every laser, and what it took."""
-    images, counts = [], {}
+    images = []
+    counts: Counts = {}
     for i, laser in enumerate(scene.lasers):
         image = direct_image(
             world,
@@ -241,10 +243,10 @@ def _lasers(
             progress=lambda done, i=i: report((i + done) / len(scene.lasers)),  # type: ignore[misc]
         )
         images.append(image.radiance)
-        counts[f"relative error, {laser.name}"] = image.error
-        counts[f"lit pixels, {laser.name}"] = image.pixels
-        counts[f"samples, {laser.name}"] = image.samples
-        counts[f"dropped contributions of direct light, {laser.name}"] = image.dropped
+        counts[DIRECT_ERROR.of(i)] = image.error
+        counts[LIT_PIXELS.of(i)] = image.pixels
+        counts[DIRECT_SAMPLES.of(i)] = image.samples
+        counts[DIRECT_DROPPED.of(i)] = image.dropped
     return tuple(images), counts
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from analysis.error import Errors
 from analysis.line.result import Line
 from analysis.triangulate import Points
+from render.counts import Counts
 from render.frame import LaserCurve
 from render.scene import Scene
 from render.sensor import Sensor
@@ -53,8 +54,8 @@ class FrameResult:
     """`Frame.plan`: what was computed, what was left out and why, one line each."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage, s, of this frame: those of `Frame.seconds` and those after it. Summed over the frames."""
-    counts: dict[str, float] = field(default_factory=dict)
-    """`Frame.counts`; what counts is summed over the frames, what is named "error" or "fraction" is averaged."""
+    counts: Counts = field(default_factory=dict)
+    """`Frame.counts`; over the frames they are summed or averaged as their kind says."""
 
 
 @dataclass(frozen=True)

@@ -236,17 +236,19 @@ def timing(report: ReportInput) -> tuple[list[tuple[str, str, float]], str]:
 
 
 def counts(report: ReportInput) -> list[tuple[str, str]]:
-    """What the renderer counted: sums over the frames, means of errors, of fractions and of what is said of a pixel."""
-    names = list(dict.fromkeys(name for frame in report.frames for name in frame.counts))
+    """What the renderer counted: sums over the frames, or means, as the kind of each quantity says."""
+    lasers = [laser.name for laser in report.scene.lasers]
     rows = []
-    for name in names:
-        values = [frame.counts[name] for frame in report.frames if name in frame.counts]
-        if "error" in name or "fraction" in name:
-            rows.append((name, percent(float(np.mean(values)), 2)))
-        elif "seconds" in name:
-            rows.append((name, seconds(float(np.sum(values)))))
-        elif "a pixel" in name or "mean" in name:
-            rows.append((name, f"{float(np.mean(values)):.3g}"))
-        else:
-            rows.append((name, count(float(np.sum(values)))))
+    for quantity in dict.fromkeys(quantity for frame in report.frames for quantity in frame.counts):
+        values = [frame.counts[quantity] for frame in report.frames if quantity in frame.counts]
+        match quantity.kind:
+            case "error":
+                text = percent(float(np.mean(values)), 2)
+            case "mean":
+                text = f"{float(np.mean(values)):.3g}"
+            case "seconds":
+                text = seconds(float(np.sum(values)))
+            case "count":
+                text = count(float(np.sum(values)))
+        rows.append((quantity.label(lasers), text))
     return rows

@@ -20,11 +20,12 @@ from analysis.report.error_figures import nice_limit
 from analysis.report.line_figures import block_maximum, places
 from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
 from analysis.report.summary import chosen, headline, remarks, total
-from analysis.report.tables import scene_tables
+from analysis.report.tables import counts, scene_tables
 from analysis.report.units import digits, micrometres
 from analysis.report.write import PLAIN_NOTE, render_page, write_report
 from analysis.triangulate import triangulate
 from render.camera import Camera
+from render.counts import AMBIENT_SAMPLES, DIRECT_ERROR, EMBREE_SECONDS, INDIRECT_CUT, LIT_PIXELS, RAYS
 from render.frame import LaserCurve
 from render.laser import LineLaser
 from render.material import (
@@ -110,7 +111,7 @@ def make_report(
             made = tuple(extraction(scene, curve, step, method, noise) for method in methods)
             results.append(LaserResult(curve, made, image))
         plan = "direct: the light that met one surface\nleft out: all else <b>"
-        frames.append(FrameResult(step, tuple(results), plan, {"laser light": 0.5}, {"rays": 12345.0}))
+        frames.append(FrameResult(step, tuple(results), plan, {"laser light": 0.5}, {RAYS: 12345.0}))
     return ReportInput(
         title=name, scene=scene, frames=tuple(frames), vertices=WALL, triangles=WALL_TRIANGLES,
         object_id=np.zeros(2, np.int32), display_max=4095.0, settings={"Extraction": {name: name}},
@@ -338,3 +339,18 @@ def test_materials_are_told_with_what_decides_how_they_shine(material, told):
     shown = report.scene.model_copy(update={"objects": (wall.model_copy(update={"material": material}),)})
     (line,) = scene_tables(dataclasses.replace(report, scene=shown))["Objects"].values()
     assert line == f"plane, 2 triangles, {told}"
+
+
+@pytest.mark.parametrize("name", ["error probe", "mean", "seconds", "fraction a pixel"])
+def test_a_laser_may_be_called_like_a_kind_of_number(name):
+    report = make_report(steps=2, name=name)
+    found = {LIT_PIXELS.of(0): 1e5, DIRECT_ERROR.of(0): 0.004, INDIRECT_CUT.of(0): 0.25}
+    found |= {AMBIENT_SAMPLES: 15.5, EMBREE_SECONDS: 0.5}
+    frames = tuple(dataclasses.replace(frame, counts=found) for frame in report.frames)
+    assert counts(dataclasses.replace(report, frames=frames)) == [
+        (f"lit pixels, {name}a", "200\u2009000"),
+        (f"relative error, {name}a", "0.40\u00a0%"),
+        (f"mean radiance taken by the clamp, {name}a", "0.25"),
+        ("samples a pixel, ambient", "15.5"),
+        ("seconds in embree, all threads", "1.00\u00a0s"),
+    ]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from render.counts import DIRECT_DROPPED, LIGHT_PATHS
 from render.errors import Cancelled, InputError
 from render.frame_files import read_frame
 from studio.interrupt import stop_on_interrupt
@@ -71,11 +72,11 @@ def test_a_time_limit_leaves_a_frame_and_what_it_takes_to_go_on(project: Project
     assert "error" in done.manifest["light"][0]["groups"]["laser, reflected on"]
     scan(slow, tmp_path, seconds=0.5, resume=True)
     second = read_frame(tmp_path / "frame_0000.json")
-    assert second.counts["light paths, laser"] > first.counts["light paths, laser"] > 0
+    assert second.counts[LIGHT_PATHS.of(0)] > first.counts[LIGHT_PATHS.of(0)] > 0
     names = [name for _, name, _ in group_lines(second, small.scene, small.render)]
     assert names == ["laser, direct", "laser, reflected on", "ambient"]
-    assert second.counts["dropped contributions of direct light, laser"] == 0
-    bad = replace(second, counts={**second.counts, "dropped contributions of direct light, laser": 3})
+    assert second.counts[DIRECT_DROPPED.of(0)] == 0
+    bad = replace(second, counts={**second.counts, DIRECT_DROPPED.of(0): 3})
     texts = [text for _, _, text in group_lines(bad, small.scene, small.render)]
     assert "3 contributions were no number" in texts[0] and not any("no number" in text for text in texts[1:])
 
