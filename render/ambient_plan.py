@@ -70,14 +70,24 @@ def choose_ambient(
     cancelled: Cancel | None = None,
 ) -> AmbientPlan:
     """Decide how many surfaces ambient light may meet. Raises Cancelled."""
+    if settings.transport == "direct" or not has_ambient(scene):
+        return ambient_plan_of(None, world, scene, settings)
+    share = onward_share(world, scene, settings.max_bounces, step=step, seed=seed, cancelled=cancelled)
+    return ambient_plan_of(share, world, scene, settings)
+
+
+def ambient_plan_of(
+    measured_share: tuple[float, float] | None, world: World, scene: Scene, settings: RenderSettings
+) -> AmbientPlan:
+    """The plan that follows from what a pilot measured; None: nothing, as `choose_ambient` does not ask."""
     if not has_ambient(scene):
         return AmbientPlan(1, expected_ambient(scene, settings))
     effort = f"to {settings.ambient_error:.1%} or {settings.ambient_samples} samples a pixel"
     head = f"ambient: {AMBIENT}, {effort}"
     blind = _blind_lines(world, scene)
-    if settings.transport == "direct":
+    if measured_share is None:
         return AmbientPlan(1, (head, f"left out: {ONWARD} - switched off, its share was not measured", *blind))
-    share, error = onward_share(world, scene, settings.max_bounces, step=step, seed=seed, cancelled=cancelled)
+    share, error = measured_share
     measured = f"a pilot puts it at {share:.2%} +- {error:.2%} of what one surface reflects"
     if math.isinf(share):
         measured = "nothing that is seen is lit otherwise"

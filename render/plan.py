@@ -30,6 +30,8 @@ from render.vertex import BENT, PLAIN, SUNK, UNJOINED
 from render.world import World
 
 Float32 = NDArray[np.float32]
+Shares = dict[str, tuple[float, float]]
+"""By `Rung.share`: light of that kind over the direct light in the image, and its standard error."""
 
 DIRECT = "direct: light of each laser that meets one surface, exact across the sheet, sampled across edges and shadows"
 
@@ -93,10 +95,20 @@ def choose_plan(
 
     direct: (h, w) direct radiance of each laser.
     """
-    tail = lens_lines(scene.camera)
     if settings.transport == "direct":
-        return Plan(None, (DIRECT, f"left out: {INDIRECT} - switched off, its share was not measured", *tail))
+        return direct_plan(scene)
     shares = pilot_shares(world, scene, direct, step=step, seed=seed, cancelled=cancelled)
+    return plan_of(shares, scene, settings)
+
+
+def direct_plan(scene: Scene) -> Plan:
+    """Where nothing is asked for but direct light."""
+    left_out = f"left out: {INDIRECT} - switched off, its share was not measured"
+    return Plan(None, (DIRECT, left_out, *lens_lines(scene.camera)))
+
+
+def plan_of(shares: Shares, scene: Scene, settings: RenderSettings) -> Plan:
+    """The plan that follows from what a pilot measured."""
     names = [rung.name for rung in RUNGS]
     wanted = names.index(settings.transport) if settings.transport in names else -1
     worth = {}
@@ -124,7 +136,7 @@ def choose_plan(
             why = "not asked for" if wanted >= 0 else f"below the negligible {settings.negligible:.2%}"
             lines.append(f"left out: {rung.light} ({rung.name}) - {measured}, {why}")
     clamped = clamp_line(settings) if kinds is not None else ()
-    return Plan(kinds, (*lines, *clamped, *tail))
+    return Plan(kinds, (*lines, *clamped, *lens_lines(scene.camera)))
 
 
 def indirect_light(
@@ -202,7 +214,7 @@ def pilot_shares(
     step: int = 0,
     seed: int = 0,
     cancelled: Cancel | None = None,
-) -> dict[str, tuple[float, float]]:
+) -> Shares:
     """Each kind of indirect light over the direct light in the image, over all lasers, with its standard error."""
     known = sum(float(image.sum(dtype=np.float64)) for image in direct)
     found = []

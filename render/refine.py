@@ -26,6 +26,7 @@ from render.lens_plan import lens_lines
 from render.material_checks import check_materials, scene_warnings
 from render.plan import DIRECT, INDIRECT, choose_plan, clamp_line, indirect_light
 from render.saved import RenderState
+from render.scan_plan import ScanPlan
 from render.scene import Scene
 from render.settings import RenderSettings
 from render.stage_clock import Clock, WholeClock
@@ -53,7 +54,7 @@ def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
         lines.append(f"{settings.transport}: {INDIRECT} - asked for")
     else:
         lines.append(
-            f"{INDIRECT}: a pilot decides step by step, and leaves out what is below {settings.negligible:.2%}"
+            f"{INDIRECT}: a pilot decides kind by kind, and leaves out what is below {settings.negligible:.2%}"
         )
     if settings.transport != "direct":
         lines.extend(clamp_line(settings))
@@ -109,8 +110,9 @@ def frames(
     keeps: Cancel | None = None,
     seconds: float | None = None,
     state: RenderState | None = None,
+    scan: ScanPlan | None = None,
 ) -> Iterator[Frame]:
-    """As `refine`; targets: errors of the laser light, one after the other."""
+    """As `refine`; targets: errors of the laser light, one after the other; scan: what was decided for all frames."""
     limit = Limit(seconds, cancelled, keeps)
     cancelled = None if cancelled is None else limit.asked
     with clock.stage("acceleration structure", len(world.triangles) * 10):
@@ -135,7 +137,10 @@ def frames(
         frame = told(replace(frame, laser_direct=direct, curves=curves), counts)
         yield frame
     with clock.stage("reflected laser light", _indirect_work(pixels, settings)) as report:
-        chosen = choose_plan(world, scene, settings, direct, step=step, seed=seed, cancelled=cancelled)
+        if scan is None:
+            chosen = choose_plan(world, scene, settings, direct, step=step, seed=seed, cancelled=cancelled)
+        else:
+            chosen = scan.light
         frame = told(replace(frame, plan="\n".join((*chosen.lines, *expected_ambient(scene, settings)))))
         for indirect, counts in indirect_light(
             world,
@@ -164,7 +169,10 @@ def frames(
         yield frame
     if lit:
         with clock.stage("ambient light", _ambient_work(pixels, settings)) as report:
-            wanted = choose_ambient(world, scene, settings, step=step, seed=seed, cancelled=cancelled)
+            if scan is None:
+                wanted = choose_ambient(world, scene, settings, step=step, seed=seed, cancelled=cancelled)
+            else:
+                wanted = scan.ambient
             frame = replace(frame, plan="\n".join((*chosen.lines, *wanted.lines)))
             for image, counts in limit.until_over(
                 planned_images(

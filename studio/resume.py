@@ -12,6 +12,7 @@ from render.frame import Frame
 from render.frame_files import read_frame
 from render.material_checks import scene_warnings
 from render.saved import RenderState, read_state, state_of
+from render.scan_plan import ScanPlan
 from render.world import World
 from studio import scan_folder
 from studio.interrupt import stop_on_interrupt
@@ -44,14 +45,16 @@ def frame_of_step(
     resume: bool = False,
     seconds: float | None = None,
     refined: Refined = lambda frame: None,
+    scan: ScanPlan | None = None,
 ) -> tuple[Frame, RenderState]:
     """One frame: found, gone on with or rendered; and its state, for `settle` once the frame is written.
 
-    resume: take what an earlier scan left in `out`. InputError: that is of something else. Cancelled: what was done is
-    kept in a file.
+    scan: the plan of all frames. resume: take what an earlier scan left in `out`. InputError: that is of something
+    else. Cancelled: what was done is kept in a file.
     """
     path = saved_path(out, step)
-    state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path)
+    mark = None if scan is None else scan.mark
+    state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path, plan=mark)
     if resume:
         found = None if path.is_file() else _found(project, world, step, out, state)
         if found is not None:
@@ -70,6 +73,7 @@ def frame_of_step(
                 seconds=seconds,
                 state=state,
                 refined=refined,
+                scan=scan,
             )
     except Cancelled:
         if state.write():
