@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.error import Errors
+from analysis.spool import Spool
 from analysis.triangulate import Points
 from render.errors import InputError
 from render.files import atomic_write
@@ -42,6 +44,8 @@ PLY_TYPES = {
     "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
 LONGEST_HEADER = 65536
+PART = 1 << 16
+"""Points of a spooled cloud that are in memory at a time."""
 
 
 def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: Scene | None = None) -> Cloud:
@@ -83,24 +87,64 @@ def merge(clouds: Sequence[Cloud]) -> Cloud:
     return {name: np.concatenate([part[name] for part in clouds]) for name in clouds[0]}
 
 
-def write_ply(path: Path | str, columns: Mapping[str, Column]) -> None:
+class SpooledCloud:
+    """A cloud of any length outside memory, of the columns of `UNITS`."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        """folder: of its file, as `Spool`."""
+        self.count = 0
+        self._spool = Spool(folder)
+        self._dtype = _table(merge([])).dtype
+
+    def add(self, columns: Cloud) -> None:
+        """InputError: as `Spool.append`."""
+        table = _table(columns)
+        if table.dtype != self._dtype:
+            raise ValueError(f"columns {table.dtype.names}; allowed: {self._dtype.names}")
+        self._spool.append(table.tobytes())
+        self.count += len(table)
+
+    def parts(self) -> Iterator[Cloud]:
+        """All of it, one part after the other; at least one, be it empty."""
+        size = self._dtype.itemsize
+        for start in range(0, max(self.count, 1), PART):
+            table = np.frombuffer(self._spool.read(start * size, PART * size), self._dtype)
+            yield {name: table[name] for name in UNITS}
+
+    def close(self) -> None:
+        self._spool.close()
+
+
+def _table(columns: Mapping[str, Column]) -> NDArray[np.void]:
+    """As the vertices of a PLY file: doubles for float64 columns, ints for int32."""
+    kinds = [(name, "<i4" if column.dtype.kind == "i" else "<f8") for name, column in columns.items()]
+    table = np.empty(len(next(iter(columns.values()))), dtype=kinds)
+    for name, column in columns.items():
+        table[name] = column
+    return table
+
+
+def _parts(points: Mapping[str, Column] | SpooledCloud) -> tuple[int, Iterator[Cloud]]:
+    if isinstance(points, SpooledCloud):
+        return points.count, points.parts()
+    return len(next(iter(points.values()))), iter([dict(points)])
+
+
+def write_ply(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> None:
     """Binary little-endian PLY: doubles for float64 columns, ints for int32. InputError: the file cannot be written."""
-    table = np.empty(
-        len(next(iter(columns.values()))),
-        dtype=[(name, "<i4" if column.dtype.kind == "i" else "<f8") for name, column in columns.items()],
-    )
+    count, parts = _parts(points)
+    first = next(parts)
     header = [
         "ply",
         "format binary_little_endian 1.0",
         "comment metre, pixel; world frame",
-        f"element vertex {len(table)}",
+        f"element vertex {count}",
+        *(f"property {'int' if column.dtype.kind == 'i' else 'double'} {name}" for name, column in first.items()),
     ]
-    for name, column in columns.items():
-        table[name] = column
-        header.append(f"property {'int' if column.dtype.kind == 'i' else 'double'} {name}")
     with atomic_write(path) as temporary, open(temporary, "wb") as file:
         file.write("\n".join([*header, "end_header", ""]).encode("ascii"))
-        file.write(table.tobytes())
+        for part in chain([first], parts):
+            file.write(_table(part).tobytes())
 
 
 def read_ply(path: Path | str) -> Cloud:
@@ -135,13 +179,16 @@ def read_ply(path: Path | str) -> Cloud:
     return {name: table[name].astype(np.float64 if table[name].dtype.kind == "f" else np.int32) for name, _ in fields}
 
 
-def write_csv(path: Path | str, columns: Mapping[str, Column]) -> None:
+def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> None:
     """One row a point, header `x_m, ..., u_px, ..., row`; floats with all digits. InputError: cannot be written."""
-    header = [f"{name}_{UNITS[name]}" if UNITS.get(name) else name for name in columns]
+    _, parts = _parts(points)
+    first = next(parts)
+    header = [f"{name}_{UNITS[name]}" if UNITS.get(name) else name for name in first]
     with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)
-        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+        for part in chain([first], parts):
+            writer.writerows(zip(*(column.tolist() for column in part.values()), strict=True))
 
 
 def read_csv(path: Path | str) -> Cloud:

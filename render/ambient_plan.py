@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from render.ambient import AmbientImage, Arrays, Film, ambient_images
 from render.bsdf import DIELECTRIC, SMOOTH
 from render.camera_paths import camera_paths
+from render.counts import AMBIENT_CLAMPED, AMBIENT_CUT, AMBIENT_DROPPED, AMBIENT_ERROR, AMBIENT_SAMPLES, Counts
 from render.lights import PointLight
 from render.material import Emitter
 from render.scene import Scene
@@ -23,11 +24,6 @@ Float = NDArray[np.float64]
 
 AMBIENT = "light of lamps, surroundings and shining objects"
 ONWARD = "ambient light that meets two or more surfaces (interreflection, light through glass)"
-AMBIENT_ERROR = "relative error, ambient"
-AMBIENT_SAMPLES = "samples a pixel, ambient"
-DROPPED_SAMPLES = "dropped contributions, ambient"
-CLAMPED_SAMPLES = "clamped contributions, ambient"
-CLAMPED_RADIANCE = "mean radiance taken by the clamp, ambient"
 
 GROUPS, GROUP_PIXELS, PIXEL_SAMPLES = 16, 64, 16
 """The pilot's pixels, drawn by chance, in groups whose spread is its uncertainty; samples of each half on one."""
@@ -74,14 +70,24 @@ def choose_ambient(
     cancelled: Cancel | None = None,
 ) -> AmbientPlan:
     """Decide how many surfaces ambient light may meet. Raises Cancelled."""
+    if settings.transport == "direct" or not has_ambient(scene):
+        return ambient_plan_of(None, world, scene, settings)
+    share = onward_share(world, scene, settings.max_bounces, step=step, seed=seed, cancelled=cancelled)
+    return ambient_plan_of(share, world, scene, settings)
+
+
+def ambient_plan_of(
+    measured_share: tuple[float, float] | None, world: World, scene: Scene, settings: RenderSettings
+) -> AmbientPlan:
+    """The plan that follows from what a pilot measured; None: nothing, as `choose_ambient` does not ask."""
     if not has_ambient(scene):
         return AmbientPlan(1, expected_ambient(scene, settings))
     effort = f"to {settings.ambient_error:.1%} or {settings.ambient_samples} samples a pixel"
     head = f"ambient: {AMBIENT}, {effort}"
     blind = _blind_lines(world, scene)
-    if settings.transport == "direct":
+    if measured_share is None:
         return AmbientPlan(1, (head, f"left out: {ONWARD} - switched off, its share was not measured", *blind))
-    share, error = onward_share(world, scene, settings.max_bounces, step=step, seed=seed, cancelled=cancelled)
+    share, error = measured_share
     measured = f"a pilot puts it at {share:.2%} +- {error:.2%} of what one surface reflects"
     if math.isinf(share):
         measured = "nothing that is seen is lit otherwise"
@@ -107,7 +113,7 @@ def planned_images(
     keeps: Cancel | None = None,
     before: Arrays | None = None,
     keep: Callable[[Film], None] | None = None,
-) -> Iterator[tuple[AmbientImage, dict[str, float]]]:
+) -> Iterator[tuple[AmbientImage, Counts]]:
     """Ever better images as the plan says, and what `Frame.counts` tells of each.
 
     keeps, before, keep: see `ambient_images`.
@@ -132,11 +138,11 @@ def planned_images(
         keep=keep,
     )
     for image in images:
-        counts = {AMBIENT_SAMPLES: image.samples, DROPPED_SAMPLES: float(image.dropped)}
+        counts: Counts = {AMBIENT_SAMPLES: image.samples, AMBIENT_DROPPED: float(image.dropped)}
         if not math.isnan(image.error):
             counts[AMBIENT_ERROR] = image.error
         if settings.clamp is not None:
-            counts |= {CLAMPED_SAMPLES: float(image.clamped), CLAMPED_RADIANCE: image.cut}
+            counts |= {AMBIENT_CLAMPED: float(image.clamped), AMBIENT_CUT: image.cut}
         yield image, counts
 
 

@@ -8,6 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from render.counts import Counts
+
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
@@ -77,7 +79,7 @@ class Frame:
     """Wall time by stage."""
     warnings: tuple[str, ...] = field(default=(), kw_only=True)
     """What may make a sensible picture of the wrong thing (`render.material_checks`)."""
-    counts: dict[str, float] = field(default_factory=dict)
+    counts: Counts = field(default_factory=dict)
     """Rays, samples, lit pixels, seconds inside embree, estimated relative error."""
 
     def laser(self, index: int) -> Float32:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.counts import counts_from
 from render.develop import Image
 from render.errors import InputError
 from render.files import atomic_write
@@ -144,7 +145,7 @@ def _frame(record: Record, layers: Layers) -> Frame:
         truth=truth,
         plan=str(record["plan"]),
         seconds=numbers_from(record["seconds"]),
-        counts=numbers_from(record["counts"]),
+        counts=counts_from(record["counts"], [str(laser["name"]) for laser in record["lasers"]]),
     )
 
 

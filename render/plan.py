@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.bidirectional import indirect_images, indirect_shares
-from render.laser import LineLaser
+from render.counts import (
+    INDIRECT_CLAMPED,
+    INDIRECT_CUT,
+    INDIRECT_DROPPED,
+    INDIRECT_ERROR,
+    LIGHT_PATHS,
+    Counts,
+)
 from render.lens_plan import lens_lines
 from render.saved import RenderState
 from render.scene import Scene
@@ -23,6 +30,8 @@ from render.vertex import BENT, PLAIN, SUNK, UNJOINED
 from render.world import World
 
 Float32 = NDArray[np.float32]
+Shares = dict[str, tuple[float, float]]
+"""By `Rung.share`: light of that kind over the direct light in the image, and its standard error."""
 
 DIRECT = "direct: light of each laser that meets one surface, exact across the sheet, sampled across edges and shadows"
 
@@ -86,10 +95,20 @@ def choose_plan(
 
     direct: (h, w) direct radiance of each laser.
     """
-    tail = lens_lines(scene.camera)
     if settings.transport == "direct":
-        return Plan(None, (DIRECT, f"left out: {INDIRECT} - switched off, its share was not measured", *tail))
+        return direct_plan(scene)
     shares = pilot_shares(world, scene, direct, step=step, seed=seed, cancelled=cancelled)
+    return plan_of(shares, scene, settings)
+
+
+def direct_plan(scene: Scene) -> Plan:
+    """Where nothing is asked for but direct light."""
+    left_out = f"left out: {INDIRECT} - switched off, its share was not measured"
+    return Plan(None, (DIRECT, left_out, *lens_lines(scene.camera)))
+
+
+def plan_of(shares: Shares, scene: Scene, settings: RenderSettings) -> Plan:
+    """The plan that follows from what a pilot measured."""
     names = [rung.name for rung in RUNGS]
     wanted = names.index(settings.transport) if settings.transport in names else -1
     worth = {}
@@ -117,12 +136,7 @@ def choose_plan(
             why = "not asked for" if wanted >= 0 else f"below the negligible {settings.negligible:.2%}"
             lines.append(f"left out: {rung.light} ({rung.name}) - {measured}, {why}")
     clamped = clamp_line(settings) if kinds is not None else ()
-    return Plan(kinds, (*lines, *clamped, *tail))
-
-
-def indirect_error(laser: LineLaser) -> str:
-    """Key of `Frame.counts`: the relative RMS error so far of a laser's indirect light."""
-    return f"relative error of reflections, {laser.name}"
+    return Plan(kinds, (*lines, *clamped, *lens_lines(scene.camera)))
 
 
 def indirect_light(
@@ -139,7 +153,7 @@ def indirect_light(
     keeps: Cancel | None = None,
     enough: Callable[[int], Cancel | None] = lambda left: None,
     state: RenderState | None = None,
-) -> Iterator[tuple[tuple[Float32, ...], dict[str, float]]]:
+) -> Iterator[tuple[tuple[Float32, ...], Counts]]:
     """Ever better indirect radiance of each laser as the plan says (dark until its turn), and `Frame.counts` of it.
 
     enough: given how many lasers are left to be done, what ends the next one (`indirect_images`). state: to go on from,
@@ -147,7 +161,7 @@ def indirect_light(
     """
     count = len(scene.lasers) if plan.kinds is not None else 0
     images = [np.zeros((scene.camera.height, scene.camera.width), np.float32)] * count
-    counts: dict[str, float] = {}
+    counts: Counts = {}
     for i, laser in enumerate(scene.lasers[:count]):
         for image in indirect_images(
             world,
@@ -169,12 +183,12 @@ def indirect_light(
             keep=None if state is None else partial(state.keep_laser, i),
         ):
             images[i] = image.radiance
-            counts[indirect_error(laser)] = image.error
-            counts[f"light paths, {laser.name}"] = image.paths
-            counts[f"dropped contributions, {laser.name}"] = image.dropped
+            counts[INDIRECT_ERROR.of(i)] = image.error
+            counts[LIGHT_PATHS.of(i)] = image.paths
+            counts[INDIRECT_DROPPED.of(i)] = image.dropped
             if settings.laser_clamp is not None:
-                counts[f"clamped contributions, {laser.name}"] = image.clamped
-                counts[f"mean radiance taken by the clamp, {laser.name}"] = image.cut
+                counts[INDIRECT_CLAMPED.of(i)] = image.clamped
+                counts[INDIRECT_CUT.of(i)] = image.cut
             yield tuple(images), dict(counts)
 
 
@@ -200,7 +214,7 @@ def pilot_shares(
     step: int = 0,
     seed: int = 0,
     cancelled: Cancel | None = None,
-) -> dict[str, tuple[float, float]]:
+) -> Shares:
     """Each kind of indirect light over the direct light in the image, over all lasers, with its standard error."""
     known = sum(float(image.sum(dtype=np.float64)) for image in direct)
     found = []

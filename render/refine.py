@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from render.ambient_plan import choose_ambient, expected_ambient, has_ambient, planned_images
 from render.checks import check_placement
+from render.counts import DIRECT_DROPPED, DIRECT_ERROR, DIRECT_SAMPLES, EMBREE_SECONDS, LIT_PIXELS, RAYS, Counts
 from render.curve import laser_curve
 from render.direct import direct_image
 from render.embree import RayScene
@@ -25,6 +26,7 @@ from render.lens_plan import lens_lines
 from render.material_checks import check_materials, scene_warnings
 from render.plan import DIRECT, INDIRECT, choose_plan, clamp_line, indirect_light
 from render.saved import RenderState
+from render.scan_plan import ScanPlan
 from render.scene import Scene
 from render.settings import RenderSettings
 from render.stage_clock import Clock, WholeClock
@@ -52,7 +54,7 @@ def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
         lines.append(f"{settings.transport}: {INDIRECT} - asked for")
     else:
         lines.append(
-            f"{INDIRECT}: a pilot decides step by step, and leaves out what is below {settings.negligible:.2%}"
+            f"{INDIRECT}: a pilot decides kind by kind, and leaves out what is below {settings.negligible:.2%}"
         )
     if settings.transport != "direct":
         lines.extend(clamp_line(settings))
@@ -108,8 +110,9 @@ def frames(
     keeps: Cancel | None = None,
     seconds: float | None = None,
     state: RenderState | None = None,
+    scan: ScanPlan | None = None,
 ) -> Iterator[Frame]:
-    """As `refine`; targets: errors of the laser light, one after the other."""
+    """As `refine`; targets: errors of the laser light, one after the other; scan: what was decided for all frames."""
     limit = Limit(seconds, cancelled, keeps)
     cancelled = None if cancelled is None else limit.asked
     with clock.stage("acceleration structure", len(world.triangles) * 10):
@@ -121,9 +124,9 @@ def frames(
     ray_start, embree_start = rays.rays, rays.seconds
     frame = Frame(step, (), None, (), None, "\n".join(plan(scene, settings)), warnings=warnings)
 
-    def told(frame: Frame, **counts: float) -> Frame:
-        so_far = {"rays": rays.rays - ray_start, "seconds in embree, all threads": rays.seconds - embree_start}
-        return replace(frame, seconds=clock.so_far(), counts={**frame.counts, **counts, **so_far})
+    def told(frame: Frame, counts: Counts | None = None) -> Frame:
+        so_far = {RAYS: float(rays.rays - ray_start), EMBREE_SECONDS: rays.seconds - embree_start}
+        return replace(frame, seconds=clock.so_far(), counts={**frame.counts, **(counts or {}), **so_far})
 
     pixels, lit = scene.camera.width * scene.camera.height, has_ambient(scene)
     with clock.stage("exact line", 0):
@@ -131,10 +134,13 @@ def frames(
     for target in targets:
         with clock.stage("laser light", _laser_work(pixels, scene, target)) as report:
             direct, counts = _lasers(world, scene, step, target, seed, threads, report, cancelled)
-        frame = told(replace(frame, laser_direct=direct, curves=curves), **counts)
+        frame = told(replace(frame, laser_direct=direct, curves=curves), counts)
         yield frame
     with clock.stage("reflected laser light", _indirect_work(pixels, settings)) as report:
-        chosen = choose_plan(world, scene, settings, direct, step=step, seed=seed, cancelled=cancelled)
+        if scan is None:
+            chosen = choose_plan(world, scene, settings, direct, step=step, seed=seed, cancelled=cancelled)
+        else:
+            chosen = scan.light
         frame = told(replace(frame, plan="\n".join((*chosen.lines, *expected_ambient(scene, settings)))))
         for indirect, counts in indirect_light(
             world,
@@ -150,7 +156,7 @@ def frames(
             enough=lambda left: limit.share(left + lit),
             state=state,
         ):
-            frame = told(replace(frame, laser_indirect=indirect), **counts)
+            frame = told(replace(frame, laser_indirect=indirect), counts)
             yield frame
     if not (frame.laser_indirect or settings.truth_images or lit):
         # nothing is left to do but to say so
@@ -163,7 +169,10 @@ def frames(
         yield frame
     if lit:
         with clock.stage("ambient light", _ambient_work(pixels, settings)) as report:
-            wanted = choose_ambient(world, scene, settings, step=step, seed=seed, cancelled=cancelled)
+            if scan is None:
+                wanted = choose_ambient(world, scene, settings, step=step, seed=seed, cancelled=cancelled)
+            else:
+                wanted = scan.ambient
             frame = replace(frame, plan="\n".join((*chosen.lines, *wanted.lines)))
             for image, counts in limit.until_over(
                 planned_images(
@@ -181,7 +190,7 @@ def frames(
                     keep=None if state is None else state.keep_film,
                 )
             ):
-                frame = told(replace(frame, ambient=image.radiance), **counts)
+                frame = told(replace(frame, ambient=image.radiance), counts)
                 yield frame
 
 
@@ -224,9 +233,10 @@ def _lasers(
     threads: int | None,
     report: Callable[[float], None],
     cancelled: Cancel | None,
-) -> tuple[tuple[Float32, ...], dict[str, float]]:
+) -> tuple[tuple[Float32, ...], Counts]:
     """The direct light of every laser, and what it took."""
-    images, counts = [], {}
+    images = []
+    counts: Counts = {}
     for i, laser in enumerate(scene.lasers):
         image = direct_image(
             world,
@@ -241,10 +251,10 @@ def _lasers(
             progress=lambda done, i=i: report((i + done) / len(scene.lasers)),  # type: ignore[misc]
         )
         images.append(image.radiance)
-        counts[f"relative error, {laser.name}"] = image.error
-        counts[f"lit pixels, {laser.name}"] = image.pixels
-        counts[f"samples, {laser.name}"] = image.samples
-        counts[f"dropped contributions of direct light, {laser.name}"] = image.dropped
+        counts[DIRECT_ERROR.of(i)] = image.error
+        counts[LIT_PIXELS.of(i)] = image.pixels
+        counts[DIRECT_SAMPLES.of(i)] = image.samples
+        counts[DIRECT_DROPPED.of(i)] = image.dropped
     return tuple(images), counts
 
 

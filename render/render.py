@@ -8,6 +8,7 @@ from pathlib import Path
 from render.frame import Axis, Frame
 from render.refine import frames
 from render.saved import RenderState
+from render.scan_plan import ScanPlan
 from render.scene import Scene
 from render.settings import RenderSettings
 from render.stage_clock import Clock
@@ -58,16 +59,17 @@ def render_world(
     seconds: float | None = None,
     state: RenderState | None = None,
     refined: Callable[[Frame], None] = lambda frame: None,
+    scan: ScanPlan | None = None,
 ) -> Frame:
     """Render a world placed for `step`; `axis` is the scan axis of the exact line.
 
     progress: of each stage. seconds, state: see `render.refine.refine`. refined: hears of every frame, the last is the
-    result. Raises InputError, Cancelled.
+    result. scan: the plan of a whole scan; None: a pilot decides for this frame alone. Raises InputError, Cancelled.
     """
     settings = settings or RenderSettings()
     clock, targets = Clock(progress), (settings.laser_error,)
     for frame in frames(
-        world, scene, settings, clock, targets, step, axis, seed, threads, cancelled, None, seconds, state
+        world, scene, settings, clock, targets, step, axis, seed, threads, cancelled, None, seconds, state, scan
     ):
         refined(frame)
     return frame

@@ -100,10 +100,18 @@ class RenderState:
 
 
 def state_of(
-    world: World, scene: Scene, settings: RenderSettings, *, step: int = 0, seed: int = 0, path: Path | None = None
+    world: World,
+    scene: Scene,
+    settings: RenderSettings,
+    *,
+    step: int = 0,
+    seed: int = 0,
+    path: Path | None = None,
+    plan: str | None = None,
 ) -> RenderState:
-    """A render that has not begun."""
-    return RenderState(fingerprint(world, scene, settings, step=step, seed=seed), path)
+    """A render that has not begun; plan: the mark of a plan made for a whole scan (`render.scan_plan`)."""
+    marks = fingerprint(world, scene, settings, step=step, seed=seed)
+    return RenderState(marks if plan is None else {**marks, "plan of the light": plan}, path)
 
 
 def read_state(state: RenderState) -> RenderState:

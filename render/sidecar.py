@@ -15,6 +15,7 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
+from render.counts import counts_record
 from render.develop import Image
 from render.errors import InputError
 from render.frame import Frame, LaserCurve
@@ -23,7 +24,9 @@ from render.sensor import Sensor
 
 Record = dict[str, Any]
 
-FORMAT, FORMAT_VERSION = "blazer-frame", 1
+FORMAT, FORMAT_VERSION = "blazer-frame", 2
+READABLE = (1, FORMAT_VERSION)
+"""Version 1 told the kind of a count by its name alone."""
 CURVE_SHAPES: dict[str, tuple[int, ...]] = {
     "index": (-1,),
     "position": (-1,),
@@ -70,7 +73,7 @@ def sidecar_record(frame: Frame, image: Image | None, scene: Scene, sensor: Sens
         "step": step,
         "plan": frame.plan,
         "seconds": {name: _plain(value) for name, value in frame.seconds.items()},
-        "counts": {name: _plain(value) for name, value in frame.counts.items()},
+        "counts": counts_record(frame.counts, _plain),
         "camera": {
             "width": camera.width,
             "height": camera.height,
@@ -120,10 +123,14 @@ def from_text(text: str, where: str) -> Record:
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         found = record.get("format") if isinstance(record, dict) else type(record).__name__
         raise InputError("not a frame's description", where=where, found=found, allowed=f'"format": "{FORMAT}"')
-    if record.get("format_version") != FORMAT_VERSION:
+    if record.get("format_version") not in READABLE:
         found, cure = record.get("format_version"), "open it with the version that wrote it, or a newer one"
         raise InputError(
-            "unknown version", where=f"{where}: format_version", found=found, allowed=f"{FORMAT_VERSION}", cure=cure
+            "unknown version",
+            where=f"{where}: format_version",
+            found=found,
+            allowed=f"1 to {FORMAT_VERSION}",
+            cure=cure,
         )
     return record
 
@@ -134,7 +141,7 @@ def curves_from(record: Record) -> tuple[LaserCurve, ...]:
 
 
 def numbers_from(values: Any) -> dict[str, float]:
-    """Named numbers, as `Frame.counts` has them. AttributeError, TypeError, ValueError: damaged."""
+    """Named numbers, as `Frame.seconds` has them. AttributeError, TypeError, ValueError: damaged."""
     return {str(name): float("nan") if value is None else float(value) for name, value in values.items()}
 
 

@@ -101,7 +101,8 @@ def run_project(
 
     if not quiet:
         print_plan(plan(project.scene.scaled(scale), project.render), to_errors=True)
-    with stage_progress(quiet, so_far) as progress:
+    frames = min(steps or project.scene.frame_count, project.scene.frame_count)
+    with stage_progress(quiet, so_far, frames=frames) as progress:
         done = run_scan(
             project,
             root,
@@ -176,7 +177,7 @@ def reconstruct_source(
         chosen = with_extraction(chosen, extraction)
         folder = out if out is not None else source
         check_output(folder)
-        with stage_progress(quiet) as progress:
+        with stage_progress(quiet, frames=len(found.frames)) as progress:
             clock = Clock(progress, never)
             result = reconstruct_folder(found, chosen, root, folder, clock, report=False, threads=threads)
     else:
@@ -202,7 +203,7 @@ def rebuild_report(folder: Path, *, threads: int | None, quiet: bool, as_json: b
     from studio.stages import Clock
 
     found = open_folder(folder)
-    with stage_progress(quiet) as progress:
+    with stage_progress(quiet, frames=len(found.frames)) as progress:
         clock = Clock(progress, never)
         result = reconstruct_folder(found, found.project, found.root, folder, clock, report=True, threads=threads)
     _print_reconstruction(result, as_json)

@@ -27,18 +27,23 @@ def silent(stage: str, done: float) -> None:
 
 
 @contextmanager
-def stage_progress(quiet: bool = False, note: Note = lambda stage: "") -> Iterator[StageProgress]:
+def stage_progress(quiet: bool = False, note: Note = lambda stage: "", *, frames: int = 1) -> Iterator[StageProgress]:
     """Yield progress(stage, done 0..1): a bar with an estimate on a terminal, else a line for every finished stage.
 
-    note: what else there is to say of a stage, as it is now.
+    note: what else there is to say of a stage, as it is now; frames: how many a scan will take.
     """
     if quiet:
         yield silent
     elif sys.stderr.isatty():
-        with _bars(note) as report:
+        with _bars(note, frames) as report:
             yield report
     else:
-        yield _lines(note)
+        yield _lines(note, frames)
+
+
+def frame_of(done: float, frames: int) -> str:
+    """Which frame of a scan is under way, given the share that is done: "frame 19 of 20"."""
+    return f"frame {min(int(done * frames + 0.5) + 1, frames)} of {frames}"
 
 
 def print_json(result: dict[str, Any]) -> None:
@@ -70,7 +75,7 @@ def print_plan(lines: Sequence[str], *, to_errors: bool = False) -> None:
 
 
 @contextmanager
-def _bars(note: Note) -> Iterator[StageProgress]:
+def _bars(note: Note, frames: int) -> Iterator[StageProgress]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
@@ -93,20 +98,22 @@ def _bars(note: Note) -> Iterator[StageProgress]:
             now = time.monotonic()
             if done >= 1.0 or now - shown.get(stage, 0.0) >= REFRESH_SECONDS:
                 shown[stage] = now
-                bars.update(tasks[stage], completed=done, note=note(stage))
+                told = frame_of(done, frames) if stage == FRAMES else stage
+                bars.update(tasks[stage], description=told, completed=done, note=note(stage))
 
         yield report
 
 
-def _lines(note: Note) -> StageProgress:
+def _lines(note: Note, frames: int) -> StageProgress:
     started: dict[str, float] = {}
     told: set[str] = set()
 
     def report(stage: str, done: float) -> None:
-        if done <= 0.0:
+        if stage == FRAMES:
+            if done < 1.0:
+                print(frame_of(done, frames), file=sys.stderr)
+        elif done <= 0.0:
             started[stage] = time.monotonic()
-        elif stage == FRAMES:
-            print(f"{stage}: {done:.0%}", file=sys.stderr)
         elif done >= 1.0 and stage in started and stage not in told:  # of many frames the first speaks for all
             told.add(stage)
             more = note(stage)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from analysis.cloud import Cloud, cloud, merge, write_csv, write_ply
 from analysis.report.model import Extraction, FrameResult, LaserResult
+from analysis.report.record import record_of
 from render.develop import Image
 from render.errors import InputError
 from render.files import atomic_write
@@ -46,7 +47,8 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     from analysis.report.write import render_page, write_report
 
     _spare_inputs(what, [path])
-    data = report_input(what.project, _first_world(what), [frame_result(what)], {}, notes=(), created=now())
+    record = record_of(what.project.scene, [frame_result(what)])
+    data = report_input(what.project, _first_world(what), record, {}, notes=(), created=now())
     if path.suffix.lower() != ".pdf":
         with atomic_write(path) as temporary:
             temporary.write_text(render_page(data), encoding="utf-8")

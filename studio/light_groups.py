@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
-from render.ambient_plan import AMBIENT_ERROR, AMBIENT_SAMPLES, CLAMPED_SAMPLES, DROPPED_SAMPLES, has_ambient
+from render.ambient_plan import has_ambient
+from render.counts import (
+    AMBIENT_CLAMPED,
+    AMBIENT_DROPPED,
+    AMBIENT_ERROR,
+    AMBIENT_SAMPLES,
+    DIRECT_DROPPED,
+    DIRECT_ERROR,
+    INDIRECT_CLAMPED,
+    INDIRECT_DROPPED,
+    INDIRECT_ERROR,
+    LIGHT_PATHS,
+)
 from render.frame import Frame
-from render.laser import LineLaser
-from render.plan import indirect_error
 from render.scene import Scene
 from render.settings import RenderSettings
 
@@ -17,12 +27,12 @@ def group_lines(frame: Frame, scene: Scene, settings: RenderSettings) -> list[tu
     """(stage, light group, what is known of it) of every group that has begun."""
     found = []
     for i, laser in enumerate(scene.lasers):
-        error = frame.counts.get(f"relative error, {laser.name}")
+        error = frame.counts.get(DIRECT_ERROR.of(i))
         if error is not None:
             parts = [f"error {error:.2%}, target {settings.laser_error:.2%}"]
-            parts += _left_out(frame.counts.get(f"dropped contributions of direct light, {laser.name}"))
+            parts += _left_out(frame.counts.get(DIRECT_DROPPED.of(i)))
             found.append((LASER, f"{laser.name}, direct", ", ".join(parts)))
-        text = _reflected(frame, laser, i, settings)
+        text = _reflected(frame, i, settings)
         if text:
             found.append((REFLECTED, f"{laser.name}, reflected on", text))
     if frame.ambient is not None:
@@ -38,11 +48,11 @@ def note(stage: str, frame: Frame, scene: Scene, settings: RenderSettings) -> st
 def unfinished(frame: Frame, scene: Scene, settings: RenderSettings) -> bool:
     """Some light group has reached neither its target error nor the most work that it may take."""
     counts = frame.counts
-    for laser in scene.lasers if frame.laser_indirect else ():
-        error = counts.get(indirect_error(laser))
+    for i in range(len(scene.lasers) if frame.laser_indirect else 0):
+        error = counts.get(INDIRECT_ERROR.of(i))
         if error is None:
             return True
-        if error > settings.indirect_error and counts[f"light paths, {laser.name}"] < settings.light_paths:
+        if error > settings.indirect_error and counts[LIGHT_PATHS.of(i)] < settings.light_paths:
             return True
     if not has_ambient(scene):
         return False
@@ -51,19 +61,19 @@ def unfinished(frame: Frame, scene: Scene, settings: RenderSettings) -> bool:
     return error > settings.ambient_error and samples < 0.9 * settings.ambient_samples
 
 
-def _reflected(frame: Frame, laser: LineLaser, index: int, settings: RenderSettings) -> str:
-    error = frame.counts.get(indirect_error(laser))
+def _reflected(frame: Frame, index: int, settings: RenderSettings) -> str:
+    error = frame.counts.get(INDIRECT_ERROR.of(index))
     if error is None:
         return ""
-    paths = frame.counts.get(f"light paths, {laser.name}", 0.0)
+    paths = frame.counts.get(LIGHT_PATHS.of(index), 0.0)
     parts = [f"error {error:.1%}, target {settings.indirect_error:.1%}", f"{paths / 1e6:.2g} million light paths"]
     direct = float(frame.laser_direct[index].sum(dtype="float64"))
     if direct > 0.0:
         parts.append(f"{float(frame.laser_indirect[index].sum(dtype='float64')) / direct:.2%} of the direct light")
-    clamped = frame.counts.get(f"clamped contributions, {laser.name}")
+    clamped = frame.counts.get(INDIRECT_CLAMPED.of(index))
     if clamped is not None:
         parts.append(f"clamped {clamped:.0f} times (biased)")
-    parts += _left_out(frame.counts.get(f"dropped contributions, {laser.name}"))
+    parts += _left_out(frame.counts.get(INDIRECT_DROPPED.of(index)))
     return ", ".join(parts)
 
 
@@ -72,9 +82,9 @@ def _ambient(frame: Frame, settings: RenderSettings) -> str:
     if AMBIENT_ERROR in counts:
         parts.append(f"error {counts[AMBIENT_ERROR]:.2%}, target {settings.ambient_error:.2%}")
     parts.append(f"{counts.get(AMBIENT_SAMPLES, 0.0):.0f} of {settings.ambient_samples} samples")
-    if CLAMPED_SAMPLES in counts:
-        parts.append(f"clamped {counts[CLAMPED_SAMPLES]:.0f} contributions (biased)")
-    parts += _left_out(counts.get(DROPPED_SAMPLES))
+    if AMBIENT_CLAMPED in counts:
+        parts.append(f"clamped {counts[AMBIENT_CLAMPED]:.0f} contributions (biased)")
+    parts += _left_out(counts.get(AMBIENT_DROPPED))
     return ", ".join(parts)
 
 

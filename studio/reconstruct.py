@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.report.model import FrameResult
 from render.errors import InputError
 from render.frame_files import read_frame
 from render.world import build_world
 from studio import scan_folder
+from studio.measuring import Measuring
 from studio.project import Project
 from studio.redevelop import development
-from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
+from studio.results import now
 from studio.stages import Clock, develop_step, step_world
 from studio.summary import summarise
-from studio.sweep import Passing, Sweep, Taken
 
 MAX_IMAGE_BYTES = 2**30
 
@@ -54,53 +53,42 @@ def _measured(
     report: bool,
     threads: int | None,
 ) -> dict[str, Any]:
-    results: list[FrameResult] = []
     how = development(found.project, asked)
     project = how.project
     with clock.stage("loading meshes"):
         first = world = build_world(project.scene, root, 0)
-    sweep = Sweep(project)
-
-    def take(ready: Iterable[tuple[Taken, Passing | None]]) -> None:
-        keep = len(found.frames) <= 16
-        for one, passing in ready:
-            before = results[0] if results else None
-            where = (one.frame, one.world, one.images)
-            results.append(measure_frame(project, *where, clock, threads, keep=keep, passing=passing, first=before))
-
-    for n in clock.frames(len(found.frames)):
-        path = found.frames[n]
-        with clock.stage("reading frames"):
-            scan_folder.check_frame(found, path)
-            frame = read_frame(path)
-        if not 0 <= frame.step < project.scene.frame_count:
-            allowed = f"0 to {project.scene.frame_count - 1}"
-            raise InputError(
-                "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
-            )
-        world = step_world(project, root, frame.step, None if frame.step == 0 else world)
-        images = develop_step(project, frame, clock, threads, how.laser_power)
-        take(sweep.add(frame, world, images))
-    take(sweep.finish())
-    if not results or not project.scene.lasers:
-        raise InputError("the scan holds no laser image", where=str(found.folder))
-    told = extraction_notes(results, project)
-    with scan_folder.replacing(found, out) as measured:
-        files = write_points(out, project, results, clock)
-        measured |= {"results": summarise(results, project.scene), "extraction": told}
-        if (asked.sensor, asked.extraction) != (found.project.sensor, found.project.extraction):
-            measured["measured_with"] = asked.model_dump(mode="json", include={"sensor", "extraction"})
-        if report:
-            notes = [*told, *(str(note) for note in found.manifest.get("notes", []))]
-            created = str(found.manifest.get("created", now()))
-            reports = write_reports(out, project, first, results, clock, notes=notes, created=created)
-            measured["report"] = [path.name for path in reports]
-            files += reports
+    with closing(Measuring(project, out, clock, threads, len(found.frames))) as measuring:
+        for n in clock.frames(len(found.frames)):
+            path = found.frames[n]
+            with clock.stage("reading frames"):
+                scan_folder.check_frame(found, path)
+                frame = read_frame(path)
+            if not 0 <= frame.step < project.scene.frame_count:
+                allowed = f"0 to {project.scene.frame_count - 1}"
+                raise InputError(
+                    "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
+                )
+            world = step_world(project, root, frame.step, None if frame.step == 0 else world)
+            measuring.add(frame, world, develop_step(project, frame, clock, threads, how.laser_power))
+        measuring.finish()
+        if not measuring.record.steps or not project.scene.lasers:
+            raise InputError("the scan holds no laser image", where=str(found.folder))
+        with scan_folder.replacing(found, out) as measured:
+            files = measuring.write_points(out)
+            measured |= {"results": summarise(measuring.record), "extraction": measuring.notes()}
+            if (asked.sensor, asked.extraction) != (found.project.sensor, found.project.extraction):
+                measured["measured_with"] = asked.model_dump(mode="json", include={"sensor", "extraction"})
+            if report:
+                notes = [str(note) for note in found.manifest.get("notes", [])]
+                created = str(found.manifest.get("created", now()))
+                reports = measuring.write_reports(out, first, notes=notes, created=created)
+                measured["report"] = [path.name for path in reports]
+                files += reports
     return {
         "name": asked.name,
         "files": [str(path) for path in files],
         "results": measured["results"],
-        "extraction": told,
+        "extraction": measured["extraction"],
         "seconds": clock.seconds,
     }
 

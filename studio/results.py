@@ -1,4 +1,4 @@
-"""From frames to results: every laser measured by every method, point files, the report."""
+"""From frames to results: every laser measured by every method, and what a report is made of."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib import metadata
-from pathlib import Path
 
-from analysis.cloud import Cloud, cloud, merge, write_csv, write_ply
 from analysis.line.settings import Method
 from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
+from analysis.report.record import ScanRecord
 from render.develop import Image
 from render.frame import Frame
 from render.model import Model
@@ -21,7 +20,6 @@ from studio.stages import Clock, Measurement, measure_step
 from studio.sweep import Passing
 
 METHODS: tuple[Method, ...] = ("likelihood", "gaussian", "centre_of_mass")
-MOST_NOTES = 12
 LIBRARIES = ("blazer-studio", "embreex", "numba", "numpy", "opencv-contrib-python-headless", "open3d", "OpenEXR")
 
 
@@ -35,19 +33,19 @@ def measure_frame(
     *,
     keep: bool,
     passing: Passing | None = None,
-    first: FrameResult | None = None,
+    compared: tuple[Method, ...] | None = None,
 ) -> FrameResult:
     """One frame by the project's method and, to compare with, by the others. `keep` the images for the report.
 
-    passing: the frames around it, for the project's method alone. first: of the scan, whose methods are compared with
-    in all its frames: "auto" may pick another in each.
+    passing: the frames around it, for the project's method alone. compared: the other methods, which are those of the
+    scan's first frame in all its frames, where "auto" may pick another in each; None: this is the first.
     """
     before = dict(clock.seconds)
     own = measure_step(project, frame, world, images, clock, threads, passing=passing)
     by_method: list[list[Measurement]] = [own]
     with clock.stage("other methods, to compare with"):
         aside = Clock(lambda stage, done: None, clock.cancelled)
-        for method in _others(own) if first is None else _compared(first):
+        for method in _others(own) if compared is None else compared:
             by_method.append(measure_step(project, frame, world, images, aside, threads, method))
     lasers = []
     for i, image in enumerate(images):
@@ -63,58 +61,16 @@ def _others(own: list[Measurement]) -> tuple[Method, ...]:
     return tuple(method for method in METHODS if not own or method != own[0].line.method)
 
 
-def _compared(frame: FrameResult) -> tuple[Method, ...]:
+def compared_methods(frame: FrameResult) -> tuple[Method, ...]:
+    """Those that the project's own was compared with."""
     methods = {extraction.line.method: None for laser in frame.lasers for extraction in laser.extractions[1:]}
     return tuple(method for method in METHODS if method in methods)
-
-
-def extraction_notes(results: Sequence[FrameResult], project: Project) -> list[str]:
-    """What was done to find each laser's line beyond its method, and in how many frames."""
-    told = []
-    for i, laser in enumerate(project.scene.lasers):
-        notes = [frame.lasers[i].extractions[0].line.note for frame in results]
-        for note in dict.fromkeys(filter(None, notes)):
-            where = f" in {notes.count(note)} of {len(notes)} frames" if notes.count(note) < len(notes) else ""
-            told.append(f"Line of {laser.name}{where}: {note}.")
-    return told[:MOST_NOTES]
-
-
-def write_points(out: Path, project: Project, results: list[FrameResult], clock: Clock) -> list[Path]:
-    """points.ply and points.csv of all frames and lasers, by the project's method, at the first step's pose."""
-    with clock.stage("writing points"):
-        clouds: list[Cloud] = []
-        for frame in results:
-            for i, laser in enumerate(frame.lasers):
-                best = laser.extractions[0]
-                clouds.append(cloud(best.points, best.errors, i, frame.step, project.scene))
-        columns = merge(clouds)
-        write_ply(out / "points.ply", columns)
-        write_csv(out / "points.csv", columns)
-    return [out / "points.ply", out / "points.csv"]
-
-
-def write_reports(
-    out: Path,
-    project: Project,
-    world: World,
-    results: Sequence[FrameResult],
-    clock: Clock,
-    *,
-    notes: Sequence[str],
-    created: str,
-) -> list[Path]:
-    """report.html and report.pdf; `world` is that of step 0."""
-    from analysis.report.write import write_report
-
-    data = report_input(project, world, results, clock.seconds, notes=notes, created=created)
-    with clock.stage("report"):
-        return list(write_report(out, data))
 
 
 def report_input(
     project: Project,
     world: World,
-    results: Sequence[FrameResult],
+    record: ScanRecord,
     seconds: Mapping[str, float],
     *,
     notes: Sequence[str],
@@ -124,14 +80,14 @@ def report_input(
     return ReportInput(
         title=project.name,
         scene=project.scene,
-        frames=tuple(results),
+        record=record,
         vertices=world.vertices,
         triangles=world.triangles,
         object_id=world.object_id,
         sensor=project.sensor,
         display_max=float(2**project.sensor.bits - 1),
         settings={"Line extraction": settings_table(project.extraction), "Rendering": settings_table(project.render)},
-        seconds={name: value for name, value in seconds.items() if name not in _frame_stages(results)},
+        seconds={name: value for name, value in seconds.items() if name not in record.seconds},
         seed=project.seed,
         versions=versions(),
         notes=tuple(notes),
@@ -164,7 +120,3 @@ def versions() -> dict[str, str]:
 def now() -> str:
     """Date and time with its zone, to the second."""
     return datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
-
-
-def _frame_stages(results: Sequence[FrameResult]) -> set[str]:
-    return {name for frame in results for name in frame.seconds}

@@ -11,6 +11,7 @@ from render.frame import Frame
 from render.frame_files import read_frame
 from render.material_checks import scene_warnings
 from render.saved import RenderState, read_state, state_of
+from render.scan_plan import ScanPlan
 from render.world import World
 from studio import scan_folder
 from studio.interrupt import stop_on_interrupt
@@ -39,14 +40,16 @@ def frame_of_step(
     resume: bool = False,
     seconds: float | None = None,
     refined: Refined = lambda frame: None,
+    plan: ScanPlan | None = None,
 ) -> tuple[Frame, RenderState]:
     """One frame: found, gone on with or rendered; and its state, for `settle` once the frame is written.
 
-    resume: take what an earlier scan left in the folder. InputError: that is of something else. Cancelled: what was
-    done is kept in a file.
+    plan: of all frames. resume: take what an earlier scan left in the folder. InputError: that is of something else.
+    Cancelled: what was done is kept in a file.
     """
     path = saved_path(scan.folder, step)
-    state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path)
+    mark = None if plan is None else plan.mark
+    state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path, plan=mark)
     if resume:
         found = None if path.is_file() else _found(project, world, step, scan, state)
         if found is not None:
@@ -65,6 +68,7 @@ def frame_of_step(
                 seconds=seconds,
                 state=state,
                 refined=refined,
+                scan=plan,
             )
     except Cancelled:
         if state.write():

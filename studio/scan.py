@@ -4,37 +4,33 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterable
-from contextlib import ExitStack
-from dataclasses import dataclass
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from analysis.report.model import FrameResult
 from render.develop import Image, develop
 from render.errors import InputError
 from render.frame import Frame
 from render.frame_files import write_frame
-from render.world import build_world
+from render.scan_plan import ScanPlan, plan_scan
+from render.world import World, build_world
 from studio import scan_folder
 from studio.inputs import input_hashes
 from studio.light_groups import group_lines
+from studio.measuring import Measuring
 from studio.project import Project
 from studio.rendered_from import made_of
-from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
+from studio.results import now
 from studio.resume import Refined, frame_of_step, settle
 from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world
 from studio.summary import summarise
-from studio.sweep import Passing, Sweep, Taken
 from studio.warm_up import PREPARING, needed, warm_up
 
 __all__ = ["Measurement", "ScanResult", "run_scan"]
-
-IMAGES_KEPT = 16
-"""Of a long scan only so many images stay in memory for the report, evenly spread."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +41,54 @@ class ScanResult:
     files: tuple[Path, ...]
     report: tuple[Path, ...]
     manifest: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """How the frames of a scan come about."""
+
+    project: Project
+    root: Path
+    scan: scan_folder.Begun
+    clock: Clock
+    threads: int | None
+    resume: bool
+    seconds: float | None
+    refined: Refined
+
+
+@dataclass
+class Written:
+    """What became of the frames so far, in a few words each."""
+
+    caught: list[warnings.WarningMessage]
+    """Where Python's warnings arrive."""
+    files: list[Path] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    """Of their sidecars."""
+    light: list[dict[str, Any]] = field(default_factory=list)
+    doubts: dict[str, str] = field(default_factory=dict)
+    """In words as at first, though figures change from step to step."""
+    warned: dict[str, None] = field(default_factory=dict)
+
+    def tell(self, frame: Frame, project: Project) -> None:
+        """The light of a frame, and what is doubtful about it."""
+        record = light_record(frame, project)
+        if self.light and self.light[-1]["plan"] == record["plan"]:
+            record["plan"] = self.light[-1]["plan"]  # the same words, once in memory
+        self.light.append(record)
+        for text in frame.warnings:
+            self.doubts.setdefault(text.split(",", 1)[0], text)
+
+    def hear(self) -> None:
+        """Take up the warnings that arrived, each once, though every frame repeats them."""
+        for warning in self.caught:
+            if issubclass(warning.category, UserWarning):
+                self.warned.setdefault(str(warning.message))
+        self.caught.clear()
+
+    def notes(self) -> list[str]:
+        return [*self.doubts.values(), *self.warned]
 
 
 def never() -> bool:
@@ -86,11 +130,14 @@ def run_scan(
         project = project.model_copy(update={"seed": seed})
     if measure and not project.scene.lasers:
         raise InputError("the rig has no laser, so there is no line to measure", where="scene.rig.lasers", found="none")
-    sweep = Sweep(project) if measure else None
     count = min(steps or project.scene.frame_count, project.scene.frame_count)
     clock = Clock(progress, cancelled)
-    with warnings.catch_warnings(record=True) as caught, ExitStack() as held:
+    measuring = Measuring(project, out, clock, threads, count, each) if measure else None
+    with ExitStack() as held, warnings.catch_warnings(record=True) as caught:
+        if measuring:
+            held.enter_context(closing(measuring))
         warnings.simplefilter("always", UserWarning)
+        written = Written(caught)
         with clock.stage("loading meshes"):
             inputs = input_hashes(project.scene, root)
             first = build_world(project.scene, root, 0)
@@ -100,84 +147,100 @@ def run_scan(
         )
         with clock.stage(PREPARING):
             warm_up(chain(*needed(project)), progress, cancelled)
-        results: list[FrameResult] = []
-        shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
-        files: list[Path] = []
-        doubts: dict[str, str] = {}
-        names: list[str] = []
-        light: list[dict[str, Any]] = []
-        world = first
-
-        def take(found: Iterable[tuple[Taken, Passing | None]]) -> None:
-            for taken, passing in found:
-                keep, before = taken.frame.step in shown, results[0] if results else None
-                results.append(
-                    measure_frame(
-                        project,
-                        taken.frame,
-                        taken.world,
-                        taken.images,
-                        clock,
-                        threads,
-                        keep=keep,
-                        passing=passing,
-                        first=before,
-                    )
-                )
-                each(results[-1])
-
-        for step in clock.frames(count):
-            world = world if step == 0 else step_world(project, root, step, world)
-            frame, state = frame_of_step(
-                project, world, step, scan, clock, threads, resume=resume, seconds=seconds, refined=refined
-            )
-            light.append(light_record(frame, project))
-            for text in frame.warnings:  # in words as at first, though figures change from step to step
-                doubts.setdefault(text.split(",", 1)[0], text)
-            images = develop_step(project, frame, clock, threads)
-            with clock.stage("writing frames"):
-                stem = scan_folder.frame_stem(step)
-                written = write_frame(
-                    out,
-                    stem,
-                    frame,
-                    together(project, frame, images),
-                    project.scene,
-                    sensor=project.sensor,
-                    made_of=made_of(project, state.marks, inputs),
-                )
-                settle(project, frame, state)
-                files += written
-                names.append(written[-1].name)
-            if sweep is not None:
-                take(sweep.add(frame, world, images))
-        if sweep is not None:
-            take(sweep.finish())
-        told = extraction_notes(results, project)
-        notes = list(doubts.values())
-        notes += [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
+        how = Rendering(project, root, scan, clock, threads, resume, seconds, refined)
+        _take_frames(how, first, count, written, measuring)
         result: dict[str, Any] = {
             "name": project.name,
             "created": now(),
-            "frames": names,
+            "frames": written.names,
             "image_scale": image_scale,
             "seed": project.seed,
-            "notes": notes,
-            "extraction": told,
-            "light": light,
+            "notes": written.notes(),
+            "extraction": measuring.notes() if measuring else [],
+            "light": written.light,
         }
+        if measuring:
+            written.files += measuring.write_points(out)
+            result["results"] = summarise(measuring.record)
+
+        def finish(reports: list[Path]) -> dict[str, Any]:
+            result["report"] = [path.name for path in reports]
+            result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
+            return scan_folder.finish(scan, result)
+
+        # whole without its report, so that what fails there costs nothing else
         reports: list[Path] = []
-        if measure:
-            files += write_points(out, project, results, clock)
-            result["results"] = summarise(results, project.scene)
-            if report:
-                reports = write_reports(
-                    out, project, first, results, clock, notes=[*told, *notes], created=result["created"]
-                )
-        result["report"] = [path.name for path in reports]
-        result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
-        manifest = scan_folder.finish(scan, result)
-    return ScanResult(out, (*files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
+        manifest = finish(reports)
+        if measuring and report:
+            reports = measuring.write_reports(out, first, notes=result["notes"], created=result["created"])
+            manifest = finish(reports)
+    return ScanResult(out, (*written.files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
+
+
+def _take_frames(how: Rendering, first: World, count: int, written: Written, measuring: Measuring | None) -> None:
+    """Render, write and measure one frame after the other; `first`: the world of step 0."""
+    plan, world = _plan(how, first), first
+    for step in how.clock.frames(count):
+        world = world if step == 0 else step_world(how.project, how.root, step, world)
+        frame, images = _write_frame(how, world, step, plan, written)
+        if measuring is not None:
+            measuring.add(frame, world, images)
+        written.hear()
+    if measuring is not None:
+        measuring.finish()
+    written.hear()
+
+
+def _plan(how: Rendering, first: World) -> ScanPlan | None:
+    """What all frames compute, whichever of them are taken; None: there is only one."""
+    project = how.project
+    if project.scene.frame_count == 1:
+        return None
+    with how.clock.stage("plan for all frames") as progress:
+        return plan_scan(
+            project.scene,
+            project.render,
+            lambda step: first if step == 0 else step_world(project, how.root, step, first),
+            seed=project.seed,
+            threads=how.threads,
+            cancelled=how.clock.cancelled,
+            progress=progress,
+        )
+
+
+def _write_frame(
+    how: Rendering, world: World, step: int, plan: ScanPlan | None, written: Written
+) -> tuple[Frame, list[Image]]:
+    """One frame as files, and its image of each laser."""
+    project, clock, threads = how.project, how.clock, how.threads
+    frame, state = frame_of_step(
+        project,
+        world,
+        step,
+        how.scan,
+        clock,
+        threads,
+        resume=how.resume,
+        seconds=how.seconds,
+        refined=how.refined,
+        plan=plan,
+    )
+    written.tell(frame, project)
+    images = develop_step(project, frame, clock, threads)
+    with clock.stage("writing frames"):
+        files = write_frame(
+            how.scan.folder,
+            scan_folder.frame_stem(step),
+            frame,
+            together(project, frame, images),
+            project.scene,
+            sensor=project.sensor,
+            made_of=made_of(project, state.marks, how.scan.inputs),
+        )
+        settle(project, frame, state)
+    written.files += files
+    written.names.append(files[-1].name)
+    return frame, images
 
 
 def light_record(frame: Frame, project: Project) -> dict[str, Any]:

@@ -18,7 +18,9 @@ from render.frame import Frame
 from render.motion import NoMotion
 from render.render import render_world
 from render.saved import RenderState
+from render.scan_plan import ScanPlan
 from render.world import World, build_world
+from studio.console import FRAMES
 from studio.expose import expose
 from studio.line import extract_line
 from studio.project import Project
@@ -60,13 +62,13 @@ class Clock:
         self.progress(name, 1.0)
 
     def frames(self, count: int) -> Iterator[int]:
-        """0..count - 1, told as the progress of "frames" where there are several."""
+        """0..count - 1, told as the progress of FRAMES where there are several."""
         for i in range(count):
             if count > 1:
-                self.progress("frames", i / count)
+                self.progress(FRAMES, i / count)
             yield i
         if count > 1:
-            self.progress("frames", 1.0)
+            self.progress(FRAMES, 1.0)
 
 
 def scaled(project: Project, image_scale: float) -> Project:
@@ -99,6 +101,7 @@ def render_step(
     seconds: float | None = None,
     state: RenderState | None = None,
     refined: Callable[[Frame], None] = lambda frame: None,
+    scan: ScanPlan | None = None,
 ) -> Frame:
     """Radiance and truth of one step; cancelled: in place of the clock's; the rest as in `render_world`."""
     frame = render_world(
@@ -114,6 +117,7 @@ def render_step(
         seconds=seconds,
         state=state,
         refined=refined,
+        scan=scan,
     )
     for name, spent in frame.seconds.items():
         clock.seconds[name] = clock.seconds.get(name, 0.0) + spent

@@ -2,50 +2,40 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from analysis.measures import robust_sigma
-from analysis.report.model import Extraction, FrameResult
-from render.scene import Scene
-
-Float = NDArray[np.float64]
+from analysis.measures import Measures
+from analysis.report.record import ScanRecord
+from analysis.report.total import Total, total
 
 
-def summarise(frames: Sequence[FrameResult], scene: Scene) -> list[dict[str, Any]]:
-    """For each laser and each method: how many points, how complete, how wrong. None where nothing was measured."""
+def summarise(record: ScanRecord) -> list[dict[str, Any]]:
+    """For each laser and each method: how many points, how complete, how wrong. None where nothing was measured.
+
+    "sampled_scan_lines" are those that robust sigma and P95 come from; bias and RMSE are always of all.
+    """
     rows = []
-    for i, laser in enumerate(scene.lasers):
-        for k in range(len(frames[0].lasers[i].extractions) if frames else 0):
-            found = [frame.lasers[i].extractions[k] for frame in frames]
-            rows.append({"laser": laser.name, "method": found[0].line.method, **_figures(found)})
+    for i, laser in enumerate(record.scene.lasers):
+        for k in range(record.method_count(i)):
+            found = total(record.chosen(i, k))
+            rows.append({"laser": laser.name, "method": found.method, **_figures(found)})
     return rows
 
 
-def _figures(found: Sequence[Extraction]) -> dict[str, Any]:
-    truth = sum(one.errors.truth_rows for one in found)
+def _figures(found: Total) -> dict[str, Any]:
     return {
-        "points": sum(int(one.points.valid.sum()) for one in found),
-        "completeness": sum(one.errors.measured_rows for one in found) / truth if truth else None,
-        "false_scan_lines": sum(one.errors.false_rows for one in found),
-        "outliers": sum(int(one.errors.outlier.sum()) for one in found),
-        "line_px": _error(np.concatenate([one.errors.position for one in found])),
-        "depth_m": _error(np.concatenate([one.errors.depth for one in found])),
-        "surface_m": _error(np.concatenate([one.errors.distance for one in found])),
+        "points": found.points,
+        "completeness": found.completeness if found.truth_rows else None,
+        "false_scan_lines": found.false_rows,
+        "outliers": found.outliers,
+        "scan_lines": found.lines,
+        "sampled_scan_lines": found.lines_kept,
+        "line_px": _error(found.u),
+        "depth_m": _error(found.depth_z),
+        "surface_m": _error(found.surface),
     }
 
 
-def _error(error: Float) -> dict[str, float | None]:
-    finite = error[np.isfinite(error)]
-    if len(finite) == 0:
-        return {"bias": None, "rmse": None, "robust_sigma": None, "p95": None}
-    return {
-        "bias": float(np.mean(finite)),
-        "rmse": math.sqrt(float(np.mean(finite**2))),
-        "robust_sigma": robust_sigma(finite),
-        "p95": float(np.percentile(np.abs(finite), 95)),
-    }
+def _error(found: Measures) -> dict[str, float | None]:
+    names = ("bias", "rmse", "robust_sigma", "p95")
+    return {name: getattr(found, name) if found.count else None for name in names}

@@ -90,23 +90,22 @@ def error_map_figure(path: Path, error: Float, limit: float, sigma: float) -> st
         return png_uri(made)
 
 
-def steps_figure(report: ReportInput) -> str:
-    """Depth error and completeness from step to step."""
-    steps = [frame.step for frame in report.frames]
+def steps_figure(report: ReportInput, shown: int) -> str:
+    """Depth error and completeness from step to step; `shown`: the step shown in detail."""
+    steps = [one.step for one in report.record.steps]
     style: dict[str, Any] = {"lw": 1.1, "marker": "o", "ms": 2.6 if len(steps) < 60 else 0}
     with figure(2.9) as made:
         error, rows = made.subplots(2, 1, sharex=True, height_ratios=(1.6, 1))
         for i, laser in enumerate(report.scene.lasers):
-            results = [frame.lasers[i].extractions[0].errors for frame in report.frames]
+            results = [one.lasers[i] for one in report.record.steps]
             line = ("-", "--", ":", "-.")[i % 4]
             name = "" if len(report.scene.lasers) == 1 else f", {short(laser.name, 16)}"
-            colour = method_colour(report.frames[0].lasers[i].extractions[0].line.method)
-            rmse = [result.depth_z.rmse * 1e6 for result in results]
-            bias = [result.depth_z.bias * 1e6 for result in results]
+            colour = method_colour(report.record.chosen(i).sums.method)
+            rmse = [result.rmse * 1e6 for result in results]
+            bias = [result.bias * 1e6 for result in results]
             error.plot(steps, rmse, ls=line, color=colour, label=f"RMSE{name}", **style)
             error.plot(steps, bias, ls=line, color=MUTED, label=f"bias{name}", **style)
             rows.plot(steps, [100 * result.completeness for result in results], ls=line, color=ACCENT, **style)
-        shown = report.shown_frame().step
         for axes in (error, rows):
             axes.axvline(shown, color=INK, lw=0.6, ls=":")
         rows.xaxis.get_major_locator().set_params(integer=True)

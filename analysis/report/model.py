@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,13 @@ from numpy.typing import NDArray
 from analysis.error import Errors
 from analysis.line.result import Line
 from analysis.triangulate import Points
+from render.counts import Counts
 from render.frame import LaserCurve
 from render.scene import Scene
 from render.sensor import Sensor
+
+if TYPE_CHECKING:
+    from analysis.report.record import ScanRecord
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int32]
@@ -53,8 +58,8 @@ class FrameResult:
     """`Frame.plan`: what was computed, what was left out and why, one line each."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage, s, of this frame: those of `Frame.seconds` and those after it. Summed over the frames."""
-    counts: dict[str, float] = field(default_factory=dict)
-    """`Frame.counts`; what counts is summed over the frames, what is named "error" or "fraction" is averaged."""
+    counts: Counts = field(default_factory=dict)
+    """`Frame.counts`; over the frames they are summed or averaged as their kind says."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +68,8 @@ class ReportInput:
 
     title: str
     scene: Scene
-    frames: tuple[FrameResult, ...]
-    """At least one, in the order of their steps."""
+    record: ScanRecord
+    """Of at least one frame, in the order of their steps."""
     vertices: Float
     """(v, 3) m, world frame, step 0."""
     triangles: Int
@@ -86,14 +91,6 @@ class ReportInput:
     """Warnings and remarks of the run, one sentence each; shown near the top."""
     created: str = ""
     """Date and time of the run, as it shall be printed."""
-
-    def shown_frame(self) -> FrameResult:
-        """The frame to show in detail: of those with images the one of median depth RMSE, else the first."""
-        shown = [frame for frame in self.frames if all(laser.image is not None for laser in frame.lasers)]
-        measured = [frame for frame in shown if np.isfinite(frame_rmse(frame))]
-        if measured:
-            return sorted(measured, key=frame_rmse)[len(measured) // 2]
-        return (shown or list(self.frames))[0]
 
 
 def frame_rmse(frame: FrameResult) -> float:

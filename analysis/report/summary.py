@@ -2,88 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.line.result import Flag
-from analysis.measures import Measures, measure
 from analysis.report.colour import method_name
-from analysis.report.model import Extraction, ReportInput
+from analysis.report.model import ReportInput
+from analysis.report.total import Total, total
 from analysis.report.units import count, micrometres, percent, pixels
-
-Float = NDArray[np.float64]
 
 ENOUGH = 30
 """Fewer points than this are no statistics to draw a conclusion from."""
 
 
-@dataclass(frozen=True)
-class Total:
-    """Errors of one method, over all frames, of one laser or all."""
-
-    method: str
-    u: Measures
-    depth_z: Measures
-    surface: Measures
-    points: int
-    truth_rows: int
-    valid_rows: int
-    measured_rows: int
-    false_rows: int
-
-    @property
-    def completeness(self) -> float:
-        """Measured rows over truth rows; NaN when nothing is visible."""
-        return self.measured_rows / self.truth_rows if self.truth_rows else float("nan")
-
-
-def chosen(report: ReportInput, laser: int | None = None, method: int = 0) -> list[Extraction]:
-    """The extractions of one method, of one laser or all, in the order of the frames."""
-    return [
-        result.extractions[method]
-        for frame in report.frames
-        for i, result in enumerate(frame.lasers)
-        if laser in (None, i) and method < len(result.extractions)
-    ]
-
-
-def total(extractions: list[Extraction]) -> Total:
-    """Measures over all points together."""
-    points, errors = [e.points for e in extractions], [e.errors for e in extractions]
-    # scan lines of different images are no neighbours
-    index = np.concatenate([np.zeros(0, np.intp), *(p.index + 1_000_000 * i for i, p in enumerate(points))])
-    rank = np.concatenate([np.zeros(0, np.intp), *(p.rank for p in points)])
-    none = np.zeros(0)
-
-    def all_of(error: list[Float], sigma: list[Float], floor: list[Float]) -> Measures:
-        joined = [np.concatenate([none, *part]) for part in (error, sigma, floor)]
-        return measure(joined[0], joined[1], joined[2], index, rank)
-
-    return Total(
-        method=extractions[0].line.method if extractions else "",
-        u=all_of([e.position for e in errors], [p.sigma_pixel for p in points], [np.ones(len(p.flag)) for p in points]),
-        depth_z=all_of(
-            [e.depth for e in errors], [p.sigma_depth for p in points], [np.abs(p.gradient[:, 2]) for p in points]
-        ),
-        surface=all_of(
-            [e.distance for e in errors],
-            [e.sigma_distance for e in errors],
-            [np.linalg.norm(p.gradient, axis=1) for p in points],
-        ),
-        points=int(sum(np.count_nonzero(p.valid) for p in points)),
-        truth_rows=sum(e.truth_rows for e in errors),
-        valid_rows=sum(e.valid_rows for e in errors),
-        measured_rows=sum(e.measured_rows for e in errors),
-        false_rows=sum(e.false_rows for e in errors),
-    )
-
-
 def headline(report: ReportInput) -> str:
     """The result in one paragraph of plain words."""
-    found = total(chosen(report))
-    frames, lasers = len(report.frames), len(report.scene.lasers)
+    found = total(report.record.chosen())
+    frames, lasers = len(report.record.steps), len(report.scene.lasers)
     where = f"in {frames} frames" if frames > 1 else "in one frame"
     who = "one laser" if lasers == 1 else f"{lasers} lasers"
     if found.truth_rows == 0:
@@ -104,14 +38,15 @@ def headline(report: ReportInput) -> str:
         f"{method_name(found.method)}. Against exact ground truth the depth is on average "
         f"{micrometres(abs(depth.bias), 2)} {side} the camera (bias) and scatters about that by "
         f"{micrometres(depth.sigma)} (standard deviation), {micrometres(depth.rmse)} in all (RMSE). "
-        f"95 % of the points lie within {micrometres(found.surface.p95)} of the true surface."
+        f"95 % of the points{' in a sample' if found.sampled else ''} lie within {micrometres(found.surface.p95)} of "
+        "the true surface."
     )
 
 
 def remarks(report: ReportInput) -> list[str]:
     """What the numbers say beyond themselves, one sentence or two each; empty when all is as it should be."""
-    extractions = chosen(report)
-    found = total(extractions)
+    chosen = report.record.chosen()
+    found = total(chosen)
     if found.truth_rows == 0 or found.depth_z.count < ENOUGH:
         return []
     said = []
@@ -146,7 +81,8 @@ def remarks(report: ReportInput) -> list[str]:
             f"Neighbouring scan lines err alike (correlation {found.u.autocorrelation:.2f}): the cause is "
             "rather the surface's texture or shape than the sensor's noise, and averaging along the line gains little."
         )
-    width, flag = _peaks(extractions)
+    width, flag = chosen.rows["width"], chosen.rows["flag"]
+    width = width[np.isfinite(width)]
     narrow = float(np.mean(width < 0.4)) if len(width) else 0.0
     if narrow > 0.1:
         said.append(
@@ -159,9 +95,12 @@ def remarks(report: ReportInput) -> list[str]:
     return said
 
 
-def _peaks(extractions: list[Extraction]) -> tuple[Float, Float]:
-    """(m,) width and flag of every point."""
-    at = [(e.line, e.points.index, e.points.rank) for e in extractions]
-    width = np.concatenate([np.zeros(0), *(line.width[i, k] for line, i, k in at)])
-    flag = np.concatenate([np.zeros(0), *(line.flag[i, k] for line, i, k in at)])
-    return width[np.isfinite(width)], flag
+def sample_note(found: Total) -> str:
+    """Which figures come from how large a sample; empty: all points are in it."""
+    if not found.sampled:
+        return ""
+    return (
+        f"Robust sigma, P95, outliers, lag 1 and the share of narrow or saturated peaks are those of a sample of "
+        f"{count(found.lines_kept)} of the {count(found.lines)} scan lines, drawn by chance; n, bias, sigma, RMSE, the "
+        "share within ±2 sigma and the counts of scan lines are of all."
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from analysis.measures import Measures
 from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
 from analysis.report.model import ReportInput, Tables
-from analysis.report.summary import chosen, total
+from analysis.report.total import total
 from analysis.report.units import (
     NONE,
     count,
@@ -59,8 +59,8 @@ def measure_tables(report: ReportInput) -> list[MethodTable]:
     """One for each laser and method."""
     tables = []
     for i, laser in enumerate(report.scene.lasers):
-        for k in range(max((len(frame.lasers[i].extractions) for frame in report.frames), default=0)):
-            found = total(chosen(report, i, k))
+        for k in range(report.record.method_count(i)):
+            found = total(report.record.chosen(i, k))
             prefix = f"{laser.name}: " if len(report.scene.lasers) > 1 else ""
             rows = [
                 ("position, px", _cells(found.u, 1.0)),
@@ -86,18 +86,17 @@ def _cells(m: Measures, scale: float) -> list[str]:
 def step_table(report: ReportInput) -> tuple[list[str], list[list[str]], bool]:
     """Header, rows, and whether steps were left out; the first method, all lasers together."""
     header = ["step", "points", "complete", "bias", "sigma", "RMSE", "P95", "outliers"]
-    picked = np.unique(np.linspace(0, len(report.frames) - 1, min(MOST_STEPS, len(report.frames))).astype(int))
+    steps = report.record.steps
+    picked = np.unique(np.linspace(0, len(steps) - 1, min(MOST_STEPS, len(steps))).astype(int))
     rows = []
-    for i in picked:
-        frame = report.frames[i]
-        found = total([laser.extractions[0] for laser in frame.lasers])
-        m = found.depth_z
+    for one in (steps[i] for i in picked):
+        m = one.depth_z
         rows.append(
-            [str(frame.step), count(found.points), percent(found.completeness)]
+            [str(one.step), count(one.points), percent(one.completeness)]
             + [micrometres(value) for value in (m.bias, m.sigma, m.rmse, m.p95)]
             + [percent(m.outlier_rate)]
         )
-    return header, rows, len(picked) < len(report.frames)
+    return header, rows, len(picked) < len(steps)
 
 
 def scene_tables(report: ReportInput) -> Tables:
@@ -212,7 +211,7 @@ def _motion(report: ReportInput) -> str:
     if motion.kind == "none":
         return "none"
     moving = "the objects move" if motion.moves == "objects" else "the rig moves"
-    return f"{motion.kind}, {moving}, {len(report.frames)} frames"
+    return f"{motion.kind}, {moving}, {len(report.record.steps)} frames"
 
 
 def laser_chips(report: ReportInput) -> list[tuple[str, str]]:
@@ -227,26 +226,26 @@ def laser_chips(report: ReportInput) -> list[tuple[str, str]]:
 def timing(report: ReportInput) -> tuple[list[tuple[str, str, float]], str]:
     """Stage, time, share of the longest (0 to 1), longest first; and the total."""
     spent = dict(report.seconds)
-    for frame in report.frames:
-        for stage, value in frame.seconds.items():
-            spent[stage] = spent.get(stage, 0.0) + value
+    for stage, value in report.record.seconds.items():
+        spent[stage] = spent.get(stage, 0.0) + value
     longest = max(spent.values(), default=0.0) or 1.0
     rows = sorted(spent.items(), key=lambda item: -item[1])
     return [(stage, seconds(value), value / longest) for stage, value in rows], seconds(sum(spent.values()))
 
 
 def counts(report: ReportInput) -> list[tuple[str, str]]:
-    """What the renderer counted: sums over the frames, means of errors, of fractions and of what is said of a pixel."""
-    names = list(dict.fromkeys(name for frame in report.frames for name in frame.counts))
+    """What the renderer counted: sums over the frames, or means, as the kind of each quantity says."""
+    lasers = [laser.name for laser in report.scene.lasers]
     rows = []
-    for name in names:
-        values = [frame.counts[name] for frame in report.frames if name in frame.counts]
-        if "error" in name or "fraction" in name:
-            rows.append((name, percent(float(np.mean(values)), 2)))
-        elif "seconds" in name:
-            rows.append((name, seconds(float(np.sum(values)))))
-        elif "a pixel" in name or "mean" in name:
-            rows.append((name, f"{float(np.mean(values)):.3g}"))
-        else:
-            rows.append((name, count(float(np.sum(values)))))
+    for quantity, (added, frames) in report.record.counts.items():
+        match quantity.kind:
+            case "error":
+                text = percent(added / frames, 2)
+            case "mean":
+                text = f"{added / frames:.3g}"
+            case "seconds":
+                text = seconds(added)
+            case "count":
+                text = count(added)
+        rows.append((quantity.label(lasers), text))
     return rows

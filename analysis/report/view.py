@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.cloud import at_first_step
 from analysis.report.colour import wavelength_colour
 from analysis.report.model import FrameResult, ReportInput
 from render.frame import LaserCurve
@@ -91,19 +90,14 @@ def scene_view(report: ReportInput, frame: FrameResult) -> SceneView:
 
 
 def cloud_view(report: ReportInput) -> tuple[View, Float, Float]:
-    """All frames' points, where the objects are at step 0, with their signed distance: view, (m, 3) m, (m,) m."""
-    points, errors = [np.zeros((0, 3))], [np.zeros(0)]
-    for frame in report.frames:
-        for laser in frame.lasers:
-            first = laser.extractions[0]
-            here = first.points.valid
-            points.append(at_first_step(first.points.world[here], report.scene, frame.step))
-            errors.append(first.errors.distance[here])
-    cloud, error = np.concatenate(points), np.concatenate(errors)
+    """The sample's points, where the objects are at step 0, with their signed distance: view, (m, 3) m, (m,) m."""
+    rows = report.record.chosen().rows
+    rows = rows[rows["valid"]]
+    cloud, error = rows["world"], rows["distance"]
     if len(cloud) > MOST_POINTS:
         kept = np.linspace(0, len(cloud) - 1, MOST_POINTS).astype(np.intp)
         cloud, error = cloud[kept], error[kept]
-    pose = report.scene.T_world_camera(report.frames[0].step)
+    pose = report.scene.T_world_camera(report.record.steps[0].step)
     spread = np.nanmedian(np.abs(error)) if np.any(np.isfinite(error)) else 0.0
     on_part = np.abs(error) <= max(1e-3, 20.0 * spread)
     shown = cloud[on_part] if np.any(on_part) else cloud if len(cloud) else report.vertices

@@ -15,7 +15,7 @@ from analysis.report.glossary import GLOSSARY
 from analysis.report.line_figures import camera_figure, profile_figure, three_panel_figure, zoom_figure
 from analysis.report.model import FrameResult, ReportInput
 from analysis.report.style import plain
-from analysis.report.summary import Total, chosen, headline, remarks, total
+from analysis.report.summary import headline, remarks, sample_note
 from analysis.report.tables import (
     MEASURE_COLUMNS,
     counts,
@@ -25,6 +25,7 @@ from analysis.report.tables import (
     step_table,
     timing,
 )
+from analysis.report.total import Total, total
 from analysis.report.units import count, micrometres, percent
 from analysis.report.view import cloud_view, placed_vertices, scene_view
 from render.files import atomic_write
@@ -70,8 +71,8 @@ def _printable(value: Any) -> Any:
 
 
 def _content(report: ReportInput) -> dict[str, Any]:
-    frame = report.shown_frame()
-    found = total(chosen(report))
+    record = report.record
+    frame, found = record.shown_frame(), total(record.chosen())
     view, cloud, error = cloud_view(report)
     limit = nice_limit(error)
     scene = scene_view(report, frame)
@@ -85,7 +86,7 @@ def _content(report: ReportInput) -> dict[str, Any]:
         process = picture.start(folder, *drawing)
         try:  # the other figures, while VTK draws
             details = [_detail(report, frame, i) for i in range(min(MOST_DETAILS, len(frame.lasers)))]
-            steps = steps_figure(report) if len(report.frames) > 1 else None
+            steps = steps_figure(report, frame.step) if len(record.steps) > 1 else None
         except BaseException:
             picture.stop(process)
             raise
@@ -106,10 +107,10 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "chips": laser_chips(report),
         "headline": headline(report),
         "tiles": _tiles(found),
-        "remarks": [*report.notes, *remarks(report)],
-        "several": len(report.frames) > 1,
+        "remarks": [*report.notes, *remarks(report), *filter(None, [sample_note(found)])],
+        "several": len(record.steps) > 1,
         "shown_step": frame.step,
-        "frame_count": len(report.frames),
+        "frame_count": len(record.steps),
         "picture_note": note,
         "steps_picture": steps,
         "step_header": header,
@@ -119,6 +120,10 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "details_left_out": f"{more} more lasers are in the tables below." if more > 0 else "",
         "measure_tables": measure_tables(report),
         "measure_columns": MEASURE_COLUMNS,
+        "sample_note": sample_note(found),
+        "cloud_points": count(len(cloud)),
+        "point_count": count(found.points),
+        "cloud_is_part": len(cloud) < found.points,
         "plan_done": [line for line in plan if not line.startswith(left_out)],
         "plan_left_out": [line.removeprefix(left_out).strip() for line in plan if line.startswith(left_out)],
         "settings": scene_tables(report),
@@ -137,7 +142,7 @@ def _detail(report: ReportInput, frame: FrameResult, i: int) -> dict[str, Any]:
     title = "The line and its profile"
     if len(report.scene.lasers) > 1:
         title += f": {plain(report.scene.lasers[i].name)}"
-    if len(report.frames) > 1:
+    if len(report.record.steps) > 1:
         title += f", step {frame.step}"
     white = report.display_max
     if white is None:
@@ -157,7 +162,7 @@ def _detail(report: ReportInput, frame: FrameResult, i: int) -> dict[str, Any]:
 
 def _facts(report: ReportInput) -> str:
     camera = report.scene.camera
-    frames = "1 frame" if len(report.frames) == 1 else f"{len(report.frames)} frames"
+    frames = "1 frame" if len(report.record.steps) == 1 else f"{len(report.record.steps)} frames"
     made = f"{report.created} · " if report.created else ""
     return f"{made}{frames} · camera {camera.width} × {camera.height} px"  # noqa: RUF001
 
@@ -165,12 +170,12 @@ def _facts(report: ReportInput) -> str:
 def _tiles(found: Total) -> list[tuple[str, str, str]]:
     if found.depth_z.count == 0:
         return []
-    depth = found.depth_z
+    depth, of_sample = found.depth_z, " (sample)" if found.sampled else ""
     return [
         ("Depth RMSE", micrometres(depth.rmse), f"{found.u.rmse:.3f} px in the image"),
         ("Depth bias", micrometres(depth.bias, 2), "+ is too far"),
-        ("Depth sigma", micrometres(depth.sigma), f"robust {micrometres(depth.robust_sigma)}"),
-        ("Off the surface", micrometres(found.surface.p95), "95 % are nearer"),
+        ("Depth sigma", micrometres(depth.sigma), f"robust {micrometres(depth.robust_sigma)}{of_sample}"),
+        ("Off the surface", micrometres(found.surface.p95), f"95 % are nearer{of_sample}"),
         ("Complete", percent(found.completeness), f"{count(found.points)} points"),
     ]
 

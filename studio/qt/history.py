@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from render.ambient_plan import AMBIENT_SAMPLES
+from render.counts import AMBIENT_SAMPLES, DIRECT_ERROR
 from render.tone import Picture, grey
 from studio.qt.compare_view import CompareView
 from studio.qt.session import Render, Session
@@ -41,7 +41,7 @@ def describe(render: Render) -> str:
     height, width = render.frame.shape
     parts = [f"{width} x {height}"]
     counts = render.frame.counts
-    errors = [counts.get(f"relative error, {laser.name}") for laser in render.project.scene.lasers]
+    errors = [counts.get(DIRECT_ERROR.of(i)) for i in range(len(render.project.scene.lasers))]
     known = [error for error in errors if error is not None]
     if known:
         parts.append(f"laser {max(known):.2%}")

@@ -25,6 +25,7 @@ from analysis.report.model import FrameResult
 from render.errors import InputError
 from render.motion import LinearStage, NoMotion, Turntable
 from render.threads import Cancel
+from studio.console import FRAMES, frame_of
 from studio.jobs import Job, Progress
 from studio.qt.icons import icon
 from studio.qt.jobs import RENDER, JobRunner
@@ -122,13 +123,15 @@ class MotionPanel(QWidget):
                 self._measured.emit(one)
 
         def work(progress: Progress, cancelled: Cancel) -> ScanResult:
-            at = 0.0
+            at, where = 0.0, ""
 
             def tell(stage: str, done: float) -> None:
-                nonlocal at
+                nonlocal at, where
                 at = max(at, share(stage, done) or 0.0)
-                if stage != "frames":
-                    progress(stage, at)
+                if stage == FRAMES:
+                    where = f"{frame_of(done, project.scene.frame_count)}: " if done < 1.0 else ""
+                else:
+                    progress(where + stage, at)
 
             return run_scan(
                 project,
@@ -221,7 +224,7 @@ class MotionPanel(QWidget):
 
 def share(stage: str, done: float) -> float | None:
     """How much of a scan is done; None: the stage does not say."""
-    if stage == "frames":
+    if stage == FRAMES:
         return 0.02 + 0.93 * done
     return 0.96 + 0.03 * done if stage in ("writing points", "report") else None
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.cloud import UNITS, at_first_step, cloud, merge, read_csv, read_ply, write_csv, write_ply
+from analysis.cloud import UNITS, SpooledCloud, at_first_step, cloud, merge, read_csv, read_ply, write_csv, write_ply
 from analysis.triangulate import PointFlag, Points
 from render.camera import Camera
 from render.errors import InputError
@@ -120,3 +120,22 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         write_ply(tmp_path / "p.ply", bad)
     assert (tmp_path / "p.ply").read_bytes() == b"old"
     assert [path.name for path in tmp_path.iterdir()] == ["p.ply"]
+
+
+def test_a_cloud_on_disk_is_written_as_the_same_cloud_in_memory(tmp_path, monkeypatch):
+    monkeypatch.setattr("analysis.cloud.PART", 7)
+    monkeypatch.setattr("analysis.spool.IN_MEMORY", 1)
+    parts = [cloud(some_points(count), None, 0, step) for step, count in enumerate((5, 0, 11, 12))]
+    spooled = SpooledCloud(tmp_path)
+    for part in parts:
+        spooled.add(part)
+    for write, name in ((write_ply, "p.ply"), (write_csv, "p.csv")):
+        write(tmp_path / name, spooled)
+        write(tmp_path / f"whole_{name}", merge(parts))
+        assert (tmp_path / name).read_bytes() == (tmp_path / f"whole_{name}").read_bytes()
+    spooled.close()
+
+
+def test_a_cloud_without_points_on_disk_has_its_columns(tmp_path):
+    write_ply(tmp_path / "p.ply", SpooledCloud(tmp_path))
+    assert {name: len(column) for name, column in read_ply(tmp_path / "p.ply").items()} == dict.fromkeys(UNITS, 0)

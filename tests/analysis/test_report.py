@@ -8,6 +8,7 @@ import math
 import re
 import zlib
 from html.parser import HTMLParser
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,12 +20,15 @@ from analysis.report.colour import method_colour, wavelength_colour
 from analysis.report.error_figures import nice_limit
 from analysis.report.line_figures import block_maximum, places
 from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
-from analysis.report.summary import chosen, headline, remarks, total
-from analysis.report.tables import scene_tables
+from analysis.report.record import record_of
+from analysis.report.summary import headline, remarks
+from analysis.report.tables import counts, scene_tables
+from analysis.report.total import total
 from analysis.report.units import digits, micrometres
 from analysis.report.write import PLAIN_NOTE, render_page, write_report
 from analysis.triangulate import triangulate
 from render.camera import Camera
+from render.counts import AMBIENT_SAMPLES, DIRECT_ERROR, EMBREE_SECONDS, INDIRECT_CUT, LIT_PIXELS, RAYS
 from render.frame import LaserCurve
 from render.laser import LineLaser
 from render.material import (
@@ -93,10 +97,10 @@ def extraction(scene: Scene, curve: LaserCurve, step: int, method: str, noise: n
     return Extraction(line, points, compare(points, line, curve, vertices, WALL_TRIANGLES, pose))
 
 
-def make_report(
+def make_frames(
     lasers: int = 1, steps: int = 1, methods: tuple[str, ...] = ("likelihood",), name: str = "laser",
     found: bool = True, visible: bool = True,
-) -> ReportInput:  # fmt: skip
+) -> tuple[Scene, list[FrameResult]]:  # fmt: skip
     """A scan of the wall with 0.1 px of noise."""
     random = np.random.default_rng(5)
     scene, frames = make_scene(lasers, steps, name), []
@@ -110,9 +114,18 @@ def make_report(
             made = tuple(extraction(scene, curve, step, method, noise) for method in methods)
             results.append(LaserResult(curve, made, image))
         plan = "direct: the light that met one surface\nleft out: all else <b>"
-        frames.append(FrameResult(step, tuple(results), plan, {"laser light": 0.5}, {"rays": 12345.0}))
+        frames.append(FrameResult(step, tuple(results), plan, {"laser light": 0.5}, {RAYS: 12345.0}))
+    return scene, frames
+
+
+def make_report(name: str = "laser", **options: Any) -> ReportInput:
+    """As `make_frames`."""
+    return report_of(*make_frames(name=name, **options), name=name)
+
+
+def report_of(scene: Scene, frames: list[FrameResult], name: str = "laser") -> ReportInput:
     return ReportInput(
-        title=name, scene=scene, frames=tuple(frames), vertices=WALL, triangles=WALL_TRIANGLES,
+        title=name, scene=scene, record=record_of(scene, frames), vertices=WALL, triangles=WALL_TRIANGLES,
         object_id=np.zeros(2, np.int32), display_max=4095.0, settings={"Extraction": {name: name}},
         seed=41, versions={"numpy": "9.9.9"}, notes=(f"a note of {name}",), created="2030-01-02",
     )  # fmt: skip
@@ -137,7 +150,8 @@ class Outward(HTMLParser):
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """A scan of three steps with two lasers and two methods, as files."""
-    report = make_report(lasers=2, steps=3, methods=("likelihood", "centre_of_mass"))
+    scene, frames = make_frames(lasers=2, steps=3, methods=("likelihood", "centre_of_mass"))
+    report = report_of(scene, frames)
     html, pdf = write_report(tmp_path_factory.mktemp("report") / "new" / "folder", report)
     return report, html.read_text(encoding="utf-8"), pdf.read_bytes()
 
@@ -155,14 +169,14 @@ def test_the_page_refers_to_nothing_outside_itself(written):
 
 def test_the_page_tells_the_numbers(written):
     report, page, _ = written
-    found = total(chosen(report))
+    found = total(report.record.chosen())
     assert micrometres(found.depth_z.rmse) in page
     assert micrometres(found.surface.p95) in page
     for m in (found.u, found.depth_z, found.surface):
         assert m.count == 600
     for k, laser in enumerate(("laser" + "a", "laser" + "b")):
         assert f"{laser}: maximum likelihood" in page
-        assert digits(1e6 * total(chosen(report, k)).depth_z.sigma) in page
+        assert digits(1e6 * total(report.record.chosen(k)).depth_z.sigma) in page
     for text in ("41", "9.9.9", "2030-01-02", "532 nm", "20\u00a0mW", "all else", "37\u2009035"):
         assert text in page
 
@@ -188,8 +202,9 @@ def test_the_pdf_has_pages(written):
 
 def test_totals_are_those_of_all_points_together(written):
     report, _, _ = written
-    found = total(chosen(report))
-    every = np.concatenate([e.errors.depth for e in chosen(report)])
+    found = total(report.record.chosen())
+    _, frames = make_frames(lasers=2, steps=3, methods=("likelihood", "centre_of_mass"))
+    every = np.concatenate([laser.extractions[0].errors.depth for frame in frames for laser in frame.lasers])
     assert found.depth_z.bias == pytest.approx(np.mean(every))
     assert found.depth_z.rmse == pytest.approx(np.sqrt(np.mean(every**2)))
     assert (found.truth_rows, found.measured_rows, found.false_rows) == (600, 600, 0)
@@ -226,17 +241,16 @@ def test_a_machine_that_cannot_draw_3d_gets_a_plain_picture(monkeypatch):
 
 
 def test_remarks_name_what_is_wrong():
-    report = make_report()
-    assert remarks(report) == []
-    frame = report.frames[0]
+    scene, (frame,) = make_frames()
+    assert remarks(report_of(scene, [frame])) == []
     first = frame.lasers[0].extractions[0]
     noise = 0.1 * np.random.default_rng(1).standard_normal(100)
 
     def said(changed: Extraction) -> str:
         laser = dataclasses.replace(frame.lasers[0], extractions=(changed,))
-        return " ".join(remarks(dataclasses.replace(report, frames=(dataclasses.replace(frame, lasers=(laser,)),))))
+        return " ".join(remarks(report_of(scene, [dataclasses.replace(frame, lasers=(laser,))])))
 
-    scene, curve = report.scene, frame.lasers[0].curve
+    curve = frame.lasers[0].curve
     assert "bias" in said(extraction(scene, curve, 0, "likelihood", noise + 0.2))
     assert "err alike" in said(extraction(scene, curve, 0, "likelihood", 0.15 * np.sin(np.arange(100) / 8)))
     assert "predicted sigma" in said(extraction(scene, curve, 0, "likelihood", 2.5 * noise))
@@ -249,21 +263,21 @@ def test_remarks_name_what_is_wrong():
 
 
 def test_the_frame_shown_is_the_one_of_median_error_among_those_with_images():
-    report = make_report(steps=3)
-    scene, curve = report.scene, wall_curve(report.scene)
+    scene, made_frames = make_frames(steps=3)
+    curve = wall_curve(scene)
     noises = (0.3, 0.1, 0.2)
     frames = []
-    for frame, noise in zip(report.frames, noises, strict=True):
+    for frame, noise in zip(made_frames, noises, strict=True):
         made = extraction(scene, curve, frame.step, "likelihood", np.full(100, noise))
         frames.append(dataclasses.replace(frame, lasers=(dataclasses.replace(frame.lasers[0], extractions=(made,)),)))
-    assert dataclasses.replace(report, frames=tuple(frames)).shown_frame().step == 2
+    assert record_of(scene, frames).shown_frame().step == 2
     blind = dataclasses.replace(frames[2], lasers=(dataclasses.replace(frames[2].lasers[0], image=None),))
-    assert dataclasses.replace(report, frames=(frames[0], blind)).shown_frame().step == 0
+    assert record_of(scene, [frames[0], blind]).shown_frame().step == 0
 
 
 def test_enlarged_places_hold_the_worst_row_and_differ():
-    report = make_report()
-    first = report.frames[0].lasers[0].extractions[0]
+    _, (frame,) = make_frames()
+    first = frame.lasers[0].extractions[0]
     found = places(first)
     assert found[0].point == int(np.argmax(np.abs(first.errors.position)))
     assert len({place.point for place in found}) == len(found)
@@ -338,3 +352,18 @@ def test_materials_are_told_with_what_decides_how_they_shine(material, told):
     shown = report.scene.model_copy(update={"objects": (wall.model_copy(update={"material": material}),)})
     (line,) = scene_tables(dataclasses.replace(report, scene=shown))["Objects"].values()
     assert line == f"plane, 2 triangles, {told}"
+
+
+@pytest.mark.parametrize("name", ["error probe", "mean", "seconds", "fraction a pixel"])
+def test_a_laser_may_be_called_like_a_kind_of_number(name):
+    scene, made = make_frames(steps=2, name=name)
+    found = {LIT_PIXELS.of(0): 1e5, DIRECT_ERROR.of(0): 0.004, INDIRECT_CUT.of(0): 0.25}
+    found |= {AMBIENT_SAMPLES: 15.5, EMBREE_SECONDS: 0.5}
+    frames = [dataclasses.replace(frame, counts=found) for frame in made]
+    assert counts(report_of(scene, frames)) == [
+        (f"lit pixels, {name}a", "200\u2009000"),
+        (f"relative error, {name}a", "0.40\u00a0%"),
+        (f"mean radiance taken by the clamp, {name}a", "0.25"),
+        ("samples a pixel, ambient", "15.5"),
+        ("seconds in embree, all threads", "1.00\u00a0s"),
+    ]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from render.ambient import ambient_image, ambient_images
-from render.ambient_plan import AMBIENT_SAMPLES, CLAMPED_SAMPLES, choose_ambient, has_ambient, onward_share
+from render.ambient_plan import choose_ambient, has_ambient, onward_share
+from render.counts import AMBIENT_CLAMPED, AMBIENT_SAMPLES
 from render.errors import Cancelled
 from render.lights import Environment, PointLight, RectangleLight
 from render.material import Conductor, Emitter, Glass, Lambertian
@@ -110,7 +111,7 @@ def test_a_clamp_makes_darker_and_says_so():
     assert free.radiance.mean() - cut.radiance.mean() == pytest.approx(cut.cut, rel=0.1)
     settings = RenderSettings(ambient_samples=4, clamp=0.02, transport="interreflection", truth_images=False)
     frame = render_world(world, scene, settings=settings)
-    assert "biased" in frame.plan and frame.counts[CLAMPED_SAMPLES] > 0
+    assert "biased" in frame.plan and frame.counts[AMBIENT_CLAMPED] > 0
 
 
 @pytest.mark.parametrize("threads", [1, 2])

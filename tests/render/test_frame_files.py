@@ -16,6 +16,7 @@ import OpenEXR
 import pytest
 
 from render.camera import Camera
+from render.counts import DIRECT_ERROR, DIRECT_SAMPLES, LIT_PIXELS, RAYS, Quantity, counts_from
 from render.develop import Image, develop
 from render.errors import InputError
 from render.frame import Frame, LaserCurve, Truth
@@ -69,7 +70,7 @@ def frame_of(scene: Scene, step: int = 3) -> Frame:
         truth=truth,
         plan="direct\nµ-facets left out",
         seconds={"laser": 0.1, "curve": 1e-3},
-        counts={"rays": 12345.0, "error": np.inf, "unknown": np.nan},
+        counts={RAYS: 12345.0, DIRECT_ERROR.of(0): np.inf, Quantity("unknown", "mean"): np.nan},
     )
 
 
@@ -208,7 +209,7 @@ def mutilations() -> dict[str, Any]:
     curve = ("lasers", 1, "curve")
     return {
         "a list": lambda record: [record],
-        "newer": at("format_version", value=2),
+        "newer": at("format_version", value=3),
         "another format": at("format", value="project"),
         "no step": at("step", remove=True),
         "step of text": at("step", value="third"),
@@ -223,7 +224,28 @@ def mutilations() -> dict[str, Any]:
         "huge index": at(*curve, "index", value=[2**40, 1, 2, 3, 4]),
         "wrong axis": at("lasers", 1, "axis", value="diagonal"),
         "counts of text": at("counts", value="many"),
+        "count of no kind": at("counts", 0, "kind", value="relative error"),
+        "count of no laser": at("counts", 0, "laser", value=-1),
     }
+
+
+def test_counts_of_a_first_version_are_read_by_the_names_that_they_had() -> None:
+    old = {
+        "rays": 7.0,
+        "lit pixels, error probe": 1e7,
+        "relative error, error probe": 0.01,
+        "samples, mean, a pixel": 4.0,
+        "else": 2.0,
+    }
+    lasers = ["error probe", "mean, a pixel"]
+    assert counts_from(old, lasers) == {
+        RAYS: 7.0,
+        LIT_PIXELS.of(0): 1e7,
+        DIRECT_ERROR.of(0): 0.01,
+        DIRECT_SAMPLES.of(1): 4.0,
+        Quantity("else"): 2.0,
+    }
+    assert LIT_PIXELS.of(0).kind == "count" and LIT_PIXELS.of(0).label(lasers) == "lit pixels, error probe"
 
 
 @pytest.mark.parametrize("name", mutilations())

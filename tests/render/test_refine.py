@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from render.ambient_plan import AMBIENT_SAMPLES
+from render.counts import AMBIENT_SAMPLES, DIRECT_ERROR, RAYS
 from render.develop import develop
 from render.errors import Cancelled
 from render.lights import Environment, PointLight
@@ -57,15 +57,15 @@ def test_every_frame_can_be_developed_and_knows_more_than_the_one_before():
         assert len(frame.curves[0].index) > 0
     assert [frame.truth is not None for frame in frames] == [False, False, True, True, True, True]
     assert [frame.ambient is not None for frame in frames] == [False] * 3 + [True] * 3
-    assert frames[1].counts["relative error, laser"] <= 0.01
-    rays = [frame.counts["rays"] for frame in frames]
+    assert frames[1].counts[DIRECT_ERROR.of(0)] <= 0.01
+    rays = [frame.counts[RAYS] for frame in frames]
     assert rays == sorted(rays) and rays[0] > 0
 
 
 def test_the_first_frame_is_a_small_part_of_the_work():
     world, scene = box_on_a_wall()
     frames = list(refine(world, scene, settings=SETTINGS))
-    assert frames[0].counts["rays"] < 0.02 * frames[-1].counts["rays"]
+    assert frames[0].counts[RAYS] < 0.02 * frames[-1].counts[RAYS]
 
 
 def test_progress_rises_to_the_end():

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from render.ambient_plan import AMBIENT_SAMPLES
+from render.counts import AMBIENT_SAMPLES, INDIRECT_CLAMPED, INDIRECT_CUT, INDIRECT_ERROR
 from render.errors import Cancelled, InputError
 from render.lights import Environment
 from render.material import Conductor
-from render.plan import indirect_error
 from render.refine import refine
 from render.render import render_world
 from render.saved import RenderState, read_state, state_of
@@ -68,8 +67,7 @@ def test_a_render_that_is_interrupted_again_and_again_ends_in_the_same_bits(groo
     assert np.array_equal(frame.laser_indirect[0], whole.laser_indirect[0]) and frame.laser_indirect[0].max() > 0
     assert np.array_equal(frame.ambient, whole.ambient)
     assert frame.plan == whole.plan
-    laser = groove[1].lasers[0]
-    assert frame.counts[indirect_error(laser)] == whole.counts[indirect_error(laser)]
+    assert frame.counts[INDIRECT_ERROR.of(0)] == whole.counts[INDIRECT_ERROR.of(0)]
     assert frame.counts[AMBIENT_SAMPLES] == whole.counts[AMBIENT_SAMPLES]
 
 
@@ -118,7 +116,7 @@ def test_a_state_without_a_file_is_new():
 def test_every_refinement_of_reflected_light_is_a_frame_and_nearer_the_last(groove):
     frames = [frame for frame in refine(*groove, settings=SETTINGS) if frame.laser_indirect and frame.ambient is None]
     assert len(frames) >= 3
-    key = indirect_error(groove[1].lasers[0])
+    key = INDIRECT_ERROR.of(0)
     told = [frame.counts[key] for frame in frames]
     assert told == sorted(told, reverse=True) and told[-1] <= SETTINGS.indirect_error
     last = frames[-1].laser_indirect[0].astype(np.float64)
@@ -130,7 +128,7 @@ def test_a_time_limit_ends_the_render_with_every_light_group(groove):
     endless = SETTINGS.model_copy(update={"indirect_error": 1e-3, "light_paths": 1 << 40, "ambient_samples": 65536})
     frame = render_world(*groove, settings=endless, seconds=2.0)
     assert frame.laser_indirect[0].max() > 0 and frame.ambient.mean() > 0
-    assert frame.counts[indirect_error(groove[1].lasers[0])] > 1e-3
+    assert frame.counts[INDIRECT_ERROR.of(0)] > 1e-3
     assert sum(frame.seconds.values()) < 60.0
 
 
@@ -138,7 +136,7 @@ def test_the_clamp_is_named_and_told(groove, whole):
     clamped = SETTINGS.model_copy(update={"laser_clamp": float(whole.laser_indirect[0].max()) / 100})
     frame = render_world(*groove, settings=clamped)
     assert "clamp: no pass" in frame.plan and "biased" in frame.plan and "clamp" not in whole.plan
-    assert frame.counts["clamped contributions, laser"] > 0
-    lost = frame.counts["mean radiance taken by the clamp, laser"]
+    assert frame.counts[INDIRECT_CLAMPED.of(0)] > 0
+    lost = frame.counts[INDIRECT_CUT.of(0)]
     kept, full = (one.laser_indirect[0].mean(dtype=np.float64) for one in (frame, whole))
     assert kept + lost == pytest.approx(full, rel=0.1) and lost > 0

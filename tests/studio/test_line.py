@@ -13,7 +13,7 @@ from render.motion import LinearStage
 from render.world import build_world
 from studio.line import extract_line, working_volume
 from studio.project import Project
-from studio.results import measure_frame
+from studio.results import compared_methods, measure_frame
 from studio.scan import run_scan
 from studio.stages import Clock, develop_step, measure_step, render_step, scaled
 from studio.templates import template_folder
@@ -101,5 +101,5 @@ def test_auto_is_not_compared_with_itself(rendered):
     assert len(set(methods)) == len(methods) and first.lasers[0].extractions[0].line.note
     # a later frame, where auto may pick another, is compared with the same methods
     dim = develop_step(bright(asked, 0.02), frame, CLOCK, None)
-    later = measure_frame(asked, frame, world, dim, CLOCK, None, keep=False, first=first)
+    later = measure_frame(asked, frame, world, dim, CLOCK, None, keep=False, compared=compared_methods(first))
     assert [one.line.method for one in later.lasers[0].extractions[1:]] == methods[1:]

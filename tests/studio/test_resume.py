@@ -9,12 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from render.counts import DIRECT_DROPPED, LIGHT_PATHS
 from render.errors import Cancelled, InputError
 from render.frame_files import read_frame
+from render.saved import state_of
+from render.world import build_world
 from studio.interrupt import stop_on_interrupt
 from studio.light_groups import group_lines, unfinished
 from studio.project import Project
-from studio.resume import saved_path
+from studio.resume import made_of, saved_path
 from studio.scan import run_scan
 from studio.stages import scaled
 from studio.templates import template_folder
@@ -71,13 +74,45 @@ def test_a_time_limit_leaves_a_frame_and_what_it_takes_to_go_on(project: Project
     assert "error" in done.manifest["light"][0]["groups"]["laser, reflected on"]
     scan(slow, tmp_path, seconds=0.5, resume=True)
     second = read_frame(tmp_path / "frame_0000.json")
-    assert second.counts["light paths, laser"] > first.counts["light paths, laser"] > 0
+    assert second.counts[LIGHT_PATHS.of(0)] > first.counts[LIGHT_PATHS.of(0)] > 0
     names = [name for _, name, _ in group_lines(second, small.scene, small.render)]
     assert names == ["laser, direct", "laser, reflected on", "ambient"]
-    assert second.counts["dropped contributions of direct light, laser"] == 0
-    bad = replace(second, counts={**second.counts, "dropped contributions of direct light, laser": 3})
+    assert second.counts[DIRECT_DROPPED.of(0)] == 0
+    bad = replace(second, counts={**second.counts, DIRECT_DROPPED.of(0): 3})
     texts = [text for _, _, text in group_lines(bad, small.scene, small.render)]
     assert "3 contributions were no number" in texts[0] and not any("no number" in text for text in texts[1:])
+
+
+def test_a_moving_scan_keeps_its_one_plan_when_it_goes_on(tmp_path: Path) -> None:
+    """Stopped after its first frame and gone on with on other threads, and first cut short by its number of steps."""
+    found = Project.load(template_folder("scan") / "project.json")
+    render = found.render.model_copy(update={"truth_images": False, "ambient_samples": 1, "laser_error": 0.05})
+    moving = found.model_copy(update={"render": render})
+
+    def run(out: Path, **options):
+        return run_scan(moving, template_folder("scan"), out=out, image_scale=0.05, measure=False, **options)
+
+    whole = run(tmp_path / "whole", steps=2, threads=1)
+    stages: list[str] = []
+    with pytest.raises(Cancelled):
+        run(tmp_path / "part", threads=2, progress=lambda stage, done: stages.append(stage),
+            cancelled=lambda: stages.count("writing frames") > 2)  # fmt: skip
+    assert (tmp_path / "part" / "frame_0000.exr").is_file()
+    gone_on = run(tmp_path / "part", steps=2, threads=2, resume=True)
+    plans = [one["plan"] for done in (whole, gone_on) for one in done.manifest["light"]]
+    assert len(plans) == 4 and all(plan == plans[0] for plan in plans)
+    assert any("the same for all 20 frames" in line for line in plans[0])
+    for step in range(2):
+        name = f"frame_{step:04d}.exr"
+        assert (tmp_path / "part" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_frame_of_another_plan_is_another_frame(project: Project) -> None:
+    world = build_world(project.scene, FOLDER, 0)
+    alone, one, other = (
+        state_of(world, project.scene, project.render, plan=plan) for plan in (None, "laser light 0", "laser light 1")
+    )
+    assert len({str(made_of(project, state)) for state in (alone, one, other)}) == 3
 
 
 def test_what_is_left_of_another_scene_is_refused(project: Project, tmp_path: Path) -> None:

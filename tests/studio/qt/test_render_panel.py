@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit
 
-from render.ambient_plan import AMBIENT_SAMPLES
+from render.counts import AMBIENT_SAMPLES
 from render.render import render_world
 from studio.compare import compare, resampled
 from studio.jobs import State

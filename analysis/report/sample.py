@@ -1,0 +1,100 @@
+"""A sample of a scan's points that never grows beyond a limit, for what no sum can give: quantiles and pictures.
+
+It is one of whole runs of neighbouring scan lines, so that it tells as well how neighbours err alike. A scan that fits
+is kept whole, and its figures are exact.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.cloud import at_first_step
+from analysis.report.model import Extraction
+from render.scene import Scene
+
+Rows = NDArray[np.void]
+"""(m,) of `ROW`, in the order of `Points`."""
+
+ROW = np.dtype(
+    [
+        ("index", "i8"), ("rank", "i4"), ("flag", "u1"), ("valid", "?"), ("width", "f8"), ("world", "f8", 3),
+        ("position", "f8"), ("depth", "f8"), ("distance", "f8"),
+        ("sigma_position", "f8"), ("sigma_depth", "f8"), ("sigma_distance", "f8"),
+        ("pixel_depth", "f8"), ("pixel_distance", "f8"),
+    ]
+)  # fmt: skip
+"""What figures ask of a point: of its peak `index`, `rank`, `flag`, `width` (px); whether it is `valid`, where it is at
+step 0 (`world`, m); its errors with their predicted sigma (px, m), and the errors in m that one pixel makes."""
+
+MOST_LINES = 1 << 18
+"""Scan lines kept, of all lasers together: 128 frames of 2048."""
+RUN = 64
+"""Neighbouring scan lines that are kept or dropped together."""
+SEED = 20_240_607
+IMAGE = 1_000_000
+"""Between the scan lines of different images, which are no neighbours."""
+
+
+def rows_of(extraction: Extraction, scene: Scene, step: int) -> Rows:
+    """What is kept of a line's points."""
+    line, points, errors = extraction.line, extraction.points, extraction.errors
+    rows = np.empty(len(points.flag), ROW)
+    rows["index"], rows["rank"], rows["valid"] = points.index, points.rank, points.valid
+    rows["flag"], rows["width"] = line.flag[points.index, points.rank], line.width[points.index, points.rank]
+    rows["world"] = at_first_step(points.world, scene, step)
+    rows["position"], rows["depth"], rows["distance"] = errors.position, errors.depth, errors.distance
+    rows["sigma_position"], rows["sigma_depth"] = points.sigma_pixel, points.sigma_depth
+    rows["sigma_distance"] = errors.sigma_distance
+    rows["pixel_depth"] = np.abs(points.gradient[:, 2])
+    rows["pixel_distance"] = np.linalg.norm(points.gradient, axis=1)
+    return rows
+
+
+class Sample:
+    """Runs drawn by chance, each as likely as any other; the same ones of every method. The chance is seeded."""
+
+    def __init__(self, most: int = MOST_LINES) -> None:
+        self._most = most
+        self._images = 0
+        self._kept = 0
+        self._seen: dict[int, int] = {}
+        self._runs: dict[tuple[int, int], tuple[int, int, list[Rows]]] = {}
+        """By image and run: the laser, how many scan lines, and their points by each method."""
+        self._drawn: list[tuple[float, int, int]] = []
+        """A heap of the same runs, the first to go first."""
+
+    def add(self, laser: int, lines: int, methods: Sequence[Rows]) -> None:
+        """The points of one image of a laser, with `lines` scan lines, by each method."""
+        starts = np.arange(0, lines, RUN)
+        lots = np.random.default_rng([SEED, self._images]).random(len(starts))
+        edges = [np.searchsorted(rows["index"], np.append(starts, lines)) for rows in methods]
+        self._seen[laser] = self._seen.get(laser, 0) + lines
+        for run, lot in enumerate(lots.tolist()):
+            size = min(RUN, lines - run * RUN)
+            parts = [rows[edge[run] : edge[run + 1]].copy() for rows, edge in zip(methods, edges, strict=True)]
+            self._runs[self._images, run] = laser, size, parts
+            self._kept += size
+            heapq.heappush(self._drawn, (-lot, self._images, run))
+            while self._kept > self._most:
+                _, image, last = heapq.heappop(self._drawn)
+                self._kept -= self._runs.pop((image, last))[1]
+        self._images += 1
+
+    def rows(self, laser: int | None, method: int) -> Rows:
+        """The points kept of a laser, or of all, by a method, in the order of the scan."""
+        found = [np.empty(0, ROW)]
+        for (image, _), (of, _, methods) in sorted(self._runs.items(), key=lambda item: item[0]):
+            if laser in (None, of) and method < len(methods):
+                part = methods[method].copy()
+                part["index"] += IMAGE * image
+                found.append(part)
+        return np.concatenate(found)
+
+    def lines(self, laser: int | None) -> tuple[int, int]:
+        """How many scan lines were kept, and how many there were."""
+        kept = sum(size for of, size, _ in self._runs.values() if laser in (None, of))
+        return kept, sum(seen for of, seen in self._seen.items() if laser in (None, of))

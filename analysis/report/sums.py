@@ -1,0 +1,87 @@
+"""What adds up over the frames of a scan exactly: counts, and the mean and spread of the errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.report.model import Extraction
+
+Float = NDArray[np.float64]
+
+
+@dataclass
+class Moments:
+    """Of errors with their predicted sigma; NaN is left out."""
+
+    count: int = 0
+    mean: float = 0.0
+    squares: float = 0.0
+    """Sum of the squares about the mean."""
+    predicted: int = 0
+    """Errors that have a sigma."""
+    covered: int = 0
+    """Those of them within +-2 sigma."""
+
+    def add(self, error: Float, sigma: Float) -> None:
+        here = np.isfinite(error)
+        e, s = error[here], sigma[here]
+        known = np.isfinite(s)
+        mean = float(np.mean(e)) if len(e) else 0.0
+        covered = int(np.count_nonzero(np.abs(e[known]) <= 2.0 * s[known]))
+        self.merge(Moments(len(e), mean, float(np.sum((e - mean) ** 2)), int(np.count_nonzero(known)), covered))
+
+    def merge(self, other: Moments) -> None:
+        """Chan, Golub & LeVeque (1983), The American Statistician 37(3), eq. 2.1: without cancellation."""
+        count = self.count + other.count
+        if other.count:
+            apart = other.mean - self.mean
+            self.squares += other.squares + apart**2 * self.count * other.count / count
+            self.mean += apart * other.count / count
+        self.count = count
+        self.predicted += other.predicted
+        self.covered += other.covered
+
+
+@dataclass
+class Sums:
+    """Of one method's lines, over frames and lasers."""
+
+    method: str = ""
+    """Of the first of them."""
+    points: int = 0
+    outliers: int = 0
+    truth_rows: int = 0
+    valid_rows: int = 0
+    measured_rows: int = 0
+    false_rows: int = 0
+    position: Moments = field(default_factory=Moments)
+    depth: Moments = field(default_factory=Moments)
+    distance: Moments = field(default_factory=Moments)
+
+    def add(self, extraction: Extraction) -> None:
+        points, errors = extraction.points, extraction.errors
+        self.method = self.method or extraction.line.method
+        self.points += int(np.count_nonzero(points.valid))
+        self.outliers += int(np.count_nonzero(errors.outlier))
+        self.truth_rows += errors.truth_rows
+        self.valid_rows += errors.valid_rows
+        self.measured_rows += errors.measured_rows
+        self.false_rows += errors.false_rows
+        self.position.add(errors.position, points.sigma_pixel)
+        self.depth.add(errors.depth, points.sigma_depth)
+        self.distance.add(errors.distance, errors.sigma_distance)
+
+    def merge(self, other: Sums) -> None:
+        self.method = self.method or other.method
+        self.points += other.points
+        self.outliers += other.outliers
+        self.truth_rows += other.truth_rows
+        self.valid_rows += other.valid_rows
+        self.measured_rows += other.measured_rows
+        self.false_rows += other.false_rows
+        self.position.merge(other.position)
+        self.depth.merge(other.depth)
+        self.distance.merge(other.distance)

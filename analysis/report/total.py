@@ -1,0 +1,108 @@
+"""All points of a scan taken together: measures from exact sums, and from the sample what no sum can give."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from analysis.measures import Measures, measure
+from analysis.report.sample import Rows
+from analysis.report.sums import Moments, Sums
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What is known of one method's lines, of one laser or of all."""
+
+    sums: Sums
+    rows: Rows
+    """The points in the sample, in the order of the scan."""
+    lines_kept: int
+    """Scan lines in the sample."""
+    lines: int
+    """Scan lines in all."""
+
+
+@dataclass(frozen=True)
+class Total:
+    """Errors of one method, over all frames, of one laser or all.
+
+    Of a scan that is longer than its sample, quantiles, outlier rate and autocorrelation are those of the sample; all
+    else is exact.
+    """
+
+    method: str
+    u: Measures
+    depth_z: Measures
+    surface: Measures
+    points: int
+    outliers: int
+    """Of each image on its own."""
+    truth_rows: int
+    valid_rows: int
+    measured_rows: int
+    false_rows: int
+    lines_kept: int
+    lines: int
+
+    @property
+    def completeness(self) -> float:
+        """Measured rows over truth rows; NaN when nothing is visible."""
+        return self.measured_rows / self.truth_rows if self.truth_rows else float("nan")
+
+    @property
+    def sampled(self) -> bool:
+        """The sample does not hold the whole scan."""
+        return self.lines_kept < self.lines
+
+
+def total(chosen: Chosen) -> Total:
+    """Measures over all points together."""
+    sums, rows = chosen.sums, chosen.rows
+    whole = chosen.lines_kept == chosen.lines
+
+    def all_of(found: Measures, moments: Moments) -> Measures:
+        return found if whole or found.count == 0 else _exact(found, moments)
+
+    return Total(
+        method=sums.method,
+        u=all_of(position_measures(rows), sums.position),
+        depth_z=all_of(depth_measures(rows), sums.depth),
+        surface=all_of(distance_measures(rows), sums.distance),
+        points=sums.points,
+        outliers=sums.outliers,
+        truth_rows=sums.truth_rows,
+        valid_rows=sums.valid_rows,
+        measured_rows=sums.measured_rows,
+        false_rows=sums.false_rows,
+        lines_kept=chosen.lines_kept,
+        lines=chosen.lines,
+    )
+
+
+def position_measures(rows: Rows) -> Measures:
+    """Of the error along the scan line, px."""
+    return measure(rows["position"], rows["sigma_position"], 1.0, rows["index"], rows["rank"])
+
+
+def depth_measures(rows: Rows) -> Measures:
+    """Of depth_z, m."""
+    return measure(rows["depth"], rows["sigma_depth"], rows["pixel_depth"], rows["index"], rows["rank"])
+
+
+def distance_measures(rows: Rows) -> Measures:
+    """Of the signed distance from the surface, m."""
+    return measure(rows["distance"], rows["sigma_distance"], rows["pixel_distance"], rows["index"], rows["rank"])
+
+
+def _exact(found: Measures, moments: Moments) -> Measures:
+    """The sample's measures, with what the sums know better."""
+    variance = moments.squares / moments.count
+    return replace(
+        found,
+        count=moments.count,
+        bias=moments.mean,
+        sigma=math.sqrt(variance),
+        rmse=math.sqrt(variance + moments.mean**2),
+        coverage=moments.covered / moments.predicted if moments.predicted else float("nan"),
+    )

@@ -1,0 +1,44 @@
+"""What a long scan need not hold in memory: bytes in an unnamed file, of which a killed program leaves nothing."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from render.errors import InputError
+
+IN_MEMORY = 1 << 23
+"""Bytes that need no file."""
+
+
+class Spool:
+    """Grows at its end, and is read anywhere."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        """folder: where the file is, once there is one; made if missing. None: the system's temporary files."""
+        self._folder = folder
+        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY, dir=None if folder is None else str(folder))  # noqa: SIM115 - it lives as long as this
+
+    def append(self, data: bytes) -> int:
+        """Where the bytes begin. InputError: the folder or the disk takes no more."""
+        try:
+            if self._folder is not None:
+                self._folder.mkdir(parents=True, exist_ok=True)
+            start = self._file.seek(0, 2)
+            self._file.write(data)
+        except OSError as error:
+            raise InputError(
+                "the scan's results cannot be kept",
+                where=str(self._folder or tempfile.gettempdir()),
+                found=error.strerror or error,
+                cure="choose a folder that you may write to and that has free space",
+            ) from error
+        return start
+
+    def read(self, start: int, size: int) -> bytes:
+        """At most `size` bytes from `start` on."""
+        self._file.seek(start)
+        return self._file.read(size)
+
+    def close(self) -> None:
+        self._file.close()
