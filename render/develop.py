@@ -27,7 +27,7 @@ from render.blur import defocus, disc_diameter, point_spread
 from render.errors import InputError
 from render.frame import Frame
 from render.poisson import poisson
-from render.random import normal
+from render.random import normal, wrapped
 from render.response import band_response, joules_per_radiance, laser_response, relative_illumination
 from render.scene import Scene
 from render.sensor import Sensor
@@ -106,7 +106,7 @@ def develop(
     def rows(start: int, stop: int) -> None:
         numbers = np.empty((stop - start, width), dtype=np.uint16)
         light = exposure.signal(start, stop)
-        _read_out(light, fixed[start:stop], start, int(seed) % 2**63, frame.step, chain, noise, numbers)
+        _read_out(light, fixed[start:stop], start, wrapped(seed), frame.step, chain, noise, numbers)
         pixels[start:stop] = numbers
 
     map_chunks(rows, height, ROWS, threads)

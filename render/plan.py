@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from render.bidirectional import indirect_images, indirect_shares
 from render.laser import LineLaser
 from render.lens_plan import lens_lines
+from render.random import wrapped
 from render.saved import RenderState
 from render.scene import Scene
 from render.settings import RenderSettings
@@ -159,7 +160,7 @@ def indirect_light(
             most_paths=settings.light_paths,
             kinds=plan.kinds or PLAIN,
             clamp=settings.laser_clamp,
-            seed=seed + i,
+            seed=wrapped(seed + i),
             threads=threads,
             cancelled=cancelled,
             progress=None if progress is None else partial(_share, progress, i, count),
@@ -206,7 +207,7 @@ def pilot_shares(
     found = []
     for i, laser in enumerate(scene.lasers):
         poses = scene.T_world_camera(step), scene.T_world_laser(i, step)
-        pilot_seed = seed + 7919 * (i + 1)
+        pilot_seed = wrapped(seed + 7919 * (i + 1))
         found.append(indirect_shares(world, scene.camera, laser, *poses, seed=pilot_seed, cancelled=cancelled))
     shares = {}
     for rung in RUNGS:

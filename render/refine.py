@@ -24,6 +24,7 @@ from render.frame import Axis, Frame, LaserCurve
 from render.lens_plan import lens_lines
 from render.material_checks import check_materials, scene_warnings
 from render.plan import DIRECT, INDIRECT, choose_plan, clamp_line, indirect_light
+from render.random import wrapped
 from render.saved import RenderState
 from render.scene import Scene
 from render.settings import RenderSettings
@@ -235,7 +236,7 @@ def _lasers(
             scene.T_world_camera(step),
             scene.T_world_laser(i, step),
             target=target,
-            seed=seed + i,
+            seed=wrapped(seed + i),
             threads=threads,
             cancelled=cancelled,
             progress=lambda done, i=i: report((i + done) / len(scene.lasers)),  # type: ignore[misc]
