@@ -123,6 +123,7 @@ def frames(
     frame = Frame(step, (), None, (), None, "\n".join(plan(scene, settings)), warnings=warnings)
 
     def told(frame: Frame, **counts: float) -> Frame:
+        frame.check()
         so_far = {"rays": rays.rays - ray_start, "seconds in embree, all threads": rays.seconds - embree_start}
         return replace(frame, seconds=clock.so_far(), counts={**frame.counts, **counts, **so_far})
 

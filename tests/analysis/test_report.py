@@ -75,7 +75,7 @@ def wall_curve(scene: Scene, visible: bool = True) -> LaserCurve:
     zero = np.zeros(n)
     return LaserCurve(
         "rows", rows.astype(np.int32), np.full(n, camera.fx * x / DEPTH + camera.cx), point, point[:, 2].copy(),
-        np.linalg.norm(point, axis=1), np.zeros(n, np.int32), zero, zero, zero, np.zeros((0, 2, 3)),
+        np.linalg.norm(point, axis=1), np.zeros(n, np.int32), zero, zero, zero + 30.0, np.zeros((0, 2, 3)),
     )  # fmt: skip
 
 
