@@ -98,12 +98,10 @@ def read_frame(path: Path | str) -> Frame:
         allowed, cure = f"the file written together with {sidecar.name}", "render again"
         raise InputError("the image is damaged or of another frame", where=str(exr), allowed=allowed, cure=cure)
     try:
-        frame = _frame(record, _decode_exr(content))
+        return _frame(record, _decode_exr(content))
     except (AttributeError, KeyError, OverflowError, TypeError, ValueError, RuntimeError) as error:
         found = f"{type(error).__name__}: {error}"
         raise InputError("the frame's description is damaged", where=str(sidecar), found=found) from None
-    frame.check()
-    return frame
 
 
 def _layers(frame: Frame, scene: Scene) -> Layers:

@@ -123,6 +123,7 @@ def render_step(
 def develop_step(project: Project, frame: Frame, clock: Clock, threads: int | None) -> list[Image]:
     """One image for each laser: they fire one after the other, so that no line hides another."""
     scene, images = project.scene, []
+    frame.check()  # it may come from a file
     with clock.stage("sensor"):
         for i in range(len(scene.lasers)):
             power = [laser.power if i == k else 0.0 for k, laser in enumerate(scene.lasers)]
