@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,10 @@ from numpy.typing import NDArray
 from analysis.report.model import FrameResult
 from render.errors import InputError
 from render.frame_files import read_frame
+from render.material_checks import scene_warnings
 from render.world import build_world
 from studio import scan_folder
+from studio.cautions import Cautions
 from studio.project import Project
 from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
 from studio.stages import Clock, develop_step, step_world
@@ -38,7 +41,12 @@ def reconstruct_folder(
     Writes points and, where asked for, the report into `out`. InputError: frames missing or not of this project.
     """
     results: list[FrameResult] = []
-    with clock.stage("loading meshes"):
+    image_scale = found.manifest.get("image_scale", 1.0)
+    if not isinstance(image_scale, float | int) or not 0.0 < image_scale < math.inf:
+        where = f"{found.folder / scan_folder.MANIFEST}: image_scale"
+        raise InputError("the image scale is none", where=where, found=image_scale, allowed="a positive number")
+    cautions = Cautions(project, image_scale)
+    with clock.stage("loading meshes"), cautions.listening():
         first = world = build_world(project.scene, root, 0)
     sweep = Sweep(project)
 
@@ -59,20 +67,33 @@ def reconstruct_folder(
                 "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
             )
         world = step_world(project, root, frame.step, None if frame.step == 0 else world)
+        cautions.look(frame, scene_warnings(world, project.scene, frame.step))
         images = develop_step(project, frame, clock, threads)
         take(sweep.add(frame, world, images))
     take(sweep.finish())
     if not results or not project.scene.lasers:
         raise InputError("the scan holds no laser image", where=str(found.folder))
     files, told = write_points(out, project, results, clock), extraction_notes(results, project)
+    figures = summarise(results, project.scene)
+    notes = cautions.notes(figures)
     if report:
-        notes = [*told, *(str(note) for note in found.manifest.get("notes", []))]
         created = str(found.manifest.get("created", now()))
-        files += write_reports(out, project, first, results, clock, notes=notes, created=created)
+        files += write_reports(
+            out,
+            project,
+            first,
+            results,
+            clock,
+            notes=[*notes, *told],
+            created=created,
+            image_scale=image_scale,
+        )
     return {
         "name": project.name,
         "files": [str(path) for path in files],
-        "results": summarise(results, project.scene),
+        "image_scale": image_scale,
+        "results": figures,
+        "notes": notes,
         "extraction": told,
         "seconds": clock.seconds,
     }

@@ -102,11 +102,12 @@ def write_reports(
     *,
     notes: Sequence[str],
     created: str,
+    image_scale: float = 1.0,
 ) -> list[Path]:
     """report.html and report.pdf; `world` is that of step 0."""
     from analysis.report.write import write_report
 
-    data = report_input(project, world, results, clock.seconds, notes=notes, created=created)
+    data = report_input(project, world, results, clock.seconds, notes=notes, created=created, image_scale=image_scale)
     with clock.stage("report"):
         return list(write_report(out, data))
 
@@ -119,6 +120,7 @@ def report_input(
     *,
     notes: Sequence[str],
     created: str,
+    image_scale: float = 1.0,
 ) -> ReportInput:
     """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage."""
     return ReportInput(
@@ -136,6 +138,7 @@ def report_input(
         versions=versions(),
         notes=tuple(notes),
         created=created,
+        image_scale=image_scale,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import chain
@@ -19,11 +18,12 @@ from render.frame import Frame
 from render.frame_files import write_frame
 from render.world import build_world
 from studio import scan_folder
+from studio.cautions import Cautions
 from studio.light_groups import group_lines
 from studio.project import Project
 from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
 from studio.resume import Refined, frame_of_step, made_of, settle
-from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world
+from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world, validated
 from studio.summary import summarise
 from studio.sweep import Passing, Sweep, Taken
 from studio.warm_up import PREPARING, needed, warm_up
@@ -77,16 +77,15 @@ def run_scan(
     and what was rendered of the frame under way.
     """
     began = time.perf_counter()
-    project = scaled(project, image_scale)
+    project = validated(scaled(project, image_scale), f"at image scale {image_scale:g}")
     if seed is not None:
-        project = project.model_copy(update={"seed": seed})
+        project = validated(project.model_copy(update={"seed": seed}), "with another seed")
     if measure and not project.scene.lasers:
         raise InputError("the rig has no laser, so there is no line to measure", where="scene.rig.lasers", found="none")
-    sweep = Sweep(project) if measure else None
+    sweep, cautions = Sweep(project) if measure else None, Cautions(project, image_scale)
     count = min(steps or project.scene.frame_count, project.scene.frame_count)
     clock = Clock(progress, cancelled)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", UserWarning)
+    with cautions.listening():
         with clock.stage("loading meshes"):
             first = build_world(project.scene, root, 0)
         scan_folder.begin(out, project)
@@ -95,7 +94,6 @@ def run_scan(
         results: list[FrameResult] = []
         shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
         files: list[Path] = []
-        doubts: dict[str, str] = {}
         names: list[str] = []
         light: list[dict[str, Any]] = []
         world = first
@@ -124,8 +122,7 @@ def run_scan(
                 project, world, step, out, clock, threads, resume=resume, seconds=seconds, refined=refined
             )
             light.append(light_record(frame, project))
-            for text in frame.warnings:  # in words as at first, though figures change from step to step
-                doubts.setdefault(text.split(",", 1)[0], text)
+            cautions.look(frame, frame.warnings)
             images = develop_step(project, frame, clock, threads)
             with clock.stage("writing frames"):
                 stem = scan_folder.frame_stem(step)
@@ -146,8 +143,8 @@ def run_scan(
         if sweep is not None:
             take(sweep.finish())
         told = extraction_notes(results, project)
-        notes = list(doubts.values())
-        notes += [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
+        figures = summarise(results, project.scene) if measure else []
+        notes = cautions.notes(figures)
         result: dict[str, Any] = {
             "name": project.name,
             "created": now(),
@@ -161,10 +158,17 @@ def run_scan(
         reports: list[Path] = []
         if measure:
             files += write_points(out, project, results, clock)
-            result["results"] = summarise(results, project.scene)
+            result["results"] = figures
             if report:
                 reports = write_reports(
-                    out, project, first, results, clock, notes=[*told, *notes], created=result["created"]
+                    out,
+                    project,
+                    first,
+                    results,
+                    clock,
+                    notes=[*notes, *told],
+                    created=result["created"],
+                    image_scale=image_scale,
                 )
     result["report"] = [path.name for path in reports]
     result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}

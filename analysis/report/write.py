@@ -106,7 +106,7 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "chips": laser_chips(report),
         "headline": headline(report),
         "tiles": _tiles(found),
-        "remarks": [*report.notes, *remarks(report)],
+        "remarks": list(dict.fromkeys((*report.notes, *remarks(found, report.image_scale)))),
         "several": len(report.frames) > 1,
         "shown_step": frame.step,
         "frame_count": len(report.frames),
@@ -159,7 +159,8 @@ def _facts(report: ReportInput) -> str:
     camera = report.scene.camera
     frames = "1 frame" if len(report.frames) == 1 else f"{len(report.frames)} frames"
     made = f"{report.created} · " if report.created else ""
-    return f"{made}{frames} · camera {camera.width} × {camera.height} px"  # noqa: RUF001
+    scale = "" if report.image_scale == 1.0 else f", image scale {report.image_scale:g}: not the scanner's figures"
+    return f"{made}{frames} · camera {camera.width} × {camera.height} px{scale}"  # noqa: RUF001
 
 
 def _tiles(found: Total) -> list[tuple[str, str, str]]:

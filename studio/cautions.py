@@ -1,0 +1,56 @@
+"""What a person should know before believing a scan, gathered frame by frame; the gravest comes first."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from analysis.report.summary import little_found, scale_note
+from render.frame import Frame
+from studio.inspection import laser_views, view_warnings
+from studio.project import Project
+
+
+class Cautions:
+    """Of one scan; `look` at every frame, then ask for the `notes`."""
+
+    def __init__(self, project: Project, image_scale: float = 1.0) -> None:
+        """project: as it is rendered, at `image_scale`."""
+        self.project, self.image_scale = project, image_scale
+        self._frames = 0
+        self._unseen = [0] * len(project.scene.lasers)
+        self._doubts: dict[str, str] = {}
+        self._heard: list[warnings.WarningMessage] = []
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Python's own warnings in here, of mesh readers and the like, become notes."""
+        with warnings.catch_warnings(record=True) as self._heard:
+            warnings.simplefilter("always", UserWarning)
+            yield
+
+    def look(self, frame: Frame, scene_warnings: Iterable[str]) -> None:
+        """At one frame, as rendered, with what `render.material_checks.scene_warnings` has to say of it."""
+        views = view_warnings(self.project, laser_views(self.project, frame)) if self._frames == 0 else []
+        for text in (*views, *scene_warnings):  # in words as at first, though figures change from step to step
+            self._doubts.setdefault(text.split(",", 1)[0], text)
+        for i, curve in enumerate(frame.curves):
+            self._unseen[i] += len(curve.index) == 0
+        self._frames += 1
+
+    def notes(self, rows: Sequence[Mapping[str, Any]] = ()) -> list[str]:
+        """One sentence or two each; rows: the results, as `studio.summary.summarise` gives them."""
+        lasers = [laser.name for laser in self.project.scene.lasers]
+        found = []
+        for name in lasers:
+            own = next((row for row in rows if row["laser"] == name), None)
+            if own is not None:
+                found.append(little_found(own["completeness"], own["points"], name if len(lasers) > 1 else ""))
+        found.append(scale_note(self.image_scale))
+        for name, unseen in zip(lasers, self._unseen, strict=True):
+            if unseen > 0 and self._frames > 1:
+                found.append(f"{name}: in {unseen} of {self._frames} frames no part of the line is both lit and seen")
+        heard = [str(one.message) for one in self._heard if issubclass(one.category, UserWarning)]
+        return list(dict.fromkeys(filter(None, (*found, *self._doubts.values(), *heard))))
