@@ -16,9 +16,11 @@ from render.files import atomic_write
 from render.frame import Frame
 from render.frame_files import write_frame
 from render.world import World, build_world
+from studio.cautions import Cautions
 from studio.project import Project
 from studio.results import now, report_input
 from studio.stages import Measurement
+from studio.summary import summarise
 
 Measurements = Mapping[str, Sequence[Measurement]]
 """By method: one for each laser."""
@@ -37,13 +39,30 @@ class Exported:
     frame: Frame
     images: tuple[Image, ...]
     measurements: Measurements
+    image_scale: float = 1.0
+    """At which it was rendered."""
 
 
 def export_report(path: Path, what: Exported) -> list[Path]:
     """One .html or .pdf file, by the suffix. InputError: nothing is measured, or the file cannot be written."""
     from analysis.report.write import render_page, write_report
 
-    data = report_input(what.project, _first_world(what), [frame_result(what)], {}, notes=(), created=now())
+    result = frame_result(what)
+    cautions = Cautions(
+        what.rendered.model_copy(update={"sensor": what.project.sensor}),
+        what.image_scale,
+        [laser.power for laser in what.project.scene.lasers],
+    )
+    cautions.look(what.frame, what.frame.warnings)
+    data = report_input(
+        what.project,
+        _first_world(what),
+        [result],
+        {},
+        notes=cautions.notes(summarise([result], what.project.scene)),
+        created=now(),
+        image_scale=what.image_scale,
+    )
     if path.suffix.lower() != ".pdf":
         with atomic_write(path) as temporary:
             temporary.write_text(render_page(data), encoding="utf-8")

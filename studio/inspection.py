@@ -6,6 +6,7 @@ All of it comes from the exact curve and the direct laser light, a fraction of a
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -117,7 +118,7 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
         frames=scene.frame_count,
         full_well=project.sensor.full_well,
         lasers=views,
-        warnings=(*view_warnings(project, views), *scene_warnings(world, scene)),
+        warnings=(*_warnings(project, views), *scene_warnings(world, scene)),
         plan=(
             *(line for line in frame.plan.splitlines() if not line.startswith("ambient: none")),
             *expected_ambient(scene, project.render),
@@ -125,23 +126,29 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
     )
 
 
-def laser_views(project: Project, frame: Frame) -> tuple[LaserView, ...]:
+def view_warnings(project: Project, frame: Frame, laser_power: Sequence[float] | None = None) -> list[str]:
+    """What `inspect` warns of, in a frame as it was rendered; laser_power: W of each laser in place of the scene's."""
+    return _warnings(project, laser_views(project, frame, laser_power), laser_power)
+
+
+def laser_views(project: Project, frame: Frame, laser_power: Sequence[float] | None = None) -> tuple[LaserView, ...]:
     """Each laser in a rendered frame; ambient light, where the frame has it, counts for `ambient_saturated` alone."""
+    powers = [laser.power for laser in project.scene.lasers] if laser_power is None else laser_power
     ambient = None
     if frame.ambient is not None:
         ambient = expected_electrons(frame, project.scene, project.sensor, laser_power=[0.0] * len(frame.curves))
     alone = replace(frame, ambient=None)
-    return tuple(_laser_view(project, alone, i, ambient) for i in range(len(project.scene.lasers)))
+    return tuple(_laser_view(project, alone, i, power, ambient) for i, power in enumerate(powers))
 
 
-def _laser_view(project: Project, frame: Frame, i: int, ambient: Float32 | None) -> LaserView:
+def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: Float32 | None) -> LaserView:
     scene, curve = project.scene, frame.curves[i]
     camera, rows = scene.camera, curve.axis == "rows"
     origin = scene.T_camera_laser(i)[:3, 3]
     plane = scene.laser_plane(i)
     nearest, farthest = working_range(camera, scene.T_camera_laser(i))
     hit = np.unique(curve.index)
-    light, width = _brightness(project, frame, i, hit)
+    light, width = _brightness(project, frame, i, power, hit)
     peak = light + project.sensor.dark_current * project.sensor.exposure_time
     length, length_px = _lengths(curve)
     some = len(curve.point) > 0
@@ -187,9 +194,11 @@ def _saturated_along(curve: LaserCurve, electrons: Float32 | None, full_well: fl
     return float(np.mean(lines[curve.index, along] > full_well))
 
 
-def _brightness(project: Project, frame: Frame, i: int, hit: NDArray[np.int32]) -> tuple[Float, Float]:
+def _brightness(
+    project: Project, frame: Frame, i: int, own_power: float, hit: NDArray[np.int32]
+) -> tuple[Float, Float]:
     """Electrons of light in the brightest pixel, and the line's sigma in px, of each scan line that is hit."""
-    power = [laser.power if k == i else 0.0 for k, laser in enumerate(project.scene.lasers)]
+    power = [own_power if k == i else 0.0 for k in range(len(frame.curves))]
     light_alone = project.sensor.model_copy(update={"dark_current": 0.0})
     electrons = expected_electrons(frame, project.scene, light_alone, laser_power=power)
     lines = (electrons if frame.curves[i].axis == "rows" else electrons.T)[hit].astype(np.float64)
@@ -252,7 +261,7 @@ def working_range(camera: Camera, T_camera_laser: Float) -> tuple[float | None, 
     return float(points[inside[0], 2]), farthest
 
 
-def view_warnings(project: Project, views: tuple[LaserView, ...]) -> list[str]:
+def _warnings(project: Project, views: tuple[LaserView, ...], laser_power: Sequence[float] | None = None) -> list[str]:
     """What a person should know before spending time on a scan, or before believing one."""
     found = []
     if not views:
@@ -269,7 +278,8 @@ def view_warnings(project: Project, views: tuple[LaserView, ...]) -> list[str]:
         if view.saturated is not None and view.saturated > 0.01:
             found.append(f"{view.name}: {view.saturated:.0%} of the line saturates; shorten sensor.exposure_time")
         if view.light_electrons is not None and view.light_electrons < DIM_ELECTRONS:
-            found.append(f"{view.name}: {_why_dim(project, i, view.light_electrons)}")
+            power = project.scene.lasers[i].power if laser_power is None else laser_power[i]
+            found.append(f"{view.name}: {_why_dim(project, i, power, view.light_electrons)}")
         if view.width_px is not None and not NARROW_PX <= view.width_px <= WIDE_PX:
             found.append(f"{view.name}: the line's sigma is about {view.width_px:.2f} px; 0.5 to 6 px measure well")
         if view.steepest_view is not None and view.steepest_view > STEEP:
@@ -279,9 +289,9 @@ def view_warnings(project: Project, views: tuple[LaserView, ...]) -> list[str]:
     return found
 
 
-def _why_dim(project: Project, i: int, electrons: float) -> str:
+def _why_dim(project: Project, i: int, power: float, electrons: float) -> str:
     laser, none = project.scene.lasers[i], "none of its light reaches the image"
-    if laser.power == 0.0:
+    if power == 0.0:
         return f"{none}: its power is 0 W"
     if project.scene.camera.lens.transmission == 0.0:
         return f"{none}: the camera's lens.transmission is 0"
