@@ -99,7 +99,7 @@ def headline(report: ReportInput) -> str:
     if found.truth_rows == 0:
         return (
             f"Nothing was measured: {who} drew no line that the camera could see {where}. "
-            "Either the sheet misses the part, or the part hides the line from the camera."
+            "Either the laser is off, or its sheet misses the part, or the part hides the line from the camera."
         )
     if found.measured_rows == 0:
         stray = f" The {count(found.points)} points are stray light or noise." if found.points else ""

@@ -164,7 +164,7 @@ def _facts(report: ReportInput) -> str:
 
 
 def _tiles(found: Total) -> list[tuple[str, str, str]]:
-    if found.depth_z.count == 0:
+    if found.measured_rows == 0:
         return []
     depth = found.depth_z
     return [

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from render.errors import InputError
 from render.laser import Divergence
 from render.lights import Environment
 from render.motion import LinearStage
@@ -103,3 +104,11 @@ def test_frames_in_which_the_sheet_has_left_the_part_are_counted(plane: Project,
     motion = LinearStage(moves="objects", step=(0.27, 0.0, 0.0), steps=2)
     done = run_scan(replaced(plane, ("scene", "motion"), motion), ROOT, out=tmp_path, report=False)
     assert any("in 1 of 2 frames no part of the line" in text for text in done.manifest["notes"])
+
+
+@pytest.mark.parametrize("scale", ["x", 0, -1.0, None, [1]])
+def test_an_image_scale_that_is_none_is_refused(scale: object, plane: Project, tmp_path: Path) -> None:
+    found = scan_folder.ScanFolder(tmp_path, plane, ROOT, (), {"image_scale": scale})
+    clock = Clock(lambda stage, done: None, lambda: False)
+    with pytest.raises(InputError, match=r"scan\.json: image_scale"):
+        reconstruct_folder(found, plane, ROOT, tmp_path, clock, report=False)
