@@ -6,6 +6,7 @@ Only click is imported here; everything else where it is used, so that --help an
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -27,6 +28,16 @@ except ModuleNotFoundError as missing:
 VERSION = "0.1.0"
 BAD_INPUT, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 3, 130, 141
 ISSUE_HINT = "this is a fault of Blazer Studio, please report it; --debug shows where it happened"
+
+
+class FiniteRange(click.FloatRange):
+    """A number between two limits; click's own range lets NaN through, which compares with nothing."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        number = float(super().convert(value, param, ctx))
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number in the range {self._describe_range()}.", param, ctx)
+        return number
 
 
 class Commands(click.Group):
@@ -113,10 +124,10 @@ def working(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of the commands that compute and write."""
     for option in (
         click.option("--steps", type=click.IntRange(1), help="Only the first so many frames of a moving scan."),
-        click.option("--scale", type=click.FloatRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
+        click.option("--scale", type=FiniteRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
         click.option(
             "--time-limit",
-            type=click.FloatRange(0.1, 1e9),
+            type=FiniteRange(0.1, 1e9),
             metavar="SECONDS",
             help="Time for the light of each frame; it ends then, short of its errors. --resume goes on from there.",
         ),
@@ -138,8 +149,8 @@ SELECT = click.option(
 GEOMETRY = click.option(
     "--geometry/--no-geometry", default=None, help="Only peaks that the laser can have made, in the working volume."
 )
-NEAREST = click.option("--nearest", type=float, help="Nearest depth of the working volume, m.")
-FARTHEST = click.option("--farthest", type=float, help="Farthest depth of the working volume, m.")
+NEAREST = click.option("--nearest", type=FiniteRange(0.0, 1e4), help="Nearest depth of the working volume, m.")
+FARTHEST = click.option("--farthest", type=FiniteRange(1e-6, 1e4), help="Farthest depth of the working volume, m.")
 
 
 def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -147,7 +158,9 @@ def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         click.option("--spacetime/--no-spacetime", default=None, help="Measure a moving scan along time."),
         click.option(
-            "--exposure-ratio", type=float, help="Each exposure is so many times shorter than the one before."
+            "--exposure-ratio",
+            type=FiniteRange(1.0, 100.0, min_open=True),
+            help="Each exposure is so many times shorter than the one before.",
         ),
         click.option("--exposures", type=int, help="Exposures taken of each frame and fused."),
         FARTHEST,

@@ -11,10 +11,15 @@ from analysis.distance import signed_distance
 from analysis.line.result import Line
 from analysis.measures import Measures, measure, outliers
 from analysis.triangulate import Points
+from render.errors import InputError
+from render.finite import check_finite
 from render.frame import LaserCurve
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
+
+REACH = 2.0
+"""Sigmas of a line to its 1/e^2 edge: a peak farther off is not that line, however wrong the other peaks are."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ class Errors:
     sigma_distance: Float
     """m, predicted from sigma_u."""
     outlier: NDArray[np.bool_]
-    """Position wrong by more than 1 px and 5 robust sigma."""
+    """Position wrong by more than 1 px, and by more than 5 robust sigma or than half of the line's own 1/e^2 width."""
     u: Measures
     """Of `position`, px."""
     depth_z: Measures
@@ -59,26 +64,37 @@ def compare(
 ) -> Errors:
     """Errors of points against the curve of the same laser and step, and the mesh (v, 3), (t, 3) in the world frame.
 
-    ValueError: line and curve are not on the same axis.
+    InputError: line and curve are not on the same axis.
     """
     if not line.axis == curve.axis == points.axis:
-        raise ValueError(f"axes differ: line {line.axis}, points {points.axis}, curve {curve.axis}")
+        raise InputError(
+            "the exact line of the frame is not on the scan axis that the line is extracted along",
+            where="extraction.axis",
+            found=line.axis,
+            allowed=f"{curve.axis}, as the frame was rendered",
+            cure="extract along that axis, or render the project again",
+        )
     along = points.pixel[:, 0 if line.axis == "rows" else 1]
-    truth = match(points.index, np.where(points.valid, along, np.nan), curve.index, curve.position)
+    lit = np.flatnonzero(curve.irradiance > 0.0)  # a laser of 0 W draws no line
+    truth = match(points.index, np.where(points.valid, along, np.nan), curve.index[lit], curve.position[lit])
     matched = truth >= 0
+    truth[matched] = lit[truth[matched]]
     position, depth = np.full(len(along), np.nan), np.full(len(along), np.nan)
     position[matched] = along[matched] - curve.position[truth[matched]]
     depth[matched] = points.depth_z[matched] - curve.depth_z[truth[matched]]
     distance, nearest = signed_distance(points.world, vertices, triangles, T_world_camera[:3, 3])
+    check_finite("errors", along_the_line=position[matched], in_depth=depth[matched])
+    if len(triangles):
+        check_finite("errors", off_the_surface=distance[points.valid])
 
     per_pixel = np.abs(
         np.einsum("ij,ij->i", points.gradient @ T_world_camera[:3, :3].T, _normals(vertices, triangles, nearest))
     )
     step = np.linalg.norm(points.gradient, axis=1)
-    wrong = outliers(position, 1.0)
+    wrong = outliers(position, 1.0, REACH * line.width[points.index, points.rank])
     where = points.index, points.rank
     valid_rows = np.unique(points.index[points.valid])
-    truth_rows = np.unique(curve.index)
+    truth_rows = np.unique(curve.index[lit])
     return Errors(
         truth=truth,
         position=position,

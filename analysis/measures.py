@@ -41,11 +41,14 @@ class Measures:
 EMPTY = Measures(0, *[float("nan")] * 9)
 
 
-def outliers(error: Float, floor: Float | float) -> Mask:
-    """(m,) errors -> (m,) larger than both `floor` (the error of one pixel) and 5 robust sigma. NaN is no outlier."""
+def outliers(error: Float, floor: Float | float, ceiling: Float | float = np.inf) -> Mask:
+    """(m,) errors -> (m,) larger than both `floor` (the error of one pixel) and 5 robust sigma. NaN is no outlier.
+
+    ceiling: larger ones are outliers in any case, as robust sigma means nothing where most errors are; NaN for none.
+    """
     if not np.any(np.isfinite(error)):
         return np.zeros(len(error), dtype=np.bool_)
-    return np.asarray(np.abs(error) > np.maximum(floor, 5.0 * robust_sigma(error)))
+    return np.asarray(np.abs(error) > np.maximum(floor, np.fmin(5.0 * robust_sigma(error), ceiling)))
 
 
 def robust_sigma(error: Float) -> float:

@@ -18,6 +18,7 @@ from analysis.line.result import Axis, Line
 from render.camera import Camera
 from render.distortion import distort, tilt_matrix
 from render.errors import InputError
+from render.finite import check_finite
 from render.pose import transform_points
 
 Float = NDArray[np.float64]
@@ -108,7 +109,7 @@ def triangulate(
     plane (4,) laser plane (a, b, c, d) in the camera frame, of any scale; T_rig_camera, T_world_camera (4, 4);
     calibration_covariance (8, 8) of `CALIBRATION` (px, m), or None.
 
-    InputError: the plane is not finite, has no normal, or passes through the camera's centre.
+    InputError: the plane is not finite, has no normal, or passes through the camera's centre; a point is not finite.
     """
     normal, offset = _unit_plane(plane)
     pixel, index, rank = line.pixels()
@@ -130,6 +131,7 @@ def triangulate(
     # dP/dq = z I - P n^T / (n . q); the third component of q is fixed, so two columns remain
     dpoint_dq = point[:, 2, None, None] * np.eye(3)[:, :2] - point[:, :, None] * (normal[:2] / facing[:, None])[:, None]
     dpoint = dpoint_dq @ dq
+    check_finite("points", coordinates=point[usable], changes_by_a_pixel=dpoint[usable])
     return Points(
         axis=line.axis,
         pixel=pixel,

@@ -15,6 +15,7 @@ from render.camera_paths import camera_paths
 from render.counts import AMBIENT_CLAMPED, AMBIENT_CUT, AMBIENT_DROPPED, AMBIENT_ERROR, AMBIENT_SAMPLES, Counts
 from render.lights import PointLight
 from render.material import Emitter
+from render.random import wrapped
 from render.scene import Scene
 from render.settings import RenderSettings
 from render.threads import Cancel, Progress
@@ -161,7 +162,7 @@ def onward_share(
     comes by way of one surface.
     """
     camera = scene.camera
-    view, own = camera.view(scene.T_world_camera(step)), (seed + PILOT_SEED) % 2**63
+    view, own = camera.view(scene.T_world_camera(step)), wrapped(seed + PILOT_SEED)
     draw = np.random.default_rng(own).integers(camera.width * camera.height, size=GROUPS * GROUP_PIXELS)
     sums = []
     # the same numbers each time, so that what is common to all is the same to the last bit

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from functools import cached_property, lru_cache
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from render.distortion import distort_points, fold_radii, undistort_points
 from render.model import Model, UnitInterval, quantity
@@ -26,6 +26,9 @@ Mask = NDArray[np.bool_]
 
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 MAX_SIDE = 32768
+MOST_TILT = math.radians(80)
+Coefficient = Annotated[float, Field(ge=-1e9, le=1e9)]
+"""Of a long lens, where the image radius is small, a calibration may well give millions."""
 FASTEST = 0.5
 """f-number of an aperture as wide as the sine condition allows."""
 
@@ -39,10 +42,10 @@ class Lens(Model):
         help="pinhole: sharp at every depth, so that f-number and focus may change after the render. thin-lens: rays "
         "through the whole aperture, blurred off the plane of focus, which tilts with the sensor (tauX, tauY).",
     )
-    f_number: float = quantity(1.4, label="f-number", help="Focal length over entrance pupil.", gt=0, le=256)
+    f_number: float = quantity(1.4, label="f-number", help="Focal length over entrance pupil.", ge=0.1, le=256)
     transmission: UnitInterval = quantity(0.9, label="Transmission", help="Of lens and filter, at the laser.")
     focus_distance: float | None = quantity(
-        None, unit="m", label="Focus distance", help="Empty: far away.", gt=0, le=1e6
+        None, unit="m", label="Focus distance", help="Empty: far away.", ge=1e-3, le=1e6
     )
     vignetting: bool = quantity(True, label="Natural vignetting", help="cos^4 fall-off towards the corners.")
 
@@ -52,15 +55,15 @@ class Camera(Model):
 
     width: int = quantity(unit="px", label="Width", gt=0, le=MAX_SIDE)
     height: int = quantity(unit="px", label="Height", gt=0, le=MAX_SIDE)
-    fx: float = quantity(unit="px", label="fx", help="Image distance over pixel pitch.", gt=0, le=1e7)
-    fy: float = quantity(unit="px", label="fy", gt=0, le=1e7)
+    fx: float = quantity(unit="px", label="fx", help="Image distance over pixel pitch.", ge=0.01, le=1e7)
+    fy: float = quantity(unit="px", label="fy", ge=0.01, le=1e7)
     cx: float = quantity(unit="px", label="cx", help="Centred: (width - 1) / 2.", ge=-1e6, le=1e6)
     cy: float = quantity(unit="px", label="cy", help="Centred: (height - 1) / 2.", ge=-1e6, le=1e6)
     skew: float = quantity(0.0, unit="px", label="Skew", ge=-1e5, le=1e5)
-    distortion: tuple[float, ...] = quantity(
+    distortion: tuple[Coefficient, ...] = quantity(
         (), label="Distortion", help="OpenCV: k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [taux tauy]]]]."
     )
-    pixel_pitch: float = quantity(3.45e-6, unit="m", label="Pixel pitch", gt=0, le=1e-3)
+    pixel_pitch: float = quantity(3.45e-6, unit="m", label="Pixel pitch", ge=1e-8, le=1e-2)
     lens: Lens = Lens()
     T_rig_camera: Pose = Pose()
 
@@ -69,6 +72,9 @@ class Camera(Model):
     def _known_length(cls, value: tuple[float, ...]) -> tuple[float, ...]:
         if len(value) not in DISTORTION_LENGTHS:
             raise ValueError(f"has {len(value)} coefficients; allowed: 0, 4, 5, 8, 12 or 14")
+        for name, tilt in zip(("taux", "tauy"), value[12:], strict=False):
+            if abs(tilt) > MOST_TILT:
+                raise ValueError(f"{name} is {tilt:g} rad; allowed: -{MOST_TILT:.4g} to {MOST_TILT:.4g} rad")
         return value
 
     @model_validator(mode="after")

@@ -25,9 +25,10 @@ from numpy.typing import NDArray
 
 from render.blur import defocus, disc_diameter, point_spread
 from render.errors import InputError
+from render.finite import check_finite
 from render.frame import Frame
 from render.poisson import poisson
-from render.random import normal
+from render.random import normal, wrapped
 from render.response import band_response, joules_per_radiance, laser_response, relative_illumination
 from render.scene import Scene
 from render.sensor import Sensor
@@ -106,7 +107,8 @@ def develop(
     def rows(start: int, stop: int) -> None:
         numbers = np.empty((stop - start, width), dtype=np.uint16)
         light = exposure.signal(start, stop)
-        _read_out(light, fixed[start:stop], start, int(seed) % 2**63, frame.step, chain, noise, numbers)
+        check_finite("sensor", electrons=light)
+        _read_out(light, fixed[start:stop], start, wrapped(seed), frame.step, chain, noise, numbers)
         pixels[start:stop] = numbers
 
     map_chunks(rows, height, ROWS, threads)
@@ -134,6 +136,7 @@ def expected_electrons(
 
     def rows(start: int, stop: int) -> None:
         electrons[start:stop] = exposure.signal(start, stop) + sensor.dark_current * sensor.exposure_time
+        check_finite("sensor", electrons=electrons[start:stop])
 
     map_chunks(rows, electrons.shape[0], ROWS, threads)
     return electrons

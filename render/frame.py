@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.counts import Counts
+from render.finite import check_finite
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -86,6 +87,13 @@ class Frame:
         """(h, w) radiance of one laser's group: direct and indirect."""
         direct = self.laser_direct[index]
         return direct + self.laser_indirect[index] if self.laser_indirect else direct
+
+    def check(self) -> None:
+        """InputError: the light or the exact lines hold a number that is none. Truth has NaN where nothing is hit."""
+        for radiance in (*self.laser_direct, *self.laser_indirect, *([] if self.ambient is None else [self.ambient])):
+            check_finite("render", radiances=radiance)
+        for curve in self.curves:
+            check_finite("render", line_positions=curve.position, points_of_the_line=curve.point)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -29,7 +29,7 @@ class Divergence(Model):
 
     kind: Literal["divergence"] = "divergence"
     full_angle: float = quantity(
-        1.15e-3, unit="rad", label="Divergence", help="Full 1/e^2 angle across the sheet.", gt=0, le=0.5
+        1.15e-3, unit="rad", label="Divergence", help="Full 1/e^2 angle across the sheet.", ge=1e-6, le=0.5
     )
 
 
@@ -37,7 +37,7 @@ class Waist(Model):
     """A focused sheet: w(z) = waist sqrt(1 + ((z - focus) / z_R)^2), z_R = pi waist^2 / (M^2 lambda), sigma = w / 2."""
 
     kind: Literal["waist"] = "waist"
-    radius: float = quantity(100e-6, unit="m", label="Waist", help="1/e^2 half-width at the focus.", gt=0, le=0.1)
+    radius: float = quantity(100e-6, unit="m", label="Waist", help="1/e^2 half-width at the focus.", ge=1e-6, le=0.1)
     focus_distance: float = quantity(0.8, unit="m", label="Focus distance", ge=0, le=1e4)
     m_squared: float = quantity(1.5, label="M^2", help="Beam quality across the sheet.", ge=1, le=1e4)
 
@@ -49,7 +49,12 @@ class LineLaser(Model):
     power: float = quantity(0.02, unit="W", label="Power", help="Optical, leaving the laser.", ge=0, le=1e4)
     wavelength_nm: float = quantity(450.0, unit="nm", label="Wavelength", ge=200, le=2000)
     fan_angle: float = quantity(
-        math.radians(45), unit="rad", label="Fan angle", help="Full angle of the sheet.", gt=0, le=math.radians(170)
+        math.radians(45),
+        unit="rad",
+        label="Fan angle",
+        help="Full angle of the sheet.",
+        ge=math.radians(0.001),
+        le=math.radians(170),
     )
     fan_profile: Literal["uniform", "gaussian", "constant"] = quantity(
         "uniform",

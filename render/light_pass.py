@@ -34,7 +34,7 @@ from render.material import reflectance_weights
 from render.medium import MOST_STEPS, scatter_inside
 from render.merge import SHRINK, Photons, merge, photons
 from render.pose import invert
-from render.random import uniform
+from render.random import uniform, wrapped
 from render.resample import join_light
 from render.surface import Surface, View
 from render.threads import Cancel
@@ -133,7 +133,7 @@ class LightPass:
 
         looked_at: the pixels that may have a camera path, in order.
         """
-        seed = self.seed * 1_000_003 + number
+        seed = wrapped(self.seed * 1_000_003 + number)
         pixels, starts = draw_paths(samples, looked_at, seed ^ CAMERA_SEED)
         found: list[tuple[int, Float, Float]] = []
         for first in range(0, paths, CHUNK_PATHS):

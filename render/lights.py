@@ -28,8 +28,8 @@ class RectangleLight(Model):
     kind: Literal["rectangle"] = "rectangle"
     name: str = quantity("panel", label="Name", min_length=1, max_length=100)
     radiance: RGB = quantity((1.0, 1.0, 1.0), unit="W/(m^2 sr)", label="Radiance", help="Per colour band R, G, B.")
-    width: float = quantity(0.3, unit="m", label="Width", help="Along x.", gt=0, le=1e4)
-    height: float = quantity(0.3, unit="m", label="Height", help="Along y.", gt=0, le=1e4)
+    width: float = quantity(0.3, unit="m", label="Width", help="Along x.", ge=1e-6, le=1e4)
+    height: float = quantity(0.3, unit="m", label="Height", help="Along y.", ge=1e-6, le=1e4)
     T_world_light: Pose = Pose()
 
 

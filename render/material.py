@@ -20,14 +20,14 @@ class Texture(Model):
 
     path: str = quantity(label="Image", help="Relative to the project file.", min_length=1, max_length=1000)
     srgb: bool = quantity(True, label="sRGB encoded", help="Off: the values are linear reflectance.")
-    scale: float = quantity(1.0, label="Factor", help="Multiplies the values.", gt=0, le=1)
+    scale: float = quantity(1.0, label="Factor", help="Multiplies the values.", ge=1e-6, le=1)
 
 
 class GreyTexture(Model):
     """An image file whose grey values are the numbers themselves, mapped as a texture is."""
 
     path: str = quantity(label="Image", help="Relative to the project file.", min_length=1, max_length=1000)
-    scale: float = quantity(1.0, label="Factor", help="The number that white stands for.", gt=0, le=1)
+    scale: float = quantity(1.0, label="Factor", help="The number that white stands for.", ge=1e-6, le=1)
 
 
 class NormalMap(Model):

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from render.model import Model, Vector3, quantity
+from render.model import Model, Position, quantity
 from render.pose import Pose, rotation_matrix
 
 Array = NDArray[np.float64]
 Moves = Literal["rig", "objects"]
 MAX_STEPS = 100_000
+Direction = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class NoMotion(Model):
@@ -35,7 +36,9 @@ class LinearStage(Model):
 
     kind: Literal["linear"] = "linear"
     moves: Moves = quantity("rig", label="What moves")
-    step: Vector3 = quantity((0.0, 0.001, 0.0), unit="m", label="Step", help="Displacement between frames, world axes.")
+    step: Position = quantity(
+        (0.0, 0.001, 0.0), unit="m", label="Step", help="Displacement between frames, world axes."
+    )
     steps: int = quantity(10, label="Frames", gt=0, le=MAX_STEPS)
 
     @property
@@ -54,8 +57,8 @@ class Turntable(Model):
 
     kind: Literal["turntable"] = "turntable"
     moves: Moves = quantity("objects", label="What moves")
-    centre: Vector3 = quantity((0.0, 0.0, 0.0), unit="m", label="Point on the axis")
-    axis: Vector3 = quantity((0.0, 0.0, 1.0), label="Axis direction")
+    centre: Position = quantity((0.0, 0.0, 0.0), unit="m", label="Point on the axis")
+    axis: tuple[Direction, Direction, Direction] = quantity((0.0, 0.0, 1.0), label="Axis direction")
     angle_step: float = quantity(math.radians(1), unit="rad", label="Step", ge=-math.pi, le=math.pi)
     steps: int = quantity(360, label="Frames", gt=0, le=MAX_STEPS)
 
@@ -84,7 +87,9 @@ class PoseList(Model):
 
     kind: Literal["poses"] = "poses"
     moves: Moves = quantity("rig", label="What moves")
-    poses: tuple[Pose, ...] = quantity(label="Poses", help="World-frame motions, one a frame.", min_length=1)
+    poses: tuple[Pose, ...] = quantity(
+        label="Poses", help="World-frame motions, one a frame.", min_length=1, max_length=MAX_STEPS
+    )
 
     @property
     def frame_count(self) -> int:

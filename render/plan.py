@@ -22,6 +22,7 @@ from render.counts import (
     Counts,
 )
 from render.lens_plan import lens_lines
+from render.random import wrapped
 from render.saved import RenderState
 from render.scene import Scene
 from render.settings import RenderSettings
@@ -173,7 +174,7 @@ def indirect_light(
             most_paths=settings.light_paths,
             kinds=plan.kinds or PLAIN,
             clamp=settings.laser_clamp,
-            seed=seed + i,
+            seed=wrapped(seed + i),
             threads=threads,
             cancelled=cancelled,
             progress=None if progress is None else partial(_share, progress, i, count),
@@ -220,7 +221,7 @@ def pilot_shares(
     found = []
     for i, laser in enumerate(scene.lasers):
         poses = scene.T_world_camera(step), scene.T_world_laser(i, step)
-        pilot_seed = seed + 7919 * (i + 1)
+        pilot_seed = wrapped(seed + 7919 * (i + 1))
         found.append(indirect_shares(world, scene.camera, laser, *poses, seed=pilot_seed, cancelled=cancelled))
     shares = {}
     for rung in RUNGS:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from render.model import Model, Vector3, quantity
+from render.model import Model, Position, Vector3, quantity
 
 Array = NDArray[np.float64]
+Turn = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
 class Pose(Model):
     """A rigid transform as a translation (m) and a rotation vector (axis times angle, rad; OpenCV's rvec)."""
 
-    translation: Vector3 = quantity((0.0, 0.0, 0.0), unit="m", label="Position", help="Origin of b, in a.")
-    rotation: Vector3 = quantity(
+    translation: Position = quantity((0.0, 0.0, 0.0), unit="m", label="Position", help="Origin of b, in a.")
+    rotation: tuple[Turn, Turn, Turn] = quantity(
         (0.0, 0.0, 0.0), unit="rad", label="Rotation vector", help="Rotation axis times angle; takes b's axes to a's."
     )
 

@@ -39,6 +39,11 @@ def _ziggurat_edges() -> NDArray[np.float64]:
 _EDGES = _ziggurat_edges()
 
 
+def wrapped(seed: int) -> int:
+    """Any whole number as a seed that the kernels can take, which is below 2^63."""
+    return seed % 2**63
+
+
 @numba.njit(nogil=True, cache=True)
 def _mix(state: np.uint64) -> np.uint64:
     """A bijection of 64 bits with full avalanche (Steele, Lea, Flood 2014, SplitMix64; Stafford's variant 13)."""

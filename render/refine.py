@@ -25,6 +25,7 @@ from render.frame import Axis, Frame, LaserCurve
 from render.lens_plan import lens_lines
 from render.material_checks import check_materials, scene_warnings
 from render.plan import DIRECT, INDIRECT, choose_plan, clamp_line, indirect_light
+from render.random import wrapped
 from render.saved import RenderState
 from render.scan_plan import ScanPlan
 from render.scene import Scene
@@ -125,6 +126,7 @@ def frames(
     frame = Frame(step, (), None, (), None, "\n".join(plan(scene, settings)), warnings=warnings)
 
     def told(frame: Frame, counts: Counts | None = None) -> Frame:
+        frame.check()
         so_far = {RAYS: float(rays.rays - ray_start), EMBREE_SECONDS: rays.seconds - embree_start}
         return replace(frame, seconds=clock.so_far(), counts={**frame.counts, **(counts or {}), **so_far})
 
@@ -245,7 +247,7 @@ def _lasers(
             scene.T_world_camera(step),
             scene.T_world_laser(i, step),
             target=target,
-            seed=seed + i,
+            seed=wrapped(seed + i),
             threads=threads,
             cancelled=cancelled,
             progress=lambda done, i=i: report((i + done) / len(scene.lasers)),  # type: ignore[misc]

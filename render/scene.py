@@ -37,7 +37,7 @@ class SceneObject(Model):
     shape: Shape
     material: Material = Lambertian()
     T_world_object: Pose = Pose()
-    scale: float = quantity(1.0, label="Scale", help="Multiplies the shape's size.", gt=0, le=1e6)
+    scale: float = quantity(1.0, label="Scale", help="Multiplies the shape's size.", ge=1e-9, le=1e6)
     crease_angle: float = quantity(
         0.0,
         unit="rad",

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from render.model import Model, UnitInterval, quantity
 
+Wavelength = Annotated[float, Field(ge=1.0, le=1e5)]
 PATTERNS = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 
 
 class SpectralCurve(Model):
     """A quantity sampled over wavelength; linear between the samples, zero beyond them."""
 
-    wavelength_nm: tuple[float, ...] = quantity(unit="nm", label="Wavelengths", min_length=1)
-    value: tuple[UnitInterval, ...] = quantity(label="Values", min_length=1)
+    wavelength_nm: tuple[Wavelength, ...] = quantity(unit="nm", label="Wavelengths", min_length=1, max_length=10_000)
+    value: tuple[UnitInterval, ...] = quantity(label="Values", min_length=1, max_length=10_000)
 
     @model_validator(mode="after")
     def _pairs_ascend(self) -> SpectralCurve:
@@ -30,7 +31,7 @@ class BandPass(Model):
     """An interference filter in front of the lens: transmits within centre +- width / 2, nothing else."""
 
     centre_nm: float = quantity(450.0, unit="nm", label="Centre", ge=200, le=2000)
-    width_nm: float = quantity(20.0, unit="nm", label="Width", gt=0, le=2000)
+    width_nm: float = quantity(20.0, unit="nm", label="Width", ge=1e-3, le=2000)
     transmission: UnitInterval = quantity(0.9, label="Transmission")
 
 
@@ -43,15 +44,15 @@ class Sensor(Model):
         label="Quantum efficiency", help="One curve for mono; R, G, B for Bayer.", min_length=1, max_length=3
     )
     band_pass: BandPass | None = quantity(None, label="Band-pass filter")
-    exposure_time: float = quantity(1e-3, unit="s", label="Exposure time", gt=0, le=1e4)
-    full_well: float = quantity(10_500.0, unit="e-", label="Full well", gt=0, le=1e9)
+    exposure_time: float = quantity(1e-3, unit="s", label="Exposure time", ge=1e-9, le=1e4)
+    full_well: float = quantity(10_500.0, unit="e-", label="Full well", ge=1, le=1e9)
     read_noise: float = quantity(2.5, unit="e-", label="Read noise", help="Standard deviation.", ge=0, le=1e5)
     dark_current: float = quantity(1.0, unit="e-/s", label="Dark current", ge=0, le=1e9)
     prnu: float = quantity(0.005, label="PRNU", help="Pixel-to-pixel gain spread, standard deviation.", ge=0, le=1)
     dsnu: float = quantity(0.5, unit="e-", label="DSNU", help="Pixel-to-pixel offset spread.", ge=0, le=1e5)
     bits: Literal[8, 10, 12, 16] = quantity(12, label="Bit depth")
     gain: float | None = quantity(
-        None, unit="DN/e-", label="Gain", help="Empty: full well maps to the highest number.", gt=0, le=1e6
+        None, unit="DN/e-", label="Gain", help="Empty: full well maps to the highest number.", ge=1e-9, le=1e6
     )
     black_level: float = quantity(0.0, unit="DN", label="Black level", ge=0, le=65535)
     speckle: Literal["off", "polarised", "depolarised"] = quantity(
@@ -71,7 +72,7 @@ class Sensor(Model):
     halo: UnitInterval = quantity(
         0.0, label="Halo", help="Share of the light in a wide halo. Takes about 0.3 s a light."
     )
-    halo_sigma: float = quantity(30e-6, unit="m", label="Halo width", help="Sigma on the sensor.", gt=0, le=1e-2)
+    halo_sigma: float = quantity(30e-6, unit="m", label="Halo width", help="Sigma on the sensor.", ge=1e-9, le=1e-2)
     defocus: bool = quantity(
         False,
         label="Defocus",

@@ -39,7 +39,8 @@ class RenderSettings(Model):
         unit="W/(m^2 sr)",
         help="Most radiance that one pass of reflected laser light may put into a pixel; it takes single bright pixels "
         "away, and with them light: biased. Empty: none.",
-        gt=0,
+        ge=1e-9,
+        le=1e12,
     )
     ambient_error: float = quantity(
         0.01, label="Ambient error", help="Target relative RMS error of the ambient light.", gt=1e-4, le=1
@@ -64,6 +65,7 @@ class RenderSettings(Model):
         unit="W/(m^2 sr)",
         help="Most that one sample of ambient light may add by way of two or more surfaces; it takes single bright "
         "pixels away, and with them light: biased. Empty: none.",
-        gt=0,
+        ge=1e-9,
+        le=1e12,
     )
     truth_images: bool = quantity(True, label="Per-pixel truth", help="Depth, position, normal and object images.")

@@ -14,6 +14,8 @@ from render.model import Model, quantity
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "um": 1e-6, "in": 0.0254}
 Unit = Literal["m", "cm", "mm", "um", "in"]
+SMALLEST = 1e-6
+"""Of any length of a shape, m: a pixel's worth under a microscope."""
 
 
 class MeshFile(Model):
@@ -31,24 +33,24 @@ class Plane(Model):
     """A rectangle in the x-y plane, facing +z."""
 
     kind: Literal["plane"] = "plane"
-    width: float = quantity(1.0, unit="m", label="Width", help="Along x.", gt=0, le=1e4)
-    height: float = quantity(1.0, unit="m", label="Height", help="Along y.", gt=0, le=1e4)
+    width: float = quantity(1.0, unit="m", label="Width", help="Along x.", ge=SMALLEST, le=1e4)
+    height: float = quantity(1.0, unit="m", label="Height", help="Along y.", ge=SMALLEST, le=1e4)
 
 
 class Box(Model):
     """An axis-aligned box."""
 
     kind: Literal["box"] = "box"
-    size_x: float = quantity(0.1, unit="m", label="Size x", gt=0, le=1e4)
-    size_y: float = quantity(0.1, unit="m", label="Size y", gt=0, le=1e4)
-    size_z: float = quantity(0.1, unit="m", label="Size z", gt=0, le=1e4)
+    size_x: float = quantity(0.1, unit="m", label="Size x", ge=SMALLEST, le=1e4)
+    size_y: float = quantity(0.1, unit="m", label="Size y", ge=SMALLEST, le=1e4)
+    size_z: float = quantity(0.1, unit="m", label="Size z", ge=SMALLEST, le=1e4)
 
 
 class Sphere(Model):
     """A sphere with vertices on the surface: `segments` around, half as many from pole to pole (poles on z)."""
 
     kind: Literal["sphere"] = "sphere"
-    radius: float = quantity(0.05, unit="m", label="Radius", gt=0, le=1e4)
+    radius: float = quantity(0.05, unit="m", label="Radius", ge=SMALLEST, le=1e4)
     segments: int = quantity(256, label="Segments", ge=8, le=4096)
 
 
@@ -56,8 +58,8 @@ class Cylinder(Model):
     """A closed cylinder along z with vertices on the surface."""
 
     kind: Literal["cylinder"] = "cylinder"
-    radius: float = quantity(0.05, unit="m", label="Radius", gt=0, le=1e4)
-    length: float = quantity(0.2, unit="m", label="Length", gt=0, le=1e4)
+    radius: float = quantity(0.05, unit="m", label="Radius", ge=SMALLEST, le=1e4)
+    length: float = quantity(0.2, unit="m", label="Length", ge=SMALLEST, le=1e4)
     segments: int = quantity(256, label="Segments", ge=3, le=65536)
 
 
@@ -66,20 +68,20 @@ class StepBlock(Model):
 
     kind: Literal["step_block"] = "step_block"
     steps: int = quantity(4, label="Steps", ge=1, le=1000)
-    tread: float = quantity(0.02, unit="m", label="Tread", help="Along x.", gt=0, le=1e3)
-    rise: float = quantity(0.01, unit="m", label="Rise", help="Along z.", gt=0, le=1e3)
-    width: float = quantity(0.1, unit="m", label="Width", help="Along y.", gt=0, le=1e3)
+    tread: float = quantity(0.02, unit="m", label="Tread", help="Along x.", ge=SMALLEST, le=1e3)
+    rise: float = quantity(0.01, unit="m", label="Rise", help="Along z.", ge=SMALLEST, le=1e3)
+    width: float = quantity(0.1, unit="m", label="Width", help="Along y.", ge=SMALLEST, le=1e3)
 
 
 class VGroove(Model):
     """A plate, top at z = 0, with a symmetric V groove of full opening `angle` and `depth` along y."""
 
     kind: Literal["v_groove"] = "v_groove"
-    angle: float = quantity(math.radians(90), unit="rad", label="Opening", gt=0.01, lt=math.pi)
-    depth: float = quantity(0.02, unit="m", label="Depth", gt=0, le=1e3)
-    width: float = quantity(0.2, unit="m", label="Width", help="Along x.", gt=0, le=1e3)
-    length: float = quantity(0.2, unit="m", label="Length", help="Along y.", gt=0, le=1e3)
-    thickness: float = quantity(0.03, unit="m", label="Thickness", gt=0, le=1e3)
+    angle: float = quantity(math.radians(90), unit="rad", label="Opening", ge=0.01, le=math.radians(179.9))
+    depth: float = quantity(0.02, unit="m", label="Depth", ge=SMALLEST, le=1e3)
+    width: float = quantity(0.2, unit="m", label="Width", help="Along x.", ge=SMALLEST, le=1e3)
+    length: float = quantity(0.2, unit="m", label="Length", help="Along y.", ge=SMALLEST, le=1e3)
+    thickness: float = quantity(0.03, unit="m", label="Thickness", ge=SMALLEST, le=1e3)
 
     @model_validator(mode="after")
     def _groove_fits(self) -> VGroove:
@@ -99,14 +101,14 @@ class WeldTee(Model):
     """
 
     kind: Literal["weld_tee"] = "weld_tee"
-    length: float = quantity(0.3, unit="m", label="Seam length", gt=0, le=10)
-    base_width: float = quantity(0.3, unit="m", label="Base width", gt=0, le=10)
-    upright_height: float = quantity(0.15, unit="m", label="Upright height", gt=0, le=10)
-    thickness: float = quantity(0.012, unit="m", label="Plate thickness", gt=0, le=1)
+    length: float = quantity(0.3, unit="m", label="Seam length", ge=SMALLEST, le=10)
+    base_width: float = quantity(0.3, unit="m", label="Base width", ge=SMALLEST, le=10)
+    upright_height: float = quantity(0.15, unit="m", label="Upright height", ge=SMALLEST, le=10)
+    thickness: float = quantity(0.012, unit="m", label="Plate thickness", ge=SMALLEST, le=1)
     bevel_angle: float = quantity(math.radians(45), unit="rad", label="Bevel angle", ge=0, le=math.radians(75))
-    leg: float = quantity(0.012, unit="m", label="Bead leg", help="Of the fillet, on both plates.", gt=0, le=1)
+    leg: float = quantity(0.012, unit="m", label="Bead leg", help="Of the fillet, on both plates.", ge=SMALLEST, le=1)
     convexity: float = quantity(0.0015, unit="m", label="Bead convexity", ge=0, le=0.1)
-    ripple_pitch: float = quantity(0.003, unit="m", label="Ripple pitch", gt=0, le=1)
+    ripple_pitch: float = quantity(0.003, unit="m", label="Ripple pitch", ge=SMALLEST, le=1)
     ripple_height: float = quantity(0.0003, unit="m", label="Ripple height", help="Peak to valley.", ge=0, le=0.1)
     ground_band: float = quantity(0.04, unit="m", label="Ground band", help="Width on each plate.", ge=0, le=10)
     triangles: int = quantity(100_000, label="Bead triangles", help="About.", ge=100, le=5_000_000)

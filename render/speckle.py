@@ -21,7 +21,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.random import normal
+from render.random import normal, wrapped
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -138,7 +138,7 @@ def scintillate(image: Float32, start: int, stop: int, field: Speckle, seed: int
     if len(lit) == 0:
         return rows
     out = rows.copy()
-    key = (int(seed) ^ (SURFACE << 24)) % 2**63
+    key = wrapped(seed ^ (SURFACE << 24))
     first, last = int(lit[0]), int(lit[-1]) + 1
     _scintillate(
         image, start, first, last, field.taps, field.quantile, field.evenness, key, step, _PATTERN + laser, out

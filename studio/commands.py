@@ -125,8 +125,6 @@ def run_project(
     if not quiet:
         _print_light(done.manifest["light"])
     _print_results(done.manifest)
-    for text in done.manifest["notes"]:
-        print(f"warning: {text}")
     print(f"{len(done.manifest['frames'])} frame(s) in {folder}, {done.manifest['seconds']['all']:.1f} s")
     for file in done.report:
         print(f"report: {file}")
@@ -270,8 +268,12 @@ def _print_results(result: dict[str, Any]) -> None:
         for row in result.get("results", [])
     ]
     header = ("Depth error", "points", "complete", "false", "bias", "RMSE", "robust sigma", "P95")
+    scale = result.get("image_scale", 1.0)
+    title = result["name"] + ("" if scale == 1.0 else f", image scale {scale:g}: not the scanner's figures")
     if rows:
-        print_table(result["name"], rows, header=header)
+        print_table(title, rows, header=header)
+    for text in result.get("notes", ()):
+        print(f"warning: {text}")
 
 
 def _project_rows(project: Project, found: Inspection) -> list[tuple[str, str]]:

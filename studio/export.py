@@ -17,11 +17,13 @@ from render.files import atomic_write
 from render.frame import Frame
 from render.frame_files import write_frame
 from render.world import World, build_world
+from studio.cautions import Cautions
 from studio.inputs import input_files
 from studio.own_files import check_not_read, check_replaceable
 from studio.project import Project
 from studio.results import now, report_input
 from studio.stages import Measurement
+from studio.summary import summarise
 
 Measurements = Mapping[str, Sequence[Measurement]]
 """By method: one for each laser."""
@@ -40,6 +42,8 @@ class Exported:
     frame: Frame
     images: tuple[Image, ...]
     measurements: Measurements
+    image_scale: float = 1.0
+    """At which it was rendered."""
 
 
 def export_report(path: Path, what: Exported) -> list[Path]:
@@ -48,7 +52,21 @@ def export_report(path: Path, what: Exported) -> list[Path]:
 
     _spare_inputs(what, [path])
     record = record_of(what.project.scene, [frame_result(what)])
-    data = report_input(what.project, _first_world(what), record, {}, notes=(), created=now())
+    cautions = Cautions(
+        what.rendered.model_copy(update={"sensor": what.project.sensor}),
+        what.image_scale,
+        [laser.power for laser in what.project.scene.lasers],
+    )
+    cautions.look(what.frame, what.frame.warnings)
+    data = report_input(
+        what.project,
+        _first_world(what),
+        record,
+        {},
+        notes=cautions.notes(summarise(record)),
+        created=now(),
+        image_scale=what.image_scale,
+    )
     if path.suffix.lower() != ".pdf":
         with atomic_write(path) as temporary:
             temporary.write_text(render_page(data), encoding="utf-8")

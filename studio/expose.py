@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from render.develop import Image, develop
 from render.frame import Frame
+from render.random import wrapped
 from studio.project import Project
 
 APART = 1_000_003
@@ -31,6 +32,6 @@ def expose(
     for k in range(project.extraction.exposures):
         time = project.sensor.exposure_time / project.extraction.exposure_ratio**k
         sensor = project.sensor.model_copy(update={"exposure_time": time})
-        seed = (project.seed + number + APART * k) % 2**63
+        seed = wrapped(project.seed + number + APART * k)
         images.append(develop(frame, project.scene, sensor, seed=seed, threads=threads, laser_power=power, noise=noise))
     return replace(images[0], shorter=tuple(images[1:]))

@@ -98,13 +98,20 @@ class Measuring:
             write_csv(out / "points.csv", self._points)
         return [out / "points.ply", out / "points.csv"]
 
-    def write_reports(self, out: Path, world: World, *, notes: Sequence[str], created: str | None = None) -> list[Path]:
+    def write_reports(
+        self, out: Path, world: World, *, notes: Sequence[str], created: str | None = None, image_scale: float = 1.0
+    ) -> list[Path]:
         """report.html and report.pdf; `world` is that of step 0."""
         from analysis.report.write import write_report
 
-        told = [*self.notes(), *notes]
         data = report_input(
-            self._project, world, self.record, self._clock.seconds, notes=told, created=created or now()
+            self._project,
+            world,
+            self.record,
+            self._clock.seconds,
+            notes=[*notes, *self.notes()],
+            created=created or now(),
+            image_scale=image_scale,
         )
         with self._clock.stage("report"):
             return list(write_report(out, data))

@@ -128,7 +128,21 @@ def _problem(entry: dict[str, Any], model: type[BaseModel]) -> Problem:
     if kind in ("value_error", "assertion_error"):
         return Problem(field, str(context.get("error", entry["msg"])), None, "")
     message = entry["msg"].removeprefix("Input should be ").removeprefix("a valid ")
+    if kind.startswith(("greater_than", "less_than")):
+        limit = next(iter(context.values()))
+        number = f"{limit:.10g}" if isinstance(limit, float) else str(limit)
+        message = f"{message.rsplit(' ', 1)[0]} {number} {_unit(model, entry['loc'])}".rstrip()
     return Problem(field, "the value is not allowed", found, message)
+
+
+def _unit(model: type[BaseModel], location: Location) -> str:
+    """Of the number at a location, or of the tuple or union that it is part of."""
+    for i, name in reversed(list(enumerate(location))):
+        for owner in _models_at(model, location[:i]):
+            if name in owner.model_fields:
+                extra = owner.model_fields[str(name)].json_schema_extra
+                return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+    return ""
 
 
 def _dotted(path: Location) -> str:

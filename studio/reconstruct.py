@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 
 from render.errors import InputError
 from render.frame_files import read_frame
+from render.material_checks import scene_warnings
 from render.world import build_world
 from studio import scan_folder
+from studio.cautions import Cautions
 from studio.measuring import Measuring
 from studio.project import Project
 from studio.redevelop import development
@@ -55,7 +58,12 @@ def _measured(
 ) -> dict[str, Any]:
     how = development(found.project, asked)
     project = how.project
-    with clock.stage("loading meshes"):
+    image_scale = found.manifest.get("image_scale", 1.0)
+    if not isinstance(image_scale, float | int) or not 0.0 < image_scale < math.inf:
+        where = f"{found.folder / scan_folder.MANIFEST}: image_scale"
+        raise InputError("the image scale is none", where=where, found=image_scale, allowed="a positive number")
+    cautions = Cautions(project, image_scale, how.laser_power)
+    with clock.stage("loading meshes"), cautions.listening():
         first = world = build_world(project.scene, root, 0)
     with closing(Measuring(project, out, clock, threads, len(found.frames))) as measuring:
         for n in clock.frames(len(found.frames)):
@@ -69,25 +77,29 @@ def _measured(
                     "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
                 )
             world = step_world(project, root, frame.step, None if frame.step == 0 else world)
+            cautions.look(frame, scene_warnings(world, project.scene, frame.step))
             measuring.add(frame, world, develop_step(project, frame, clock, threads, how.laser_power))
         measuring.finish()
         if not measuring.record.steps or not project.scene.lasers:
             raise InputError("the scan holds no laser image", where=str(found.folder))
         with scan_folder.replacing(found, out) as measured:
             files = measuring.write_points(out)
-            measured |= {"results": summarise(measuring.record), "extraction": measuring.notes()}
+            figures = summarise(measuring.record)
+            notes = cautions.notes(figures)
+            measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
             if (asked.sensor, asked.extraction) != (found.project.sensor, found.project.extraction):
                 measured["measured_with"] = asked.model_dump(mode="json", include={"sensor", "extraction"})
             if report:
-                notes = [str(note) for note in found.manifest.get("notes", [])]
                 created = str(found.manifest.get("created", now()))
-                reports = measuring.write_reports(out, first, notes=notes, created=created)
+                reports = measuring.write_reports(out, first, notes=notes, created=created, image_scale=image_scale)
                 measured["report"] = [path.name for path in reports]
                 files += reports
     return {
         "name": asked.name,
         "files": [str(path) for path in files],
+        "image_scale": image_scale,
         "results": measured["results"],
+        "notes": notes,
         "extraction": measured["extraction"],
         "seconds": clock.seconds,
     }

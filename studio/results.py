@@ -75,6 +75,7 @@ def report_input(
     *,
     notes: Sequence[str],
     created: str,
+    image_scale: float = 1.0,
 ) -> ReportInput:
     """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage."""
     return ReportInput(
@@ -92,6 +93,7 @@ def report_input(
         versions=versions(),
         notes=tuple(notes),
         created=created,
+        image_scale=image_scale,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ from render.frame_files import write_frame
 from render.scan_plan import ScanPlan, plan_scan
 from render.world import World, build_world
 from studio import scan_folder
+from studio.cautions import Cautions
 from studio.inputs import input_hashes
 from studio.light_groups import group_lines
 from studio.measuring import Measuring
@@ -26,7 +26,7 @@ from studio.project import Project
 from studio.rendered_from import made_of
 from studio.results import now
 from studio.resume import Refined, frame_of_step, settle
-from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world
+from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world, validated
 from studio.summary import summarise
 from studio.warm_up import PREPARING, needed, warm_up
 
@@ -61,15 +61,11 @@ class Rendering:
 class Written:
     """What became of the frames so far, in a few words each."""
 
-    caught: list[warnings.WarningMessage]
-    """Where Python's warnings arrive."""
+    cautions: Cautions
     files: list[Path] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
     """Of their sidecars."""
     light: list[dict[str, Any]] = field(default_factory=list)
-    doubts: dict[str, str] = field(default_factory=dict)
-    """In words as at first, though figures change from step to step."""
-    warned: dict[str, None] = field(default_factory=dict)
 
     def tell(self, frame: Frame, project: Project) -> None:
         """The light of a frame, and what is doubtful about it."""
@@ -77,18 +73,7 @@ class Written:
         if self.light and self.light[-1]["plan"] == record["plan"]:
             record["plan"] = self.light[-1]["plan"]  # the same words, once in memory
         self.light.append(record)
-        for text in frame.warnings:
-            self.doubts.setdefault(text.split(",", 1)[0], text)
-
-    def hear(self) -> None:
-        """Take up the warnings that arrived, each once, though every frame repeats them."""
-        for warning in self.caught:
-            if issubclass(warning.category, UserWarning):
-                self.warned.setdefault(str(warning.message))
-        self.caught.clear()
-
-    def notes(self) -> list[str]:
-        return [*self.doubts.values(), *self.warned]
+        self.cautions.look(frame, frame.warnings)
 
 
 def never() -> bool:
@@ -125,19 +110,19 @@ def run_scan(
     so far stay, whole, and what was rendered of the frame under way.
     """
     began = time.perf_counter()
-    project = scaled(project, image_scale)
+    project = validated(scaled(project, image_scale), f"at image scale {image_scale:g}")
     if seed is not None:
-        project = project.model_copy(update={"seed": seed})
+        project = validated(project.model_copy(update={"seed": seed}), "with another seed")
     if measure and not project.scene.lasers:
         raise InputError("the rig has no laser, so there is no line to measure", where="scene.rig.lasers", found="none")
+    cautions = Cautions(project, image_scale)
     count = min(steps or project.scene.frame_count, project.scene.frame_count)
     clock = Clock(progress, cancelled)
     measuring = Measuring(project, out, clock, threads, count, each) if measure else None
-    with ExitStack() as held, warnings.catch_warnings(record=True) as caught:
+    with ExitStack() as held, cautions.listening():
         if measuring:
             held.enter_context(closing(measuring))
-        warnings.simplefilter("always", UserWarning)
-        written = Written(caught)
+        written = Written(cautions)
         with clock.stage("loading meshes"):
             inputs = input_hashes(project.scene, root)
             first = build_world(project.scene, root, 0)
@@ -155,13 +140,14 @@ def run_scan(
             "frames": written.names,
             "image_scale": image_scale,
             "seed": project.seed,
-            "notes": written.notes(),
+            "notes": [],
             "extraction": measuring.notes() if measuring else [],
             "light": written.light,
         }
         if measuring:
             written.files += measuring.write_points(out)
             result["results"] = summarise(measuring.record)
+        result["notes"] = cautions.notes(result.get("results", ()))
 
         def finish(reports: list[Path]) -> dict[str, Any]:
             result["report"] = [path.name for path in reports]
@@ -172,7 +158,9 @@ def run_scan(
         reports: list[Path] = []
         manifest = finish(reports)
         if measuring and report:
-            reports = measuring.write_reports(out, first, notes=result["notes"], created=result["created"])
+            reports = measuring.write_reports(
+                out, first, notes=result["notes"], created=result["created"], image_scale=image_scale
+            )
             manifest = finish(reports)
     return ScanResult(out, (*written.files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
 
@@ -185,10 +173,8 @@ def _take_frames(how: Rendering, first: World, count: int, written: Written, mea
         frame, images = _write_frame(how, world, step, plan, written)
         if measuring is not None:
             measuring.add(frame, world, images)
-        written.hear()
     if measuring is not None:
         measuring.finish()
-    written.hear()
 
 
 def _plan(how: Rendering, first: World) -> ScanPlan | None:

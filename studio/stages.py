@@ -83,6 +83,11 @@ def scaled(project: Project, image_scale: float) -> Project:
     return project.model_copy(update={"scene": scene, "sensor": sensor})
 
 
+def validated(project: Project, where: str) -> Project:
+    """The project, of whose numbers some were worked out. InputError: one is beyond its limits."""
+    return Project.from_data(project.model_dump(mode="json"), where)
+
+
 def step_world(project: Project, root: Path, step: int, before: World | None) -> World:
     """The placed triangles of a step; the ones before where the objects stand still."""
     motion = project.scene.motion
@@ -133,6 +138,7 @@ def develop_step(
     """
     scene, images = project.scene, []
     powers = [laser.power for laser in scene.lasers] if laser_power is None else laser_power
+    frame.check()  # it may come from a file
     with clock.stage("sensor"):
         for i in range(len(scene.lasers)):
             power = [value if i == k else 0.0 for k, value in enumerate(powers)]

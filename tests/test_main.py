@@ -11,6 +11,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import PIL.Image
 import pytest
 from click.testing import CliRunner, Result
 
@@ -85,6 +87,22 @@ class TestExitCodes:
     def test_wrong_usage_is_bad_input(self, arguments: list[str]) -> None:
         done = call(*arguments)
         assert done.exit_code == 2 and "Traceback" not in done.output
+
+    @pytest.mark.parametrize("value", ["nan", "-nan", "inf", "-inf", "1e400", "0x1p3"])
+    @pytest.mark.parametrize("option", ["--scale", "--time-limit", "--exposure-ratio", "--nearest", "--farthest"])
+    def test_a_number_that_is_none_is_bad_input(self, option: str, value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("studio.commands.run_project", lambda *_, **__: None)
+        assert call("run", option, "2").exit_code == 0
+        done = call("run", option, value)
+        assert done.exit_code == 2 and option in done.stderr and "Traceback" not in done.output
+
+    @pytest.mark.parametrize("times", ["1e300,1e-300", "nan,1", "inf,1", "0,1", "1e20,1", "1,-1", "1e-320,1e-321"])
+    def test_exposure_times_that_cannot_be_are_bad_input(self, times: str, tmp_path: Path) -> None:
+        image = np.random.default_rng(0).normal(100, 5, (64, 64)).clip(0, 255).astype(np.uint8)
+        for name in ("a.png", "b.png"):
+            PIL.Image.fromarray(image).save(tmp_path / name)
+        done = call("extract", tmp_path / "a.png", tmp_path / "b.png", "--hdr", times)
+        assert done.exit_code == 2 and "expos" in done.stderr and "Traceback" not in done.output
 
     def test_a_missing_system_library_is_named_before_anything_is_imported(
         self, monkeypatch: pytest.MonkeyPatch

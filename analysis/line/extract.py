@@ -19,6 +19,7 @@ from analysis.line.noise import NoiseModel
 from analysis.line.result import Axis, Line
 from analysis.line.settings import ExtractionSettings, Method, Select
 from render.errors import InputError
+from render.finite import check_finite
 
 CANDIDATES = 5
 """Peaks that one is selected from, unless the settings ask for more."""
@@ -60,6 +61,7 @@ def extract(
     alone = chosen.select == "strongest" and volume is None
     wanted = chosen if alone else chosen.model_copy(update={"peaks": max(chosen.peaks, CANDIDATES)})
     line = replace(measure(lines, wanted, threads), note=note)
+    check_finite("line", positions=line.u[line.valid])
     return line if alone else select(line, chosen.select, volume)
 
 

@@ -22,6 +22,8 @@ from render.errors import InputError
 
 Float32 = NDArray[np.float32]
 
+SHORTEST, LONGEST, MOST_RATIO = 1e-30, 1e30, 1e15
+"""Of exposure times in any unit; farther apart, their electrons leave the range of float32."""
 ROUNDS = 3
 """Weights and rate settle in two."""
 
@@ -53,8 +55,12 @@ def fuse(images: Sequence[NDArray[Any]], exposure_times: Sequence[float], noise:
     if len(types) > 1:
         raise InputError("the exposures are not of one type", where="exposures", found=", ".join(types))
     times = np.asarray(exposure_times, dtype=np.float64)
-    if not (np.isfinite(times).all() and (times > 0.0).all()):
-        raise InputError("an exposure time is out of range", where="exposures", found=times.tolist(), allowed="above 0")
+    if not np.all((times >= SHORTEST) & (times <= LONGEST)):
+        allowed = f"{SHORTEST:g} to {LONGEST:g}"
+        raise InputError("an exposure time is out of range", where="exposures", found=times.tolist(), allowed=allowed)
+    if times.max() > MOST_RATIO * times.min():
+        found, allowed = f"{times.max() / times.min():.3g} times the shortest", f"{MOST_RATIO:g} times at most"
+        raise InputError("the longest exposure is too long", where="exposures", found=found, allowed=allowed)
     if noise.saturation is None:
         raise InputError("fusion needs to know which pixels are saturated", where="noise.saturation")
     full = (noise.saturation - noise.black_level) / noise.gain

@@ -96,7 +96,7 @@ class ExtractionSettings(Model):
         None, unit="m", label="Nearest depth", help="Of the working volume; empty: from the camera on.", ge=0, le=1e4
     )
     farthest: float | None = quantity(
-        None, unit="m", label="Farthest depth", help="Of the working volume; empty: no end.", gt=0, le=1e4
+        None, unit="m", label="Farthest depth", help="Of the working volume; empty: no end.", ge=1e-6, le=1e4
     )
     exposures: int = quantity(
         1,

@@ -89,6 +89,8 @@ class ReportInput:
     """Library -> version."""
     notes: tuple[str, ...] = ()
     """Warnings and remarks of the run, one sentence each; shown near the top."""
+    image_scale: float = 1.0
+    """Pixels a side of what was measured, over those of the scanner."""
     created: str = ""
     """Date and time of the run, as it shall be printed."""
 

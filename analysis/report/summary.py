@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.line.result import Flag
 from analysis.report.colour import method_name
 from analysis.report.model import ReportInput
-from analysis.report.total import Total, total
+from analysis.report.total import NARROW_PX, Total, total
 from analysis.report.units import count, micrometres, percent, pixels
 
 ENOUGH = 30
 """Fewer points than this are no statistics to draw a conclusion from."""
+LITTLE = 0.5
+"""Below this share of the line the errors say more of what was found by chance than of the line."""
 
 
 def headline(report: ReportInput) -> str:
@@ -23,12 +24,14 @@ def headline(report: ReportInput) -> str:
     if found.truth_rows == 0:
         return (
             f"Nothing was measured: {who} drew no line that the camera could see {where}. "
-            "Either the sheet misses the part, or the part hides the line from the camera."
+            "Either the laser is off, or its sheet misses the part, or the part hides the line from the camera."
         )
-    if found.depth_z.count == 0:
+    if found.measured_rows == 0:
+        stray = f" The {count(found.points)} points are stray light or noise." if found.points else ""
         return (
             f"Nothing was measured: the camera could see the line on {count(found.truth_rows)} scan lines {where}, but "
             f"none was found by {method_name(found.method)}. The line may be too faint, or the threshold too high."
+            f"{stray}"
         )
     depth = found.depth_z
     side = "too far from" if depth.bias > 0 else "too near to"
@@ -43,14 +46,42 @@ def headline(report: ReportInput) -> str:
     )
 
 
-def remarks(report: ReportInput) -> list[str]:
-    """What the numbers say beyond themselves, one sentence or two each; empty when all is as it should be."""
-    chosen = report.record.chosen()
-    found = total(chosen)
+def scale_note(image_scale: float) -> str:
+    """That figures at another image scale are not the scanner's; empty at 1."""
+    if image_scale == 1.0:
+        return ""
+    return (
+        f"Measured at image scale {image_scale:g}, with {image_scale:g} times the scanner's pixels a side: these "
+        "figures are not the scanner's. Measure at scale 1 for those."
+    )
+
+
+def little_found(completeness: float | None, points: int, name: str = "") -> str:
+    """That less than half of the line was found; empty where it was. None: there was no line. name: of the laser."""
+    who = f"{name}: " if name else ""
+    stray = f"; the {points} points are stray light or noise" if points else ""
+    if completeness is None or np.isnan(completeness):
+        return f"{who}No line is lit and seen, so that nothing was measured{stray}."
+    if completeness == 0.0:
+        return f"{who}Nothing of the line was found{stray}."
+    if completeness >= LITTLE:
+        return ""
+    return (
+        f"{who}Only {completeness:.1%} of the line was found. The errors are those of the points that there are, "
+        "wrong peaks among them: they say little of the scanner."
+    )
+
+
+def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
+    """What the numbers say beyond themselves, one sentence or two each; empty when all is as it should be.
+
+    found: of one laser or all, of a frame or a whole scan; image_scale: at which it was measured.
+    """
+    missing = little_found(found.completeness, found.points)
+    said = [text for text in (missing, scale_note(image_scale)) if text]
     if found.truth_rows == 0 or found.depth_z.count < ENOUGH:
-        return []
-    said = []
-    if found.completeness < 0.95:
+        return said
+    if LITTLE <= found.completeness < 0.95:
         missed = found.truth_rows - found.measured_rows
         said.append(
             f"{count(missed)} scan lines on which the line can be seen ({percent(missed / found.truth_rows)}) have no "
@@ -81,17 +112,15 @@ def remarks(report: ReportInput) -> list[str]:
             f"Neighbouring scan lines err alike (correlation {found.u.autocorrelation:.2f}): the cause is "
             "rather the surface's texture or shape than the sensor's noise, and averaging along the line gains little."
         )
-    width, flag = chosen.rows["width"], chosen.rows["flag"]
-    width = width[np.isfinite(width)]
-    narrow = float(np.mean(width < 0.4)) if len(width) else 0.0
-    if narrow > 0.1:
+    if found.narrow > 0.1:
         said.append(
-            f"On {percent(narrow, 0)} of the points the line is narrower than 0.4 px (sigma): too narrow for the "
-            "pixels, so that the measured position depends on where within a pixel the line falls."
+            f"On {percent(found.narrow, 0)} of the points the line is narrower than {NARROW_PX} px (sigma): too narrow "
+            "for the pixels, so that the measured position depends on where within a pixel the line falls."
         )
-    saturated = float(np.mean(flag == Flag.SATURATED)) if len(flag) else 0.0
-    if saturated > 0.02:
-        said.append(f"{percent(saturated)} of the peaks are saturated and were measured from what is left of them.")
+    if found.saturated > 0.02:
+        said.append(
+            f"{percent(found.saturated)} of the peaks are saturated and were measured from what is left of them."
+        )
     return said
 
 

@@ -5,9 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.line.result import Flag
 from analysis.measures import Measures, measure
 from analysis.report.sample import Rows
 from analysis.report.sums import Moments, Sums
+
+NARROW_PX = 0.4
+"""Sigma of a line below which the pixels are too coarse for it."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +51,10 @@ class Total:
     false_rows: int
     lines_kept: int
     lines: int
+    narrow: float = 0.0
+    """Share of the points on which the line is too narrow for the pixels, its sigma below `NARROW_PX`."""
+    saturated: float = 0.0
+    """Share of the points that are saturated."""
 
     @property
     def completeness(self) -> float:
@@ -77,7 +88,13 @@ def total(chosen: Chosen) -> Total:
         false_rows=sums.false_rows,
         lines_kept=chosen.lines_kept,
         lines=chosen.lines,
+        narrow=_share(rows["width"][np.isfinite(rows["width"])] < NARROW_PX),
+        saturated=_share(rows["flag"] == Flag.SATURATED),
     )
+
+
+def _share(there: NDArray[np.bool_]) -> float:
+    return float(np.mean(there)) if len(there) else 0.0
 
 
 def position_measures(rows: Rows) -> Measures:

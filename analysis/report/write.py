@@ -107,7 +107,10 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "chips": laser_chips(report),
         "headline": headline(report),
         "tiles": _tiles(found),
-        "remarks": [*report.notes, *remarks(report), *filter(None, [sample_note(found)])],
+        "remarks": [
+            *dict.fromkeys((*report.notes, *remarks(found, report.image_scale))),
+            *filter(None, [sample_note(found)]),
+        ],
         "several": len(record.steps) > 1,
         "shown_step": frame.step,
         "frame_count": len(record.steps),
@@ -164,11 +167,12 @@ def _facts(report: ReportInput) -> str:
     camera = report.scene.camera
     frames = "1 frame" if len(report.record.steps) == 1 else f"{len(report.record.steps)} frames"
     made = f"{report.created} · " if report.created else ""
-    return f"{made}{frames} · camera {camera.width} × {camera.height} px"  # noqa: RUF001
+    scale = "" if report.image_scale == 1.0 else f", image scale {report.image_scale:g}: not the scanner's figures"
+    return f"{made}{frames} · camera {camera.width} × {camera.height} px{scale}"  # noqa: RUF001
 
 
 def _tiles(found: Total) -> list[tuple[str, str, str]]:
-    if found.depth_z.count == 0:
+    if found.measured_rows == 0:
         return []
     depth, of_sample = found.depth_z, " (sample)" if found.sampled else ""
     return [

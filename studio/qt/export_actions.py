@@ -88,6 +88,7 @@ class ExportActions(QObject):
             render.frame,
             tuple(render.images),
             dict(render.measurements),
+            render.image_scale,
         )
         writers: dict[str, Callable[[Path, export.Exported], list[Path]]] = {
             "report": export.export_report,

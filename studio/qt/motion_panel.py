@@ -152,6 +152,8 @@ class MotionPanel(QWidget):
     def _done(self, result: ScanResult) -> None:
         self.report = next((path for path in result.report if path.suffix == ".html"), None)
         self.open.setVisible(self.report is not None)
+        for text in result.manifest["notes"]:
+            self.session.message.emit("warning", text)
         self.session.message.emit("info", f"The scan is done: {result.folder}")
 
     def _open_report(self) -> None:

@@ -11,6 +11,7 @@ from render.refine import refine
 from render.saved import RenderState
 from render.threads import Cancel
 from render.world import World, build_world
+from studio.inspection import view_warnings
 from studio.jobs import Progress
 from studio.project import Project
 from studio.qt.session import Render
@@ -41,6 +42,7 @@ def render_frames(
     if world is None:
         progress("loading meshes", 0.0)
         world = build_world(project.scene, root, step)
+    doubts: tuple[str, ...] = ()
     for frame in refine(
         world,
         project.scene,
@@ -54,9 +56,10 @@ def render_frames(
         seconds=seconds,
         state=state,
     ):
-        take(world, frame)
+        take(world, replace(frame, warnings=(*doubts, *frame.warnings)))
         # the line is there before the kernels of all other light
         warm_up(for_all, lambda stage, done: progress(stage, 0.0), cancelled)
+        doubts = doubts or tuple(view_warnings(project, frame))
 
 
 def can_go_on(render: Render | None) -> bool:

@@ -61,6 +61,8 @@ class RenderPanel(QWidget):
         self._render: Render | None = None
         self._before: Render | None = None
         self._keep = False
+        self._warned: set[str] = set()
+        """What was told of the render under way."""
         self._state = RenderState({})
         self.plan = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
         self.plan.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
@@ -138,6 +140,7 @@ class RenderPanel(QWidget):
         number = max([render.number for render in session.renders], default=0) + 1
         self._template = (number, project, source, image_scale)
         self.errors.clear()
+        self._warned = set()
         self._run(project, root, step, world, RenderState({}))
 
     def _run(self, project: Project, root: Path, step: int, world: World | None, state: RenderState) -> None:
@@ -295,11 +298,13 @@ class RenderPanel(QWidget):
                 source=source,
             )
             self.session.add_render(self._render)
-            for text in frame.warnings:
-                self.session.message.emit("warning", text)
         else:
             self._render.frame = carried(frame, self._render.frame)
             self.session.renders_changed.emit()
+        for text in frame.warnings:
+            if text not in self._warned:
+                self._warned.add(text)
+                self.session.message.emit("warning", text)
         self.errors.setText(error_text(self._render))
         self.plan.setText(plan_text(tuple(frame.plan.splitlines())))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 
@@ -15,6 +16,7 @@ from analysis.line.result import Flag, Line
 from analysis.measures import measure
 from analysis.triangulate import triangulate
 from render.camera import Camera
+from render.errors import InputError
 from render.frame import LaserCurve
 
 THETA, BASELINE, DEPTH = math.radians(13), 0.2, 0.85
@@ -107,6 +109,49 @@ def test_rows_that_are_missing_false_or_wrong_are_counted_apart():
     assert errors.outlier.sum() == 5
     assert errors.surface.count == 97
     assert errors.u.robust_sigma < 0.02 < errors.u.sigma
+
+
+def test_stray_peaks_do_not_count_as_measured_however_many_they_are():
+    """Where most peaks are wrong the robust sigma is hundreds of pixels; the line's own width is not."""
+    curve, random = wall_curve(np.arange(100, 1900)), np.random.default_rng(5)
+    u = np.full((2048, 1), np.nan)
+    u[100:1900, 0] = random.uniform(0, 2448, 1800)
+    right = slice(100, 300)
+    u[right, 0] = curve.position[:200] + random.normal(0, 0.1, 200)
+    _, errors = errors_of(line_of(u, 0.05), curve)
+    assert errors.valid_rows > 1400
+    # each stray peak is within 2 px of the line by a chance of 4 in 2448
+    assert 200 <= errors.measured_rows <= 200 + 12
+
+
+def test_a_laser_without_light_draws_no_line_to_be_found():
+    curve = wall_curve(np.arange(100, 1900))
+    dark = dataclasses.replace(curve, irradiance=np.zeros(1800))
+    u = np.full((2048, 1), np.nan)
+    u[100:1900, 0] = curve.position
+    _, errors = errors_of(line_of(u, 0.05), dark)
+    assert (errors.truth_rows, errors.measured_rows, errors.false_rows) == (0, 0, 1800)
+    assert math.isnan(errors.completeness) and errors.u.count == 0
+
+
+def test_a_line_along_the_other_axis_is_refused_in_words():
+    curve = dataclasses.replace(wall_curve(np.arange(100, 1900)), axis="columns")
+    with pytest.raises(InputError, match=r"extraction\.axis.*found rows.*columns"):
+        errors_of(line_of(np.full((2048, 1), np.nan), 0.05), curve)
+
+
+@pytest.mark.parametrize("stage", ["points", "errors"])
+def test_a_point_that_is_no_number_is_named_with_its_stage(stage: str):
+    curve = wall_curve(np.arange(100, 1900))
+    u = np.full((2048, 1), np.nan)
+    u[100:1900, 0] = curve.position
+    line, vertices = line_of(u, 0.05), WALL.copy()
+    if stage == "points":
+        line.u[500, 0] = np.nan
+    else:
+        curve.depth_z[500] = np.inf
+    with pytest.raises(InputError, match=f"stage '{stage}'"):
+        errors_of(line, curve, vertices)
 
 
 def test_each_crossing_is_matched_once_and_to_the_nearest():

@@ -79,7 +79,7 @@ def wall_curve(scene: Scene, visible: bool = True) -> LaserCurve:
     zero = np.zeros(n)
     return LaserCurve(
         "rows", rows.astype(np.int32), np.full(n, camera.fx * x / DEPTH + camera.cx), point, point[:, 2].copy(),
-        np.linalg.norm(point, axis=1), np.zeros(n, np.int32), zero, zero, zero, np.zeros((0, 2, 3)),
+        np.linalg.norm(point, axis=1), np.zeros(n, np.int32), zero, zero, zero + 30.0, np.zeros((0, 2, 3)),
     )  # fmt: skip
 
 
@@ -229,7 +229,8 @@ def test_a_scan_that_measured_nothing_says_so(visible):
     assert "Nothing was measured" in headline(report)
     assert "Nothing was measured" in page
     assert "nan" not in re.sub(r"base64,[^\"]*|[a-z]*nan[a-z]+", "", page.lower())
-    assert remarks(report) == []
+    assert "nothing was measured" in remarks(total(report.record.chosen()))[0].lower() or visible
+    assert "Nothing of the line was found" in remarks(total(report.record.chosen()))[0] or not visible
 
 
 def test_a_machine_that_cannot_draw_3d_gets_a_plain_picture(monkeypatch):
@@ -242,13 +243,17 @@ def test_a_machine_that_cannot_draw_3d_gets_a_plain_picture(monkeypatch):
 
 def test_remarks_name_what_is_wrong():
     scene, (frame,) = make_frames()
-    assert remarks(report_of(scene, [frame])) == []
+
+    def told(shown: FrameResult) -> list[str]:
+        return remarks(total(report_of(scene, [shown]).record.chosen()))
+
+    assert told(frame) == []
     first = frame.lasers[0].extractions[0]
     noise = 0.1 * np.random.default_rng(1).standard_normal(100)
 
     def said(changed: Extraction) -> str:
         laser = dataclasses.replace(frame.lasers[0], extractions=(changed,))
-        return " ".join(remarks(report_of(scene, [dataclasses.replace(frame, lasers=(laser,))])))
+        return " ".join(told(dataclasses.replace(frame, lasers=(laser,))))
 
     curve = frame.lasers[0].curve
     assert "bias" in said(extraction(scene, curve, 0, "likelihood", noise + 0.2))
@@ -260,6 +265,16 @@ def test_remarks_name_what_is_wrong():
     assert "outliers" in said(extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 3, 9.0, noise)))
     narrow = dataclasses.replace(first.line, width=0.3 * np.ones_like(first.line.width))
     assert "narrower" in said(dataclasses.replace(first, line=narrow))
+    lost = extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 60, np.nan, noise))
+    assert remarks(total([lost]))[0].startswith("Only 40.0% of the line was found")
+
+
+def test_a_report_at_another_image_scale_says_at_its_head_that_it_is_not_the_scanners():
+    report = dataclasses.replace(make_report(), image_scale=0.25)
+    page = render_page(report)
+    head = page[: page.index("<figure")]
+    assert "image scale 0.25: not the scanner" in head and "Measure at scale 1" in head
+    assert "image scale" not in render_page(make_report())
 
 
 def test_the_frame_shown_is_the_one_of_median_error_among_those_with_images():

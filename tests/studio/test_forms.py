@@ -12,6 +12,7 @@ import pytest
 from pydantic import BaseModel
 from scipy.spatial.transform import Rotation
 
+from analysis.line.settings import ExtractionSettings
 from render.camera import Lens
 from render.errors import InputError
 from render.laser import Divergence, Waist
@@ -85,11 +86,12 @@ class TestDescription:
     def test_limits_are_told_in_shown_units_and_open_ends_are_respected(self, project: Project) -> None:
         fan = spec(project.scene.lasers[0], "fan_angle")
         assert fan.problem(math.radians(45)) is None
-        assert fan.problem(0.0) == "must be more than 0 deg"
+        assert fan.problem(0.0) == "must be at least 0.001 deg"
         assert fan.problem(math.radians(171)) == "must be at most 170 deg"
         transmission = spec(project.scene.camera.lens, "transmission")
         assert transmission.problem(1.0) is None
         assert transmission.problem(1.01) == "must be at most 1"
+        assert spec(ExtractionSettings(), "exposure_ratio").problem(1.0) == "must be more than 1"
 
     def test_a_drag_stays_where_values_are_allowed(self, project: Project) -> None:
         for path in ITEMS:

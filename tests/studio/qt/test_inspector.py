@@ -60,7 +60,7 @@ class TestTyping:
         [
             ("power", "-1", "at least 0 mW"),
             ("fan_angle", "171", "at most 170 deg"),
-            ("fan_angle", "0", "more than 0 deg"),
+            ("fan_angle", "0", "at least 0.001 deg"),
             ("wavelength_nm", "ten", "not a number"),
             ("wavelength_nm", "450 kg", "unit"),
         ],

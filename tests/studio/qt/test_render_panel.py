@@ -228,3 +228,13 @@ def test_renders_of_other_sizes_meet_on_the_grid_of_the_first():
     images = develop_again(frame, development(project, project))
     same = compare("image", (frame, images), (frame, images))
     assert same is not None and same.rms == 0.0
+
+
+def test_what_inspect_warns_of_is_told_once_while_it_renders(qtbot, panel):
+    session, told = panel.session, []
+    session.message.connect(lambda level, text: told.append((level, text)))
+    session.set(("scene", "rig", "lasers", 0, "power"), 0.0)
+    press(qtbot, panel.start_button)
+    finish(qtbot, panel)
+    dark = [text for level, text in told if level == "warning" and "power is 0 W" in text]
+    assert len(dark) == 1
