@@ -105,7 +105,7 @@ class KernelCache(caching.FunctionCache):
             if not KernelCache._told:
                 KernelCache._told = True
                 reason = f"{error.strerror or error}; they are compiled anew at the next start"
-                warnings.warn(f"compiled kernels cannot be kept in {kept_in()}: {reason}", RuntimeWarning, stacklevel=2)
+                warnings.warn(f"compiled kernels cannot be kept in {kept_in()}: {reason}", UserWarning, stacklevel=2)
 
 
 def _seal(path: str, content: bytes) -> bytes:
