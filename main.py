@@ -18,7 +18,7 @@ try:
     import click
 
     from studio.streams import finish, print_json, streams
-    from studio.system import message, missing_needs, missing_python_package
+    from studio.system import message, missing_needs, missing_python_package, why_not_in_this_folder
 except KeyboardInterrupt:
     sys.exit(130)
 except ModuleNotFoundError as missing:
@@ -341,11 +341,11 @@ def new(template: str | None, folder: Path | None, **options: Any) -> None:
 
 def _require_system() -> None:
     """Before heavy imports: name the system libraries that are missing, and the command that brings them."""
-    missing = missing_needs()
-    if missing:
+    missing, reason = missing_needs(), why_not_in_this_folder()
+    if missing or reason:
         from render.errors import InputError
 
-        raise InputError(f"the system lacks libraries\n{message(missing)}")
+        raise InputError(reason or f"the system lacks libraries\n{message(missing)}")
 
 
 if __name__ == "__main__":

@@ -99,3 +99,16 @@ def test_without_python_packages_the_entry_names_the_way_to_set_up() -> None:
     done = subprocess.run([sys.executable, "-S", str(ROOT / "main.py"), "--help"], capture_output=True, text=True)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr and "make run" in done.stderr
+
+
+def test_a_program_in_a_folder_whose_name_is_not_text_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import main
+
+    reason = system.why_not_in_this_folder("/opt/\udcff/blazer")
+    assert reason is not None and "UTF-8" in reason and system.why_not_in_this_folder() is None
+    monkeypatch.setattr(main, "why_not_in_this_folder", lambda: reason)
+    with pytest.raises(SystemExit, match="2"):
+        main.cli(["inspect"])
+    assert "\\udcff/blazer" in capsys.readouterr().err
