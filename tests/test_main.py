@@ -18,6 +18,8 @@ from render.errors import Cancelled, InputError
 from studio.templates import DESCRIPTIONS, template_folder
 
 ROOT = Path(__file__).resolve().parents[1]
+PATIENCE = 600.0
+"""s; how long a process takes decides nothing, but one that hangs shall end."""
 HEAVY = {"numpy", "numba", "rich", "pydantic", "PySide6", "cv2", "jinja2"}
 
 
@@ -33,7 +35,7 @@ def spawn(*arguments: object, **options: Any) -> subprocess.Popen[str]:
 class TestHelp:
     def test_help_imports_only_what_answers_at_once(self) -> None:
         process = spawn("--help", env={**os.environ, "PYTHONPROFILEIMPORTTIME": "1"})
-        text, errors = process.communicate()
+        text, errors = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0 and "reconstruct" in text
         imported = {line.rsplit("|", 1)[1].strip() for line in errors.splitlines() if line.startswith("import time:")}
         own = {name for name in imported if name.split(".")[0] in ("render", "analysis", "studio")}
@@ -190,7 +192,7 @@ class TestStudio:
 class TestProcess:
     def test_json_is_alone_on_standard_output(self) -> None:
         process = spawn("inspect", "--json")
-        text, _ = process.communicate()
+        text, _ = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0 and json.loads(text)["ok"]
 
     def test_a_reader_that_goes_away_is_no_error(self) -> None:
@@ -198,7 +200,7 @@ class TestProcess:
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
         errors = process.stderr.read()
-        process.wait()
+        process.wait(timeout=PATIENCE)
         assert "Traceback" not in errors and "BrokenPipe" not in errors and process.returncode == main.BROKEN_PIPE
 
     @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device of Linux")
@@ -218,7 +220,7 @@ class TestProcess:
     )
     def test_streams_that_take_nothing_do_not_end_in_a_fault(self, shell: str, code: int) -> None:
         command = shell.format(f"{sys.executable} {ROOT / 'main.py'}")
-        done = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
+        done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=PATIENCE)
         assert done.returncode == code and done.stdout[:9] == ("Templates" if "new 2>" in shell else "")
         assert done.stderr.count("\n") <= 1 and "Exception" not in done.stderr
 
@@ -228,7 +230,7 @@ class TestProcess:
         strict = {**os.environ, "PYTHONIOENCODING": "utf-8:strict"}
         for arguments in (["new", "plane", folder], ["new", "--force", "--json", "plane", folder], ["inspect", folder]):
             process = spawn(*arguments, env=strict)
-            text, errors = process.communicate()
+            text, errors = process.communicate(timeout=PATIENCE)
             assert (process.returncode, "Traceback" in errors) == (0, False)
             assert "udcff" in text or arguments[0] == "inspect"
 
@@ -244,7 +246,7 @@ class TestProcess:
         for cut in (len(data) // 2, len(data) - 100, 400):
             image.write_bytes(data[:cut])
             process = spawn("extract", image, "--json")
-            text, _ = process.communicate()
+            text, _ = process.communicate(timeout=PATIENCE)
             assert process.returncode == 2 and json.loads(text)["ok"] is False
 
     @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
@@ -255,7 +257,7 @@ class TestProcess:
             if "exact line" in line:
                 break
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate()
+        _, errors = process.communicate(timeout=PATIENCE)
         assert process.returncode == main.INTERRUPTED and "interrupted" in errors and "Traceback" not in errors
         left = [path for path in (tmp_path / "out").rglob("*") if path.is_file()] if (tmp_path / "out").exists() else []
         assert [path for path in left if path.name.startswith(".")] == [] and not (

@@ -52,6 +52,7 @@ def opened(home: Path, *arguments: str, cwd: Path | None = None) -> dict[str, An
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
+        timeout=600.0,
     )
     assert done.returncode == 0, done.stderr
     found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
