@@ -8,6 +8,7 @@ Only click is imported here, and what needs the standard library alone; everythi
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -56,7 +57,11 @@ class Commands(click.Group):
             except SystemExit as ended:  # click's end of shell completion, and of help that nobody reads
                 code = BROKEN_PIPE if ended.code == 1 else ended.code
             except BaseException as error:
+                if args is None:
+                    signal.signal(signal.SIGINT, signal.SIG_IGN)  # once is enough
                 code = _report_error(error, "--debug" in asked, "--json" in asked)
+        if args is None:  # only threads are waited for from now on, and a second Ctrl-C ends that without a word
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
         sys.exit(code)
 
     def invoke(self, context: click.Context) -> Any:

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -263,3 +264,24 @@ class TestProcess:
         assert [path for path in left if path.name.startswith(".")] == [] and not (
             tmp_path / "out" / "scan.json"
         ).exists()
+
+    @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+    def test_a_second_ctrl_c_ends_the_wait_for_threads_without_a_word(self) -> None:
+        code = (
+            "import main, sys, threading, studio.commands as commands\n"
+            "def busy(*_, **__):\n"
+            "    threading.Thread(target=threading.Event().wait, args=(600,)).start()\n"
+            "    raise KeyboardInterrupt\n"
+            "commands.inspect_project = busy\n"
+            "sys.argv = ['main.py', 'inspect', '--json']\n"
+            "main.cli()"
+        )
+        command = [sys.executable, "-c", code]
+        process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert process.stdout is not None and process.stderr is not None
+        while process.stdout.readline() != "}\n":
+            assert process.poll() is None
+        while process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.05)
+        assert process.returncode == -signal.SIGINT and process.stderr.read().count("\n") == 1
