@@ -24,7 +24,7 @@ lint: $(INSTALLED)
 validate: $(INSTALLED_VALIDATION)
 	$(BIN)/pytest -m validation tests
 
-benchmark: $(INSTALLED)
+benchmark: system-tests $(INSTALLED)
 	@for script in $(filter-out %/bench_peers.py,$(wildcard tests/benchmarks/bench_*.py)); do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 peers: $(INSTALLED_VALIDATION)

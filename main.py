@@ -1,22 +1,26 @@
 """The one entry of Blazer Studio: no arguments opens the studio, subcommands run the same work without windows.
 
 Exit codes: 0 done, 2 bad input (one message says what to change), 3 a fault of the program, 130 interrupted.
-Only click is imported here; everything else where it is used, so that --help answers at once.
+Only click is imported here, and what needs the standard library alone; everything else where it is used, so that
+--help answers at once.
 """
 
 from __future__ import annotations
 
 import math
 import os
+import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 try:
     import click
 
-    from studio.system import message, missing_needs, missing_python_package
+    from studio.streams import finish, print_json, streams
+    from studio.system import message, missing_needs, missing_python_package, why_not_in_this_folder
 except KeyboardInterrupt:
     sys.exit(130)
 except ModuleNotFoundError as missing:
@@ -27,6 +31,7 @@ except ModuleNotFoundError as missing:
 
 VERSION = "0.1.0"
 BAD_INPUT, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 3, 130, 141
+NEEDS_LESS = "fewer pixels (--scale, where a command has it) or smaller meshes, textures and images need less"
 ISSUE_HINT = "this is a fault of Blazer Studio, please report it; --debug shows where it happened"
 
 
@@ -49,69 +54,80 @@ class Commands(click.Group):
             args = ["open", *args]
         return super().resolve_command(context, args)
 
+    def main(self, args: Sequence[str] | None = None, *given: Any, **extra: Any) -> Any:
+        """Ends the program, by SystemExit. What is wrong with the options is told before they are known."""
+        words = list(sys.argv[1:] if args is None else args)
+        asked = [word.split("=")[0] for word in (words[: words.index("--")] if "--" in words else words)]
+        with streams("--json" in asked):
+            try:
+                ended = super().main(args, *given, **{**extra, "standalone_mode": False})
+                if isinstance(ended, BaseException):
+                    raise ended
+                code: Any = ended if isinstance(ended, int) else 0
+                finish(code)
+            except SystemExit as ended:  # click's end of shell completion, and of help that nobody reads
+                code = BROKEN_PIPE if ended.code == 1 else ended.code
+            except BaseException as error:
+                if args is None:
+                    signal.signal(signal.SIGINT, signal.SIG_IGN)  # once is enough
+                code = _report_error(error, "--debug" in asked, "--json" in asked)
+        if args is None:  # only threads are waited for from now on, and a second Ctrl-C ends that without a word
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+        sys.exit(code)
+
     def invoke(self, context: click.Context) -> Any:
+        """Returns what ended a command: click has its own mind about some exceptions."""
         try:
-            result = super().invoke(context)
-            sys.stdout.flush()
-            return result
+            return super().invoke(context)
         except (click.ClickException, click.exceptions.Exit):
             raise
         except BaseException as error:
-            context.exit(_report_error(error, context))
+            return error
 
 
-def _report_error(error: BaseException, context: click.Context) -> int:
+def _report_error(error: BaseException, debug: bool, as_json: bool) -> int:
     """Say what happened, on standard error and, where asked for, as JSON; return the exit code."""
     from render.errors import Cancelled, InputError
 
-    options = context.find_root().meta
     details: dict[str, Any] = {}
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the interpreter complains when it closes
         return BROKEN_PIPE
     if isinstance(error, (KeyboardInterrupt, Cancelled, click.Abort)):
         kept = f"; {error}" if isinstance(error, Cancelled) and str(error) else ""
         code, text = INTERRUPTED, f"interrupted; no file was left half-written{kept}"
+    elif isinstance(error, click.ClickException):
+        code, text = BAD_INPUT, error.format_message()
+        context = getattr(error, "ctx", None)
+        if context is not None:
+            text = f"{text.rstrip('.')}; see {context.command_path} --help"
     elif isinstance(error, InputError):
         code, text = BAD_INPUT, str(error)
         details = {name: getattr(error, name) for name in ("what", "where", "found", "allowed", "cure")}
     elif isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith(("render", "analysis", "studio")):
         code, text = BAD_INPUT, missing_python_package(error.name)
     elif isinstance(error, MemoryError):
-        code, text = BAD_INPUT, "not enough memory; a smaller --scale needs less"
+        code, text = BAD_INPUT, f"not enough memory{f' ({error})' if str(error) else ''}; {NEEDS_LESS}"
     elif isinstance(error, OSError):
         code, text = BAD_INPUT, f"{error.filename or 'the system refused'}: {error.strerror or error}"
     else:
         code, text = INTERNAL_ERROR, f"internal error: {type(error).__name__}: {error}; {ISSUE_HINT}"
-    if options.get("debug"):
+    if debug:
         import traceback
 
         traceback.print_exception(error)
-    click.echo(_printable(f"error: {text}"), err=True)
-    if options.get("as_json"):
-        from studio.console import print_json
-
-        print_json({"ok": False, "exit_code": code, "error": {"message": text, **details}})
+    print(f"error: {text}", file=sys.stderr)
+    if as_json:
+        with suppress(OSError):
+            print_json({"ok": False, "exit_code": code, "error": {"message": text, **details}})
     return code
-
-
-def _printable(text: str) -> str:
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
-
-
-def _remember(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
-    context.find_root().meta[parameter.name or ""] = value
-    return value
 
 
 def common(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options that every command has."""
     for option in (
-        click.option("--debug", is_flag=True, expose_value=False, callback=_remember, help="Show tracebacks."),
+        click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks."),
         click.option("--quiet", "-q", is_flag=True, help="No progress."),
-        click.option(
-            "--json", "as_json", is_flag=True, callback=_remember, help="Print the result as one JSON object."
-        ),
+        click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object."),
     ):
         command = option(command)
     return command
@@ -343,11 +359,11 @@ def new(template: str | None, folder: Path | None, **options: Any) -> None:
 
 def _require_system() -> None:
     """Before heavy imports: name the system libraries that are missing, and the command that brings them."""
-    missing = missing_needs()
-    if missing:
+    missing, reason = missing_needs(), why_not_in_this_folder()
+    if missing or reason:
         from render.errors import InputError
 
-        raise InputError(f"the system lacks libraries\n{message(missing)}")
+        raise InputError(reason or f"the system lacks libraries\n{message(missing)}")
 
 
 if __name__ == "__main__":

@@ -7,13 +7,18 @@ update of the program it would go on with machine code of before.
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
 import re
 import shutil
 import sys
 import time
 from contextlib import suppress
+from functools import cache
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = ("render", "analysis")
@@ -21,6 +26,7 @@ KEPT = 2
 """Folders that stay in any case: the one in use and the one before."""
 UNUSED = 24 * 3600.0
 """s; older folders may still be in use by a program that was started before the change."""
+DISPATCHER = "numba.core.dispatcher"
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 CONSTANT = re.compile(rb"\b(?:[A-Z][A-Z0-9_]+|Flag)\b")
 
@@ -58,30 +64,75 @@ def cache_folder(root: Path = ROOT) -> Path:
 
 
 def keep_kernels(root: Path = ROOT) -> Path | None:
-    """Let numba keep machine code in the folder of the present source; folders long out of use go.
+    """Keep machine code, sealed, in the folder of the present source; folders long out of use go.
 
-    Returns the folder; None: NUMBA_CACHE_DIR names another, or none can be made, and numba decides.
+    Returns the folder, which need not be one that can be written; None: NUMBA_CACHE_DIR names another.
     """
+    _seal_caches()
     folder = cache_folder(root)
     given = os.environ.get("NUMBA_CACHE_DIR")
     if given and Path(given).parent != folder:  # one of ours comes from the program that started this one
         return None
     kept = folder / source_key(root)
-    try:
+    with suppress(OSError):
         kept.mkdir(parents=True, exist_ok=True)
         os.utime(kept)
-    except OSError:
-        return None
-    _remove_old(folder)
+        _remove_old(folder, kept)
     os.environ["NUMBA_CACHE_DIR"] = str(kept)
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = str(kept)
     return kept
 
 
-def _remove_old(folder: Path) -> None:
-    with suppress(OSError):
-        ages = sorted(((time.time() - other.stat().st_mtime, other) for other in folder.iterdir()), key=lambda p: p[0])
-        for age, other in ages[KEPT:]:
-            if age > UNUSED:
-                shutil.rmtree(other, ignore_errors=True)
+@cache
+def kept_in() -> str:
+    """The folder that is used as long as this program runs, its own or the one that NUMBA_CACHE_DIR names."""
+    return os.environ.get("NUMBA_CACHE_DIR") or str(cache_folder() / source_key())
+
+
+def _remove_old(folder: Path, kept: Path) -> None:
+    """Folders out of use, and what a kill left behind while a file was written."""
+    now = time.time()
+    ages = sorted(((now - other.stat().st_mtime, other) for other in folder.iterdir()), key=lambda p: p[0])
+    for age, other in ages[KEPT:]:
+        if age > UNUSED:
+            shutil.rmtree(other, ignore_errors=True)
+    for left in kept.glob("*/*.tmp.*"):
+        if now - left.stat().st_mtime > UNUSED:
+            left.unlink()
+
+
+def _seal_caches() -> None:
+    """From now on numba asks render.sealed_cache for the cache of a function; numba itself need not be there yet."""
+    if DISPATCHER in sys.modules:
+        _use_seals(sys.modules[DISPATCHER])
+    elif not any(isinstance(finder, _Dispatcher) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _Dispatcher())
+
+
+class _Dispatcher(MetaPathFinder):
+    """Finds numba's dispatcher as others do, and has it changed as soon as it is imported."""
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        if name != DISPATCHER:
+            return None
+        sys.meta_path.remove(self)
+        spec = importlib.util.find_spec(name)
+        if spec is not None and spec.loader is not None:
+            execute = spec.loader.exec_module
+
+            def execute_and_change(module: ModuleType) -> None:
+                execute(module)
+                _use_seals(module)
+
+            spec.loader.exec_module = execute_and_change  # type: ignore[method-assign]
+        return spec
+
+
+def _use_seals(dispatcher: ModuleType) -> None:
+    def sealed(kernel: object) -> object:
+        from render.sealed_cache import cache_of
+
+        return cache_of(kernel)
+
+    dispatcher.FunctionCache = sealed  # type: ignore[attr-defined]

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from render.errors import InputError
-from studio.console import print_json, print_plan, print_table, stage_progress
+from studio.console import print_plan, print_table, stage_progress
 from studio.project import Project, project_file
+from studio.streams import print_json
 from studio.templates import DESCRIPTIONS, new_project, template_folder
 
 if TYPE_CHECKING:

@@ -1,14 +1,19 @@
-"""What a person sees while a command runs: progress on standard error, results on standard output."""
+"""What a person sees while a command runs: progress on standard error, results on standard output.
+
+Names come from files, and files from strangers: nothing that is printed is taken as markup or reaches the terminal as
+a control character.
+"""
 
 from __future__ import annotations
 
-import json
 import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
+
+from studio.streams import clean, unescaped
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,23 +51,19 @@ def frame_of(done: float, frames: int) -> str:
     return f"frame {min(int(done * frames + 0.5) + 1, frames)} of {frames}"
 
 
-def print_json(result: dict[str, Any]) -> None:
-    """The machine-readable result, one JSON object, the only thing on standard output."""
-    sys.stdout.write(json.dumps(result, indent=2, allow_nan=False, default=str) + "\n")
-    sys.stdout.flush()
-
-
 def print_table(title: str, rows: Sequence[Sequence[str]], *, header: Sequence[str] = ()) -> None:
-    """A titled table; the first column names the row, numbers below a header are aligned to the right."""
+    """A titled table; the first column names the row, numbers below a header are aligned to the right and never cut."""
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", title_style="bold", show_header=bool(header), box=None)
+    table = Table(title=clean(title), title_justify="left", title_style="bold", show_header=bool(header), box=None)
     for i in range(max(map(len, rows), default=0)):
         justify: Any = "right" if header and i > 0 else "left"
         style = "dim" if i == 0 and not header else None
-        table.add_column(header[i] if header else "", style=style, justify=justify, no_wrap=i == 0)
+        table.add_column(
+            clean(header[i]) if header else "", style=style, justify=justify, no_wrap=(i == 0) != bool(header)
+        )
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(clean, row))
     _console(sys.stdout).print(table)
 
 
@@ -79,12 +80,12 @@ def _bars(note: Note, frames: int) -> Iterator[StageProgress]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     columns = (
-        TextColumn("{task.description:<34}"),
+        TextColumn("{task.description:<34}", markup=False),
         BarColumn(bar_width=30),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}", style="dim"),
+        TextColumn("{task.fields[note]}", style="dim", markup=False),
     )
     tasks: dict[str, Any] = {}
     shown: dict[str, float] = {}
@@ -92,14 +93,14 @@ def _bars(note: Note, frames: int) -> Iterator[StageProgress]:
 
         def report(stage: str, done: float) -> None:
             if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=1.0, note="")
+                tasks[stage] = bars.add_task(clean(stage), total=1.0, note="")
             elif done <= 0.0 and bars.tasks[tasks[stage]].finished:
                 bars.reset(tasks[stage])  # the same stage of the next frame
             now = time.monotonic()
             if done >= 1.0 or now - shown.get(stage, 0.0) >= REFRESH_SECONDS:
                 shown[stage] = now
                 told = frame_of(done, frames) if stage == FRAMES else stage
-                bars.update(tasks[stage], description=told, completed=done, note=note(stage))
+                bars.update(tasks[stage], description=told, completed=done, note=clean(note(stage)))
 
         yield report
 
@@ -125,4 +126,5 @@ def _lines(note: Note, frames: int) -> StageProgress:
 def _console(stream: Any) -> Console:
     from rich.console import Console
 
-    return Console(file=stream, highlight=False, width=None if stream.isatty() else PLAIN_WIDTH)
+    width = None if stream.isatty() else PLAIN_WIDTH
+    return Console(file=unescaped(stream), highlight=False, markup=False, emoji=False, width=width)

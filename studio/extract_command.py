@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from render.errors import InputError
-from studio.console import print_json, print_table, stage_progress
+from studio.console import print_table, stage_progress
+from studio.streams import print_json
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

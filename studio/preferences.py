@@ -1,22 +1,24 @@
 """What the desktop remembers from one start to the next: recent projects, theme, arrangement. Qt-free, one JSON file.
 
-Nothing here is worth a failure: a damaged file gives the defaults, a folder that cannot be written forgets.
+Nothing here is worth a failure: a damaged file is put aside, a folder that cannot be written forgets.
 """
 
 from __future__ import annotations
 
-import json
 import os
 from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticSerializationError
 
 from render.errors import InputError
-from render.files import atomic_write
+from render.files import atomic_write, read_bytes
+from studio.strict_json import parse_object
 
 RECENT = 10
+MOST_BYTES = 2**20
 APPLICATION = "blazer-studio"
 
 
@@ -25,7 +27,7 @@ class Preferences(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    recent: tuple[str, ...] = ()
+    recent: tuple[str, ...] = Field(default=(), max_length=RECENT)
     """Absolute paths, latest first."""
     theme: Literal["system", "dark", "light"] = "system"
     toured: bool = False
@@ -45,13 +47,20 @@ class PreferencesFile:
     def __init__(self, folder: Path | None = None) -> None:
         """folder: None for the one that the system keeps for it."""
         self.path = (folder or config_folder()) / "preferences.json"
-        self.values = _read(self.path)
+        self.trouble = ""
+        """What a person should know of how they were read."""
+        self.values = self._read()
 
     def change(self, **values: object) -> None:
-        """Set some values, and write the file."""
-        self.values = Preferences.model_validate({**dict(self.values), **values})
+        """Set some values, and write the file. Names that are no text, as Linux allows for files, are not kept."""
+        changed = Preferences.model_validate({**dict(self.values), **values})
+        try:
+            text = changed.model_dump_json(indent=2) + "\n"
+        except PydanticSerializationError:
+            return
+        self.values = changed
         with suppress(InputError, OSError), atomic_write(self.path) as temporary:
-            temporary.write_text(self.values.model_dump_json(indent=2) + "\n", encoding="utf-8")
+            temporary.write_text(text, encoding="utf-8")
 
     def add_recent(self, path: Path) -> None:
         """Put a project first in the list."""
@@ -62,11 +71,25 @@ class PreferencesFile:
     def forget_recent(self, path: Path | str) -> None:
         self.change(recent=tuple(entry for entry in self.values.recent if entry != str(path)))
 
-
-def _read(path: Path) -> Preferences:
-    try:
-        return Preferences.model_validate(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, ValidationError):
+    def _read(self) -> Preferences:
+        if not os.path.lexists(self.path):
+            return Preferences()
+        try:
+            text = read_bytes(self.path, MOST_BYTES, "preferences file").decode("utf-8")
+            return Preferences.model_validate(parse_object(text, str(self.path), "preferences file"))
+        except InputError as error:
+            reason = error.what
+        except UnicodeDecodeError:
+            reason = "the preferences file is not UTF-8 text"
+        except ValidationError as error:
+            first = error.errors()[0]
+            reason = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+        aside = self.path.with_suffix(".damaged.json")
+        try:
+            os.replace(self.path, aside)
+            self.trouble = f"Your preferences could not be read and start anew ({reason}); the file is kept as {aside}"
+        except OSError:
+            self.trouble = f"Your preferences could not be read and start anew ({reason}): {self.path}"
         return Preferences()
 
 

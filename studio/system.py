@@ -15,6 +15,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PYTHON_NEEDED = (3, 11)
 TESTS = "--tests"
 """Argument of this file: check what the tests need as well."""
@@ -82,6 +83,15 @@ def missing_desktop_needs() -> list[Need]:
     if not sys.platform.startswith("linux"):
         return []
     return [need for need in DESKTOP_LIBRARIES if not _loads(need.library)]
+
+
+def why_not_in_this_folder(folder: str = ROOT) -> str | None:
+    """The reason why the program cannot work where it is, or None: the compiler takes no other names."""
+    try:
+        folder.encode("utf-8")
+    except UnicodeEncodeError:
+        return f"the program's folder has a name that is not UTF-8, rename or move it: {folder}"
+    return None
 
 
 def apt_command(packages: list[str]) -> str:

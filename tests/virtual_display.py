@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from studio.system import VIRTUAL_DISPLAY, message
 
 SIZE = (1920, 1200)
 
@@ -15,6 +22,8 @@ def display() -> Iterator[None]:
     if os.environ.get("DISPLAY"):
         yield
         return
+    if not shutil.which("Xvfb"):
+        sys.exit(f"no display, and none can be made\n{message([VIRTUAL_DISPLAY])}")
     from pyvirtualdisplay import Display
 
     made = Display(visible=False, size=SIZE, color_depth=24)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from studio.display import INSTEAD, why_no_display
 from studio.qt.quick_start import no_collection, plain_imports
-from studio.system import message, missing_desktop_needs, missing_needs
+from studio.system import message, missing_desktop_needs, missing_needs, why_not_in_this_folder
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -29,6 +29,9 @@ def why_not() -> str | None:
     missing = [*missing_needs(), *missing_desktop_needs()]
     if missing:
         return f"the system lacks libraries\n{message(missing)}"
+    reason = why_not_in_this_folder()
+    if reason is not None:
+        return reason
     reason = why_no_display()
     return None if reason is None else f"{reason}; {INSTEAD}"
 
@@ -115,4 +118,6 @@ def start(path: Path | None) -> MainWindow:
         QTimer.singleShot(FIRST_LOOK_MS, window, window.render_small)
         if not preferences.values.toured:
             window.start_tour()
+    if preferences.trouble:
+        session.message.emit("warning", preferences.trouble)
     return window

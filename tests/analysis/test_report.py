@@ -266,7 +266,7 @@ def test_remarks_name_what_is_wrong():
     narrow = dataclasses.replace(first.line, width=0.3 * np.ones_like(first.line.width))
     assert "narrower" in said(dataclasses.replace(first, line=narrow))
     lost = extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 60, np.nan, noise))
-    assert remarks(total([lost]))[0].startswith("Only 40.0% of the line was found")
+    assert said(lost).startswith("Only 40.0% of the line was found")
 
 
 def test_a_report_at_another_image_scale_says_at_its_head_that_it_is_not_the_scanners():

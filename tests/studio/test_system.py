@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -99,3 +100,29 @@ def test_without_python_packages_the_entry_names_the_way_to_set_up() -> None:
     done = subprocess.run([sys.executable, "-S", str(ROOT / "main.py"), "--help"], capture_output=True, text=True)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr and "make run" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="virtual displays of X11")
+def test_a_benchmark_without_a_display_names_what_would_make_one() -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"} | {"PATH": ""}
+    script = ROOT / "tests" / "benchmarks" / "bench_start.py"
+    done = subprocess.run([sys.executable, str(script), "1"], env=environment, capture_output=True, text=True)
+    assert done.returncode == 1 and "xvfb" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_what_opens_windows_for_make_has_its_libraries_looked_for_first() -> None:
+    rules = (ROOT / "Makefile").read_text()
+    assert all(f"\n{target}: system-tests " in rules for target in ("test", "benchmark"))
+
+
+def test_a_program_in_a_folder_whose_name_is_not_text_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import main
+
+    reason = system.why_not_in_this_folder("/opt/\udcff/blazer")
+    assert reason is not None and "UTF-8" in reason and system.why_not_in_this_folder() is None
+    monkeypatch.setattr(main, "why_not_in_this_folder", lambda: reason)
+    with pytest.raises(SystemExit, match="2"):
+        main.cli(["inspect"])
+    assert "\\udcff/blazer" in capsys.readouterr().err

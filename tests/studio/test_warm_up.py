@@ -7,7 +7,6 @@ import os
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -100,7 +99,7 @@ def slow_step(monkeypatch):
 
     def step(cancelled):
         runs.append(1)
-        go.wait(20.0)
+        go.wait(180.0)
 
     monkeypatch.setitem(warm_up.STEPS, "slow", step)
     yield go, runs
@@ -113,12 +112,12 @@ def test_who_waits_is_told_and_cancelled_at_once_and_a_step_runs_once(slow_step)
     told, asked = [], []
 
     def cancelled():
-        asked.append(time.perf_counter())
+        asked.append(1)
         return len(asked) > 3
 
     with pytest.raises(Cancelled):
         warm_up.warm_up(("slow",), lambda stage, done: told.append(stage), cancelled)
-    assert time.perf_counter() - asked[-1] < 0.1
+    assert len(asked) == 4 and not warm_up._ends["slow"].done()
     assert set(told) == {warm_up.PREPARING} and "compiled" in warm_up.PREPARING
     go.set()
     warm_up.warm_up(("slow",), lambda stage, done: None, lambda: False)

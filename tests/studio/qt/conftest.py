@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from pytestqt.qtbot import QtBot
@@ -14,15 +14,15 @@ from pytestqt.qtbot import QtBot
 from studio.display import why_no_display
 
 if TYPE_CHECKING:
-    from PySide6.QtWidgets import QApplication
+    from PySide6.QtWidgets import QApplication, QWidget
 
     from studio.qt.window import MainWindow
 
 os.environ.setdefault("QT_API", "pyside6")
 os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
 HERE = Path(__file__).parent
-PATIENCE_MS = 30_000
-"""A wait ends when its condition holds; the machine may be shared, and kernels may have to be compiled."""
+PATIENCE_MS = 180_000
+"""A wait ends when its condition holds; the machine may be shared by many, and how long it takes decides nothing."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -35,8 +35,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 class PatientBot(QtBot):
-    def waitUntil(self, callback: Callable[[], bool | None], *, timeout: int = PATIENCE_MS) -> None:
-        super().waitUntil(callback, timeout=timeout)
+    """Every wait for something to happen is this patient, whatever a test says."""
+
+    def waitUntil(self, callback: Callable[[], bool | None], *, timeout: int = 0) -> None:
+        super().waitUntil(callback, timeout=max(timeout, PATIENCE_MS))
+
+    def waitSignal(self, signal: Any, *, timeout: int = 0, **options: Any) -> Any:
+        return super().waitSignal(signal, timeout=max(timeout, PATIENCE_MS), **options)
+
+    def waitSignals(self, signals: list[Any], *, timeout: int = 0, **options: Any) -> Any:
+        return super().waitSignals(signals, timeout=max(timeout, PATIENCE_MS), **options)
+
+    def waitActive(self, widget: QWidget, *, timeout: int = 0) -> Any:
+        return super().waitActive(widget, timeout=max(timeout, PATIENCE_MS))
+
+    def waitExposed(self, widget: QWidget, *, timeout: int = 0) -> Any:
+        return super().waitExposed(widget, timeout=max(timeout, PATIENCE_MS))
 
 
 @pytest.fixture
@@ -67,7 +81,7 @@ def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
     yield
     left = [thread for thread in set(threading.enumerate()) - before if thread.name.startswith("job ")]
     for thread in left:
-        thread.join(2.0)
+        thread.join(PATIENCE_MS / 1000)
     assert not [thread.name for thread in left if thread.is_alive()]
 
 

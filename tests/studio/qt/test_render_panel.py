@@ -90,10 +90,14 @@ def test_pause_holds_the_render_and_go_on_continues_it(qtbot, panel):
     job = panel.runner.job()
     press(qtbot, panel.pause_button)
     assert job.state is State.PAUSED and panel.pause_button.text() == "Go on"
-    qtbot.wait(150)  # chunks under way end
+
+    def stands() -> bool:
+        before = panel.session.shown.world.rays.rays
+        qtbot.wait(150)
+        return panel.session.shown.world.rays.rays == before
+
+    qtbot.waitUntil(stands)  # when chunks under way have ended
     rays = panel.session.shown.world.rays.rays
-    qtbot.wait(150)
-    assert panel.session.shown.world.rays.rays == rays
     press(qtbot, panel.pause_button)
     qtbot.waitUntil(lambda: panel.session.shown.world.rays.rays > rays)
     press(qtbot, panel.cancel_button)

@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 
 from studio.autosave import Autosave
 from studio.document import Document
-from studio.preferences import Preferences, PreferencesFile
+from studio.preferences import PreferencesFile
 from studio.project import Project
 from studio.qt import theme
 from studio.qt.actions import COMMANDS, Command
@@ -321,10 +321,6 @@ class TestBadInput:
 
 
 class TestPreferences:
-    def test_a_damaged_file_gives_the_defaults(self, tmp_path: Path) -> None:
-        (tmp_path / "preferences.json").write_text('{"theme": "purple"}')
-        assert PreferencesFile(tmp_path).values == Preferences()
-
     def test_the_latest_project_is_first_and_ten_are_kept(self, tmp_path: Path) -> None:
         preferences = PreferencesFile(tmp_path)
         for i in [*range(12), 5]:

@@ -172,6 +172,7 @@ def test_export_report_points_and_image(
     window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     render(window, qtbot)
+    monkeypatch.setattr("analysis.report.picture.TIME_LIMIT", 180.0)
     for key, name in (("export_html", "report.html"), ("export_csv", "points.csv"), ("export_png", "image.png")):
         path = tmp_path / "out" / name
         monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, path=path, **__: (str(path), ""))
