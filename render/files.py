@@ -65,12 +65,13 @@ def inside(root: Path, relative: str, where: str) -> Path:
     return resolved
 
 
-def read_bytes(path: Path, most: int, what: str = "file") -> bytes:
+def read_bytes(path: Path, most: int, what: str = "file", where: str | None = None) -> bytes:
     """The bytes of a regular file of at most `most` bytes; its size is looked at before anything is read.
 
+    where: the field that names it, for the message; without one, its path.
     InputError: missing, a folder, a device or a pipe, larger than that, or not readable.
     """
-    where = str(path)
+    where = str(path) if where is None else where
     try:
         # a pipe that nobody writes to would block the opening itself
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -92,17 +93,18 @@ def read_bytes(path: Path, most: int, what: str = "file") -> bytes:
     return data
 
 
-def check_regular(path: Path, most: int, what: str = "file") -> None:
+def check_regular(path: Path, most: int, what: str = "file", where: str | None = None) -> None:
     """InputError: `path` is no regular file of at most `most` bytes. For readers that open the file themselves."""
+    where = str(path) if where is None else where
     try:
-        _check_regular(os.stat(path), most, what, str(path))
+        _check_regular(os.stat(path), most, what, where)
     except InputError:
         raise
     except FileNotFoundError:
-        raise InputError(f"there is no such {what}", where=str(path)) from None
+        raise InputError(f"there is no such {what}", where=where) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"the {what} cannot be read", where=str(path), found=reason) from None
+        raise InputError(f"the {what} cannot be read", where=where, found=reason) from None
 
 
 def _check_regular(status: os.stat_result, most: int, what: str, where: str) -> None:
