@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from render.closed import closed_outward
 from render.errors import InputError
-from render.files import inside, sha256
+from render.files import check_regular, inside, sha256
 from render.material import Blend, BumpMap, FromMesh, Glass, GreyTexture, NormalMap, Subsurface, Texture
 from render.mesh import Mesh
 from render.mesh_colour import merged_look, part_look
-from render.mesh_reader import EXTENSIONS, check_triangle_count, read_parts
+from render.mesh_headers import MAX_FILE_BYTES
+from render.mesh_reader import EXTENSIONS, SideFiles, read_parts
 from render.primitives import Primitive, primitive_mesh
 from render.scene import SceneObject
 from render.shape import UNITS, MeshFile, Sphere, WeldTee
@@ -24,7 +25,6 @@ from render.texture import load_texture
 from render.vertex_normals import corner_normals
 from render.weld_tee import weld_tee_mesh
 
-MAX_FILE_BYTES = 4 * 2**30
 MAX_EXTENT = 1e4
 """m; farther from its origin a mesh keeps no micrometres in float32 rays."""
 LARGE_EXTENT = 20.0
@@ -112,22 +112,15 @@ def _texture(path: Path, srgb: bool, scale: float, field: str, version: object) 
 def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str, filled: bool) -> Mesh:
     path = inside(root, shape.path, f"{where}: shape.path")
     where = f"{where}: {shape.path}"
-    cure = "put the mesh into the project folder, or correct shape.path"
-    try:
-        state = path.stat()
-    except OSError as error:
-        raise InputError("the mesh file cannot be read", where=where, found=error.strerror, cure=cure) from error
-    if not path.is_file():
-        found = "a folder" if path.is_dir() else "a device"
-        raise InputError("the mesh is not a file", where=where, found=found, cure=cure)
     if path.suffix[1:].lower() not in EXTENSIONS:
         allowed = ", ".join(f".{name}" for name in EXTENSIONS)
         found = path.suffix or path.name
         raise InputError("the mesh file's kind is not known", where=where, found=found, allowed=allowed)
-    if not 0 < state.st_size <= MAX_FILE_BYTES:
-        what = "the mesh file is empty" if state.st_size == 0 else "the mesh file is too large"
-        found = f"{state.st_size} bytes"
-        raise InputError(what, where=where, found=found, allowed=f"1 to {MAX_FILE_BYTES} bytes", cure="export it again")
+    if not path.exists():
+        cure = "put the mesh into the project folder, or correct shape.path"
+        raise InputError("there is no such mesh file", where=where, cure=cure)
+    check_regular(path, MAX_FILE_BYTES, "mesh file", where)
+    state = path.stat()
     material = item.material.base if isinstance(item.material, Blend) else item.material
     colours = isinstance(material.albedo, FromMesh)
     factor = UNITS[shape.unit] * item.scale
@@ -155,16 +148,11 @@ def _read(
     """A checked mesh, its vertices multiplied by factor; `version` changes with the file."""
     if expected_sha256 is not None and sha256(path) != expected_sha256:
         warnings.warn(f"{where}: the file has changed since the project was saved", stacklevel=2)
-    parts = read_parts(path, root, where, colours=colours)
-    if not parts:
-        raise InputError(
-            "the mesh has no triangles",
-            where=where,
-            found="no faces (a point cloud?)",
-            cure="mesh the points first, or export the faces too",
-        )
+    files = SideFiles(path, root, where)
+    parts = read_parts(path, where, files, colours=colours)
+    if colours and files.refused:
+        raise files.refused[0]
     counts = [len(part.triangles) for part in parts]
-    check_triangle_count(sum(counts), where)
     vertices = np.concatenate([part.vertices for part in parts]) * factor
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     triangles = np.concatenate([part.triangles + offset for part, offset in zip(parts, offsets, strict=True)])
