@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import re
+import struct
 import subprocess
 import sys
 from dataclasses import fields, replace
@@ -18,6 +21,7 @@ import pytest
 from render.camera import Camera
 from render.develop import Image, develop
 from render.errors import InputError
+from render.exr import decode_exr
 from render.frame import Frame, LaserCurve, Truth
 from render.frame_files import read_frame, write_frame
 from render.laser import LineLaser
@@ -26,7 +30,7 @@ from render.pose import Pose
 from render.scene import Rig, Scene, SceneObject
 from render.sensor import Sensor, SpectralCurve
 from render.shape import Box
-from render.sidecar import safe_name
+from render.sidecar import safe_name, sealed
 
 WIDTH, HEIGHT = 61, 40
 NAMES = ("blue", "a.b/c\\d ü%", "x" * 100, "日" * 100)
@@ -229,9 +233,64 @@ def mutilations() -> dict[str, Any]:
 @pytest.mark.parametrize("name", mutilations())
 def test_a_wrong_description_is_refused_by_name(written: list[Path], name: str) -> None:
     record = mutilations()[name](json.loads(written[2].read_text(encoding="utf-8")))
+    with contextlib.suppress(AttributeError, TypeError):
+        record = sealed(record)  # as if it had been written so
     written[2].write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(InputError, match=r"frame_0003\.json"):
         read_frame(written[2])
+
+
+@pytest.mark.parametrize("change", ["truth", "pose", "step", "no seal", "NaN"])
+def test_a_description_changed_since_it_was_written_is_refused(written: list[Path], change: str) -> None:
+    record = json.loads(written[2].read_text(encoding="utf-8"))
+    written[2].write_text(json.dumps(record, indent=3), encoding="utf-8")
+    assert same_bits(read_frame(written[2]), frame_of(scene_of())), "blanks are no change"
+    match change:
+        case "truth":
+            record["lasers"][1]["curve"]["depth_z"][0] += 0.001
+        case "pose":
+            record["camera"]["T_world_camera"][0][3] += 0.1
+        case "step":
+            record["step"] += 1
+        case "no seal":
+            del record["record_sha256"]
+        case "NaN":
+            record["lasers"][1]["curve"]["position"][0] = float("nan")
+    written[2].write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(InputError, match=r"frame_0003\.json: the frame's description was changed.*render the"):
+        read_frame(written[0])
+
+
+def test_no_message_about_a_damaged_frame_is_in_a_librarys_words(written: list[Path]) -> None:
+    random = np.random.default_rng(17)
+    words = re.compile(r"Error\b|Exception|NoneType|numpy|shape |dtype|codec|\(\)|argument|python_buffer|part index")
+    for path in (written[0], written[2]):
+        whole = path.read_bytes()
+        for _ in range(60):
+            content = bytearray(whole)
+            for place in random.integers(0, len(content), random.integers(1, 4)):
+                content[place] = random.integers(0, 256)
+            content = content if random.random() < 0.7 else content[: random.integers(0, len(content))]
+            path.write_bytes(content)
+            if bytes(content) == whole:
+                continue
+            try:
+                decode_exr(bytes(content), str(path))  # as for a photograph, which has no checksum
+            except InputError as error:
+                assert str(path) in str(error) and not words.search(str(error)), error
+            try:
+                read_frame(path)
+            except InputError as error:
+                assert "frame_0003" in str(error) and not words.search(str(error)), error
+        path.write_bytes(whole)
+
+
+def test_an_exr_of_many_pixels_or_parts_is_refused_before_they_are_made(written: list[Path]) -> None:
+    content = bytearray(written[0].read_bytes())
+    at = content.index(b"dataWindow\0box2i\0") + 21
+    struct.pack_into("<4i", content, at, 0, 0, 2**20, 2**20)
+    with pytest.raises(InputError, match=r"too big, or damaged; found 1048577 x 1048577 pixels"):
+        decode_exr(bytes(content), "a.exr")
 
 
 def test_the_sidecar_of_another_frame_is_refused(tmp_path: Path, written: list[Path]) -> None:
