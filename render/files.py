@@ -27,6 +27,8 @@ def atomic_write(path: Path | str) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
             raise IsADirectoryError(None, "a folder of that name exists")
+        if target.exists() and not target.is_file():  # replacing it would take a device from the system
+            raise OSError(None, "it is a device or a pipe, not a regular file")
         temporary.touch(exist_ok=False)
         yield temporary
         with open(temporary, "r+b") as written:
@@ -109,7 +111,7 @@ def check_regular(path: Path, most: int, what: str = "file", where: str | None =
 
 def _check_regular(status: os.stat_result, most: int, what: str, where: str) -> None:
     if stat.S_ISDIR(status.st_mode):
-        raise InputError(f"a folder, not a {what}", where=where)
+        raise InputError(f"the {what} is a folder", where=where)
     if not stat.S_ISREG(status.st_mode):
         raise InputError(f"the {what} is not a regular file", where=where, found="a device or a pipe")
     if status.st_size > most:
