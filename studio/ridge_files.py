@@ -17,7 +17,8 @@ from analysis.line.ridges import find_ridges
 from analysis.line.settings import ExtractionSettings
 from analysis.line.subtract import subtract_off
 from render.files import atomic_write
-from studio.photographs import check_light, load_photograph, naming, table_path
+from studio.image_files import load_photograph
+from studio.photographs import check_light, naming, table_path
 
 COLUMNS = (
     "line",

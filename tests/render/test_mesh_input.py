@@ -55,7 +55,7 @@ def test_a_file_that_is_absent_a_folder_or_empty_is_told(tmp_path: Path) -> None
     text = message(tmp_path, "meshes/part.ply")
     assert "there is no such mesh file" in text and "put the mesh into the project folder" in text
     (tmp_path / "folder.ply").mkdir()
-    assert "folder.ply: a folder, not a mesh file" in message(tmp_path, "folder.ply")
+    assert "folder.ply: the mesh file is a folder" in message(tmp_path, "folder.ply")
     assert "the mesh file is empty" in message_of_text(tmp_path, "a.stl", b"")
     os.mkfifo(tmp_path / "pipe.ply")
     assert "not a regular file; found a device or a pipe" in message(tmp_path, "pipe.ply")

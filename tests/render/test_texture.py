@@ -72,7 +72,7 @@ def test_a_camera_s_orientation_tag_does_not_turn_a_texture(tmp_path: Path) -> N
 def test_a_texture_that_is_absent_or_a_folder_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"object 'part': material\.albedo\.path: the texture is not there.*rust\.png"):
         load(tmp_path / "rust.png")
-    with pytest.raises(InputError, match="a folder, not a texture"):
+    with pytest.raises(InputError, match="the texture is a folder"):
         load(tmp_path)
 
 

@@ -235,7 +235,7 @@ class TestMeshImport:
         import_mesh(file, tmp_path / "project", 0.5)
         assert not list((tmp_path / "project").rglob("secret*"))
 
-    @pytest.mark.parametrize("library", ["/dev/zero", "pipe.mtl", "link.mtl", "../outside.mtl", "folder.mtl"])
+    @pytest.mark.parametrize("library", ["/dev/full", "pipe.mtl", "link.mtl", "../outside.mtl", "folder.mtl"])
     def test_a_material_library_is_read_by_the_projects_own_rules(self, tmp_path: Path, library: str) -> None:
         file = self.mesh(tmp_path / "in" / "part.obj")
         (tmp_path / "outside.mtl").write_text("newmtl a\nmap_Kd wood.png\n")
