@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -16,12 +17,12 @@ from render.files import check_regular, inside, sha256
 from render.material import Blend, BumpMap, FromMesh, Glass, GreyTexture, NormalMap, Subsurface, Texture
 from render.mesh import Mesh
 from render.mesh_colour import merged_look, part_look
-from render.mesh_headers import MAX_FILE_BYTES
+from render.mesh_headers import MAX_FILE_BYTES, MAX_TRIANGLES, check_together
 from render.mesh_reader import EXTENSIONS, SideFiles, read_parts
-from render.primitives import Primitive, primitive_mesh
+from render.primitives import Primitive, primitive_mesh, triangle_count
 from render.scene import SceneObject
 from render.shape import UNITS, MeshFile, Sphere, WeldTee
-from render.texture import load_texture
+from render.texture import MAX_PIXELS, load_texture
 from render.vertex_normals import corner_normals
 from render.weld_tee import weld_tee_mesh
 
@@ -65,6 +66,29 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
     return dataclasses.replace(mesh, texture=object_texture(albedo, Path(root), field))
 
 
+def load_meshes(items: Sequence[SceneObject], root: Path) -> list[Mesh]:
+    """The meshes of a scene's visible objects, as `load_mesh`; what they hold together is bounded as they come.
+
+    InputError: as `load_mesh`; more than MAX_TRIANGLES or, in their textures, MAX_PIXELS in all objects together.
+    """
+    meshes: list[Mesh] = []
+    triangles, textures = 0, dict[int, int]()
+    for item in items:
+        where = f"object {item.name!r}"
+        if isinstance(item.shape, WeldTee):
+            check_together("triangles", triangles + item.shape.triangles, MAX_TRIANGLES, where)
+        elif not isinstance(item.shape, MeshFile):
+            check_together("triangles", triangles + triangle_count(item.shape), MAX_TRIANGLES, where)
+        mesh = load_mesh(item, root)
+        triangles += len(mesh.triangles)
+        check_together("triangles", triangles, MAX_TRIANGLES, where)
+        if mesh.texture is not None:
+            textures[id(mesh.texture)] = mesh.texture.size // 3
+            check_together("pixels of textures", sum(textures.values()), MAX_PIXELS, where)
+        meshes.append(mesh)
+    return meshes
+
+
 def object_texture(texture: Texture | GreyTexture | NormalMap | BumpMap, root: Path, field: str) -> NDArray[np.float32]:
     """(h, w, 3) linear image of a texture below root; kept until the file changes. InputError: absent or bad."""
     path = inside(root, texture.path, field)
@@ -72,7 +96,11 @@ def object_texture(texture: Texture | GreyTexture | NormalMap | BumpMap, root: P
     version = None if state is None else (state.st_mtime_ns, state.st_size)
     srgb = isinstance(texture, Texture) and texture.srgb
     scale = texture.scale if isinstance(texture, Texture | GreyTexture) else 1.0
-    return _texture(path, srgb, scale, field, version)
+    try:
+        return _texture(path, srgb, scale, version)
+    except InputError as error:  # kept by what it is read from, so that all objects share it, and not by the field
+        where = f"{field}: {path.name}"
+        raise InputError(error.what, where=where, found=error.found, allowed=error.allowed, cure=error.cure) from None
 
 
 def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
@@ -104,9 +132,9 @@ def _made(shape: Primitive | WeldTee, crease_angle: float, filled: str) -> Mesh:
 
 
 @lru_cache(maxsize=8)
-def _texture(path: Path, srgb: bool, scale: float, field: str, version: object) -> NDArray[np.float32]:
+def _texture(path: Path, srgb: bool, scale: float, version: object) -> NDArray[np.float32]:
     """`version` changes with the file, so that an edited texture is read anew."""
-    return load_texture(path, srgb=srgb, scale=scale, where=field)
+    return load_texture(path, srgb=srgb, scale=scale, where=str(path))
 
 
 def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str, filled: bool) -> Mesh:

@@ -87,6 +87,18 @@ def check_triangle_count(count: int, where: str) -> None:
         )
 
 
+def check_together(what: str, count: int, most: int, where: str) -> None:
+    """InputError: with the object `where`, a scene holds more of something than it may."""
+    if count > most:
+        raise InputError(
+            f"the scene has too many {what}",
+            where=where,
+            found=f"{count} with the objects before it",
+            allowed=f"at most {most} in all visible objects together",
+            cure="make this one or those before it smaller, or hide some",
+        )
+
+
 def damaged(kind: str, where: str, found: object = None, allowed: str = "a whole, valid file") -> InputError:
     """The file does not keep to its format."""
     what = f"the file cannot be read as {kind.upper()}"

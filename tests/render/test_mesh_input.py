@@ -15,16 +15,20 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import render.material_atlas
 import render.mesh_files
 import render.mesh_headers
 import render.mesh_reader
+from render.camera import Camera
 from render.errors import InputError
 from render.files import sha256
-from render.material import FromMesh, Lambertian, Texture
+from render.material import Blend, BumpMap, FromMesh, Lambertian, Texture
 from render.mesh import Mesh
 from render.mesh_files import load_mesh
-from render.scene import SceneObject
-from render.shape import MeshFile, Sphere
+from render.primitives import primitive_mesh, triangle_count
+from render.scene import Rig, Scene, SceneObject
+from render.shape import Box, Cylinder, MeshFile, Plane, Sphere, StepBlock, VGroove
+from render.world import build_world
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 VERTICES = np.array([[0, 0, 0], [0.25, 0, 0], [0.25, 0.125, 0], [0, 0.125, 0], [0.125, 0.0625, 0.5]])
@@ -204,7 +208,7 @@ def test_a_texture_asks_for_uv(tmp_path: Path) -> None:
 
 def test_an_absent_texture_is_told_with_its_field(tmp_path: Path) -> None:
     item = SceneObject(name="ball", shape=Sphere(segments=8), material=Lambertian(albedo=Texture(path="wood.png")))
-    with pytest.raises(InputError, match=r"object 'ball': material\.albedo\.path: the texture is not there.*wood\.png"):
+    with pytest.raises(InputError, match=r"object 'ball': material\.albedo\.path: wood\.png: the texture is not there"):
         load_mesh(item, tmp_path)
     outside = Lambertian(albedo=Texture(path="../wood.png"))
     with pytest.raises(InputError, match=r"object 'ball': material\.albedo\.path: the path leaves the project"):
@@ -391,3 +395,54 @@ def test_nothing_of_a_damaged_file_reaches_the_terminal(tmp_path: Path, capfd: p
     message_of_text(tmp_path, "a.stl", example("stl_ascii", tmp_path).replace(b"vertex 0", b"vertex x", 1))
     message_of_text(tmp_path, "a.ply", example("ply", tmp_path)[:-3])
     assert capfd.readouterr() == ("", "")
+
+
+def scene_of(*items: SceneObject) -> Scene:
+    return Scene(rig=Rig(camera=Camera(width=4, height=4, fx=4, fy=4, cx=1.5, cy=1.5)), objects=items)
+
+
+def test_what_a_scene_holds_together_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[object] = []
+    original = render.mesh_files.primitive_mesh
+    monkeypatch.setattr(render.mesh_files, "primitive_mesh", lambda shape: made.append(shape) or original(shape))
+    monkeypatch.setattr(render.mesh_files, "MAX_TRIANGLES", 300)
+    balls = [SceneObject(name=f"ball {k}", shape=Sphere(segments=16, radius=0.1 + 0.01 * k)) for k in range(3)]
+    assert len(build_world(scene_of(*balls[:1]), tmp_path).triangles) == 2 * 16 * 7
+    with pytest.raises(
+        InputError, match=r"object 'ball 1': the scene has too many triangles; found 448.*at most 300 in"
+    ):
+        build_world(scene_of(*balls), tmp_path)
+    assert len(made) == 1, "the second is told before it is made"
+    hidden = [balls[0], *(ball.model_copy(update={"visible": False}) for ball in balls[1:])]
+    assert len(build_world(scene_of(*hidden), tmp_path).triangles) == 224
+
+
+def test_images_are_counted_once_however_many_objects_share_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from PIL import Image
+
+    for name in ("a", "b", "c"):
+        Image.fromarray(np.full((10, 10, 3), 99, dtype=np.uint8)).save(tmp_path / f"{name}.png")
+    monkeypatch.setattr(render.mesh_files, "MAX_PIXELS", 250)
+    monkeypatch.setattr(render.material_atlas, "MAX_PIXELS", 250)
+
+    def items(*names: str) -> list[SceneObject]:
+        looks = [Lambertian(albedo=Texture(path=f"{name}.png")) for name in names]
+        return [SceneObject(name=f"{k}", shape=Plane(), material=look) for k, look in enumerate(looks)]
+
+    world = build_world(scene_of(*items("a", "b", "a", "b", "a")), tmp_path)
+    assert len(world.textures) == 200 * 3
+    assert world.texture_shape.tolist() == [[0, 10, 10], [100, 10, 10]] * 2 + [[0, 10, 10]]
+    with pytest.raises(InputError, match=r"object '2': the scene has too many pixels of textures; found 300"):
+        build_world(scene_of(*items("a", "b", "c")), tmp_path)
+    bumps = Lambertian(albedo=Texture(path="a.png"), relief=BumpMap(path="b.png", height=1e-3))
+    masked = Blend(base=bumps, over=Lambertian(), mask=Texture(path="c.png", srgb=False))
+    with pytest.raises(InputError, match=r"object 'p': material\.mask: the scene has too many pixels of textures"):
+        build_world(scene_of(SceneObject(name="p", shape=Plane(), material=masked)), tmp_path)
+
+
+def test_the_number_of_a_primitives_triangles_is_known_before_it_is_made() -> None:
+    balls = Sphere(segments=8), Sphere(segments=33)
+    for shape in (Plane(), Box(), *balls, Cylinder(segments=7), StepBlock(steps=3), StepBlock(steps=1), VGroove()):
+        assert triangle_count(shape) == len(primitive_mesh(shape).triangles), shape
