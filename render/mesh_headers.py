@@ -15,6 +15,7 @@ MAX_TEXT_BYTES = 2**28
 """Of OBJ, OFF, glTF and the text kinds of PLY and STL, which take some ten times their size to read."""
 MAX_TRIANGLES = 20_000_000
 MAX_VERTICES = 3 * MAX_TRIANGLES
+MAX_DEPTH = 64
 MAX_PARTS = 10_000
 """Nodes and materials of one file."""
 GLTF_EXTENSIONS = ("KHR_materials", "KHR_lights", "EXT_texture_webp")
@@ -56,7 +57,7 @@ def declared_faces(data: bytes, kind: str, where: str) -> int:
         case "off":
             return _off(data, where)
         case "obj":
-            check_text(data, where)
+            check_text(data, kind, where)
             faces = len(re.findall(rb"^[ \t]*f\s", data, re.MULTILINE))
             check_triangle_count(faces, where)
             return faces
@@ -65,8 +66,8 @@ def declared_faces(data: bytes, kind: str, where: str) -> int:
             return 0
 
 
-def check_text(data: bytes, where: str) -> None:
-    """InputError: a text file of more than MAX_TEXT_BYTES."""
+def check_text(data: bytes, kind: str, where: str) -> None:
+    """InputError: a text file of more than MAX_TEXT_BYTES, or that is not text."""
     if len(data) > MAX_TEXT_BYTES:
         cure = "export it as binary PLY or STL, or simplify it"
         allowed = f"at most {MAX_TEXT_BYTES} bytes of text"
@@ -137,7 +138,7 @@ def _stl(data: bytes, where: str) -> int:
         check_triangle_count(declared, where)
         return int(declared)
     if b"facet" in data[:65536].lower():
-        check_text(data, where)
+        check_text(data, "stl", where)
         faces = data.lower().count(b"endfacet")
         check_triangle_count(faces, where)
         return faces
@@ -187,7 +188,7 @@ def ply_header(data: bytes, where: str) -> tuple[bool, list[PlyElement], int]:
 def _ply(data: bytes, where: str) -> int:
     text, elements, start = ply_header(data, where)
     if text:
-        check_text(data, where)
+        check_text(data, "ply", where)
     rows = {element.name: element.rows for element in elements}
     check_triangle_count(rows.get("face", 0), where)
     _check_vertices(rows.get("vertex", 0), where)
@@ -201,7 +202,7 @@ def _ply(data: bytes, where: str) -> int:
 
 
 def _off(data: bytes, where: str) -> int:
-    check_text(data, where)
+    check_text(data, "off", where)
     match = re.search(rb"OFF(?:\s|#[^\n]*\n)*(\d+)\s+(\d+)", data[:65536])
     if match is None:
         raise damaged("off", where, "no counts", "OFF, and the numbers of vertices, faces and edges")
@@ -226,7 +227,7 @@ def gltf_header(data: bytes, kind: str, where: str) -> dict[str, Any]:
         text = data[20 : 20 + chunk]
     else:
         text = data
-    check_text(text, where)
+    check_text(text, kind, where)
     try:
         header = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -271,10 +272,26 @@ def _check_counts(header: dict[str, Any], where: str) -> None:
     shown = [node["mesh"] for node in nodes if "mesh" in node]
     check_triangle_count(sum(sizes[number] for number in shown) if shown else sum(sizes), where)
     parts = [len(mesh["primitives"]) for mesh in meshes]
+    _check_tree(nodes, where)
     found = max(len(nodes), sum(parts), sum(parts[number] for number in shown))
     if found > MAX_PARTS:
         allowed, cure = f"at most {MAX_PARTS}", "join the parts before exporting the mesh"
         raise InputError("the mesh has too many parts", where=where, found=found, allowed=allowed, cure=cure)
+
+
+def _check_tree(nodes: list[dict[str, Any]], where: str) -> None:
+    """InputError: nodes in a circle, or more than MAX_DEPTH levels, whose placing takes the square of their number."""
+    children = [node.get("children", ()) for node in nodes]
+    below = {child for each in children for child in each}
+    level, seen, depth = [k for k in range(len(nodes)) if k not in below], 0, 0
+    while level and depth <= MAX_DEPTH and seen <= len(nodes):
+        seen, depth = seen + len(level), depth + 1
+        level = [child for k in level for child in children[k]]
+    if seen != len(nodes):
+        found = f"more than {depth} levels" if depth > MAX_DEPTH else "a node that is in a circle or twice in it"
+        cure = "join the parts before exporting the mesh"
+        what, allowed = "the tree of nodes cannot be followed", f"at most {MAX_DEPTH} levels, each node once"
+        raise InputError(what, where=where, found=found, allowed=allowed, cure=cure)
 
 
 def _unsupported(header: dict[str, Any]) -> list[str]:

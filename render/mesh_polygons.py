@@ -9,13 +9,14 @@ import io
 import re
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from render.mesh_headers import EXPORT, PlyElement, damaged, ply_header
+from render.mesh_headers import EXPORT, PlyElement, bad_line, damaged, ply_header
 from render.polygons import ear_cut, fan, fan_covers
 
 Float = NDArray[np.float64]
@@ -48,51 +49,67 @@ def as_triangles(data: bytes, kind: str, where: str) -> bytes:
             return data
 
 
-def cut(vertices: Float, polygons: Sequence[Int], where: str) -> list[Int]:
-    """The triangles of each polygon, (n - 2, 3) numbers of its corners; polygons: (n,) vertices each, n of 3 or more.
+@dataclass(frozen=True)
+class Cut:
+    """Triangles of m polygons, polygon after polygon."""
 
-    InputError: one crosses itself.
+    owner: Int
+    """(t,) the polygon that each is of."""
+    corners: Int
+    """(t, 3) places in the flat list of all polygons' corners."""
+    plain: NDArray[np.bool_]
+    """(m,) whether they are the fan around the first corner."""
+
+
+def cut(vertices: Float, flat: Int, sizes: Int, where: str) -> Cut:
+    """Cut m polygons of sizes[k] corners, 3 or more; flat: the vertices of all of them, one after the other.
+
+    InputError: a vertex that does not exist, or a polygon that crosses itself.
     """
-    triangles: list[Int] = [np.empty((0, 3), dtype=np.int64)] * len(polygons)
-    sizes = np.array([len(polygon) for polygon in polygons], dtype=np.int64)
+    starts, first = np.cumsum(sizes) - sizes, np.cumsum(sizes - 2) - (sizes - 2)
+    owner = np.repeat(np.arange(len(sizes)), sizes - 2)
+    corners = np.empty((len(owner), 3), dtype=np.int64)
+    plain = np.ones(len(sizes), dtype=np.bool_)
     bent = 0
-    for size in np.unique(sizes):
+    for size in np.unique(sizes).tolist():
         members = np.flatnonzero(sizes == size)
-        for start in range(0, len(members), max(1, 2**18 // int(size))):  # in pieces, to bound the memory
-            some = members[start : start + max(1, 2**18 // int(size))]
-            points = vertices[np.stack([polygons[k] for k in some])]
+        step = max(1, 2**18 // size)  # in pieces, to bound the memory
+        for some in (members[start : start + step] for start in range(0, len(members), step)):
+            points = vertices[flat[starts[some, None] + np.arange(size)]]
+            triangles, plain[some] = _cut(points)
             bent += int((_bend(points) > FLATNESS).sum()) if size > 3 else 0
-            for k, found in zip(some, _cut(points), strict=True):
-                if found is None:
-                    raise InputError(
-                        "a polygon of the mesh cannot be cut into triangles",
-                        where=where,
-                        found=f"face {k}, of {size} corners, which crosses or touches itself",
-                        allowed=f"edges that meet only at corners; {MAX_CORNERS} corners where it is concave",
-                        cure=f"{EXPORT}, as triangles",
-                    )
-                triangles[k] = found
+            bad = np.flatnonzero((triangles < 0).any(axis=(1, 2)))
+            if len(bad):
+                raise InputError(
+                    "a polygon of the mesh cannot be cut into triangles",
+                    where=where,
+                    found=f"face {some[bad[0]]}, of {size} corners, which crosses or touches itself",
+                    allowed=f"edges that meet only at corners; {MAX_CORNERS} corners where it is concave",
+                    cure=f"{EXPORT}, as triangles",
+                )
+            corners[first[some, None] + np.arange(size - 2)] = triangles + starts[some, None, None]
     if bent:
         warnings.warn(
             f"{where}: {bent} polygons are not flat; their shape depends on how they are cut into triangles",
             stacklevel=2,
         )
-    return triangles
+    return Cut(owner, corners, plain)
 
 
-def _cut(points: Float) -> list[Int | None]:
-    """(n - 2, 3) triangles of each polygon of n corners, (m, n, 3); None where it crosses itself."""
+def _cut(points: Float) -> tuple[Int, NDArray[np.bool_]]:
+    """(m, n - 2, 3) triangles of polygons of n corners, (m, n, 3), -1 where one crosses itself; (m,) plain fans."""
     count, size = points.shape[:2]
-    triangles: list[Int | None] = [fan(size)] * count
-    left = np.flatnonzero(~fan_covers(points)) if size > 3 else np.zeros(0, dtype=np.int64)
-    for first in range(1, min(size, 8)):  # a concave quadrilateral has a corner that sees all of it, as most have
-        seen = fan_covers(np.roll(points[left], -first, axis=1))
-        for k in left[seen]:
-            triangles[k] = (fan(size) + first) % size
+    triangles = np.repeat(fan(size)[None], count, axis=0)
+    plain = fan_covers(points) if size > 3 else np.ones(count, dtype=np.bool_)
+    left = np.flatnonzero(~plain)
+    for turned in range(1, min(size, 8)):  # a concave quadrilateral has a corner that sees all of it, as most have
+        seen = fan_covers(np.roll(points[left], -turned, axis=1))
+        triangles[left[seen]] = (fan(size) + turned) % size
         left = left[~seen]
     for k in left:
-        triangles[k] = ear_cut(points[k]) if size <= MAX_CORNERS else None
-    return triangles
+        found = ear_cut(points[k]) if size <= MAX_CORNERS else None
+        triangles[k] = -1 if found is None else found
+    return triangles, plain
 
 
 def no_such_vertex(index: int, where: str, allowed: str) -> InputError:
@@ -112,13 +129,10 @@ def _bend(points: Float) -> Float:
     return np.asarray(np.divide(height, size, out=np.zeros_like(height), where=size > 0.0))
 
 
-def _checked(polygons: Sequence[Int], count: int, where: str, base: int = 0) -> None:
+def _checked(flat: Int, count: int, where: str, base: int = 0) -> None:
     """InputError: an index that is not of `count` vertices; base: what the file counts from."""
-    if not polygons:
-        return
-    every = np.concatenate(list(polygons))
-    for index in (int(every.min()), int(every.max())):
-        if not 0 <= index < count:
+    for index in (int(flat.min(initial=0)), int(flat.max(initial=0))):
+        if len(flat) and not 0 <= index < count:
             raise no_such_vertex(index + base, where, f"{base} ... {count - 1 + base}")
 
 
@@ -132,41 +146,48 @@ def _obj(data: bytes, where: str) -> bytes:
         data = re.sub(rb"^(f[^\n#]*)#[^\n]*", rb"\1", data, flags=re.MULTILINE)
     if re.search(rb"^f[^\n]*\s[+-]?0+(?=[/\s]|\Z)", data, re.MULTILINE):
         raise no_such_vertex(0, where, "1 or more, as OBJ counts from 1")
-    negative = re.search(rb"^f[^\n]*-", data, re.MULTILINE)
-    polygons = re.search(rb"^f([ \t]+\S+){4}", data, re.MULTILINE)
-    if not negative and not polygons:
-        return data
+    negative = re.search(rb"^f[^\n]*-", data, re.MULTILINE) is not None
+    polygons = re.search(rb"^f([ \t]+\S+){4}", data, re.MULTILINE) is not None
+    lines = data.splitlines() if negative or polygons else []
+    if negative:
+        _count_absolutely(lines, where)
+    if not polygons:
+        return b"\n".join(lines) if negative else data
+    rows = [line.split()[1:4] for line in lines if line[:2] in (b"v ", b"v\t")]
+    numbers = [k for k, line in enumerate(lines) if line[:2] in (b"f ", b"f\t") and len(line.split()) > 4]
+    faces = [lines[k].split()[1:] for k in numbers]
+    try:
+        vertices = np.array(rows, dtype=np.float64).reshape(-1, 3)
+        flat = np.array([corner.partition(b"/")[0] for face in faces for corner in face]).astype(np.int64) - 1
+    except (OverflowError, ValueError):
+        fault = bad_line(data, "obj")
+        raise damaged("obj", where, fault, "v with three numbers, f with whole numbers") from None
+    _checked(flat, len(vertices), where, base=1)
+    sizes = np.array([len(face) for face in faces], dtype=np.int64)
+    found = cut(vertices, flat, sizes, where)
+    if found.plain.all():  # as trimesh cuts them
+        return b"\n".join(lines) if negative else data
+    starts = np.cumsum(sizes) - sizes
+    places = np.searchsorted(found.owner, np.arange(len(sizes) + 1))
+    for k in np.flatnonzero(~found.plain).tolist():
+        triangles = (found.corners[places[k] : places[k + 1]] - starts[k]).tolist()
+        lines[numbers[k]] = b"\n".join(b"f " + b" ".join(faces[k][i] for i in triangle) for triangle in triangles)
+    return b"\n".join(lines)
+
+
+def _count_absolutely(lines: list[bytes], where: str) -> None:
+    """Replace the relative indices of OBJ lines, in place."""
     so_far = {b"v": 0, b"vt": 0, b"vn": 0}
-    lines = data.splitlines()
-    rows: list[list[bytes]] = []
-    faces: dict[int, list[bytes]] = {}
     for number, line in enumerate(lines):
         words = line.split()
-        if not words:
-            continue
-        if words[0] in so_far:
+        if words and words[0] in so_far:
             so_far[words[0]] += 1
-            if words[0] == b"v":
-                rows.append(words[1:4])
-        elif words[0] == b"f":
+        elif words and words[0] == b"f" and b"-" in line:
             counts = list(so_far.values())
             corners = [_absolute(word, counts) for word in words[1:]]
             if any(corner.startswith((b"0", b"-")) for corner in corners):
                 raise no_such_vertex(-1, where, "a vertex above the face")
-            if len(corners) > 3 or negative:
-                faces[number] = corners
-    try:
-        vertices = np.array(rows, dtype=np.float64).reshape(-1, 3)
-        indices = [
-            np.array([int(corner.split(b"/")[0]) - 1 for corner in corners], dtype=np.int64)
-            for corners in faces.values()
-        ]
-    except (OverflowError, ValueError):
-        raise damaged("obj", where, allowed="v with three numbers, f with whole numbers") from None
-    _checked(indices, len(vertices), where, base=1)
-    for (number, corners), triangles in zip(faces.items(), cut(vertices, indices, where), strict=True):
-        lines[number] = b"\n".join(b"f " + b" ".join(corners[k] for k in triangle) for triangle in triangles.tolist())
-    return b"\n".join(lines)
+            lines[number] = b"f " + b" ".join(corners)
 
 
 def _absolute(corner: bytes, counts: list[int]) -> bytes:
@@ -200,13 +221,19 @@ def _off(data: bytes, where: str) -> bytes:
     except (IndexError, OverflowError, ValueError):
         raise damaged("off", where, f"a fault in {place}", allowed) from None
     polygons = [polygon for polygon in polygons if len(polygon) > 2]
-    _checked(polygons, vertices, where)
-    if all(len(polygon) == 3 for polygon in polygons):
+    flat, sizes = _flat(polygons)
+    _checked(flat, vertices, where)
+    found = cut(points, flat, sizes, where)
+    if found.plain.all():  # as trimesh cuts them
         return data
-    parts = [polygon[found] for polygon, found in zip(polygons, cut(points, polygons, where), strict=True)]
-    triangles = np.concatenate(parts)
-    made = [b"3 %d %d %d" % tuple(triangle) for triangle in triangles.tolist()]
+    made = [b"3 %d %d %d" % tuple(triangle) for triangle in flat[found.corners].tolist()]
     return b"\n".join([head + b"OFF", b"%d %d 0" % (vertices, len(made)), *lines[1 : 1 + vertices], *made])
+
+
+def _flat(polygons: Sequence[Int]) -> tuple[Int, Int]:
+    """All corners, one after the other, and how many each has."""
+    flat = np.concatenate([np.empty(0, dtype=np.int64), *polygons]).astype(np.int64)
+    return flat, np.array([len(polygon) for polygon in polygons], dtype=np.int64)
 
 
 def _ply(data: bytes, where: str) -> bytes:
@@ -220,9 +247,9 @@ def _ply(data: bytes, where: str) -> bytes:
     try:
         raw = load_ply(io.BytesIO(data), skip_materials=True)["metadata"]["_ply_raw"]
     except (IndexError, KeyError, TypeError, ValueError):
-        found = "a row that is not of its properties" if text else "more or fewer bytes than its header says"
+        fault = "a row that is not of its properties" if text else "more or fewer bytes than its header says"
         allowed = "rows as the header says" if text else "bytes as the header says, all faces of as many corners"
-        raise damaged("ply", where, found, allowed) from None
+        raise damaged("ply", where, fault, allowed) from None
     names = [name for name in ("vertex_indices", "vertex_index") if name in raw["face"]["properties"]]
     if not names or "vertex" not in raw:
         raise damaged("ply", where, "faces without vertex_indices", "property list uchar int vertex_indices")
@@ -232,17 +259,17 @@ def _ply(data: bytes, where: str) -> bytes:
     points, _ = _columns(raw["vertex"])
     scalars, lists = _columns(raw["face"])
     polygons = lists[names[0]]
-    kept = [number for number, polygon in enumerate(polygons) if len(polygon) > 2]
-    polygons = [polygons[number] for number in kept]
+    kept = np.flatnonzero([len(polygon) > 2 for polygon in polygons])
+    flat, sizes = _flat([polygons[number] for number in kept])
     vertices = np.stack([points[axis] for axis in "xyz"], axis=1).astype(np.float64)
-    _checked(polygons, len(vertices), where)
-    pieces = cut(vertices, polygons, where)
-    owner = np.repeat(kept, [len(triangles) for triangles in pieces])
+    _checked(flat, len(vertices), where)
+    found = cut(vertices, flat, sizes, where)
+    owner = kept[found.owner]
     columns: list[tuple[str, NDArray[Any]]] = [(name, values[owner]) for name, values in scalars.items()]
-    made = {names[0]: np.concatenate([p[t] for p, t in zip(polygons, pieces, strict=True)]).astype(np.int32)}
+    made = {names[0]: flat[found.corners].astype(np.int32)}
     if "texcoord" in lists:
-        uv = [np.reshape(lists["texcoord"][number], (-1, 2)) for number in kept]
-        made["texcoord"] = np.concatenate([c[t].reshape(-1, 6) for c, t in zip(uv, pieces, strict=True)])
+        uv = np.concatenate([np.reshape(lists["texcoord"][number], (-1, 2)) for number in kept])
+        made["texcoord"] = uv[found.corners].reshape(-1, 6)
     image = re.search(rb"^comment[ \t]+TextureFile[^\n]*\n", data[:start], re.MULTILINE | re.IGNORECASE)
     header = b"ply\nformat binary_little_endian 1.0\n" + (image[0] if image else b"")
     header += b"element vertex %d\n" % len(vertices) + _properties(list(points.items()))
