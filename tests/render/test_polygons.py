@@ -16,6 +16,7 @@ from render.mesh_files import load_mesh
 from render.polygons import ear_cut, fan, fan_covers
 from render.scene import SceneObject
 from render.shape import MeshFile
+from tests.render.damaged import PROGRAM_WORDS, damaged_copies
 
 DART = [(0.6, 0.0), (0.2, 0.2), (0.0, 0.6), (0.0, 0.0)]
 """Concave where no fan from its first corner covers it; 0.12 m^2."""
@@ -140,3 +141,23 @@ def test_random_polygons_are_covered_exactly() -> None:
         assert area(points[triangles]) == pytest.approx(shoelace([tuple(p) for p in outline]), rel=1e-9)
         if not covered:
             assert area(points[fan(count)]) > shoelace([tuple(p) for p in outline])
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("kind", ["obj", "relative.obj", "off", "ply", "binary.ply"])
+def test_a_damaged_file_of_polygons_gives_a_mesh_or_a_message_in_plain_words(tmp_path: Path, kind: str) -> None:
+    whole = binary_ply(SPIRAL) if kind == "binary.ply" else text(kind.rpartition(".")[2], SPIRAL).encode()
+    if kind == "relative.obj":
+        whole = "".join(f"v {x} {y} 0\nvt {x} {y}\n" for x, y in DART).encode() + b"f -4/-4 -3/-3 -2/-2 -1/-1\n"
+    outcomes = set()
+    for number, content in enumerate(damaged_copies(whole, 80, seed=5)):
+        try:
+            mesh = read(tmp_path, f"{number}.{kind}", content)
+        except InputError as error:
+            assert f"object 'part': {number}.{kind}" in str(error)
+            assert not PROGRAM_WORDS.search(str(error)), error
+            outcomes.add("told")
+        else:
+            assert np.isfinite(mesh.vertices).all() and mesh.triangles.max() < len(mesh.vertices)
+            outcomes.add("read")
+    assert outcomes == {"told", "read"}
