@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import struct
@@ -236,6 +237,27 @@ def gltf_header(data: bytes, kind: str, where: str) -> dict[str, Any]:
     if not isinstance(header, dict):
         raise damaged(kind, where, "JSON that is not an object")
     return header
+
+
+def embedded_images(data: bytes, kind: str, where: str) -> dict[str, bytes]:
+    """The images within a GLB or GLTF file by their place; those in files of their own are not among them."""
+    header, images = gltf_header(data, kind, where), {}
+    begin = 28 + struct.unpack_from("<I", data, 12)[0] if kind == "glb" else 0
+    try:
+        for number, image in enumerate(header.get("images", [])):
+            content = b""
+            if image.get("uri", "").startswith("data:"):
+                content = base64.b64decode(image["uri"].partition(",")[2])
+            elif kind == "glb" and "bufferView" in image:
+                view = header["bufferViews"][image["bufferView"]]
+                start = begin + view.get("byteOffset", 0)
+                content = data[start : start + view["byteLength"]]
+            else:
+                continue
+            images[f"images[{number}]"] = content
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError):
+        raise damaged(kind, where, "an entry of images that is missing or of another type") from None
+    return images
 
 
 def check_gltf(header: dict[str, Any], where: str) -> None:

@@ -27,6 +27,7 @@ from render.mesh_headers import (
     check_triangle_count,
     damaged,
     declared_faces,
+    embedded_images,
     gltf_header,
 )
 from render.mesh_polygons import as_triangles, no_such_vertex
@@ -69,7 +70,7 @@ class SideFiles:
             raise
         self.bytes_left -= len(data)
         if file.suffix.lower() in IMAGES:
-            self._check_image(data, spelling)
+            self.check_image(data, spelling)
         return data
 
     __getitem__ = get
@@ -93,7 +94,7 @@ class SideFiles:
             cure="put it beside the mesh",
         )
 
-    def _check_image(self, data: bytes, name: str) -> None:
+    def check_image(self, data: bytes, name: str) -> None:
         """Remember an image that cannot be opened; trimesh would go on without it."""
         try:
             image_size(data, f"{self.where}: {name}")
@@ -150,6 +151,9 @@ def read_parts(path: Path, where: str, files: SideFiles, *, colours: bool) -> li
         raise InputError("the mesh file is empty", where=where, cure=EXPORT)
     try:
         declared = declared_faces(data, kind, where)
+        if colours and kind in ("gltf", "glb"):
+            for name, image in embedded_images(data, kind, where).items():
+                files.check_image(image, name)
         # A GLB or GLTF keeps its UV with its material, so that those are always read.
         skip = not colours and kind not in ("gltf", "glb")
         options = {"process": False, "use_embree": False, "skip_materials": skip}

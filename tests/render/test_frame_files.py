@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 import os
 import struct
@@ -283,6 +284,13 @@ def test_an_exr_of_many_pixels_or_parts_is_refused_before_they_are_made(written:
     struct.pack_into("<4i", content, at, 0, 0, 2**20, 2**20)
     with pytest.raises(InputError, match=r"too big, or damaged; found 1048577 x 1048577 pixels"):
         decode_exr(bytes(content), "a.exr")
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    pixels = np.ones((4, 4), np.float32)
+    parts = [OpenEXR.Part({**header, "name": name}, {"Y": pixels}, name) for name in ("first", "second")]
+    stream = io.BytesIO()
+    OpenEXR.File(parts).write(stream)
+    with pytest.raises(InputError, match=r"b\.exr: the EXR has several parts; found 2; allowed: one; save each part"):
+        decode_exr(stream.getvalue(), "b.exr")
 
 
 def test_the_sidecar_of_another_frame_is_refused(tmp_path: Path, written: list[Path]) -> None:

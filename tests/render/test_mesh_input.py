@@ -385,6 +385,20 @@ def test_an_image_that_cannot_be_opened_is_told_where_the_reader_would_go_on_wit
     assert "a.obj: wood.png: the texture cannot be read; found no image" in found
 
 
+def test_an_image_within_a_glb_that_cannot_be_opened_is_told(tmp_path: Path) -> None:
+    from PIL import Image
+
+    image = Image.fromarray(np.full((8, 8, 3), 99, dtype=np.uint8))
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=image)
+    uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
+    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    data = trimesh.Trimesh(VERTICES, TRIANGLES, process=False, visual=visual).export(file_type="glb")
+    (tmp_path / "a.glb").write_bytes(data)
+    assert load_mesh(thing("a.glb", FromMesh()), tmp_path).texture is not None
+    text = message_of_text(tmp_path, "b.glb", data.replace(b"\x89PNG", b"rust"), albedo=FromMesh())
+    assert "b.glb: images[0]: the texture cannot be read; found no image" in text
+
+
 def test_nothing_of_a_damaged_file_reaches_the_terminal(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     message_of_text(tmp_path, "a.stl", example("stl_ascii", tmp_path).replace(b"vertex 0", b"vertex x", 1))
     message_of_text(tmp_path, "a.ply", example("ply", tmp_path)[:-3])
