@@ -6,6 +6,7 @@ import hashlib
 import os
 import secrets
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
@@ -120,7 +121,8 @@ def _check_regular(status: os.stat_result, most: int, what: str, where: str) -> 
 
 
 def sha256(path: Path) -> str:
-    """SHA-256 of a file's bytes, 64 lower-case hexadecimal digits. InputError: the file cannot be read."""
+    """SHA-256 of a regular file's bytes, 64 lower-case hexadecimal digits. InputError: the file cannot be read."""
+    check_regular(path, sys.maxsize)
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

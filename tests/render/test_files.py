@@ -119,7 +119,7 @@ def test_a_neighbour_whose_name_begins_alike_is_outside(tmp_path: Path) -> None:
 def test_sha256_is_that_of_the_bytes(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"laser" * 100_000)
     assert sha256(tmp_path / "a") == hashlib.sha256(b"laser" * 100_000).hexdigest()
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="there is no such file"):
         sha256(tmp_path / "absent")
 
 
@@ -143,6 +143,12 @@ def test_pipes_devices_folders_and_names_without_a_file_are_refused_before_they_
         for refuse in (read_bytes, check_regular):
             with pytest.raises(InputError, match=problem):
                 refuse(path, 10, "mesh")
+
+
+def test_a_pipe_has_no_hash(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe: the file is not a regular file"):
+        sha256(tmp_path / "pipe")
 
 
 def test_a_pipe_is_not_replaced_by_a_file_also_where_a_link_leads_to_it(tmp_path: Path) -> None:

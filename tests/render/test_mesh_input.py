@@ -14,20 +14,16 @@ import trimesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import render.material_atlas
 import render.mesh_files
 import render.mesh_headers
 import render.mesh_reader
-from render.camera import Camera
 from render.errors import InputError
 from render.files import sha256
-from render.material import Blend, BumpMap, FromMesh, Lambertian, Texture
+from render.material import FromMesh, Lambertian, Texture
 from render.mesh import Mesh
 from render.mesh_files import load_mesh
-from render.primitives import primitive_mesh, triangle_count
-from render.scene import Rig, Scene, SceneObject
-from render.shape import Box, Cylinder, MeshFile, Plane, Sphere, StepBlock, VGroove
-from render.world import build_world
+from render.scene import SceneObject
+from render.shape import MeshFile, Sphere
 from tests.render.damaged import PROGRAM_WORDS
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -356,16 +352,15 @@ def test_a_fault_in_a_text_mesh_is_told_with_its_place(tmp_path: Path, name: str
 def test_a_row_of_a_text_ply_that_says_more_corners_than_it_has_is_told(tmp_path: Path) -> None:
     data = example("ply_ascii", tmp_path)
     start = data.index(b"\n3 ")
-    text = message_of_text(tmp_path, "a.ply", data[: start + 1] + b"9" + data[start + 2 :])
-    assert "found face 0, which says '9' corners" in text
+    told = message_of_text(tmp_path, "a.ply", data[: start + 1] + b"9" + data[start + 2 :])
+    assert "found face 0, which says '9' corners" in told
 
 
 def test_a_gltf_of_more_parts_than_a_file_may_have_is_told_before_they_are_made(tmp_path: Path) -> None:
     header = json.loads(example("gltf", tmp_path))
     header["nodes"] = [{"mesh": 0}] * 20_000
-    assert "too many parts; found 20000; allowed: at most 10000" in message_of_text(
-        tmp_path, "a.gltf", json.dumps(header)
-    )
+    text = message_of_text(tmp_path, "a.gltf", json.dumps(header))
+    assert "too many parts; found 20000; allowed: at most 10000" in text
     header = json.loads(example("gltf", tmp_path))
     header["accessors"][0] = {"componentType": 5125, "type": "SCALAR", "count": 10**12}
     assert "too many" in message_of_text(tmp_path, "b.gltf", json.dumps(header))
@@ -381,8 +376,8 @@ def test_an_image_that_cannot_be_opened_is_told_where_the_reader_would_go_on_wit
     (tmp_path / "a.mtl").write_text("newmtl m\nKd 0.5 0.5 0.5\nmap_Kd wood.png\n")
     (tmp_path / "wood.png").write_text("rust")
     text = f"mtllib a.mtl\nusemtl m\n{TRIANGLE}vt 0 0\nf 1/1 2/1 3/1\n"
-    found = message_of_text(tmp_path, "a.obj", text, albedo=FromMesh())
-    assert "a.obj: wood.png: the texture cannot be read; found no image" in found
+    told = "a.obj: wood.png: the texture cannot be read; found no image"
+    assert told in message_of_text(tmp_path, "a.obj", text, albedo=FromMesh())
 
 
 def test_an_image_within_a_glb_that_cannot_be_opened_is_told(tmp_path: Path) -> None:
@@ -403,54 +398,3 @@ def test_nothing_of_a_damaged_file_reaches_the_terminal(tmp_path: Path, capfd: p
     message_of_text(tmp_path, "a.stl", example("stl_ascii", tmp_path).replace(b"vertex 0", b"vertex x", 1))
     message_of_text(tmp_path, "a.ply", example("ply", tmp_path)[:-3])
     assert capfd.readouterr() == ("", "")
-
-
-def scene_of(*items: SceneObject) -> Scene:
-    return Scene(rig=Rig(camera=Camera(width=4, height=4, fx=4, fy=4, cx=1.5, cy=1.5)), objects=items)
-
-
-def test_what_a_scene_holds_together_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[object] = []
-    original = render.mesh_files.primitive_mesh
-    monkeypatch.setattr(render.mesh_files, "primitive_mesh", lambda shape: made.append(shape) or original(shape))
-    monkeypatch.setattr(render.mesh_files, "MAX_TRIANGLES", 300)
-    balls = [SceneObject(name=f"ball {k}", shape=Sphere(segments=16, radius=0.1 + 0.01 * k)) for k in range(3)]
-    assert len(build_world(scene_of(*balls[:1]), tmp_path).triangles) == 2 * 16 * 7
-    with pytest.raises(
-        InputError, match=r"object 'ball 1': the scene has too many triangles; found 448.*at most 300 in"
-    ):
-        build_world(scene_of(*balls), tmp_path)
-    assert len(made) == 1, "the second is told before it is made"
-    hidden = [balls[0], *(ball.model_copy(update={"visible": False}) for ball in balls[1:])]
-    assert len(build_world(scene_of(*hidden), tmp_path).triangles) == 224
-
-
-def test_images_are_counted_once_however_many_objects_share_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from PIL import Image
-
-    for name in ("a", "b", "c"):
-        Image.fromarray(np.full((10, 10, 3), 99, dtype=np.uint8)).save(tmp_path / f"{name}.png")
-    monkeypatch.setattr(render.mesh_files, "MAX_PIXELS", 250)
-    monkeypatch.setattr(render.material_atlas, "MAX_PIXELS", 250)
-
-    def items(*names: str) -> list[SceneObject]:
-        looks = [Lambertian(albedo=Texture(path=f"{name}.png")) for name in names]
-        return [SceneObject(name=f"{k}", shape=Plane(), material=look) for k, look in enumerate(looks)]
-
-    world = build_world(scene_of(*items("a", "b", "a", "b", "a")), tmp_path)
-    assert len(world.textures) == 200 * 3
-    assert world.texture_shape.tolist() == [[0, 10, 10], [100, 10, 10]] * 2 + [[0, 10, 10]]
-    with pytest.raises(InputError, match=r"object '2': the scene has too many pixels of textures; found 300"):
-        build_world(scene_of(*items("a", "b", "c")), tmp_path)
-    bumps = Lambertian(albedo=Texture(path="a.png"), relief=BumpMap(path="b.png", height=1e-3))
-    masked = Blend(base=bumps, over=Lambertian(), mask=Texture(path="c.png", srgb=False))
-    with pytest.raises(InputError, match=r"object 'p': material\.mask: the scene has too many pixels of textures"):
-        build_world(scene_of(SceneObject(name="p", shape=Plane(), material=masked)), tmp_path)
-
-
-def test_the_number_of_a_primitives_triangles_is_known_before_it_is_made() -> None:
-    balls = Sphere(segments=8), Sphere(segments=33)
-    for shape in (Plane(), Box(), *balls, Cylinder(segments=7), StepBlock(steps=3), StepBlock(steps=1), VGroove()):
-        assert triangle_count(shape) == len(primitive_mesh(shape).triangles), shape
