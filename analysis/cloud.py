@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
@@ -15,7 +16,7 @@ from analysis.error import Errors
 from analysis.spool import Spool
 from analysis.triangulate import Points
 from render.errors import InputError
-from render.files import atomic_write
+from render.files import atomic_write, read_bytes
 from render.pose import invert, transform_points
 from render.scene import Scene
 
@@ -38,6 +39,7 @@ UNITS = {
     "step": "",
 }
 INTEGERS = ("row", "laser", "step")
+MAX_BYTES = 2**32
 PLY_TYPES = {
     "char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
     "double": "<f8", "int8": "i1", "uint8": "u1", "int16": "<i2", "uint16": "<u2", "int32": "<i4", "uint32": "<u4",
@@ -150,10 +152,7 @@ def write_ply(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
 def read_ply(path: Path | str) -> Cloud:
     """The scalar columns of a binary little-endian PLY's vertices, as float64 or int32. InputError: it is none."""
     where = str(path)
-    try:
-        data = Path(path).read_bytes()
-    except OSError as error:
-        raise InputError("the file cannot be read", where=where, found=error.strerror or error) from error
+    data = read_bytes(Path(path), MAX_BYTES, "point cloud")
     end = data.find(b"end_header\n", 0, LONGEST_HEADER)
     if not data.startswith(b"ply\n") or end < 0:
         raise InputError("not a PLY file", where=where, allowed="a PLY header")
@@ -194,18 +193,20 @@ def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
 def read_csv(path: Path | str) -> Cloud:
     """Inverse of `write_csv`. InputError: a cell is no number, or a row is short."""
     names = {f"{name}_{unit}" if unit else name: name for name, unit in UNITS.items()}
+    data = read_bytes(Path(path), MAX_BYTES, "table")
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError("the table cannot be read", where=str(path), found=error) from error
+        header, *rows = list(csv.reader(io.StringIO(data.decode("utf-8"), newline=""))) or [[]]
+    except (UnicodeDecodeError, csv.Error):
+        found = "bytes that are not UTF-8, or a cell without end"
+        raise InputError("the table cannot be read", where=str(path), found=found) from None
     cells: Cloud = {}
     for i, title in enumerate(header):
         name = names.get(title, title)
         try:
             cells[name] = np.array([row[i] for row in rows], dtype=np.int32 if name in INTEGERS else np.float64)
-        except (ValueError, IndexError, OverflowError) as error:
+        except (ValueError, IndexError, OverflowError):
+            kind = "whole numbers" if name in INTEGERS else "numbers"
             raise InputError(
-                "the table holds a cell that is no number", where=f"{path}: {title}", found=error
-            ) from error
+                "the table holds a cell that is no number", where=f"{path}: {title}", allowed=f"{kind} in every row"
+            ) from None
     return cells

@@ -31,6 +31,8 @@ def atomic_write(path: Path | str) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
             raise IsADirectoryError(None, "a folder of that name exists")
+        if target.exists() and not target.is_file():  # replacing it would take a device from the system
+            raise OSError(None, "it is a device or a pipe, not a regular file")
         temporary.touch(exist_ok=False)
         yield temporary
         with open(temporary, "r+b") as written:
@@ -78,12 +80,13 @@ def inside(root: Path, relative: str, where: str) -> Path:
     return resolved
 
 
-def read_bytes(path: Path, most: int, what: str = "file") -> bytes:
+def read_bytes(path: Path, most: int, what: str = "file", where: str | None = None) -> bytes:
     """The bytes of a regular file of at most `most` bytes; its size is looked at before anything is read.
 
+    where: the field that names it, for the message; without one, its path.
     InputError: missing, a folder, a device or a pipe, larger than that, or not readable.
     """
-    where = str(path)
+    where = str(path) if where is None else where
     try:
         # a pipe that nobody writes to would block the opening itself
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -105,22 +108,23 @@ def read_bytes(path: Path, most: int, what: str = "file") -> bytes:
     return data
 
 
-def check_regular(path: Path, most: int, what: str = "file") -> None:
+def check_regular(path: Path, most: int, what: str = "file", where: str | None = None) -> None:
     """InputError: `path` is no regular file of at most `most` bytes. For readers that open the file themselves."""
+    where = str(path) if where is None else where
     try:
-        _check_regular(os.stat(path), most, what, str(path))
+        _check_regular(os.stat(path), most, what, where)
     except InputError:
         raise
     except FileNotFoundError:
-        raise InputError(f"there is no such {what}", where=str(path)) from None
+        raise InputError(f"there is no such {what}", where=where) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"the {what} cannot be read", where=str(path), found=reason) from None
+        raise InputError(f"the {what} cannot be read", where=where, found=reason) from None
 
 
 def _check_regular(status: os.stat_result, most: int, what: str, where: str) -> None:
     if stat.S_ISDIR(status.st_mode):
-        raise InputError(f"a folder, not a {what}", where=where)
+        raise InputError(f"the {what} is a folder", where=where)
     if not stat.S_ISREG(status.st_mode):
         raise InputError(f"the {what} is not a regular file", where=where, found="a device or a pipe")
     if status.st_size > most:

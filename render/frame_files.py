@@ -5,7 +5,8 @@
     depth_z.Z, depth_range.Z m                                          object_id.Y      uint32, 2^32 - 1 for none
 
 All layers are float32 but the object's, compressed without loss (ZIP). The sidecar is written last and holds the EXR's
-SHA-256, so that a set of files of two frames, or of half a frame, is never read as one.
+SHA-256 and its own, so that a set of files of two frames, of half a frame, or with a number changed since, is never
+read as one.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from numpy.typing import NDArray
 from render.counts import counts_from
 from render.develop import Image
 from render.errors import InputError
-from render.files import atomic_write
+from render.exr import decode_exr
+from render.files import atomic_write, read_bytes
 from render.frame import Frame, Truth
 from render.scene import Scene
 from render.sensor import Sensor
 from render.sidecar import (
+    AGAIN,
     Record,
     curves_from,
     from_text,
@@ -33,6 +36,7 @@ from render.sidecar import (
     laser_layer,
     numbers_from,
     safe_name,
+    sealed,
     sidecar_record,
     to_text,
 )
@@ -47,6 +51,7 @@ TRUTH_LAYERS = {
 }
 AMBIENT_LAYERS = ("ambient.R", "ambient.G", "ambient.B")
 OBJECT_LAYER = "object_id.Y"
+MAX_SIDECAR_BYTES, MAX_EXR_BYTES = 2**28, 2**32
 
 
 def write_frame(
@@ -79,7 +84,7 @@ def write_frame(
         "made_of": made_of,
         "exr_sha256": hashlib.sha256(exr).hexdigest(),
     }
-    written.append(_write(folder / f"{name}.json", to_text(record).encode()))
+    written.append(_write(folder / f"{name}.json", to_text(sealed(record)).encode()))
     return written
 
 
@@ -90,19 +95,21 @@ def read_frame(path: Path | str) -> Frame:
     """
     sidecar, exr = Path(path).with_suffix(".json"), Path(path).with_suffix(".exr")
     try:
-        text = _read(sidecar).decode()
+        text = read_bytes(sidecar, MAX_SIDECAR_BYTES, "frame's description").decode()
     except UnicodeDecodeError:
-        raise InputError("the frame's description is not UTF-8 text", where=str(sidecar)) from None
+        raise InputError("the frame's description is not UTF-8 text", where=str(sidecar), cure=AGAIN) from None
     record = from_text(text, str(sidecar))
-    content = _read(exr)
+    content = read_bytes(exr, MAX_EXR_BYTES, "frame's image")
     if hashlib.sha256(content).hexdigest() != record.get("exr_sha256"):
-        allowed, cure = f"the file written together with {sidecar.name}", "render again"
-        raise InputError("the image is damaged or of another frame", where=str(exr), allowed=allowed, cure=cure)
+        allowed = f"the file written together with {sidecar.name}"
+        raise InputError("the image is damaged or of another frame", where=str(exr), allowed=allowed, cure=AGAIN)
+    layers = decode_exr(content, str(exr))
     try:
-        return _frame(record, _decode_exr(content))
-    except (AttributeError, KeyError, OverflowError, TypeError, ValueError, RuntimeError) as error:
-        found = f"{type(error).__name__}: {error}"
-        raise InputError("the frame's description is damaged", where=str(sidecar), found=found) from None
+        return _frame(record, layers)
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
+        allowed = "step, plan, seconds, counts, and lasers with layer, curve and axis"
+        where = str(sidecar)
+        raise InputError("the frame's description is damaged", where=where, allowed=allowed, cure=AGAIN) from None
 
 
 def _layers(frame: Frame, scene: Scene) -> Layers:
@@ -163,13 +170,6 @@ def _encode_exr(layers: Layers) -> memoryview:
     return stream.getbuffer()
 
 
-def _decode_exr(content: bytes) -> Layers:
-    import OpenEXR
-
-    channels = OpenEXR.File(io.BytesIO(content), separate_channels=True).channels()
-    return {name: np.ascontiguousarray(channel.pixels) for name, channel in channels.items()}
-
-
 def _encode_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     import cv2
 
@@ -183,10 +183,3 @@ def _write(path: Path, content: bytes | memoryview) -> Path:
     with atomic_write(path) as temporary:
         temporary.write_bytes(content)
     return path
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError("the file cannot be read", where=str(path), found=error.strerror or error) from None

@@ -23,7 +23,9 @@ from render.material import (
     Texture,
 )
 from render.mesh import Mesh
+from render.mesh_headers import check_together
 from render.scene import SceneObject
+from render.texture import MAX_PIXELS
 
 Float32 = NDArray[np.float32]
 Place = tuple[int, int, int]
@@ -48,6 +50,8 @@ class MaterialAtlas:
         self.relief: list[tuple[float, float]] = []
         self.least_alpha: list[float] = []
         self.texels = 0
+        self.known: dict[int, tuple[Float32, Place]] = {}
+        """By identity, and kept so that it stays one: objects share the image that they share."""
 
     def add(self, material: BaseMaterial, mesh: Mesh, where: str) -> int:
         """A material with the texture or colour that its mesh brings; returns its number.
@@ -55,7 +59,7 @@ class MaterialAtlas:
         InputError: a map without UV, or a bad image.
         """
         uses_texture = isinstance(material.albedo, Texture | FromMesh) and mesh.texture is not None
-        self.shapes.append(self.image(mesh.texture) if uses_texture and mesh.texture is not None else NOWHERE)
+        self.shapes.append(self.image(mesh.texture, where) if uses_texture and mesh.texture is not None else NOWHERE)
         self.albedo.append((1.0, 1.0, 1.0) if uses_texture else _constant_albedo(material, mesh))
         self.masks.append(NOWHERE)
         self.second.append(-1)
@@ -74,30 +78,34 @@ class MaterialAtlas:
         if isinstance(over.albedo, Texture):
             texture = self._load(over.albedo, mesh, f"{where}.over.albedo")
         self.second[index] = self.add(over, replace(mesh, texture=texture), f"{where}.over")
-        self.masks[index] = self.image(mask)
+        self.masks[index] = self.image(mask, f"{where}.mask")
 
-    def image(self, image: Float32) -> Place:
-        """Append (h, w, 3); returns its place."""
-        shape = (self.texels, image.shape[0], image.shape[1])
-        self.images.append(image.astype(np.float32).ravel())
+    def image(self, image: Float32, where: str) -> Place:
+        """Append (h, w, 3), once; returns its place. InputError: more than MAX_PIXELS in all images together."""
+        if id(image) in self.known:
+            return self.known[id(image)][1]
+        place = (self.texels, image.shape[0], image.shape[1])
         self.texels += image.shape[0] * image.shape[1]
-        return shape
+        check_together("pixels of textures", self.texels, MAX_PIXELS, where)
+        self.images.append(np.asarray(image, dtype=np.float32).ravel())
+        self.known[id(image)] = image, place
+        return place
 
     def _add_detail(self, material: BaseMaterial, mesh: Mesh, where: str) -> None:
         flags = SMOOTH_NORMALS if mesh.normals is not None else 0
         roughness, relief, least, factors = NOWHERE, NOWHERE, 1.0, (0.0, 0.0)
         if isinstance(material, Conductor | Coated | Glass) and isinstance(material.roughness, GreyTexture):
             image = self._load(material.roughness, mesh, f"{where}.roughness")
-            roughness, flags = self.image(image), flags | ROUGHNESS_MAP
+            roughness, flags = self.image(image, where), flags | ROUGHNESS_MAP
             least = float(image.mean(axis=2).min())
             least = max(least, LEAST_COAT) if isinstance(material, Coated) else least
         match material.relief:
             case NormalMap() as given:
                 values = centred(self._load(given, mesh, f"{where}.relief"))
-                relief, flags = self.image(values), flags | NORMAL_MAP
+                relief, flags = self.image(values, where), flags | NORMAL_MAP
                 factors = given.strength, -given.strength if given.green_down else given.strength
             case BumpMap() as given:
-                relief = self.image(self._load(given, mesh, f"{where}.relief"))
+                relief = self.image(self._load(given, mesh, f"{where}.relief"), where)
                 flags, factors = flags | BUMP_MAP, (given.height, 0.0)
         self.detail.append(flags)
         self.maps.append((roughness, relief))

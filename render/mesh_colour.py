@@ -135,5 +135,8 @@ def _linear_image(image: Any, where: str) -> Float32:
         raise InputError("the texture is too large", where=f"{where}: {name}", found=found)
     try:
         return linear_reflectance(np.asarray(image.convert("RGB")))
-    except Exception as error:  # Pillow decodes only now, and raises many kinds on damaged data
-        raise InputError("the texture cannot be read", where=f"{where}: {name}", found=error) from error
+    except MemoryError:
+        raise
+    except Exception as error:  # Pillow decodes only now, and raises many kinds on damaged data, in words of its own
+        found = "an image that is cut short or damaged"
+        raise InputError("the texture cannot be read", where=f"{where}: {name}", found=found) from error

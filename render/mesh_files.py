@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,19 +13,19 @@ from numpy.typing import NDArray
 
 from render.closed import closed_outward
 from render.errors import InputError
-from render.files import inside, sha256
+from render.files import check_regular, inside, sha256
 from render.material import Blend, BumpMap, FromMesh, Glass, GreyTexture, NormalMap, Subsurface, Texture
 from render.mesh import Mesh
 from render.mesh_colour import merged_look, part_look
-from render.mesh_reader import EXTENSIONS, check_triangle_count, read_parts
-from render.primitives import Primitive, primitive_mesh
+from render.mesh_headers import MAX_FILE_BYTES, MAX_TRIANGLES, check_together
+from render.mesh_reader import EXTENSIONS, SideFiles, read_parts
+from render.primitives import Primitive, primitive_mesh, triangle_count
 from render.scene import SceneObject
 from render.shape import UNITS, MeshFile, Sphere, WeldTee
-from render.texture import load_texture
+from render.texture import MAX_PIXELS, load_texture
 from render.vertex_normals import corner_normals
 from render.weld_tee import weld_tee_mesh
 
-MAX_FILE_BYTES = 4 * 2**30
 MAX_EXTENT = 1e4
 """m; farther from its origin a mesh keeps no micrometres in float32 rays."""
 LARGE_EXTENT = 20.0
@@ -65,6 +66,29 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
     return dataclasses.replace(mesh, texture=object_texture(albedo, Path(root), field))
 
 
+def load_meshes(items: Sequence[SceneObject], root: Path) -> list[Mesh]:
+    """The meshes of a scene's visible objects, as `load_mesh`; what they hold together is bounded as they come.
+
+    InputError: as `load_mesh`; more than MAX_TRIANGLES or, in their textures, MAX_PIXELS in all objects together.
+    """
+    meshes: list[Mesh] = []
+    triangles, textures = 0, dict[int, int]()
+    for item in items:
+        where = f"object {item.name!r}"
+        if isinstance(item.shape, WeldTee):
+            check_together("triangles", triangles + item.shape.triangles, MAX_TRIANGLES, where)
+        elif not isinstance(item.shape, MeshFile):
+            check_together("triangles", triangles + triangle_count(item.shape), MAX_TRIANGLES, where)
+        mesh = load_mesh(item, root)
+        triangles += len(mesh.triangles)
+        check_together("triangles", triangles, MAX_TRIANGLES, where)
+        if mesh.texture is not None:
+            textures[id(mesh.texture)] = mesh.texture.size // 3
+            check_together("pixels of textures", sum(textures.values()), MAX_PIXELS, where)
+        meshes.append(mesh)
+    return meshes
+
+
 def object_texture(texture: Texture | GreyTexture | NormalMap | BumpMap, root: Path, field: str) -> NDArray[np.float32]:
     """(h, w, 3) linear image of a texture below root; kept until the file changes. InputError: absent or bad."""
     path = inside(root, texture.path, field)
@@ -72,7 +96,11 @@ def object_texture(texture: Texture | GreyTexture | NormalMap | BumpMap, root: P
     version = None if state is None else (state.st_mtime_ns, state.st_size)
     srgb = isinstance(texture, Texture) and texture.srgb
     scale = texture.scale if isinstance(texture, Texture | GreyTexture) else 1.0
-    return _texture(path, srgb, scale, field, version)
+    try:
+        return _texture(path, srgb, scale, version)
+    except InputError as error:  # kept by what it is read from, so that all objects share it, and not by the field
+        where = f"{field}: {path.name}"
+        raise InputError(error.what, where=where, found=error.found, allowed=error.allowed, cure=error.cure) from None
 
 
 def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
@@ -104,30 +132,23 @@ def _made(shape: Primitive | WeldTee, crease_angle: float, filled: str) -> Mesh:
 
 
 @lru_cache(maxsize=8)
-def _texture(path: Path, srgb: bool, scale: float, field: str, version: object) -> NDArray[np.float32]:
+def _texture(path: Path, srgb: bool, scale: float, version: object) -> NDArray[np.float32]:
     """`version` changes with the file, so that an edited texture is read anew."""
-    return load_texture(path, srgb=srgb, scale=scale, where=field)
+    return load_texture(path, srgb=srgb, scale=scale, where=str(path))
 
 
 def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str, filled: bool) -> Mesh:
     path = inside(root, shape.path, f"{where}: shape.path")
     where = f"{where}: {shape.path}"
-    cure = "put the mesh into the project folder, or correct shape.path"
-    try:
-        state = path.stat()
-    except OSError as error:
-        raise InputError("the mesh file cannot be read", where=where, found=error.strerror, cure=cure) from error
-    if not path.is_file():
-        found = "a folder" if path.is_dir() else "a device"
-        raise InputError("the mesh is not a file", where=where, found=found, cure=cure)
     if path.suffix[1:].lower() not in EXTENSIONS:
         allowed = ", ".join(f".{name}" for name in EXTENSIONS)
         found = path.suffix or path.name
         raise InputError("the mesh file's kind is not known", where=where, found=found, allowed=allowed)
-    if not 0 < state.st_size <= MAX_FILE_BYTES:
-        what = "the mesh file is empty" if state.st_size == 0 else "the mesh file is too large"
-        found = f"{state.st_size} bytes"
-        raise InputError(what, where=where, found=found, allowed=f"1 to {MAX_FILE_BYTES} bytes", cure="export it again")
+    if not path.exists():
+        cure = "put the mesh into the project folder, or correct shape.path"
+        raise InputError("there is no such mesh file", where=where, cure=cure)
+    check_regular(path, MAX_FILE_BYTES, "mesh file", where)
+    state = path.stat()
     material = item.material.base if isinstance(item.material, Blend) else item.material
     colours = isinstance(material.albedo, FromMesh)
     factor = UNITS[shape.unit] * item.scale
@@ -155,16 +176,11 @@ def _read(
     """A checked mesh, its vertices multiplied by factor; `version` changes with the file."""
     if expected_sha256 is not None and sha256(path) != expected_sha256:
         warnings.warn(f"{where}: the file has changed since the project was saved", stacklevel=2)
-    parts = read_parts(path, root, where, colours=colours)
-    if not parts:
-        raise InputError(
-            "the mesh has no triangles",
-            where=where,
-            found="no faces (a point cloud?)",
-            cure="mesh the points first, or export the faces too",
-        )
+    files = SideFiles(path, root, where)
+    parts = read_parts(path, where, files, colours=colours)
+    if colours and files.refused:
+        raise files.refused[0]
     counts = [len(part.triangles) for part in parts]
-    check_triangle_count(sum(counts), where)
     vertices = np.concatenate([part.vertices for part in parts]) * factor
     offsets = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     triangles = np.concatenate([part.triangles + offset for part, offset in zip(parts, offsets, strict=True)])

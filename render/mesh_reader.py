@@ -6,9 +6,9 @@ Side files (MTL, buffers, images) come only from inside the project folder; noth
 from __future__ import annotations
 
 import io
-import json
+import logging
 import re
-import struct
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,15 +18,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from render.files import inside
+from render.files import inside, read_bytes
+from render.mesh_headers import (
+    EXPORT,
+    MAX_FILE_BYTES,
+    MAX_PARTS,
+    bad_line,
+    check_triangle_count,
+    damaged,
+    declared_faces,
+    embedded_images,
+    gltf_header,
+)
+from render.mesh_polygons import as_triangles, no_such_vertex
+from render.texture import image_size
 
 Float = NDArray[np.float64]
 
 EXTENSIONS = ("ply", "stl", "obj", "glb", "gltf", "off")
-MAX_TRIANGLES = 50_000_000
-GLTF_EXTENSIONS = ("KHR_materials", "KHR_lights", "EXT_texture_webp")
-"""Required extensions that do not change the geometry or its UV."""
-GLTF_FLOAT = 5126
+IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".gif", ".tga")
 
 
 @dataclass(frozen=True)
@@ -42,80 +52,134 @@ class Part:
 
 
 class SideFiles:
-    """Gives trimesh the files that a mesh file names, from inside the project folder; remembers what was refused."""
+    """Gives trimesh the files that a mesh file names, from inside a folder; remembers what was refused."""
 
     def __init__(self, path: Path, root: Path, where: str) -> None:
         self.root, self.where = root, where
-        self.folder = path.parent.relative_to(root.resolve())
+        self.folder = path.resolve().parent.relative_to(root.resolve())
         self.refused: list[InputError] = []
+        self.bytes_left = MAX_FILE_BYTES
 
     def get(self, name: str) -> bytes:
-        """Bytes of a side file, its name taken relative to the mesh file. InputError: absent, or outside."""
+        """Bytes of a side file, its name taken relative to the mesh file. InputError: absent, outside, too big."""
+        try:
+            spelling, file = self.find(name)
+            data = read_bytes(file, self.bytes_left, "file that the mesh names", f"{self.where}: {spelling}")
+        except InputError as error:
+            self.refused.append(error)
+            raise
+        self.bytes_left -= len(data)
+        if file.suffix.lower() in IMAGES:
+            self.check_image(data, spelling)
+        return data
+
+    __getitem__ = get
+
+    def find(self, name: str) -> tuple[str, Path]:
+        """The name as it is to be spelled, and where the file is. InputError: absent, or outside."""
         name = name.strip()
         # As written; percent-encoded (glTF); with Windows' separator; after options ("map_Kd -s 1 1 1 wood.png").
         plain = name.replace("\\", "/")
         for spelling in dict.fromkeys((name, unquote(name), plain, plain.split(" ")[-1])):
             try:
                 file = inside(self.root, str(self.folder / spelling), self.where)
-                if file.is_file():
-                    return file.read_bytes()
-            except (InputError, OSError):
+                if spelling and file.exists() and not file.is_dir():
+                    return spelling, file
+            except (InputError, OSError, ValueError):
                 continue
-        error = InputError(
+        raise InputError(
             "a file that the mesh names is absent, or outside the project folder",
             where=self.where,
             found=name,
             cure="put it beside the mesh",
         )
-        self.refused.append(error)
-        raise error
 
-    __getitem__ = get
+    def check_image(self, data: bytes, name: str) -> None:
+        """Remember an image that cannot be opened; trimesh would go on without it."""
+        try:
+            image_size(data, f"{self.where}: {name}")
+        except InputError as error:
+            self.refused.append(error)
 
 
-def read_parts(path: Path, root: Path, where: str, *, colours: bool) -> list[Part]:
+def side_files(path: Path, root: Path) -> list[str]:
+    """Names, relative to a mesh file, of the files below `root` that reading it takes: materials, buffers, images.
+
+    What cannot be read names none; reading the mesh tells why.
+    """
+    files = SideFiles(path, root, str(path))
+    kind, names = path.suffix[1:].lower(), []
+    try:
+        if kind == "gltf":
+            header = gltf_header(read_bytes(path, MAX_FILE_BYTES), kind, str(path))
+            uris = [entry.get("uri", "data:") for entry in (*header.get("buffers", ()), *header.get("images", ()))]
+            names = [uri for uri in uris if not uri.startswith("data:")]
+        elif kind == "ply":
+            names = _words_after(rb"comment[ \t]+TextureFile", read_bytes(path, MAX_FILE_BYTES)[:65536])
+        elif kind == "obj":
+            names = _words_after(b"mtllib", read_bytes(path, MAX_FILE_BYTES))
+            for library in list(names):
+                names += _words_after(rb"(?:map_\w+|bump|disp)", files.get(library))
+    except (AttributeError, InputError, TypeError):
+        pass
+    found = []
+    for name in names:
+        with suppress(InputError):
+            found.append(files.find(name)[0])
+    return list(dict.fromkeys(found))
+
+
+def _words_after(keyword: bytes, data: bytes) -> list[str]:
+    """What stands after a keyword on each line that begins with it."""
+    lines = re.findall(rb"^[ \t]*" + keyword + rb"[ \t]+([^\n]+)", data, re.MULTILINE | re.IGNORECASE)
+    return [line.decode("utf-8", "replace").strip() for line in lines[:MAX_PARTS]]
+
+
+def read_parts(path: Path, where: str, files: SideFiles, *, colours: bool) -> list[Part]:
     """All triangles of a file, placed by its scene graph; polygons are cut into triangles.
 
-    path: inside `root`, of a kind in EXTENSIONS. colours: read materials and textures too.
-    InputError: the file is damaged, cut short, or uses a feature that would be read wrongly; or, with colours, a
-    material file or image that it names is absent or outside `root`.
+    path: of a kind in EXTENSIONS. colours: read materials and textures too; `files.refused` then tells which it lacks.
+    InputError: the file is damaged, cut short, too large, without triangles, or uses a feature that would be read
+    wrongly.
     """
     import trimesh
 
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)  # it prints tracebacks of what is told here in words
     kind = path.suffix[1:].lower()
-    files = SideFiles(path, root, where)
+    data = read_bytes(path, MAX_FILE_BYTES, "mesh file", where)
+    if not data:
+        raise InputError("the mesh file is empty", where=where, cure=EXPORT)
     try:
-        if kind in ("gltf", "glb"):
-            _check_gltf(_gltf_header(path, kind), where)
-        declared = _declared_faces(path, kind)
-        check_triangle_count(declared, where)
-        with open(path, "rb") as file:
-            stream: Any = io.BytesIO(_absolute_indices(file.read(), where)) if kind == "obj" else file
-            # A GLB or GLTF keeps its UV with its material, so that those are always read.
-            skip = not colours and kind not in ("gltf", "glb")
-            options = {"process": False, "use_embree": False, "skip_materials": skip}
-            scene = trimesh.load_scene(stream, file_type=kind, resolver=files, **options)
-        parts = _placed(scene, where)
-        read = sum(len(part.triangles) for part in parts)
-        if 0 < read < declared:
-            raise ValueError(f"{read} of {declared} faces can be read")
+        declared = declared_faces(data, kind, where)
+        if colours and kind in ("gltf", "glb"):
+            for name, image in embedded_images(data, kind, where).items():
+                files.check_image(image, name)
+        # A GLB or GLTF keeps its UV with its material, so that those are always read.
+        skip = not colours and kind not in ("gltf", "glb")
+        options = {"process": False, "use_embree": False, "skip_materials": skip}
+        stream: Any = io.BytesIO(as_triangles(data, kind, where))
+        parts = _placed(trimesh.load_scene(stream, file_type=kind, resolver=files, **options), where)
     except InputError:
         raise
-    except OSError as error:
-        raise InputError("the file cannot be read", where=where, found=error.strerror or error) from error
-    except Exception as error:  # a damaged file makes a reader fail in any way
+    except MemoryError:
+        cure = "simplify the mesh, or cut it into the region that the scanner sees"
+        found = f"{len(data)} bytes"
+        raise InputError("not enough memory to read the mesh", where=where, found=found, cure=cure) from None
+    except Exception as error:  # a damaged file makes a reader fail in any way, in words of its own
         outside = re.match(r"index (-?\d+) is out of bounds for axis 0 with size (\d+)", str(error))
         if kind == "obj" and outside:
-            raise _no_such_vertex(int(outside[1]) + 1, where, f"1 ... {outside[2]}") from error
+            raise no_such_vertex(int(outside[1]) + 1, where, f"1 ... {outside[2]}") from error
+        raise damaged(kind, where, bad_line(data, kind)) from error
+    read = sum(len(part.triangles) for part in parts)
+    if read < declared:
+        raise damaged(kind, where, bad_line(data, kind) or f"{declared} faces of which {read} can be read")
+    if not parts:
         raise InputError(
-            f"the file cannot be read as {kind.upper()}",
+            "the mesh has no triangles",
             where=where,
-            found=f"{type(error).__name__}: {error}",
-            allowed="a whole, valid file",
-            cure="export the mesh again, as triangles",
-        ) from error
-    if colours and files.refused:
-        raise files.refused[0]
+            found=bad_line(data, kind) or "no faces (a point cloud?)",
+            cure="mesh the points first, or export the faces too",
+        )
     return parts
 
 
@@ -135,7 +199,7 @@ def _placed(scene: Any, where: str) -> list[Part]:
             raise ValueError(f"vertices {vertices.shape}, triangles {triangles.shape}")
         lowest, highest = int(triangles.min()), int(triangles.max())
         if lowest < 0 or highest >= len(vertices):
-            raise _no_such_vertex(lowest if lowest < 0 else highest, where, f"0 ... {len(vertices) - 1}")
+            raise no_such_vertex(lowest if lowest < 0 else highest, where, f"0 ... {len(vertices) - 1}")
         # trimesh makes up vertex normals on request; only those in its cache came from the file.
         normals = np.array(geometry.vertex_normals) if "vertex_normals" in geometry._cache else None
         if normals is not None and not _differs_from_facets(vertices, triangles, normals):
@@ -160,101 +224,3 @@ def _differs_from_facets(vertices: Float, triangles: NDArray[np.int64], normals:
     dot = np.einsum("tk,tck->tc", facet, normals[triangles])
     lengths = np.linalg.norm(facet, axis=1)[:, None] * np.linalg.norm(normals, axis=1)[triangles]
     return bool((dot < np.cos(np.radians(1.0)) * lengths).any())
-
-
-def check_triangle_count(count: int, where: str) -> None:
-    """InputError: more than MAX_TRIANGLES."""
-    if count > MAX_TRIANGLES:
-        raise InputError(
-            "the mesh has too many triangles",
-            where=where,
-            found=count,
-            allowed=f"at most {MAX_TRIANGLES}",
-            cure="simplify the mesh, or cut it into the region that the scanner sees",
-        )
-
-
-def _no_such_vertex(index: int, where: str, allowed: str) -> InputError:
-    what = "a triangle names a vertex that does not exist"
-    return InputError(what, where=where, found=f"index {index}", allowed=allowed, cure="export the mesh again")
-
-
-def _declared_faces(path: Path, kind: str) -> int:
-    """Number of faces that a file says it has: an intact reading has at least as many triangles."""
-    if kind in ("gltf", "glb"):  # their readers check every length themselves
-        return 0
-    with open(path, "rb") as file:
-        if kind == "stl":
-            header = file.read(84)
-            declared = struct.unpack("<I", header[80:])[0] if len(header) == 84 else 0
-            if path.stat().st_size == 84 + 50 * declared:
-                return int(declared)
-            return (header + file.read()).lower().count(b"endfacet")
-        if kind == "ply":
-            match = re.search(rb"^element\s+face\s+(\d+)", file.read(65536), re.MULTILINE)
-            return int(match[1]) if match else 0
-        data = file.read()
-    if kind == "off":
-        match = re.search(rb"OFF(?:\s|#[^\n]*\n)*\d+\s+(\d+)", data)
-        return int(match[1]) if match else 0
-    return len(re.findall(rb"^f\s", data, re.MULTILINE))
-
-
-def _absolute_indices(data: bytes, where: str) -> bytes:
-    """OBJ text with relative (negative) indices counted from where they stand; trimesh would count from the end."""
-    if re.search(rb"^f[^\n]*\s0+(?=[/\s]|\Z)", data, re.MULTILINE):
-        raise _no_such_vertex(0, where, "1 or more, as OBJ counts from 1")
-    if not re.search(rb"^f[^\n]*-", data, re.MULTILINE):
-        return data
-    counts = {b"v": 0, b"vt": 0, b"vn": 0}
-    lines = data.splitlines()
-    for number, line in enumerate(lines):
-        words = line.split()
-        if words and words[0] in counts:
-            counts[words[0]] += 1
-        elif words and words[0] == b"f":
-            so_far = list(counts.values())
-            corners = [
-                [
-                    b"%d" % (int(index) + 1 + total) if index.startswith(b"-") else index
-                    for index, total in zip(word.split(b"/"), so_far, strict=False)
-                ]
-                for word in words[1:]
-            ]
-            if any(corner[0].startswith((b"0", b"-")) for corner in corners):
-                raise _no_such_vertex(-1, where, "a vertex above the face")
-            lines[number] = b"f " + b" ".join(b"/".join(corner) for corner in corners)
-    return b"\n".join(lines)
-
-
-def _gltf_header(path: Path, kind: str) -> dict[str, Any]:
-    """The JSON of a GLTF or GLB file."""
-    with open(path, "rb") as file:
-        if kind == "glb":
-            magic, _, _, length, chunk = struct.unpack("<4sII I4s", file.read(20))
-            if magic != b"glTF" or chunk != b"JSON":
-                raise ValueError("not a GLB file")
-            return dict(json.loads(file.read(length)))
-        return dict(json.loads(file.read()))
-
-
-def _check_gltf(header: dict[str, Any], where: str) -> None:
-    """Refuse the features of glTF 2.0 that trimesh passes over or misreads."""
-    unknown = [name for name in header.get("extensionsRequired", []) if not name.startswith(GLTF_EXTENSIONS)]
-    accessors = header.get("accessors", [])
-    used = {
-        primitive["attributes"].get(name)
-        for mesh in header.get("meshes", [])
-        for primitive in mesh["primitives"]
-        for name in ("POSITION", "TEXCOORD_0")
-    } - {None}
-    features = [f"extension {name}" for name in unknown]
-    features += ["sparse accessor"] * any("sparse" in accessor for accessor in accessors)
-    features += ["integer positions or UV"] * any(accessors[i]["componentType"] != GLTF_FLOAT for i in used)
-    if features:
-        raise InputError(
-            "the file uses a glTF feature that is not supported",
-            where=where,
-            found=features[0],
-            cure="export it without compression, quantisation and sparse accessors",
-        )

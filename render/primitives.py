@@ -32,6 +32,23 @@ def primitive_mesh(shape: Primitive) -> Mesh:
             return v_groove(shape)
 
 
+def triangle_count(shape: Primitive) -> int:
+    """How many triangles `primitive_mesh` makes of a shape."""
+    match shape:
+        case Plane():
+            return 2
+        case Box():
+            return 12
+        case Sphere():
+            return 2 * shape.segments * (max(4, shape.segments // 2) - 1)
+        case Cylinder():
+            return 4 * shape.segments
+        case StepBlock():
+            return 12 * shape.steps
+        case VGroove():
+            return 24
+
+
 def mesh(vertices: Float, triangles: Int, uv: Float) -> Mesh:
     """Mesh of (v, 3) m, (t, 3) and (t, 3, 2), in the types that the kernels are compiled for."""
     return Mesh(

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import time
-import zipfile
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from render.files import atomic_write
+from render.files import atomic_write, check_regular
 from render.gathered import Gathered
 from render.kernel_cache import source_key
 from render.scene import Scene
@@ -29,6 +28,7 @@ Arrays = dict[str, NDArray[Any]]
 
 TARGETS = {"indirect_error", "light_paths", "ambient_error", "ambient_samples", "truth_images"}
 """Settings that say when to end, which may be others when a render goes on."""
+MAX_BYTES = 2**33
 EVERY = 30.0
 """s between two writings of the file."""
 
@@ -121,7 +121,8 @@ def read_state(state: RenderState) -> RenderState:
     """
     if state.path is None or not state.path.is_file():
         return state
-    where = str(state.path)
+    where, cure = str(state.path), "delete it, or render without --resume"
+    check_regular(state.path, MAX_BYTES, "saved render")
     try:
         with np.load(state.path, allow_pickle=False) as file:
             found: dict[str, Arrays] = {}
@@ -129,9 +130,9 @@ def read_state(state: RenderState) -> RenderState:
                 part, _, name = key.partition("/")
                 found.setdefault(part, {})[name] = file[key]
         marks = {name: str(mark) for name, mark in found.pop("of").items()}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        cure = "delete it, or render without --resume"
-        raise InputError("the saved render is damaged", where=where, found=error, cure=cure) from None
+    except Exception as error:  # a damaged archive fails in any way, also by asking for memory without end
+        found_bytes = "data cut short or changed"
+        raise InputError("the saved render is damaged", where=where, found=found_bytes, cure=cure) from error
     others = [name for name, mark in state.marks.items() if marks.get(name) != mark]
     if others:
         raise InputError(
@@ -139,14 +140,15 @@ def read_state(state: RenderState) -> RenderState:
             where=where,
             found=f"another {' and another '.join(others)}",
             allowed="a render of the same scene with the same settings; only targets may differ",
-            cure="delete it, or render without --resume",
+            cure=cure,
         )
     try:
         lasers = {
             int(name.split()[1]): Gathered.of_arrays(arrays) for name, arrays in found.items() if name != "ambient"
         }
-    except (KeyError, ValueError, IndexError) as error:
-        raise InputError("the saved render is damaged", where=where, found=error) from None
+    except (KeyError, ValueError, IndexError, TypeError):
+        told = "arrays that are missing or of another shape"
+        raise InputError("the saved render is damaged", where=where, found=told, cure=cure) from None
     return RenderState(state.marks, state.path, lasers, found.get("ambient"))
 
 

@@ -40,6 +40,8 @@ CURVE_SHAPES: dict[str, tuple[int, ...]] = {
     "segments": (-1, 2, 3),
 }
 INTEGERS = ("index", "object_id")
+SEAL = "record_sha256"
+AGAIN = "render the frame again"
 PACKAGES = ("blazer-studio", "embreex", "numba", "numpy", "OpenEXR")
 LONGEST_NAME = 80
 
@@ -103,6 +105,12 @@ def sidecar_record(frame: Frame, image: Image | None, scene: Scene, sensor: Sens
     }
 
 
+def sealed(record: Record) -> Record:
+    """The record with the SHA-256 of its own text, so that a number changed in it later is noticed."""
+    entries = {key: value for key, value in record.items() if key != SEAL}
+    return {**entries, SEAL: hashlib.sha256(to_text(entries).encode()).hexdigest()}
+
+
 def to_text(record: Record) -> str:
     """JSON text, one line for each entry of the record and for each laser."""
     lines = []
@@ -115,11 +123,15 @@ def to_text(record: Record) -> str:
 
 
 def from_text(text: str, where: str) -> Record:
-    """The record in a text. InputError: not JSON, not a frame's sidecar, or a newer one."""
+    """The record in a text. InputError: not JSON, not a frame's sidecar, a newer one, or changed since written."""
     try:
         record = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"the frame's description is not JSON: {error}", where=where) from None
+    except json.JSONDecodeError as error:
+        place = f"{where}, line {error.lineno}, column {error.colno}"
+        raise InputError("the frame's description is not JSON", where=place, cure=AGAIN) from None
+    except (ValueError, RecursionError):
+        reason = "a number too long, or lists nested too deeply"
+        raise InputError("the frame's description is not JSON", where=where, found=reason, cure=AGAIN) from None
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         found = record.get("format") if isinstance(record, dict) else type(record).__name__
         raise InputError("not a frame's description", where=where, found=found, allowed=f'"format": "{FORMAT}"')
@@ -132,7 +144,17 @@ def from_text(text: str, where: str) -> Record:
             allowed=f"1 to {FORMAT_VERSION}",
             cure=cure,
         )
+    if not _is_whole(record):
+        allowed = "numbers as they were written together with its image"
+        raise InputError("the frame's description was changed or damaged", where=where, allowed=allowed, cure=AGAIN)
     return record
+
+
+def _is_whole(record: Record) -> bool:
+    try:
+        return bool(sealed(record)[SEAL] == record.get(SEAL))
+    except (TypeError, ValueError):  # NaN, half characters, lists in place of objects
+        return False
 
 
 def curves_from(record: Record) -> tuple[LaserCurve, ...]:

@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
+from render.files import read_bytes
 
 Float32 = NDArray[np.float32]
 
 MAX_PIXELS = 2**26
-"""About 0.8 GB once decoded."""
+"""Of one image, and of all of a scene together; about 0.8 GB once decoded."""
+MAX_FILE_BYTES = 2**29
+ALLOWED = "a whole PNG, JPEG, TIFF, BMP or WebP image of 8 or 16 bit"
 
 
 def srgb_to_linear(values: NDArray[Any]) -> NDArray[np.float64]:
@@ -42,18 +45,43 @@ def load_texture(path: Path, *, srgb: bool, scale: float, where: str) -> Float32
     scale: multiplies the values. where: the field, for messages.
     InputError: absent, not an image, damaged, or of more than MAX_PIXELS.
     """
-    if not path.is_file():
-        raise InputError(
-            "the texture is not there" if not path.exists() else "the texture is not a file",
-            where=where,
-            found=path.name,
-            cure="put the image into the project folder, or give a number instead",
-        )
+    if not path.exists():
+        cure = "put the image into the project folder, or give a number instead"
+        raise InputError("the texture is not there", where=where, found=path.name, cure=cure)
+    place = f"{where}: {path.name}"
+    return decode_texture(read_bytes(path, MAX_FILE_BYTES, "texture", place), srgb=srgb, scale=scale, where=place)
+
+
+def image_size(data: bytes, where: str) -> tuple[int, int]:
+    """Width and height of an image file's bytes; nothing is decoded.
+
+    InputError: no image that Pillow knows, of more than MAX_PIXELS, or of several pages.
+    """
+    from PIL import Image, UnidentifiedImageError
+
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError("the texture cannot be read", where=where, found=error.strerror or error) from error
-    return decode_texture(data, srgb=srgb, scale=scale, where=f"{where}: {path.name}")
+        with Image.open(io.BytesIO(data)) as image:
+            (width, height), pages = image.size, getattr(image, "n_frames", 1)
+    except Image.DecompressionBombError:
+        width, height, pages = MAX_PIXELS, 3, 1  # what Pillow refuses has more
+    except UnidentifiedImageError:
+        raise InputError("the texture cannot be read", where=where, found="no image", allowed=ALLOWED) from None
+    except MemoryError:
+        raise
+    except Exception as error:  # Pillow raises many kinds on damaged data, in words of its own
+        raise InputError("the texture cannot be read", where=where, found="damaged data", allowed=ALLOWED) from error
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            "the texture is too large",
+            where=where,
+            found=f"{width} x {height} pixels",
+            allowed=f"at most {MAX_PIXELS} pixels",
+            cure="scale the image down",
+        )
+    if pages > 1:
+        cure = "save the one that is meant as an image of its own"
+        raise InputError("the image has several pages", where=where, found=pages, allowed="one", cure=cure)
+    return width, height
 
 
 def decode_texture(data: bytes, *, srgb: bool, scale: float, where: str) -> Float32:
@@ -63,19 +91,10 @@ def decode_texture(data: bytes, *, srgb: bool, scale: float, where: str) -> Floa
 
     # WeasyPrint, once a report was made, has Pillow take cut images for whole ones
     ImageFile.LOAD_TRUNCATED_IMAGES = False
-    allowed = "a whole PNG, JPEG, TIFF, BMP or WebP image of 8 or 16 bit"
+    image_size(data, where)
     try:
-        # Pillow tells the size before decoding and refuses a cut image; OpenCV keeps 16 bit.
+        # Pillow refuses a cut image; OpenCV keeps 16 bit.
         with Image.open(io.BytesIO(data)) as image:
-            width, height = image.size
-            if width * height > MAX_PIXELS:
-                raise InputError(
-                    "the texture is too large",
-                    where=where,
-                    found=f"{width} x {height} pixels",
-                    allowed=f"at most {MAX_PIXELS} pixels",
-                    cure="scale the image down",
-                )
             image.load()
             codes: NDArray[Any] | None = cv2.imdecode(
                 np.frombuffer(data, dtype=np.uint8),
@@ -83,11 +102,13 @@ def decode_texture(data: bytes, *, srgb: bool, scale: float, where: str) -> Floa
             )
             if codes is None:  # a format that only Pillow knows
                 codes = np.asarray(image.convert("RGB"))[:, :, ::-1]
-    except InputError:
+    except MemoryError:
         raise
-    except Exception as error:  # Pillow and OpenCV raise many kinds on damaged data
-        raise InputError("the texture cannot be read", where=where, found=error, allowed=allowed) from error
+    except Exception as error:  # Pillow and OpenCV raise many kinds on damaged data, in words of their own
+        found = "an image that is cut short or damaged"
+        raise InputError("the texture cannot be read", where=where, found=found, allowed=ALLOWED) from error
     if codes.dtype not in (np.uint8, np.uint16):
-        raise InputError("the texture's number type is not known", where=where, found=codes.dtype, allowed=allowed)
+        raise InputError("the texture's number type is not known", where=where, found=codes.dtype, allowed=ALLOWED)
     linear = linear_reflectance(codes[:, :, ::-1], srgb=srgb)
-    return np.ascontiguousarray(linear * np.float32(scale))
+    linear *= np.float32(scale)
+    return np.ascontiguousarray(linear)

@@ -98,10 +98,13 @@ class World:
 
 
 def build_world(scene: Scene, root: Path, step: int = 0) -> World:
-    """Load the visible objects' meshes and place them for a step. Raises InputError for a bad mesh or texture."""
-    from render.mesh_files import load_mesh
+    """Load the visible objects' meshes and place them for a step.
 
-    return place_meshes(scene, [load_mesh(item, root) for item in scene.visible_objects], step, root)
+    Raises InputError for a bad mesh or texture, or where they hold more together than a scene may.
+    """
+    from render.mesh_files import load_meshes
+
+    return place_meshes(scene, load_meshes(scene.visible_objects, root), step, root)
 
 
 def place_meshes(scene: Scene, meshes: list[Mesh], step: int = 0, root: Path | None = None) -> World:

@@ -10,9 +10,9 @@ from pydantic import BaseModel
 from render.errors import InputError
 from render.files import atomic_write, inside, sha256
 from render.material import BumpMap, GreyTexture, NormalMap, Texture
+from render.mesh_reader import side_files
 from render.scene import Scene
 from render.shape import MeshFile
-from studio.mesh_import import side_files
 
 
 def named_files(item: BaseModel, where: str) -> dict[str, str]:
@@ -51,7 +51,7 @@ def carry(scene: Scene, root: Path, folder: Path) -> list[Path]:
     pairs = []
     for relative, where in named_files(scene, "scene").items():
         beside = Path(relative).parent
-        for each in (relative, *(str(beside / name) for name in side_files(inside(root, relative, where)))):
+        for each in (relative, *(str(beside / name) for name in side_files(inside(root, relative, where), root))):
             source, target = inside(root, each, where), inside(folder, each, where)
             if not source.is_file():
                 continue

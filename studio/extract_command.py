@@ -103,8 +103,8 @@ def _asked(
     """The options, checked against each other. InputError names the option."""
     from analysis.line.extract import settings_of
     from studio.commands import load_project
+    from studio.image_files import load_photograph
     from studio.line import working_volume
-    from studio.photographs import load_photograph
 
     options["channel"] = options.pop("laser")
     settings, volume = settings_of(None, **options), None

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from render.errors import InputError
 from render.files import check_regular, inside, sha256
-from render.mesh_files import MAX_FILE_BYTES
+from render.mesh_headers import MAX_FILE_BYTES
+from render.mesh_reader import side_files
 from render.scene import Scene
 from studio.carry import named_files
-from studio.mesh_import import side_files
 
 MOST_NAMED = 6
 """Things that a message names one by one."""
@@ -31,7 +31,7 @@ def input_files(scene: Scene, root: Path) -> dict[str, Path]:
         if not file.is_file():
             continue
         found[Path(relative).as_posix()] = file
-        for name in side_files(file):
+        for name in side_files(file, root):
             beside = (Path(relative).parent / name).as_posix()
             with suppress(InputError):  # the mesh reader takes none from outside either
                 side = inside(root, beside, where)

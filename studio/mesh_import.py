@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import unquote
 
 import numpy as np
 
 from render.errors import InputError
-from render.files import atomic_write, sha256
+from render.files import atomic_write, check_regular, sha256
 from render.mesh_files import LARGE_EXTENT, load_mesh
-from render.mesh_reader import EXTENSIONS, read_parts
+from render.mesh_headers import MAX_FILE_BYTES
+from render.mesh_reader import EXTENSIONS, SideFiles, read_parts, side_files
 from render.scene import SceneObject
 from render.shape import UNITS, MeshFile, Unit
 
@@ -57,8 +55,7 @@ def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
     if not is_mesh(file):
         allowed = ", ".join(f".{name}" for name in EXTENSIONS)
         raise InputError("this is not a mesh file", where=str(file), found=file.suffix or file.name, allowed=allowed)
-    if not file.is_file():
-        raise InputError("there is no such file", where=str(file))
+    check_regular(file, MAX_FILE_BYTES, "mesh file")
     made: list[Path] = []
     try:
         inside = _copied(file, root / FOLDER, made) if needs_copy(file, root) else file.resolve()
@@ -67,36 +64,6 @@ def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
         for copy in made:
             copy.unlink(missing_ok=True)
         raise
-
-
-def side_files(file: Path) -> list[str]:
-    """Files that a mesh file names: OBJ materials with their images, glTF buffers and images."""
-    suffix = file.suffix.lower()
-    if suffix == ".gltf":
-        try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            entries = [*data.get("buffers", []), *data.get("images", [])]
-            uris = [unquote(entry["uri"]) for entry in entries if not entry.get("uri", "data:").startswith("data:")]
-        except (ValueError, AttributeError, TypeError):
-            return []  # reading it will tell what is wrong
-        return uris
-    if suffix != ".obj":
-        return []
-    libraries = _words_after(file, r"mtllib")
-    images = [name for library in libraries for name in _words_after(file.parent / library, r"(?:map_\w+|bump|disp)")]
-    return libraries + images
-
-
-def _words_after(file: Path, keyword: str) -> list[str]:
-    """The last word of each line that begins with a keyword."""
-    if not file.is_file():
-        return []
-    pattern = re.compile(rf"\s*{keyword}\s+(?:.*\s)?(\S+)\s*", re.IGNORECASE)
-    try:
-        with open(file, encoding="utf-8", errors="replace") as lines:
-            return [match[1].replace("\\", "/") for line in lines if (match := pattern.fullmatch(line))]
-    except OSError:
-        return []
 
 
 def copied_beside(file: Path, root: Path, folder: str) -> str:
@@ -108,29 +75,26 @@ def copied_beside(file: Path, root: Path, folder: str) -> str:
 
 def _copied(file: Path, folder: Path, made: list[Path]) -> Path:
     """The file in a folder of the project; the same bytes there are used again, another file of that name is kept."""
-    sides = [name for name in side_files(file) if _is_below(file.parent / name, file.parent)]
+    check_regular(file, MAX_FILE_BYTES)
+    sides = side_files(file, file.parent) if is_mesh(file) else []
     target, number = folder / file.name, 1
     while target.exists() and sha256(target) != sha256(file):
         number += 1
         target = folder / (f"{file.stem} {number}{file.suffix}" if not sides else f"{file.stem} {number}/{file.name}")
     for source, copy in [(file, target), *((file.parent / name, target.parent / name) for name in sides)]:
-        if copy.exists() or not source.is_file():
+        if copy.exists():
             continue
+        check_regular(source, MAX_FILE_BYTES, "file that the mesh names")
         with atomic_write(copy) as temporary:
             shutil.copyfile(source, temporary)
         made.append(copy)
     return target.resolve()
 
 
-def _is_below(file: Path, folder: Path) -> bool:
-    return file.resolve().is_relative_to(folder.resolve())
-
-
 def _judged(file: Path, root: Path, view: float) -> ImportedMesh:
     relative = file.relative_to(root.resolve()).as_posix()
-    parts = read_parts(file, root, f"mesh {relative}", colours=False)
-    if not parts:
-        raise InputError("the mesh has no triangles", where=relative, cure="mesh the points first, or export the faces")
+    where = f"mesh {relative}"
+    parts = read_parts(file, where, SideFiles(file, root, where), colours=False)
     low = np.min([part.vertices.min(axis=0) for part in parts], axis=0)
     high = np.max([part.vertices.max(axis=0) for part in parts], axis=0)
     extent = float((high - low).max())

@@ -24,9 +24,9 @@ from analysis.line.settings import ExtractionSettings
 from analysis.line.subtract import subtract_off
 from render.errors import InputError
 from render.files import atomic_write
+from studio.image_files import load_photograph
 from studio.line import tell
 from studio.own_files import LINE_COLUMNS, check_replaceable
-from studio.reconstruct import MAX_IMAGE_BYTES, read_image
 
 SCARCE, PLENTY = 0.25, 0.5
 """Shares of scan lines with a line: below the first, the other axis is tried, and named if it has the second."""
@@ -35,33 +35,6 @@ PLATEAU = 32
 """Pixels of one number that a sensor's limit makes, and chance does not."""
 SATURATED_SHARE = 0.5
 """Of the scan lines; an exposure with more of them is no base to estimate noise from."""
-
-
-def load_photograph(path: Path) -> NDArray[Any]:
-    """(h, w) or (h, w, 3) of a PNG, TIFF, JPEG, BMP or EXR. InputError: missing, too big, damaged, without RGB or Y."""
-    return _read_exr(path) if path.suffix.lower() == ".exr" else read_image(path)
-
-
-def _read_exr(path: Path) -> NDArray[Any]:
-    import OpenEXR
-
-    try:
-        if path.stat().st_size > MAX_IMAGE_BYTES:
-            raise InputError("the image is too big", where=str(path), allowed=f"{MAX_IMAGE_BYTES} bytes")
-        stream = io.BytesIO(path.read_bytes())
-    except OSError as error:
-        raise InputError("the image cannot be read", where=str(path), found=error.strerror or error) from None
-    try:
-        layers = OpenEXR.File(stream, separate_channels=True).channels()
-        pixels = {name: np.asarray(channel.pixels, dtype=np.float32) for name, channel in layers.items()}
-    except (RuntimeError, TypeError, ValueError) as error:
-        raise InputError("the image cannot be decoded", where=str(path), found=error) from None
-    if {"R", "G", "B"} <= pixels.keys():
-        return np.stack([pixels[name] for name in "RGB"], axis=2)
-    if "Y" in pixels or len(pixels) == 1:
-        return pixels.get("Y", next(iter(pixels.values())))
-    found = ", ".join(sorted(pixels))
-    raise InputError("the EXR has no image of its own", where=str(path), found=found, allowed="channels R, G, B, or Y")
 
 
 def extract_photograph(

@@ -13,6 +13,8 @@ from render.errors import InputError
 from studio.strict_json import brief
 
 MAX_LISTED = 5
+MAX_ERRORS = 1000
+LONGEST_NAME = 60
 Location = tuple[int | str, ...]
 
 
@@ -32,6 +34,10 @@ class Problem:
 
 def input_error(error: ValidationError, model: type[BaseModel], data: Any, where: str) -> InputError:
     """One message for everything wrong in `data`, up to five problems, the rest counted."""
+    if error.error_count() > MAX_ERRORS:  # each takes a kilobyte and a search for the name that was meant
+        allowed = "keys and values as in a project that `new` writes"
+        found_errors = f"{error.error_count()} problems"
+        return InputError("this is hardly a project", where=where, found=found_errors, allowed=allowed)
     found = problems(error, model, data)
     if len(found) == 1:
         only = found[0]
@@ -114,14 +120,16 @@ def _problem(entry: dict[str, Any], model: type[BaseModel]) -> Problem:
         return Problem(field, "the field is missing", None, "")
     if kind == "extra_forbidden":
         names = _field_names(model, entry["loc"][:-1])
-        near = difflib.get_close_matches(str(entry["loc"][-1]), names, n=1, cutoff=0.5)
+        near = difflib.get_close_matches(str(entry["loc"][-1])[:LONGEST_NAME], names, n=1, cutoff=0.5)
         cure = f"did you mean {near[0]}?" if near else ""
         return Problem(field, "unknown key", None, "" if near else ", ".join(names), cure)
     if kind == "union_tag_not_found":
         return Problem(field, "the field kind is missing", found, ", ".join(_kinds(model, entry["loc"])))
     if kind == "union_tag_invalid":
         expected = str(context.get("expected_tags", ""))
-        near = difflib.get_close_matches(str(context.get("tag")), [tag.strip("'") for tag in expected.split(", ")], 1)
+        near = difflib.get_close_matches(
+            str(context.get("tag"))[:LONGEST_NAME], [tag.strip("'") for tag in expected.split(", ")], 1
+        )
         place = f"{field}.kind" if field else "kind"
         cure = f"did you mean {near[0]}?" if near else ""
         return Problem(place, "unknown kind", brief(context.get("tag")), expected.replace("'", ""), cure)
@@ -148,7 +156,8 @@ def _unit(model: type[BaseModel], location: Location) -> str:
 def _dotted(path: Location) -> str:
     text = ""
     for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+        name = part if isinstance(part, int) or len(part) <= LONGEST_NAME else part[: LONGEST_NAME - 3] + "..."
+        text += f"[{name}]" if isinstance(name, int) else f".{name}" if text else name
     return text
 
 

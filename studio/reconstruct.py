@@ -1,4 +1,4 @@
-"""Points without rendering, from the frames of an earlier scan; and how an image file is read."""
+"""Points without rendering, from the frames of an earlier scan."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ import math
 from contextlib import closing
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from render.errors import InputError
 from render.frame_files import read_frame
@@ -22,8 +19,6 @@ from studio.redevelop import development
 from studio.results import now
 from studio.stages import Clock, develop_step, step_world
 from studio.summary import summarise
-
-MAX_IMAGE_BYTES = 2**30
 
 
 def reconstruct_folder(
@@ -103,27 +98,3 @@ def _measured(
         "extraction": measured["extraction"],
         "seconds": clock.seconds,
     }
-
-
-def read_image(path: Path) -> NDArray[Any]:
-    """(h, w) or (h, w, 3) RGB digital numbers of a PNG, TIFF, JPEG or BMP. InputError: missing, too big or damaged."""
-    import cv2
-
-    try:
-        size = path.stat().st_size
-        if size > MAX_IMAGE_BYTES:
-            raise InputError(
-                "the image is too big", where=str(path), found=f"{size} bytes", allowed=f"{MAX_IMAGE_BYTES}"
-            )
-        data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
-    except OSError as error:
-        raise InputError("the image cannot be read", where=str(path), found=error.strerror or error) from None
-    try:
-        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if len(data) else None
-    except cv2.error as error:
-        raise InputError("the image cannot be decoded", where=str(path), found=error.err) from None
-    if image is None:
-        raise InputError("the file is not an image", where=str(path), allowed="PNG, TIFF, JPEG or BMP")
-    if image.ndim == 3:
-        image = np.ascontiguousarray(image[:, :, 2::-1])
-    return np.asarray(image)

@@ -16,9 +16,10 @@ from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
 from analysis.line.result import Flag, Line
 from render.errors import InputError
+from studio.image_files import load_photograph
 from studio.line import tell, working_volume
 from studio.own_files import check_replaceable
-from studio.photographs import extract_series, load_photograph, naming
+from studio.photographs import extract_series, naming
 from studio.project import Project
 from studio.stages import Clock, triangulate_line
 from studio.sweep import surface_motion

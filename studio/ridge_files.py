@@ -17,8 +17,9 @@ from analysis.line.ridges import find_ridges
 from analysis.line.settings import ExtractionSettings
 from analysis.line.subtract import subtract_off
 from render.files import atomic_write
+from studio.image_files import load_photograph
 from studio.own_files import RIDGE_COLUMNS
-from studio.photographs import check_light, load_photograph, naming, table_path
+from studio.photographs import check_light, naming, table_path
 
 
 def ridges_of_file(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from render.errors import InputError
+from render.files import read_bytes
 
 MAX_BYTES = 64 * 2**20
 MAX_DEPTH = 64
@@ -61,27 +62,16 @@ def brief(value: Any, length: int = 60) -> str:
     """A value as JSON, cut to a length that fits a message."""
     if isinstance(value, dict | list) and len(value) > length:
         return f"{'an object' if isinstance(value, dict) else 'a list'} of {len(value)} items"
+    value = value[:length] if isinstance(value, str) else value
     text = json.dumps(value, default=str)
     return text if len(text) <= length else text[: length - 3] + "..."
 
 
 def _read(path: Path, what: str) -> str:
     where = str(path)
-    try:
-        if path.is_dir():
-            raise InputError(f"a folder, not a {what}", where=where, cure="give the .json file in it")
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(f"the {what} is too big", where=where, found=f"{size} bytes", allowed=f"{MAX_BYTES}")
-        with open(path, "rb") as file:
-            data = file.read(MAX_BYTES + 1)  # a device has no size to ask for
-    except FileNotFoundError:
-        raise InputError(f"there is no such {what}", where=where) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"the {what} cannot be read", where=where, found=reason) from None
-    if len(data) > MAX_BYTES:
-        raise InputError(f"the {what} is too big", where=where, allowed=f"{MAX_BYTES} bytes")
+    if path.is_dir():
+        raise InputError(f"a folder, not a {what}", where=where, cure="give the .json file in it")
+    data = read_bytes(path, MAX_BYTES, what)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

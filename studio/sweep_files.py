@@ -14,8 +14,8 @@ from analysis.line.settings import ExtractionSettings
 from analysis.line.spacetime import passage
 from render.errors import InputError
 from render.files import atomic_write
+from studio.image_files import load_photograph
 from studio.own_files import check_replaceable
-from studio.photographs import load_photograph
 
 
 def passage_of_files(

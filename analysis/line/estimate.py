@@ -14,10 +14,13 @@ from analysis.line.measure import measure
 from analysis.line.noise import FULL_SCALES, NoiseModel, image_saturation
 from analysis.line.result import Line
 from analysis.line.settings import ExtractionSettings
+from render.errors import InputError
 
 LINES = 256
 """Scan lines looked at."""
 ROUNDS = 6
+CHANCE = 32
+"""Fewer pixels may share one number, with no other but the dark's, by chance."""
 FULL_WELL = 1e4
 """Electrons taken for the highest number when no line says better."""
 
@@ -28,7 +31,10 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
     Noise without light is that of the differences of neighbours along the scan line, edges clipped out. The gain is
     the photon transfer of the line's own fit: the one that makes the typical reduced chi-square of likelihood fits 1.
     What the Gaussian model cannot follow (speckle, a lens with tails) counts as noise, so that sigma_u stays honest.
+
+    InputError: the image has two numbers only, which say nothing of noise or of the line's profile.
     """
+    _check_levels(image)
     axis = 0 if settings.axis == "rows" else 1
     stride = max(1, image.shape[axis] // LINES) | 1  # odd: keeps the rows of a Bayer pattern alternating
     sample = image[::stride] if axis == 0 else image[:, ::stride]
@@ -68,6 +74,20 @@ def residual_ratio(line: Line) -> float | None:
     freedom = np.maximum(2.0 * np.ceil(4.0 * line.width[valid] + 1.5) - 3.0, 1.0)
     # Wilson and Hilferty (1931): median of chi2 / f is (1 - 2 / 9f)^3
     return max(float(np.median(line.chi2[valid] / (1.0 - 2.0 / (9.0 * freedom)) ** 3)), 1e-3)
+
+
+def _check_levels(image: NDArray[Any]) -> None:
+    low, high = np.nanmin(image), np.nanmax(image)
+    if low == high or np.count_nonzero(image == high) < CHANCE:
+        return
+    if bool(((image == low) | (image == high)).all()):
+        raise InputError(
+            "the image is black and white, without the line's profile",
+            where="image",
+            found=f"no numbers but {low:g} and {high:g}",
+            allowed="8 bits or more a pixel",
+            cure="save the image as the camera gave it, before any threshold",
+        )
 
 
 def _full_scale(image: NDArray[Any]) -> float:

@@ -15,7 +15,7 @@ from analysis.line.half_energy import halve_seeds
 from analysis.line.log_fit import fit_logarithms
 from analysis.line.matched_filter import response_gain
 from analysis.line.phase import turn_seeds
-from analysis.line.result import Line
+from analysis.line.result import Flag, Line
 from analysis.line.ridge import HALO, fill_gaps, ridge_seeds
 from analysis.line.settings import ExtractionSettings
 from analysis.line.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, interpolate_seeds
@@ -59,6 +59,9 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None) -> 
             _measure_rows(signal, mask, floor, settings, correlation, seeds, flags[start:stop], out[start:stop])
 
     map_chunks(work, lines.count, TALL_CHUNK if halo else CHUNK, threads)
+    # a position that says less than a guess along the whole scan line is none
+    lost = out[..., 1] > lines.image.shape[1] / np.sqrt(12.0)
+    out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
     u, sigma_u, width, amplitude, background, chi2 = (np.ascontiguousarray(out[..., j]) for j in range(6))
     return Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
 

@@ -109,7 +109,7 @@ def test_a_broken_table_is_refused_in_words(tmp_path, content):
     (tmp_path / "p.csv").write_text(content)
     with pytest.raises(InputError, match="row"):
         read_csv(tmp_path / "p.csv")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="there is no such table"):
         read_csv(tmp_path / "absent.csv")
 
 

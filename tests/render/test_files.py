@@ -119,7 +119,7 @@ def test_a_neighbour_whose_name_begins_alike_is_outside(tmp_path: Path) -> None:
 def test_sha256_is_that_of_the_bytes(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"laser" * 100_000)
     assert sha256(tmp_path / "a") == hashlib.sha256(b"laser" * 100_000).hexdigest()
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="there is no such file"):
         sha256(tmp_path / "absent")
 
 
@@ -136,10 +136,31 @@ def test_pipes_devices_folders_and_names_without_a_file_are_refused_before_they_
     for path, problem in (
         (tmp_path / "pipe", "not a regular file"),
         (Path("/dev/zero"), "not a regular file"),
-        (tmp_path, "a folder, not a mesh"),
+        (tmp_path, "the mesh is a folder"),
         (tmp_path / "none", "there is no such mesh"),
         (tmp_path / "a\0b", "cannot be read"),
     ):
         for refuse in (read_bytes, check_regular):
             with pytest.raises(InputError, match=problem):
                 refuse(path, 10, "mesh")
+
+
+def test_a_pipe_has_no_hash(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe: the file is not a regular file"):
+        sha256(tmp_path / "pipe")
+
+
+def test_a_pipe_is_not_replaced_by_a_file_also_where_a_link_leads_to_it(tmp_path: Path) -> None:
+    pipe, link = tmp_path / "pipe.json", tmp_path / "link.json"
+    os.mkfifo(pipe)
+    link.symlink_to(pipe)
+    for path in (pipe, link):
+        with (
+            pytest.raises(
+                InputError, match=rf"{path.name}: the file cannot be written; found it is a device or a pipe"
+            ),
+            atomic_write(path) as temporary,
+        ):
+            temporary.write_text("new")
+        assert pipe.is_fifo() and sorted(tmp_path.iterdir()) == [link, pipe]

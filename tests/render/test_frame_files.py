@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import os
+import struct
 import subprocess
 import sys
 from dataclasses import fields, replace
@@ -19,6 +22,7 @@ from render.camera import Camera
 from render.counts import DIRECT_ERROR, DIRECT_SAMPLES, LIT_PIXELS, RAYS, Quantity, counts_from
 from render.develop import Image, develop
 from render.errors import InputError
+from render.exr import decode_exr
 from render.frame import Frame, LaserCurve, Truth
 from render.frame_files import read_frame, write_frame
 from render.laser import LineLaser
@@ -27,7 +31,8 @@ from render.pose import Pose
 from render.scene import Rig, Scene, SceneObject
 from render.sensor import Sensor, SpectralCurve
 from render.shape import Box
-from render.sidecar import safe_name
+from render.sidecar import safe_name, sealed
+from tests.render.damaged import PROGRAM_WORDS, damaged_copies
 
 WIDTH, HEIGHT = 61, 40
 NAMES = ("blue", "a.b/c\\d ü%", "x" * 100, "日" * 100)
@@ -251,9 +256,63 @@ def test_counts_of_a_first_version_are_read_by_the_names_that_they_had() -> None
 @pytest.mark.parametrize("name", mutilations())
 def test_a_wrong_description_is_refused_by_name(written: list[Path], name: str) -> None:
     record = mutilations()[name](json.loads(written[2].read_text(encoding="utf-8")))
+    with contextlib.suppress(AttributeError, TypeError):
+        record = sealed(record)  # as if it had been written so
     written[2].write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(InputError, match=r"frame_0003\.json"):
         read_frame(written[2])
+
+
+@pytest.mark.parametrize("change", ["truth", "pose", "step", "no seal", "NaN"])
+def test_a_description_changed_since_it_was_written_is_refused(written: list[Path], change: str) -> None:
+    record = json.loads(written[2].read_text(encoding="utf-8"))
+    written[2].write_text(json.dumps(record, indent=3), encoding="utf-8")
+    assert same_bits(read_frame(written[2]), frame_of(scene_of())), "blanks are no change"
+    match change:
+        case "truth":
+            record["lasers"][1]["curve"]["depth_z"][0] += 0.001
+        case "pose":
+            record["camera"]["T_world_camera"][0][3] += 0.1
+        case "step":
+            record["step"] += 1
+        case "no seal":
+            del record["record_sha256"]
+        case "NaN":
+            record["lasers"][1]["curve"]["position"][0] = float("nan")
+    written[2].write_text(json.dumps(record), encoding="utf-8")
+    with pytest.raises(InputError, match=r"frame_0003\.json: the frame's description was changed.*render the"):
+        read_frame(written[0])
+
+
+def test_no_message_about_a_damaged_frame_is_in_a_librarys_words(written: list[Path]) -> None:
+    for path in (written[0], written[2]):
+        whole = path.read_bytes()
+        for content in damaged_copies(whole, 60, seed=17):
+            path.write_bytes(content)
+            try:
+                decode_exr(content, str(path))  # as for a photograph, which has no checksum
+            except InputError as error:
+                assert str(path) in str(error) and not PROGRAM_WORDS.search(str(error)), error
+            try:
+                read_frame(path)
+            except InputError as error:
+                assert "frame_0003" in str(error) and not PROGRAM_WORDS.search(str(error)), error
+        path.write_bytes(whole)
+
+
+def test_an_exr_of_many_pixels_or_parts_is_refused_before_they_are_made(written: list[Path]) -> None:
+    content = bytearray(written[0].read_bytes())
+    at = content.index(b"dataWindow\0box2i\0") + 21
+    struct.pack_into("<4i", content, at, 0, 0, 2**20, 2**20)
+    with pytest.raises(InputError, match=r"too big, or damaged; found 1048577 x 1048577 pixels"):
+        decode_exr(bytes(content), "a.exr")
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    pixels = np.ones((4, 4), np.float32)
+    parts = [OpenEXR.Part({**header, "name": name}, {"Y": pixels}, name) for name in ("first", "second")]
+    stream = io.BytesIO()
+    OpenEXR.File(parts).write(stream)
+    with pytest.raises(InputError, match=r"b\.exr: the EXR has several parts; found 2; allowed: one; save each part"):
+        decode_exr(stream.getvalue(), "b.exr")
 
 
 def test_the_sidecar_of_another_frame_is_refused(tmp_path: Path, written: list[Path]) -> None:

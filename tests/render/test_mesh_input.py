@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import render.mesh_files
+import render.mesh_headers
 import render.mesh_reader
 from render.errors import InputError
 from render.files import sha256
@@ -23,6 +24,7 @@ from render.mesh import Mesh
 from render.mesh_files import load_mesh
 from render.scene import SceneObject
 from render.shape import MeshFile, Sphere
+from tests.render.damaged import PROGRAM_WORDS
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 VERTICES = np.array([[0, 0, 0], [0.25, 0, 0], [0.25, 0.125, 0], [0, 0.125, 0], [0.125, 0.0625, 0.5]])
@@ -50,12 +52,13 @@ def message_of_text(root: Path, name: str, text: str | bytes, **options: object)
 
 
 def test_a_file_that_is_absent_a_folder_or_empty_is_told(tmp_path: Path) -> None:
-    assert "cannot be read; found No such file" in message(tmp_path, "meshes/part.ply")
+    text = message(tmp_path, "meshes/part.ply")
+    assert "there is no such mesh file" in text and "put the mesh into the project folder" in text
     (tmp_path / "folder.ply").mkdir()
-    assert "not a file; found a folder" in message(tmp_path, "folder.ply")
-    assert "empty; found 0 bytes" in message_of_text(tmp_path, "a.stl", b"")
+    assert "folder.ply: the mesh file is a folder" in message(tmp_path, "folder.ply")
+    assert "the mesh file is empty" in message_of_text(tmp_path, "a.stl", b"")
     os.mkfifo(tmp_path / "pipe.ply")
-    assert "not a file" in message(tmp_path, "pipe.ply")
+    assert "not a regular file; found a device or a pipe" in message(tmp_path, "pipe.ply")
 
 
 @pytest.mark.parametrize("name", ["part.step", "part", "part.ply.zip", "part.drc"])
@@ -143,16 +146,16 @@ def test_a_gigantic_mesh_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     with pytest.raises(InputError, match="object 'ball': the mesh is too large"):
         load_mesh(item, tmp_path)
 
-    # The header alone tells; nothing of that size is read.
+    # The header alone tells; nothing of that size is made.
     header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nelement face 60000000\n"
     assert "too many triangles; found 60000000" in message_of_text(tmp_path, "a.ply", header + "end_header\n")
     with open(tmp_path / "b.stl", "wb") as file:  # sparse: takes no disk
-        file.write(bytes(80) + struct.pack("<I", 60_000_000))
-        file.truncate(84 + 50 * 60_000_000)
-    assert "too many triangles; found 60000000" in message(tmp_path, "b.stl")
+        file.write(bytes(80) + struct.pack("<I", 21_000_000))
+        file.truncate(84 + 50 * 21_000_000)
+    assert "too many triangles; found 21000000" in message(tmp_path, "b.stl")
     with open(tmp_path / "c.stl", "wb") as file:
         file.truncate(5 * 2**30)
-    assert "too large; found 5368709120 bytes" in message(tmp_path, "c.stl")
+    assert "c.stl: the mesh file is too big; found 5368709120 bytes" in message(tmp_path, "c.stl")
 
     # A small file that shows one geometry many times.
     scene = trimesh.Scene([trimesh.Trimesh(VERTICES, TRIANGLES, process=False)])
@@ -160,7 +163,7 @@ def test_a_gigantic_mesh_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     for k in range(9):
         scene.graph.update(frame_to=f"copy{k}", geometry=name)
     scene.export(tmp_path / "d.glb")
-    monkeypatch.setattr(render.mesh_reader, "MAX_TRIANGLES", 59)
+    monkeypatch.setattr(render.mesh_headers, "MAX_TRIANGLES", 59)
     assert "too many triangles; found 60" in message(tmp_path, "d.glb")
 
 
@@ -201,7 +204,7 @@ def test_a_texture_asks_for_uv(tmp_path: Path) -> None:
 
 def test_an_absent_texture_is_told_with_its_field(tmp_path: Path) -> None:
     item = SceneObject(name="ball", shape=Sphere(segments=8), material=Lambertian(albedo=Texture(path="wood.png")))
-    with pytest.raises(InputError, match=r"object 'ball': material\.albedo\.path: the texture is not there.*wood\.png"):
+    with pytest.raises(InputError, match=r"object 'ball': material\.albedo\.path: wood\.png: the texture is not there"):
         load_mesh(item, tmp_path)
     outside = Lambertian(albedo=Texture(path="../wood.png"))
     with pytest.raises(InputError, match=r"object 'ball': material\.albedo\.path: the path leaves the project"):
@@ -304,7 +307,8 @@ def test_a_damaged_file_gives_a_mesh_or_a_message_and_nothing_else(
         try:
             mesh = load_mesh(thing(name, albedo), folder)
         except InputError as error:
-            assert "object 'part'" in str(error)
+            assert f"object 'part': {name}" in str(error)
+            assert not PROGRAM_WORDS.search(str(error)), error
             return
         assert_sound(mesh)
 
@@ -316,3 +320,81 @@ def assert_sound(mesh: Mesh) -> None:
     assert np.isfinite(mesh.vertices).all() and np.abs(mesh.vertices).max() <= render.mesh_files.MAX_EXTENT
     assert mesh.triangles.min() >= 0 and mesh.triangles.max() < len(mesh.vertices)
     assert mesh.uv is None or (mesh.uv.shape == (*mesh.triangles.shape, 2) and np.isfinite(mesh.uv).all())
+
+
+def test_a_count_that_lies_is_told_with_the_length_that_it_asks_for(tmp_path: Path) -> None:
+    stl = bytearray(example("stl", tmp_path))
+    for count in (0, 5, 7, 2**31):
+        stl[80:84] = struct.pack("<I", count)
+        text = message_of_text(tmp_path, "a.stl", bytes(stl))
+        assert f"found a count of {count} triangles, which take {84 + 50 * count} bytes, in a file of 384" in text
+    for kind in ("ply", "ply_ascii"):
+        data = example(kind, tmp_path).replace(b"element face 6", b"element face 600")
+        text = message_of_text(tmp_path, f"{kind}.ply", data)
+        assert "600 of face, which take at least" in text and "point cloud" not in text
+    off = example("off", tmp_path).replace(b"5 6 0", b"5 600 0")
+    assert "5 vertices and 600 faces in a file of" in message_of_text(tmp_path, "a.off", off)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "fault"),
+    [
+        ("a.obj", TRIANGLE + "f 1 2 three\n", "'f 1 2 three' in line 4"),
+        ("b.obj", TRIANGLE.replace("0 1 0", "0 1 O") + "f 1 2 3\n", "'v 0 1 O' in line 3"),
+        ("a.off", "OFF\n3 1 0\n0 0 0\n1 0 zero\n0 1 0\n3 0 1 2\n", "'1 0 zero' in line 4"),
+        ("b.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n4 0 1 2\n", "a fault in face 0; allowed: a count"),
+    ],
+)
+def test_a_fault_in_a_text_mesh_is_told_with_its_place(tmp_path: Path, name: str, content: str, fault: str) -> None:
+    assert f"found {fault}" in message_of_text(tmp_path, name, content)
+
+
+def test_a_row_of_a_text_ply_that_says_more_corners_than_it_has_is_told(tmp_path: Path) -> None:
+    data = example("ply_ascii", tmp_path)
+    start = data.index(b"\n3 ")
+    told = message_of_text(tmp_path, "a.ply", data[: start + 1] + b"9" + data[start + 2 :])
+    assert "found face 0, which says '9' corners" in told
+
+
+def test_a_gltf_of_more_parts_than_a_file_may_have_is_told_before_they_are_made(tmp_path: Path) -> None:
+    header = json.loads(example("gltf", tmp_path))
+    header["nodes"] = [{"mesh": 0}] * 20_000
+    text = message_of_text(tmp_path, "a.gltf", json.dumps(header))
+    assert "too many parts; found 20000; allowed: at most 10000" in text
+    header = json.loads(example("gltf", tmp_path))
+    header["accessors"][0] = {"componentType": 5125, "type": "SCALAR", "count": 10**12}
+    assert "too many" in message_of_text(tmp_path, "b.gltf", json.dumps(header))
+
+
+def test_a_file_without_end_beside_the_mesh_is_told(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.mtl")
+    text = message_of_text(tmp_path, "a.obj", f"mtllib a.mtl\n{TRIANGLE}f 1 2 3\n", albedo=FromMesh())
+    assert "a.obj: a.mtl: the file that the mesh names is not a regular file" in text
+
+
+def test_an_image_that_cannot_be_opened_is_told_where_the_reader_would_go_on_without_it(tmp_path: Path) -> None:
+    (tmp_path / "a.mtl").write_text("newmtl m\nKd 0.5 0.5 0.5\nmap_Kd wood.png\n")
+    (tmp_path / "wood.png").write_text("rust")
+    text = f"mtllib a.mtl\nusemtl m\n{TRIANGLE}vt 0 0\nf 1/1 2/1 3/1\n"
+    told = "a.obj: wood.png: the texture cannot be read; found no image"
+    assert told in message_of_text(tmp_path, "a.obj", text, albedo=FromMesh())
+
+
+def test_an_image_within_a_glb_that_cannot_be_opened_is_told(tmp_path: Path) -> None:
+    from PIL import Image
+
+    image = Image.fromarray(np.full((8, 8, 3), 99, dtype=np.uint8))
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=image)
+    uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
+    visual = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    data = trimesh.Trimesh(VERTICES, TRIANGLES, process=False, visual=visual).export(file_type="glb")
+    (tmp_path / "a.glb").write_bytes(data)
+    assert load_mesh(thing("a.glb", FromMesh()), tmp_path).texture is not None
+    text = message_of_text(tmp_path, "b.glb", data.replace(b"\x89PNG", b"rust"), albedo=FromMesh())
+    assert "b.glb: images[0]: the texture cannot be read; found no image" in text
+
+
+def test_nothing_of_a_damaged_file_reaches_the_terminal(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    message_of_text(tmp_path, "a.stl", example("stl_ascii", tmp_path).replace(b"vertex 0", b"vertex x", 1))
+    message_of_text(tmp_path, "a.ply", example("ply", tmp_path)[:-3])
+    assert capfd.readouterr() == ("", "")

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from render.mesh import Mesh
-from render.primitives import Primitive, primitive_mesh
+from render.primitives import Primitive, primitive_mesh, triangle_count
 from render.shape import Box, Cylinder, Plane, Sphere, StepBlock, VGroove
 from tests.closed_forms import step_block_tops, v_groove_tops
 
@@ -122,3 +122,9 @@ def test_a_step_block_stands_on_z_0_and_climbs_along_x() -> None:
     np.testing.assert_allclose(mesh.vertices.min(axis=0), (-0.05, -0.05, 0.0), atol=1e-16)
     np.testing.assert_allclose(mesh.vertices.max(axis=0), (0.05, 0.05, 0.05), atol=1e-16)
     assert mesh.vertices[mesh.vertices[:, 0] < -0.04][:, 2].max() == pytest.approx(0.01)
+
+
+def test_the_number_of_a_primitives_triangles_is_known_before_it_is_made() -> None:
+    balls = Sphere(segments=8), Sphere(segments=33)
+    for shape in (Plane(), Box(), *balls, Cylinder(segments=7), StepBlock(steps=3), StepBlock(steps=1), VGroove()):
+        assert triangle_count(shape) == len(primitive_mesh(shape).triangles), shape

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -105,6 +107,19 @@ def test_a_damaged_file_is_named(groove, tmp_path):
     path = tmp_path / "state.npz"
     path.write_bytes(b"PK\x03\x04 no archive")
     with pytest.raises(InputError, match=r"damaged.*delete it"):
+        read_state(state_of(*groove, SETTINGS, path=path))
+
+
+def test_a_saved_render_that_asks_for_endless_memory_is_damaged(groove, tmp_path):
+    path = tmp_path / "state.npz"
+    np.savez(path, **{"of/version": np.array("1"), "laser 0/sum": np.zeros(3)})
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    members["laser 0/sum.npy"] = members["laser 0/sum.npy"].replace(b"(3,), }        ", b"(9999999999,), }")
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    with pytest.raises(InputError, match="the saved render is damaged; found data cut short or changed; delete it"):
         read_state(state_of(*groove, SETTINGS, path=path))
 
 

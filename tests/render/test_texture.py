@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from pathlib import Path
 
 import cv2
@@ -71,7 +72,7 @@ def test_a_camera_s_orientation_tag_does_not_turn_a_texture(tmp_path: Path) -> N
 def test_a_texture_that_is_absent_or_a_folder_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"object 'part': material\.albedo\.path: the texture is not there.*rust\.png"):
         load(tmp_path / "rust.png")
-    with pytest.raises(InputError, match="not a file"):
+    with pytest.raises(InputError, match="the texture is a folder"):
         load(tmp_path)
 
 
@@ -117,3 +118,19 @@ def test_mutated_images_give_a_texture_or_a_message() -> None:
         except InputError:
             continue
         assert texture.ndim == 3 and texture.shape[2] == 3 and np.isfinite(texture).all()
+
+
+def test_an_image_of_several_pages_is_refused(tmp_path: Path) -> None:
+    pages = [Image.fromarray(np.full((4, 4), value, dtype=np.uint8)) for value in (0, 200)]
+    for name in ("a.tiff", "a.gif", "a.png"):
+        pages[0].save(tmp_path / name, save_all=True, append_images=pages[1:])
+        with pytest.raises(
+            InputError, match=rf"{name}: the image has several pages; found 2; allowed: one; save the one"
+        ):
+            load(tmp_path / name)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.png")
+    with pytest.raises(InputError, match=r"pipe\.png: the texture is not a regular file"):
+        load(tmp_path / "pipe.png")

@@ -14,9 +14,9 @@ from render.lights import Environment
 from render.pose import Pose
 from render.scene import SceneObject
 from render.shape import Plane
+from studio.image_files import load_photograph
 from studio.inspection import Inspection, inspect
 from studio.project import Project
-from studio.reconstruct import read_image
 from studio.scan import run_scan
 from studio.templates import DESCRIPTIONS, template_folder
 
@@ -78,7 +78,7 @@ def test_line_width(facing: Project, found: Inspection) -> None:
 def test_peak_electrons_are_those_of_the_image(facing: Project, found: Inspection, tmp_path: Path) -> None:
     """Median of the row maxima; shot noise of the maximum over a few pixels moves it by a few percent."""
     run_scan(facing, ROOT, out=tmp_path, measure=False)
-    rows = read_image(tmp_path / "frame_0000.png").max(axis=1)
+    rows = load_photograph(tmp_path / "frame_0000.png").max(axis=1)
     hit = np.sort(rows)[-found.lasers[0].scan_lines_hit :]
     electrons = np.median(hit) / facing.sensor.dn_per_electron
     assert found.lasers[0].peak_electrons == pytest.approx(electrons, rel=0.05)

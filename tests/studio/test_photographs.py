@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 from click.testing import CliRunner, Result
+from PIL import Image
 
 import main
 from tests.analysis.line_images import expected, exposed
@@ -49,8 +52,6 @@ def green(electrons: Any) -> Any:
 
 
 def test_every_kind_of_file_gives_the_line(tmp_path: Path) -> None:
-    import OpenEXR
-
     electrons = counts()
     images = {
         "mono.png": eight_bit(electrons),
@@ -104,18 +105,35 @@ def bad_images(folder: Path) -> dict[str, str]:
         "grey.png": (np.full_like(good, 77), "same everywhere"),
         "nan.tiff": (np.full(good.shape, np.nan, np.float32), "finite"),
         "turned.png": (np.ascontiguousarray(good.T), "--axis columns"),
+        "one_bit.png": (np.where(good > 20, np.uint8(255), np.uint8(0)), "black and white, without the line's profile"),
     }
     for name, (image, _) in images.items():
         assert cv2.imwrite(str(folder / name), image)
     (folder / "text.png").write_text("not an image")
     (folder / "empty.tiff").write_bytes(b"")
     (folder / "damaged.exr").write_bytes(b"v/1\x01 damaged")
+    for name in ("pages.tiff", "pages.gif"):
+        page = Image.fromarray(good)
+        page.save(folder / name, save_all=True, append_images=[Image.fromarray(good[::-1].copy())] * 2)
+    os.mkfifo(folder / "pipe.png")
+    (folder / "linked.png").symlink_to(folder / "pipe.png")
+    (folder / "folder.png").mkdir()
+    with open(folder / "sparse.tiff", "wb") as file:
+        file.truncate(2**30)
+    OpenEXR.File({}, {name: np.ones((4, 4), np.float32) for name in ("a", "b")}).write(str(folder / "layers.exr"))
     told = {name: text for name, (_, text) in images.items()}
     return told | {
         "text.png": "not an image",
         "empty.tiff": "not an image",
-        "damaged.exr": "",
-        "missing.png": "missing",
+        "damaged.exr": "cannot be read; found no header of an EXR; allowed: a whole, valid file",
+        "missing.png": "no such image",
+        "pages.tiff": "several pages; found 3; allowed: one; save each page as an image of its own",
+        "pages.gif": "several pages; found 2",
+        "pipe.png": "not a regular file; found a device or a pipe",
+        "linked.png": "not a regular file",
+        "folder.png": "the image is a folder",
+        "sparse.tiff": "too big; found 1073741824 bytes; allowed: 536870912 bytes",
+        "layers.exr": "no image of its own; found a, b",
     }
 
 
@@ -156,3 +174,14 @@ def test_what_does_not_fit_the_image_is_named(arguments: list[str], text: str, t
     done = call(tmp_path / "a.png", *arguments)
     assert done.exit_code == 2 and text in done.stderr and "Traceback" not in done.output
     assert not list(tmp_path.glob("*.csv"))
+
+
+def test_what_says_less_of_the_position_than_a_guess_is_not_found(tmp_path: Path) -> None:
+    across = np.abs(np.arange(WIDTH) - CENTRE[:, None])
+    thresholded = np.where(across < 2.2, 255, 0).astype(np.uint8)
+    thresholded[0, 0] = 128  # not only black and white
+    cv2.imwrite(str(tmp_path / "a.png"), thresholded)
+    done = call(tmp_path / "a.png", "--json")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["images"][0]["found"] == 0
+    assert {row["flag"] for row in table(tmp_path / "a_line.csv")} == {"NOT_CONVERGED"}

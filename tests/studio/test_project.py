@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import errno
 import json
+import os
 import shutil
 from pathlib import Path
 from typing import Any
@@ -242,6 +243,21 @@ class TestDamagedFiles:
     def test_too_big(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(strict_json, "MAX_BYTES", 1000)
         assert "too big" in self.write(tmp_path / "a.json", b"{" + b" " * 1000 + b"}")
+
+    def test_a_great_many_unknown_keys_are_counted_without_a_search_for_each(self, tmp_path: Path) -> None:
+        keys = ", ".join(f'"k{i}": 1' for i in range(50_000))
+        message = self.write(tmp_path / "a.json", f'{{"schema_version": 1, {keys}}}'.encode())
+        assert "this is hardly a project; found 5" in message and "a.json" in message and len(message) < 300
+
+    def test_a_key_of_any_length_fits_the_message(self, tmp_path: Path) -> None:
+        data = SAMPLE | {"x" * 1_000_000: 1, "name": "n" * 1_000_000}
+        message = self.write(tmp_path / "a.json", json.dumps(data).encode())
+        assert "xxx...: unknown key" in message and len(message) < 600
+
+    def test_a_pipe_is_not_waited_for(self, tmp_path: Path) -> None:
+        os.mkfifo(tmp_path / "a.json")
+        with pytest.raises(InputError, match=r"a\.json: the project file is not a regular file"):
+            Project.load(tmp_path / "a.json")
 
     def test_not_an_object(self, tmp_path: Path) -> None:
         assert "not a JSON object" in self.write(tmp_path / "a.json", b"[1, 2]")

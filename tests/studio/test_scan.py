@@ -16,8 +16,9 @@ from render.pose import Pose
 from render.scene import SceneObject
 from render.shape import MeshFile
 from studio import scan_folder
+from studio.image_files import load_photograph
 from studio.project import Project
-from studio.reconstruct import read_image, reconstruct_folder
+from studio.reconstruct import reconstruct_folder
 from studio.reconstruct_images import reconstruct_images
 from studio.scan import run_scan
 from studio.stages import Clock, scaled
@@ -91,7 +92,7 @@ class TestRepeating:
         project, root = still("plane"), template_folder("plane")
         for seed in (1, 2):
             run_scan(project, root, out=tmp_path / str(seed), image_scale=SCALE, seed=seed, measure=False)
-        images = [read_image(tmp_path / str(seed) / "frame_0000.png") for seed in (1, 2)]
+        images = [load_photograph(tmp_path / str(seed) / "frame_0000.png") for seed in (1, 2)]
         assert np.mean(images[0] != images[1]) > 0.1
 
     def test_frames_measured_again_give_the_same_points(self, finished: Path, tmp_path: Path) -> None:
@@ -142,7 +143,7 @@ class TestAccuracy:
         for scale in (0.25, 0.5):
             out = tmp_path / str(scale)
             run_scan(project, template_folder("plane"), out=out, image_scale=scale, measure=False)
-            peaks.append(np.median(read_image(out / "frame_0000.png").max(axis=1)))
+            peaks.append(np.median(load_photograph(out / "frame_0000.png").max(axis=1)))
         assert 0.4 < peaks[0] / peaks[1] < 1.5
 
 
@@ -229,4 +230,4 @@ class TestDamagedFolders:
     def test_what_is_no_image_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "a.png").write_bytes(b"not an image")
         with pytest.raises(InputError, match="not an image"):
-            read_image(tmp_path / "a.png")
+            load_photograph(tmp_path / "a.png")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,14 @@ import trimesh
 from render.checks import check_placement
 from render.errors import InputError
 from render.lights import PointLight, RectangleLight
+from render.mesh_reader import side_files
 from render.motion import LinearStage, NoMotion, PoseList, Turntable
 from render.pose import invert
 from render.shape import Box, Cylinder, Plane, Sphere, StepBlock, VGroove, WeldTee
 from render.world import build_world
 from studio import scene_edits
 from studio.document import replaced, value_at
-from studio.mesh_import import copied_beside, import_mesh, needs_copy, side_files
+from studio.mesh_import import copied_beside, import_mesh, needs_copy
 from studio.placement import field_of_view, target, working_distance
 from studio.project import Project
 from studio.scene_edits import LASERS, LIGHTS, OBJECTS
@@ -217,13 +219,13 @@ class TestMeshImport:
         file.write_text("mtllib part.mtl\n" + text)
         (file.parent / "part.mtl").write_text("newmtl a\nKd 1 0 0\nmap_Kd -s 1 1 1 wood.png\n")
         (file.parent / "wood.png").write_bytes(b"png")
-        assert side_files(file) == ["part.mtl", "wood.png"]
+        assert side_files(file, file.parent) == ["part.mtl", "wood.png"]
         import_mesh(file, tmp_path / "project", 0.5)
         copied = sorted(copy.name for copy in (tmp_path / "project" / "meshes").iterdir())
         assert copied == ["part.mtl", "part.obj", "wood.png"]
         gltf = self.mesh(tmp_path / "in" / "scene.gltf")
         buffers = [entry["uri"] for entry in json.loads(gltf.read_text())["buffers"]]
-        assert side_files(gltf) == buffers
+        assert side_files(gltf, gltf.parent) == buffers
         assert import_mesh(gltf, tmp_path / "project", 0.5).triangles == 12
 
     def test_side_files_outside_the_meshs_folder_are_not_fetched(self, tmp_path: Path) -> None:
@@ -232,6 +234,22 @@ class TestMeshImport:
         file.write_text("mtllib ../secret.mtl\n" + file.read_text())
         import_mesh(file, tmp_path / "project", 0.5)
         assert not list((tmp_path / "project").rglob("secret*"))
+
+    @pytest.mark.parametrize("library", ["/dev/full", "pipe.mtl", "link.mtl", "../outside.mtl", "folder.mtl"])
+    def test_a_material_library_is_read_by_the_projects_own_rules(self, tmp_path: Path, library: str) -> None:
+        file = self.mesh(tmp_path / "in" / "part.obj")
+        (tmp_path / "outside.mtl").write_text("newmtl a\nmap_Kd wood.png\n")
+        os.mkfifo(file.parent / "pipe.mtl")
+        (file.parent / "link.mtl").symlink_to(tmp_path / "outside.mtl")
+        (file.parent / "folder.mtl").mkdir()
+        file.write_text(f"mtllib {library}\n" + file.read_text())
+        root = tmp_path / "project"
+        if library == "pipe.mtl":  # it is there, and would be copied without end
+            with pytest.raises(InputError, match=r"pipe\.mtl: the file that the mesh names is not a regular file"):
+                import_mesh(file, root, 0.5)
+        else:
+            assert import_mesh(file, root, 0.5).triangles == 12
+        assert not list(root.rglob("*.mtl"))
 
     def test_a_bad_file_leaves_nothing_behind(self, tmp_path: Path) -> None:
         broken = tmp_path / "broken.stl"
