@@ -87,11 +87,11 @@ class MainWindow(QMainWindow):
             self._remember_arrangement()
         wanted = workspace(key)
         self.workspace = wanted.key
-        arrange(self, self.docks, wanted)
-        if restore(self, self.preferences.values.arrangements.get(wanted.key, "")):
-            self.panels["viewport"].setVisible(wanted.viewport)
-        else:
-            QTimer.singleShot(0, self, lambda: share_out(self, self.docks, wanted))
+        # before the panels come: all together they may need more room than the window has, and it would grow
+        self.panels["viewport"].setVisible(wanted.viewport)
+        if not self._restore_panels():
+            self.rearrange()
+            QTimer.singleShot(0, self, self._fit_panels)
         self.commands[SWITCH[wanted.key]].setChecked(True)
         self.cloud.pin(wanted.key == "measure")
         self.preferences.change(workspace=wanted.key)
@@ -129,8 +129,8 @@ class MainWindow(QMainWindow):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        if not event.spontaneous() and self.workspace not in self.preferences.values.arrangements:
-            QTimer.singleShot(0, self, lambda: share_out(self, self.docks, workspace(self.workspace)))
+        if not event.spontaneous():
+            QTimer.singleShot(0, self, self._fit_panels)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.files.may_close():
@@ -176,6 +176,9 @@ class MainWindow(QMainWindow):
             dock = QDockWidget(panel.title, self)
             dock.setObjectName(panel.key)
             dock.setWidget(_scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
+            # added here once; from now on Qt moves docks only by restoring a state
+            self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
+            dock.hide()
             self.commands.submenus["panels"].addAction(dock.toggleViewAction())
             docks[panel.key] = dock
         return docks
@@ -312,9 +315,19 @@ class MainWindow(QMainWindow):
 
     def _restore(self) -> None:
         values = self.preferences.values
+        # the panels first: of what is restored into a window that is hidden and maximized, Qt keeps a second copy, and
+        # lays it out again after another state has freed the docks' places in it
+        self.switch_to(values.workspace)
         if values.geometry:
             self.restoreGeometry(QByteArray.fromBase64(QByteArray(values.geometry.encode())))
-        self.switch_to(values.workspace)
+
+    def _restore_panels(self) -> bool:
+        return restore(self, self.preferences.values.arrangements.get(self.workspace, ""))
+
+    def _fit_panels(self) -> None:
+        """Once more, in the size that the window has come to."""
+        if not self._restore_panels():
+            share_out(self, self.docks, workspace(self.workspace))
 
     def _remember_arrangement(self) -> None:
         kept = {**self.preferences.values.arrangements, self.workspace: remembered(self)}

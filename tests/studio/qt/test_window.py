@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QMimeData, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QDropEvent
-from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMessageBox, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from studio.autosave import Autosave
@@ -88,6 +88,38 @@ class TestWorkspaces:
         assert again.size() == window.size()
         again.close()
         again.deleteLater()
+
+    def test_panels_are_not_restored_into_a_window_that_is_hidden_and_maximized(
+        self, own_window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """There Qt keeps pointers to docks' places that it frees with the next state: a segmentation fault, later."""
+        own_window.showMaximized()
+        own_window.switch_to("render")
+        own_window.close()
+        into: list[tuple[bool, bool]] = []
+        real = QMainWindow.restoreState
+
+        def restore(window: QMainWindow, *given: Any) -> bool:
+            into.append((window.isVisible(), window.isMaximized()))
+            return real(window, *given)
+
+        monkeypatch.setattr(MainWindow, "restoreState", restore)
+        again = MainWindow(own_window.session, PreferencesFile(tmp_path / "config"), Autosave(tmp_path / "state"))
+        again.show()
+        again.switch_to("measure")
+        assert again.isMaximized()
+        assert len(into) >= 2 and (False, True) not in into
+        again.close()
+        again.deleteLater()
+
+    def test_no_dock_is_ever_taken_out(self, window: MainWindow, monkeypatch: pytest.MonkeyPatch) -> None:
+        moved: list[object] = []
+        for name in ("addDockWidget", "removeDockWidget", "splitDockWidget", "tabifyDockWidget"):
+            monkeypatch.setattr(window, name, lambda *given: moved.append(given))
+        for each in WORKSPACES:
+            window.switch_to(each.key)
+            window.rearrange()
+        assert not moved
 
     def test_every_panel_is_the_real_one(self, window: MainWindow) -> None:
         assert {panel.key: type(window.panels[panel.key]).__name__ for panel in PANELS} == {
