@@ -36,6 +36,7 @@ from studio.forms import kind_label
 from studio.mesh_import import is_mesh
 from studio.project import Project
 from studio.qt import scene_actions, theme
+from studio.qt.drops import accept_copy, dragged_files
 from studio.qt.mesh_importer import import_meshes
 from studio.qt.scene_icons import icon_name, scene_icon
 from studio.qt.session import Session
@@ -341,12 +342,16 @@ class SceneTree(QTreeWidget):
         self._dragged = ()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        if self._dragged or _meshes(event):
+        if _meshes(event):
+            accept_copy(event)
+        elif self._dragged:
             event.acceptProposedAction()
 
     def dragMoveEvent(self, event: QDragMoveEvent) -> None:
         super().dragMoveEvent(event)  # it scrolls, and draws where the item would go
-        if _meshes(event) or self._place(event.position().toPoint()) is not None:
+        if _meshes(event):
+            accept_copy(event)
+        elif self._place(event.position().toPoint()) is not None:
             event.acceptProposedAction()
         else:
             event.ignore()
@@ -355,7 +360,7 @@ class SceneTree(QTreeWidget):
         path, files, place = self._dragged, _meshes(event), self._place(event.position().toPoint())
         self.setState(self.State.NoState)
         if files:
-            event.acceptProposedAction()
+            accept_copy(event)
             import_meshes(self.session, files, self)
         elif path and place is not None:
             event.acceptProposedAction()
@@ -389,5 +394,4 @@ def _is_object(project: Project, path: FieldPath) -> bool:
 
 def _meshes(event: QDropEvent) -> list[Path]:
     """The mesh files among what is dragged in."""
-    files = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-    return [file for file in files if is_mesh(file)]
+    return [file for file in dragged_files(event) if is_mesh(file)]

@@ -37,7 +37,7 @@ class StatusBar(QStatusBar):
         self.left = QLabel()
         self.left.setObjectName("muted")
         self.pause = self._button("pause", "Pause", self.toggle_pause)
-        self.cancel = self._button("cancel", "Cancel (Esc)", self.cancel_work)
+        self.cancel = self._button("cancel", "Cancel (Shift+F5)", self.cancel_work)
         self.text = _Message()
         self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.text.clicked.connect(self.log_asked)

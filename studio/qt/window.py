@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, Qt, QTimer
-from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
+from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QScrollArea, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from studio.autosave import Autosave
@@ -17,6 +17,7 @@ from studio.preferences import PreferencesFile
 from studio.qt import scene_actions, theme
 from studio.qt.actions import Actions
 from studio.qt.dialogs import about, show_trouble
+from studio.qt.drops import accept_copy, dragged_files
 from studio.qt.error_cloud import ErrorCloud
 from studio.qt.export_actions import ExportActions
 from studio.qt.file_actions import FileActions
@@ -148,13 +149,13 @@ class MainWindow(QMainWindow):
         event.accept()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        paths = dragged_files(event)
         if any(is_mesh(path) or path.suffix.lower() == ".json" or path.is_dir() for path in paths):
-            event.acceptProposedAction()
+            accept_copy(event)
 
     def dropEvent(self, event: QDropEvent) -> None:
-        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-        event.acceptProposedAction()
+        paths = dragged_files(event)
+        accept_copy(event)
         # after the drop has ended: a dialog inside it would hold up the program that the file comes from
         QTimer.singleShot(0, self, lambda: self.take(paths))
 
@@ -255,7 +256,7 @@ class MainWindow(QMainWindow):
             "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
             "render": session.render_asked.emit,
             "pause": self.status.toggle_pause,
-            "cancel": self._escape,
+            "cancel": self.status.cancel_work,
             "scan": self._scan,
             "frame_points": self.cloud.frame,
             "log": lambda: self.show_panel("log"),
@@ -279,6 +280,7 @@ class MainWindow(QMainWindow):
         }
         for key, fill in filled.items():
             menus[key].aboutToShow.connect(lambda menu=menus[key], fill=fill: (menu.clear(), fill(menu)))
+        QShortcut(Qt.Key.Key_Escape, self).activated.connect(self._escape)
         self.status.log_asked.connect(lambda: self.show_panel("log"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
@@ -292,8 +294,10 @@ class MainWindow(QMainWindow):
     def _escape(self) -> None:
         if self.tour is not None:
             self.tour.end()
-        else:
-            self.status.cancel_work()
+        elif self.status.job is not None:
+            # it leaves fields, menus and drags: once too often must not cost an hour of work
+            keys = self.commands["cancel"].shortcut().toString()
+            self.session.message.emit("info", f"Esc does not stop the {self.status.job.name}; {keys} does")
 
     def _rename(self) -> None:
         self.show_panel("scene")

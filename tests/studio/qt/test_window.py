@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QMimeData, QPointF, Qt, QTimer, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMessageBox, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from render.errors import Cancelled
+from render.threads import Cancel
 from studio.autosave import Autosave
 from studio.document import Document
+from studio.jobs import Progress
 from studio.preferences import Preferences, PreferencesFile
 from studio.project import Project
 from studio.qt import theme
 from studio.qt.actions import COMMANDS, Command
 from studio.qt.help import FOLDER, PAGES
 from studio.qt.panels import PANELS
+from studio.qt.session import Render
 from studio.qt.window import MainWindow
 from studio.qt.workspaces import WORKSPACES
+from tests.studio.qt.small_session import small_project as sphere
+from tests.studio.qt.small_session import small_render
 
 POWER = ("scene", "rig", "lasers", 0, "power")
 
@@ -125,6 +132,46 @@ class TestWorkspaces:
         assert {panel.key: type(window.panels[panel.key]).__name__ for panel in PANELS} == {
             panel.key: panel.name for panel in PANELS
         }
+
+
+class TestWork:
+    """Jobs that a person meets with keys and files."""
+
+    def test_escape_leaves_it_alone_and_says_what_cancels(self, window: MainWindow, qtbot: QtBot) -> None:
+        job = window.runner.run("export", "export report.pdf", until_cancelled)
+        qtbot.waitUntil(lambda: window.status.job is job)
+        with qtbot.waitSignal(window.session.message) as told:
+            qtbot.keyClick(window, Qt.Key.Key_Escape)
+        assert "Shift+F5" in told.args[1] and not job.cancel_asked
+        with qtbot.waitSignal(window.runner.cancelled):
+            qtbot.keyClick(window, Qt.Key.Key_F5, Qt.KeyboardModifier.ShiftModifier)
+
+    def test_another_render_is_not_refused_in_silence(self, window: MainWindow, qtbot: QtBot) -> None:
+        window.runner.run("render", "scan", until_cancelled)
+        with qtbot.waitSignal(window.session.message) as told:
+            qtbot.keyClick(window, Qt.Key.Key_F5)
+        assert told.args[0] == "warning" and "being rendered" in told.args[1]
+        with qtbot.waitSignal(window.runner.cancelled):
+            window.runner.cancel("render")
+        assert not window.runner.busy, "nor does it wait for the scan to end"
+
+    def test_a_cancelled_export_writes_nothing_and_says_so(
+        self, window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from studio import export
+
+        def slow(path: Path, what: export.Exported) -> list[Path]:
+            path.write_text("half of it")
+            window.runner.cancel("export")
+            return [path]
+
+        monkeypatch.setattr(export, "export_points", slow)
+        world, frame = small_render()
+        window.session.add_render(Render(1, sphere(), world, frame))
+        with qtbot.waitSignals([window.runner.cancelled, window.session.message]):
+            window.exports.write("export_csv", tmp_path / "out" / "points.csv")
+        assert not (tmp_path / "out").exists()
+        assert window.panels["log"].as_text().endswith("No file was written")  # type: ignore[attr-defined]
 
 
 class TestTheme:
@@ -248,6 +295,22 @@ class TestFiles:
         drop(window, other)
         qtbot.waitUntil(lambda: window.session.project.name == "Other")
         assert "Other" in window.windowTitle()
+
+    def test_files_are_copied_from_and_never_moved(self, window: MainWindow, small_project: Path) -> None:
+        data = files(small_project)
+        buttons, shift = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.ShiftModifier
+        either = Qt.DropAction.CopyAction | Qt.DropAction.MoveAction
+        for actions, taken in ((Qt.DropAction.MoveAction, False), (either, True)):
+            entered = QDragEnterEvent(QPoint(9, 9), actions, data, buttons, shift)
+            entered.setDropAction(Qt.DropAction.MoveAction)
+            entered.ignore()
+            window.dragEnterEvent(entered)
+            assert entered.isAccepted() == taken
+        assert entered.dropAction() == Qt.DropAction.CopyAction
+        dropped = QDropEvent(QPointF(9, 9), either, data, buttons, shift)
+        dropped.setDropAction(Qt.DropAction.MoveAction)
+        window.dropEvent(dropped)
+        assert dropped.isAccepted() and dropped.dropAction() == Qt.DropAction.CopyAction
 
     def test_recent_projects_are_in_the_menu(self, window: MainWindow, small_project: Path) -> None:
         assert window.files.open(small_project)
@@ -395,9 +458,20 @@ def test_a_bad_project_on_the_command_line_is_told_over_the_sample(
     window.deleteLater()
 
 
-def drop(window: QWidget, path: Path) -> None:
+def files(*paths: Path) -> QMimeData:
     data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(path))])
+    data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
+    return data
+
+
+def until_cancelled(progress: Progress, cancelled: Cancel) -> None:
+    while not cancelled():
+        time.sleep(0.005)
+    raise Cancelled
+
+
+def drop(window: QWidget, path: Path) -> None:
+    data = files(path)
     buttons, keys = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
     window.dropEvent(QDropEvent(QPointF(9, 9), Qt.DropAction.CopyAction, data, buttons, keys))
 
