@@ -77,8 +77,13 @@ def config_folder() -> Path:
     return Path(platformdirs.user_config_dir(APPLICATION, appauthor=False))
 
 
-def recovery_folder() -> Path:
-    """Where unsaved work is kept in case of a crash."""
+def state_folder() -> Path:
+    """Where the system keeps what a program left behind for this person."""
     import platformdirs
 
-    return Path(platformdirs.user_state_dir(APPLICATION, appauthor=False)) / "recovery"
+    return Path(platformdirs.user_state_dir(APPLICATION, appauthor=False))
+
+
+def recovery_folder() -> Path:
+    """Where unsaved work is kept in case of a crash."""
+    return state_folder() / "recovery"

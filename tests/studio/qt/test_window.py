@@ -18,11 +18,13 @@ from render.errors import Cancelled
 from render.threads import Cancel
 from studio.autosave import Autosave
 from studio.document import Document
+from studio.fault_log import Fault
 from studio.jobs import Progress
 from studio.preferences import Preferences, PreferencesFile
 from studio.project import Project
 from studio.qt import theme
 from studio.qt.actions import COMMANDS, Command
+from studio.qt.fault_notice import FaultNotice, offer
 from studio.qt.help import FOLDER, PAGES
 from studio.qt.panels import PANELS
 from studio.qt.session import Render
@@ -413,6 +415,31 @@ class TestBadInput:
         self.told("ZeroDivisionError", "unharmed", "report")
         log = window.panels["log"].as_text()  # type: ignore[attr-defined]
         assert "division by zero" in log and "again" in log
+
+
+class TestCrash:
+    """What an earlier process left is offered, and in no one's way."""
+
+    @pytest.fixture
+    def notice(self, window: MainWindow) -> FaultNotice:
+        return offer(window, Fault("2026-11-22 10:31", "Fatal Python error: Segmentation fault\n  in arrange"))
+
+    def test_it_is_shown_among_the_messages(self, window: MainWindow, qtbot: QtBot, notice: FaultNotice) -> None:
+        assert notice.isVisible() and QApplication.activeModalWidget() is None
+        with qtbot.waitSignal(notice.destroyed):
+            qtbot.mouseClick(notice.show_button, Qt.MouseButton.LeftButton)
+        assert window.docks["log"].isVisible()
+        assert "in arrange" in window.panels["log"].as_text()  # type: ignore[attr-defined]
+
+    def test_it_is_copied_with_the_versions(self, window: MainWindow, qtbot: QtBot, notice: FaultNotice) -> None:
+        with qtbot.waitSignal(notice.destroyed):
+            qtbot.mouseClick(notice.copy_button, Qt.MouseButton.LeftButton)
+        text = QApplication.clipboard().text()
+        assert "10:31" in text and "Segmentation fault" in text and "Qt 6" in text
+
+    def test_it_is_put_away(self, qtbot: QtBot, notice: FaultNotice) -> None:
+        with qtbot.waitSignal(notice.destroyed):
+            qtbot.mouseClick(notice.close_button, Qt.MouseButton.LeftButton)
 
 
 class TestPreferences:
