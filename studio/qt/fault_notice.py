@@ -28,7 +28,7 @@ class FaultNotice(QWidget):
         self.close_button.setIcon(icon("cancel"))
         self.show_button.clicked.connect(self.show_fault)
         self.copy_button.clicked.connect(self.copy)
-        self.close_button.clicked.connect(self.deleteLater)
+        self.close_button.clicked.connect(self.put_away)
         line = QHBoxLayout(self)
         line.setContentsMargins(0, 0, 0, 0)
         line.setSpacing(2)
@@ -43,11 +43,15 @@ class FaultNotice(QWidget):
     def show_fault(self) -> None:
         self.window_above.session.message.emit("warning", self.text())
         self.window_above.show_panel("log")
-        self.deleteLater()
+        self.put_away()
 
     def copy(self) -> None:
         QApplication.clipboard().setText(self.text())
         self.window_above.session.message.emit("info", "Copied: please report it")
+        self.put_away()
+
+    def put_away(self) -> None:
+        self.hide()
         self.deleteLater()
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMessageBo
 from pytestqt.qtbot import QtBot
 
 from render.errors import Cancelled
+from render.material import Texture
 from render.threads import Cancel
 from studio.autosave import Autosave
 from studio.document import Document
@@ -26,6 +28,7 @@ from studio.qt import theme
 from studio.qt.actions import COMMANDS, Command
 from studio.qt.fault_notice import FaultNotice, offer
 from studio.qt.help import FOLDER, PAGES
+from studio.qt.live import live
 from studio.qt.panels import PANELS
 from studio.qt.session import Render
 from studio.qt.window import MainWindow
@@ -174,6 +177,52 @@ class TestWork:
             window.exports.write("export_csv", tmp_path / "out" / "points.csv")
         assert not (tmp_path / "out").exists()
         assert window.panels["log"].as_text().endswith("No file was written")  # type: ignore[attr-defined]
+
+
+class TestImpossibleMaterial:
+    """It is told where it is, and the part stays."""
+
+    MATERIAL = ("scene", "objects", 0, "material")
+
+    @pytest.fixture
+    def told(self, window: MainWindow, qtbot: QtBot) -> Iterator[MainWindow]:
+        session = window.session
+        session.select(self.MATERIAL[:3])
+        session.set((*self.MATERIAL, "albedo"), Texture(path="textures/nowhere.png"))
+        qtbot.waitUntil(lambda: bool(session.problems))
+        yield window
+        session.document.undo()
+        qtbot.waitUntil(lambda: not session.problems and not live(session).is_loading)
+        assert window.panels["inspector"].problem.isHidden()  # type: ignore[attr-defined]
+
+    def test_the_part_stays(self, told: MainWindow) -> None:
+        look = live(told.session).look
+        assert len(look.placed) == len(told.session.project.scene.visible_objects)
+
+    def test_tree_and_field_are_marked(self, told: MainWindow) -> None:
+        item = told.panels["scene"].item(self.MATERIAL[:3])  # type: ignore[attr-defined]
+        assert item.foreground(0).color().name() == theme.colours().error.lower()
+        assert "nowhere.png" in item.toolTip(0) or "texture" in item.toolTip(0)
+        inspector = told.panels["inspector"]
+        assert inspector.problem.isVisible() and inspector.problem.wordWrap()  # type: ignore[attr-defined]
+        form = inspector.form  # type: ignore[attr-defined]
+        marked = [path for path, kind in form.kinds.items() if kind.invalid]
+        for path, rows in form.rows.items():
+            marked += [path for row in rows for editor, _ in row._parts() if getattr(editor, "invalid", False)]
+        assert len(marked) == 1 and marked[0][:4] == self.MATERIAL
+
+    def test_a_long_message_wraps_within_the_window(self, told: MainWindow, qtbot: QtBot) -> None:
+        text = "object 'part': material: " + 40 * "why it will not do, " + "choose another"
+        told.session.message.emit("error", text)
+        whole = told.status.whole
+        assert whole.isVisible() and whole.text() == text
+        assert told.rect().contains(whole.geometry()) and whole.height() > 2 * whole.fontMetrics().height()
+        size = told.panels["scene"].size()
+        qtbot.mouseClick(whole, Qt.MouseButton.LeftButton)
+        assert not whole.isVisible() and told.docks["log"].isVisible()
+        told.docks["log"].hide()
+        told.session.message.emit("info", "short")
+        assert not whole.isVisible() and told.panels["scene"].size() == size
 
 
 class TestTheme:
