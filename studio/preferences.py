@@ -32,9 +32,9 @@ class Preferences(BaseModel):
     """The tour was seen or skipped, so that the next start does not begin with it."""
     workspace: str = "setup"
     geometry: str = ""
-    """Of the window, as Qt saves it, base64."""
+    """Of the window, as Qt saves it, sealed with a checksum."""
     arrangements: dict[str, str] = {}
-    """Of the panels in each workspace, as Qt saves them, base64."""
+    """Of the panels in each workspace, as Qt saves them, sealed."""
     folder: str = ""
     """Where a file was opened or saved last."""
 

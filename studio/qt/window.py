@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, Qt, QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QScrollArea, QSizePolicy, QToolBar, QToolButton, QWidget
 
@@ -32,7 +32,7 @@ from studio.qt.session import Session
 from studio.qt.shortcuts import CheatSheet
 from studio.qt.status import StatusBar
 from studio.qt.tour import Step, Tour
-from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, share_out, workspace
+from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, sealed, share_out, unsealed, workspace
 from studio.trouble import trouble
 
 TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
@@ -138,7 +138,7 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         self._remember_arrangement()
-        self.preferences.change(geometry=bytes(self.saveGeometry().toBase64().data()).decode())
+        self.preferences.change(geometry=sealed(self.saveGeometry()))
         if self.tour is not None:
             self.tour.end()
         self.runner.close()
@@ -322,8 +322,9 @@ class MainWindow(QMainWindow):
         # the panels first: of what is restored into a window that is hidden and maximized, Qt keeps a second copy, and
         # lays it out again after another state has freed the docks' places in it
         self.switch_to(values.workspace)
-        if values.geometry:
-            self.restoreGeometry(QByteArray.fromBase64(QByteArray(values.geometry.encode())))
+        geometry = unsealed(values.geometry)
+        if geometry is not None:
+            self.restoreGeometry(geometry)
 
     def _restore_panels(self) -> bool:
         return restore(self, self.preferences.values.arrangements.get(self.workspace, ""))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import zlib
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -145,9 +147,26 @@ def share_out(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Worksp
 
 def remembered(window: QMainWindow) -> str:
     """The arrangement as text."""
-    return bytes(window.saveState(VERSION).toBase64().data()).decode()
+    return sealed(window.saveState(VERSION))
 
 
 def restore(window: QMainWindow, text: str) -> bool:
-    """Bring back a remembered arrangement; False: it is not one, or of another version."""
-    return bool(text) and window.restoreState(QByteArray.fromBase64(QByteArray(text.encode())), VERSION)
+    """Bring back a remembered arrangement; False: it is not one, damaged, or of another version."""
+    state = unsealed(text)
+    return state is not None and window.restoreState(state, VERSION)
+
+
+def sealed(data: QByteArray) -> str:
+    """What Qt saved, as text with a checksum."""
+    raw = bytes(data.data())
+    return f"{zlib.crc32(raw):08x}:{base64.b64encode(raw).decode()}"
+
+
+def unsealed(text: str) -> QByteArray | None:
+    """None: it is not as it was sealed. Of damaged bytes Qt makes what it can, which may be a segmentation fault."""
+    checksum, _, encoded = text.partition(":")
+    try:
+        raw = base64.b64decode(encoded, validate=True)
+    except ValueError:
+        return None
+    return QByteArray(raw) if raw and checksum == f"{zlib.crc32(raw):08x}" else None

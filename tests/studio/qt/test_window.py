@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import sys
 import time
 from collections.abc import Iterator
@@ -32,7 +33,7 @@ from studio.qt.live import live
 from studio.qt.panels import PANELS
 from studio.qt.session import Render
 from studio.qt.window import MainWindow
-from studio.qt.workspaces import WORKSPACES
+from studio.qt.workspaces import WORKSPACES, remembered, restore
 from tests.studio.qt.small_session import small_project as sphere
 from tests.studio.qt.small_session import small_render
 
@@ -123,6 +124,18 @@ class TestWorkspaces:
         assert len(into) >= 2 and (False, True) not in into
         again.close()
         again.deleteLater()
+
+    def test_a_damaged_arrangement_never_reaches_qt(self, window: MainWindow, monkeypatch: pytest.MonkeyPatch) -> None:
+        """It would end in a segmentation fault, at this start and at every other."""
+        whole, chance = remembered(window), random.Random(1)
+        assert restore(window, whole)
+        monkeypatch.setattr(window, "restoreState", lambda *_: pytest.fail("given to Qt"))
+        for _ in range(2000):
+            at, new = chance.randrange(len(whole)), chr(chance.randrange(256))
+            damaged = whole[:at] + new + whole[at + chance.randrange(2) :]
+            assert damaged == whole or not restore(window, damaged)
+        for text in ("", ":", "00000000:", whole[9:], whole[:-4], "\udcff", 10**5 * "["):
+            assert not restore(window, text)
 
     def test_no_dock_is_ever_taken_out(self, window: MainWindow, monkeypatch: pytest.MonkeyPatch) -> None:
         moved: list[object] = []
