@@ -15,9 +15,16 @@ def display() -> Iterator[None]:
     if os.environ.get("DISPLAY"):
         yield
         return
+    with screen(SIZE):
+        yield
+
+
+@contextmanager
+def screen(size: tuple[int, int]) -> Iterator[None]:
+    """A virtual one of that size, px, even where there is another."""
     from pyvirtualdisplay import Display
 
-    made = Display(visible=False, size=SIZE, color_depth=24)
+    made = Display(visible=False, size=size, color_depth=24)
     made.start()
     try:
         yield
