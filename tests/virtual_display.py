@@ -10,18 +10,11 @@ SIZE = (1920, 1200)
 
 
 @contextmanager
-def display() -> Iterator[None]:
-    """The one that is there, or a virtual one while the context lasts."""
-    if os.environ.get("DISPLAY"):
+def display(size: tuple[int, int] = SIZE, anew: bool = False) -> Iterator[None]:
+    """The one that is there, or a virtual one of this size, px, while the context lasts; anew: that in any case."""
+    if os.environ.get("DISPLAY") and not anew:
         yield
         return
-    with screen(SIZE):
-        yield
-
-
-@contextmanager
-def screen(size: tuple[int, int]) -> Iterator[None]:
-    """A virtual one of that size, px, even where there is another."""
     from pyvirtualdisplay import Display
 
     made = Display(visible=False, size=size, color_depth=24)

@@ -22,7 +22,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from virtual_display import screen
+from virtual_display import display
 
 SCREENS = (((1280, 800), "1"), ((1920, 1200), "1.5"), ((2560, 1440), "2"), ((1920, 1200), "1"), ((2560, 1440), "1.5"))
 """Size, px, and QT_SCALE_FACTOR, in turn: never the screen of the start before."""
@@ -62,7 +62,7 @@ def start(seed: int, switches: int, home: str) -> bool:
     size, scale = SCREENS[seed % len(SCREENS)]
     command = [sys.executable, str(Path(__file__).resolve()), "--start", str(seed), str(switches)]
     began = time.monotonic()
-    with screen(size):
+    with display(size, anew=True):
         environment = os.environ | {
             "XDG_CONFIG_HOME": f"{home}/config",
             "XDG_STATE_HOME": f"{home}/state",
