@@ -232,7 +232,7 @@ class SceneTree(QTreeWidget):
         item.setText(NAME, node.name)
         item.setData(NAME, DETAIL, node.detail)
         wrong = bool(node.problem)
-        item.setIcon(NAME, scene_icon("problem", theme.colours().error) if wrong else scene_icon(*node.icon))
+        item.setIcon(NAME, scene_icon("problem") if wrong else scene_icon(*node.icon))
         told = node.problem or node.detail
         item.setToolTip(NAME, f"<p>{escape(node.name)}: {escape(told)}</p>" if told else node.name)
         if node.visible is not None:

@@ -224,6 +224,11 @@ class TestImpossibleMaterial:
             marked += [path for row in rows for editor, _ in row._parts() if getattr(editor, "invalid", False)]
         assert len(marked) == 1 and marked[0][:4] == self.MATERIAL
 
+    def test_estimates_are_not_passed_off_as_those_of_the_scene(self, told: MainWindow) -> None:
+        camera, design = told.panels["camera"], told.panels["readout"]
+        assert "not of the scene" in camera.badge_text.text() and camera.badge.isVisible()  # type: ignore[attr-defined]
+        assert design.problem.isVisible()  # type: ignore[attr-defined]
+
     def test_a_long_message_wraps_within_the_window(self, told: MainWindow, qtbot: QtBot) -> None:
         text = "object 'part': material: " + 40 * "why it will not do, " + "choose another"
         told.session.message.emit("error", text)
