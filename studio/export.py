@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,10 +12,11 @@ from analysis.cloud import Cloud, cloud, merge, write_csv, write_ply
 from analysis.report.model import Extraction, FrameResult, LaserResult
 from analysis.report.record import record_of
 from render.develop import Image
-from render.errors import InputError
+from render.errors import Cancelled, InputError
 from render.files import atomic_write
 from render.frame import Frame
 from render.frame_files import write_frame
+from render.threads import Cancel
 from render.world import World, build_world
 from studio.cautions import Cautions
 from studio.inputs import input_files
@@ -44,6 +45,10 @@ class Exported:
     measurements: Measurements
     image_scale: float = 1.0
     """At which it was rendered."""
+
+
+Writer = Callable[[Path, Exported], list[Path]]
+"""Any of those below: makes the file, and what belongs beside it; gives the paths."""
 
 
 def export_report(path: Path, what: Exported) -> list[Path]:
@@ -112,6 +117,18 @@ def export_points(path: Path, what: Exported) -> list[Path]:
     write = write_csv if path.suffix.lower() == ".csv" else write_ply
     write(path, merge(point_clouds(what)))
     return [path]
+
+
+def export_unless(cancelled: Cancel, write: Writer, path: Path, what: Exported) -> list[Path]:
+    """What a writer makes, once all of it is made; a cancelled export leaves no file. Raises Cancelled."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = write(Path(folder) / path.name, what)
+        if cancelled():
+            raise Cancelled
+        for file in made:
+            with atomic_write(path.with_name(file.name)) as temporary:
+                shutil.copyfile(file, temporary)
+    return [path.with_name(file.name) for file in made]
 
 
 def point_clouds(what: Exported) -> list[Cloud]:

@@ -34,9 +34,9 @@ class Preferences(BaseModel):
     """The tour was seen or skipped, so that the next start does not begin with it."""
     workspace: str = "setup"
     geometry: str = ""
-    """Of the window, as Qt saves it, base64."""
+    """Of the window, as Qt saves it, sealed with a checksum."""
     arrangements: dict[str, str] = {}
-    """Of the panels in each workspace, as Qt saves them, base64."""
+    """Of the panels in each workspace, as Qt saves them, sealed."""
     folder: str = ""
     """Where a file was opened or saved last."""
 
@@ -100,8 +100,13 @@ def config_folder() -> Path:
     return Path(platformdirs.user_config_dir(APPLICATION, appauthor=False))
 
 
-def recovery_folder() -> Path:
-    """Where unsaved work is kept in case of a crash."""
+def state_folder() -> Path:
+    """Where the system keeps what a program left behind for this person."""
     import platformdirs
 
-    return Path(platformdirs.user_state_dir(APPLICATION, appauthor=False)) / "recovery"
+    return Path(platformdirs.user_state_dir(APPLICATION, appauthor=False))
+
+
+def recovery_folder() -> Path:
+    """Where unsaved work is kept in case of a crash."""
+    return state_folder() / "recovery"

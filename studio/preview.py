@@ -6,6 +6,7 @@ changes poses only: the plane and the rays are taken into each object's frame, a
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import threading
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from render.curve import curve_of_cut, cut_triangles, visible
 from render.embree import RayScene
 from render.errors import InputError
 from render.frame import Axis, LaserCurve
+from render.material import Lambertian
 from render.mesh_files import load_mesh
 from render.pose import Pose, invert, transform_points
 from render.quick import reflectance_at
@@ -101,7 +103,7 @@ class Preview:
         self.threads = threads
         self.speed = Speed()
         self.errors: dict[str, InputError] = {}
-        """By object name: why it is not shown."""
+        """By object name: why it is not shown, or not as what it is made of."""
         self._rays: dict[object, tuple[RayScene, Float]] = {}
         self._bodies: dict[object, Body] = {}
         self._failed: dict[object, InputError] = {}
@@ -113,16 +115,25 @@ class Preview:
         return [item for key, item in wanted.items() if key not in self._bodies and key not in self._failed]
 
     def load(self, item: SceneObject, root: Path) -> None:
-        """Make an object's body. A bad mesh is remembered, and told in `errors` of the next look."""
-        key, shape_key = _key(item, root), _shape_key(item, root)
+        """Make an object's body. A bad one is remembered, and told in `errors` of the next look.
+
+        Where only the material is impossible, the object stands there in plain grey.
+        """
+        key = _key(item, root)
         try:
-            mesh = load_mesh(item, root)
-            # the world of this object alone, standing at its own origin
-            alone = item.model_copy(update={"T_world_object": Pose()})
-            world = place_meshes(Scene(rig=ALONE, objects=(alone,)), [mesh], root=root)
+            self._bodies[key] = self._body(item, root)
         except InputError as error:
             self._failed[key] = error
-            return
+            with contextlib.suppress(InputError):
+                self._bodies[key] = self._body(item.model_copy(update={"material": Lambertian()}), root)
+
+    def _body(self, item: SceneObject, root: Path) -> Body:
+        shape_key = _shape_key(item, root)
+        mesh = load_mesh(item, root)
+        # the world of this object alone, standing at its own origin
+        alone = item.model_copy(update={"T_world_object": Pose()})
+        world = place_meshes(Scene(rig=ALONE, objects=(alone,)), [mesh], root=root)
+        surface = world.surface
         with self._lock:
             if shape_key not in self._rays:
                 self._rays[shape_key] = (
@@ -131,7 +142,7 @@ class Preview:
                 )
             rays, boxes = self._rays[shape_key]
         bounds = np.stack([world.vertices.min(axis=0), world.vertices.max(axis=0)])
-        self._bodies[key] = Body(world.surface, rays, boxes, bounds)
+        return Body(surface, rays, boxes, bounds)
 
     def forget(self) -> None:
         """Read every mesh anew (files may have changed)."""
@@ -150,7 +161,7 @@ class Preview:
             if key in self._bodies:
                 T = scene.T_world_object(item, step)
                 placed.append(Placed(i, self._bodies[key], T, invert(T)))
-            elif key in self._failed:
+            if key in self._failed:
                 errors[item.name] = self._failed[key]
         self.errors = errors
         return Look(project, step, tuple(placed), self)

@@ -17,16 +17,16 @@ SIZE = (1920, 1200)
 
 
 @contextmanager
-def display() -> Iterator[None]:
-    """The one that is there, or a virtual one while the context lasts."""
-    if os.environ.get("DISPLAY"):
+def display(size: tuple[int, int] = SIZE, anew: bool = False) -> Iterator[None]:
+    """The one that is there, or a virtual one of this size, px, while the context lasts; anew: that in any case."""
+    if os.environ.get("DISPLAY") and not anew:
         yield
         return
     if not shutil.which("Xvfb"):
         sys.exit(f"no display, and none can be made\n{message([VIRTUAL_DISPLAY])}")
     from pyvirtualdisplay import Display
 
-    made = Display(visible=False, size=SIZE, color_depth=24)
+    made = Display(visible=False, size=size, color_depth=24)
     made.start()
     try:
         yield

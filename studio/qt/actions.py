@@ -76,7 +76,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("motion", "Scene", "M&otion"),
     Command("render", "Render", "&Render", "F5", "render", "Render the frame with the settings of the Render panel"),
     Command("pause", "Render", "&Pause or go on", "F9", "pause"),
-    Command("cancel", "Render", "&Cancel", "Esc", "cancel", "Stop what is being computed; what is there stays"),
+    Command("cancel", "Render", "&Cancel", "Shift+F5", "cancel", "Stop what is being computed"),
     "Render/-",
     Command(
         "scan", "Render", "Run the whole &scan…", "Ctrl+F5", "", "Every step of the motion, with points and report"

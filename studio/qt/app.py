@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from studio.display import INSTEAD, why_no_display
+from studio.fault_log import last_fault, watch
+from studio.preferences import state_folder
 from studio.qt.quick_start import no_collection, plain_imports
 from studio.system import message, missing_desktop_needs, missing_needs, why_not_in_this_folder
 
@@ -42,8 +44,14 @@ def open_studio(path: Path | None = None) -> int:
     if reason is not None:
         print(f"error: the studio does not open: {reason}", file=sys.stderr)
         return BAD_INPUT
+    fault = last_fault(state_folder())
+    watch(state_folder())
     app = application()
     window = start(path)
+    if fault is not None:
+        from studio.qt.fault_notice import offer
+
+        offer(window, fault)
     # what is there now stays to the end: looking through it for garbage would only hold up the window
     gc.freeze()
     code = app.exec()

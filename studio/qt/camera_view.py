@@ -170,6 +170,7 @@ class CameraView(QWidget):
         session.renders_changed.connect(self._renders_changed)
         session.project_changed.connect(self._project_changed)
         session.step_changed.connect(self._step_changed)
+        session.problems_changed.connect(self._show_badge)
         session.developed.connect(self._developed)
         session.measured.connect(self._draw_overlay)
         session.hover_changed.connect(self._draw_hover)
@@ -254,6 +255,8 @@ class CameraView(QWidget):
             text = "Still refining." if self.session.dragging else ""
         else:
             text = ""
+        if self.is_live and self.session.problems and self.live.ready:
+            text = "Live estimate, but not of the scene as it is set: the scene tree marks what cannot be."
         self._colour_badge()
         self.badge_text.setText(text)
         self.render_button.setVisible(shown is None or self.stale)

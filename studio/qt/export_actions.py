@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from render.threads import Cancel
-from studio.jobs import Progress
+from studio.jobs import Job, Progress
 from studio.preferences import PreferencesFile
 from studio.qt.actions import Actions
 from studio.qt.dialogs import show_trouble, suggested
@@ -45,6 +44,8 @@ class ExportActions(QObject):
         actions.connect("screenshot", self.screenshot)
         for signal in (session.renders_changed, session.measured, session.developed):
             signal.connect(self.refresh)
+        self._job: Job[list[Path]] | None = None
+        runner.cancelled.connect(self._tell_cancelled)
         self.refresh()
 
     def refresh(self) -> None:
@@ -90,7 +91,7 @@ class ExportActions(QObject):
             dict(render.measurements),
             render.image_scale,
         )
-        writers: dict[str, Callable[[Path, export.Exported], list[Path]]] = {
+        writers: dict[str, export.Writer] = {
             "report": export.export_report,
             "frame": export.export_frame,
             "image": export.export_image,
@@ -100,9 +101,9 @@ class ExportActions(QObject):
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
             progress(path.name, 0.3)
-            return writer(path, what)
+            return export.export_unless(cancelled, writer, path, what)
 
-        self.runner.run(LANE, f"export {path.name}", work, self._tell)
+        self._job = self.runner.run(LANE, f"export {path.name}", work, self._tell)
         self.preferences.change(folder=str(path.parent))
 
     def screenshot(self) -> None:
@@ -118,6 +119,10 @@ class ExportActions(QObject):
         else:
             error = OSError(None, "the file cannot be written", str(path))
             show_trouble(self.window, trouble(error, "save the screenshot"))
+
+    def _tell_cancelled(self, job: Job[list[Path]]) -> None:
+        if job is self._job:
+            self.session.message.emit("info", f"Cancelled: {job.name}. No file was written")
 
     def _tell(self, written: list[Path]) -> None:
         self.session.message.emit("info", f"Wrote {', '.join(str(path) for path in written)}")

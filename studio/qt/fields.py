@@ -140,11 +140,7 @@ class TextField(QLineEdit):
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         if self.invalid:
-            painter = QPainter(self)
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.setPen(QPen(QColor(theme.colours().error), 1.5))
-            painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 2, 2)
-            painter.end()
+            _outline(self)
 
 
 class NumbersField(TextField):
@@ -248,6 +244,7 @@ class ChoiceField(QComboBox):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(6)
+        self.invalid = False
         self.values = [value for _, value, _ in values]
         for i, (label, _, help) in enumerate(values):
             self.addItem(label)
@@ -269,8 +266,27 @@ class ChoiceField(QComboBox):
         """The value was refused: the old one stays."""
         self.setCurrentIndex(self._shown)
 
+    def set_invalid(self, invalid: bool) -> None:
+        if invalid != self.invalid:
+            self.invalid = invalid
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        super().paintEvent(event)
+        if self.invalid:
+            _outline(self)
+
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
+
+
+def _outline(field: QWidget) -> None:
+    """Around what will not do."""
+    painter = QPainter(field)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(QPen(QColor(theme.colours().error), 1.5))
+    painter.drawRoundedRect(QRectF(field.rect()).adjusted(1, 1, -1, -1), 2, 2)
+    painter.end()
 
 
 def tool_button(text: str, tip: str) -> QToolButton:

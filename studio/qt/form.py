@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
@@ -119,6 +119,20 @@ class Form(QWidget):
             self._rebuild(path, spec)
         else:
             self._refresh(path, spec)
+
+    def mark(self, wrong: Iterable[FieldPath]) -> None:
+        """Outline the fields at these paths; of one that has no field of its own, the choice of its kind."""
+        marked = {self._shown_at(path) for path in wrong}
+        for path, rows in self.rows.items():
+            for row in rows:
+                row.mark(path in marked)
+        for path, kind in self.kinds.items():
+            kind.set_invalid(path in marked)
+
+    def _shown_at(self, path: FieldPath) -> FieldPath:
+        while path and path not in self.rows and path not in self.kinds:
+            path = path[:-1]
+        return path
 
     def change(self, owner: FieldPath, spec: FieldSpec, value: Any, label: str, merge: str) -> str | None:
         """Edit the document; why it was refused, or None."""

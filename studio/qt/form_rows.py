@@ -82,6 +82,12 @@ class Row(QWidget):
         self.reason.setText(why[:1].upper() + why[1:])
         self.reason.setVisible(bool(why))
 
+    def mark(self, wrong: bool) -> None:
+        """Outline the value as one that will not do; what is being typed has its own say."""
+        for editor, _ in self._parts():
+            if isinstance(editor, TextField | ChoiceField) and not getattr(editor, "pending", False):
+                editor.set_invalid(wrong)
+
     def _title(self) -> tuple[str, str]:
         """What the label says, and the unit where the editor does not show it."""
         return self.spec.label, self.spec.unit.shown if self.spec.kind == "numbers" else ""

@@ -61,6 +61,9 @@ class Inspector(QWidget):
             head.addWidget(button)
         self.hint = QLabel(wordWrap=True)
         self.hint.setObjectName("muted")
+        self.problem = QLabel(wordWrap=True)
+        self.problem.setObjectName("error")
+        self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.form = Form(session, self._choose_file)
         content = QWidget()
         column = QVBoxLayout(content)
@@ -68,6 +71,7 @@ class Inspector(QWidget):
         column.setSpacing(6)
         column.addLayout(head)
         column.addWidget(self.hint)
+        column.addWidget(self.problem)
         column.addWidget(self.form)
         column.addStretch(1)
         scroll = QScrollArea(widgetResizable=True)
@@ -80,6 +84,7 @@ class Inspector(QWidget):
         self._menus_path: FieldPath | None = None
         session.selection_changed.connect(self.refresh)
         session.project_changed.connect(self.refresh)
+        session.problems_changed.connect(self._show_problem)
         theme.notice.changed.connect(self.refresh)
         self.refresh()
 
@@ -102,9 +107,17 @@ class Inspector(QWidget):
         self.hint.setText(hint)
         self.hint.setVisible(bool(hint))
         self.form.show_item(path, spec)
+        self._show_problem()
         if path != self._menus_path:
             self._menus_path = path
             self._fill_menus(path, is_list)
+
+    def _show_problem(self) -> None:
+        """Why the selection is not as it is set: in words, and at its fields."""
+        text = self.session.problem_of(self.session.selection)
+        self.problem.setText(text)
+        self.problem.setVisible(bool(text))
+        self.form.mark(self.session.problems)
 
     def _fill_menus(self, path: FieldPath, is_list: bool) -> None:
         self.presets.menu().clear()

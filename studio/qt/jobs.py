@@ -13,6 +13,8 @@ from studio.jobs import Job, State, Work
 
 RENDER = "render"
 """The lane of final renders: there is one at a time in the whole desktop."""
+BUSY = "Something is being rendered: wait for it, or cancel it first (Shift+F5)"
+"""What a person is told who asks for another one."""
 PROGRESS_MS = 100
 SWITCH_SECONDS = 0.002
 """How long a busy Python thread may keep the interpreter while the window waits for it (Python's own: 5 ms)."""

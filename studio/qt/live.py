@@ -14,6 +14,7 @@ from render.scene import SceneObject
 from render.threads import Cancel
 from studio.jobs import Progress
 from studio.preview import Look, Preview
+from studio.problem_fields import problem_fields
 from studio.qt.jobs import JobRunner
 from studio.qt.session import Session
 from studio.warm_up import warm_up
@@ -96,10 +97,11 @@ class Live(QObject):
         if not self.ready:
             return Look(session.project, self.step, (), self.preview)
         look = self.preview.look(session.project, session.document.root, self.step, wait=False)
-        for name, error in self.preview.errors.items():
+        for error in self.preview.errors.values():
             if str(error) not in self._told:
                 self._told.add(str(error))
-                session.message.emit("error", f"{name}: {error}")
+                session.message.emit("error", str(error))
+        session.tell_problems(problem_fields(look, self.preview.errors))
         return look
 
     def _load_missing(self) -> None:
@@ -139,4 +141,5 @@ class Live(QObject):
     def _start_anew(self) -> None:
         self.preview = Preview()
         self._told.clear()
+        self.session.tell_problems({})
         self._timer.start()

@@ -28,7 +28,7 @@ from render.threads import Cancel
 from studio.console import FRAMES, frame_of
 from studio.jobs import Job, Progress
 from studio.qt.icons import icon
-from studio.qt.jobs import RENDER, JobRunner
+from studio.qt.jobs import BUSY, RENDER, JobRunner
 from studio.qt.session import Session
 from studio.scan import ScanResult, run_scan
 from studio.scene_edits import set_motion
@@ -109,7 +109,7 @@ class MotionPanel(QWidget):
         """Run the scan into a folder; None: something else is being rendered."""
         session = self.session
         if self.runner.job(RENDER) is not None:
-            session.message.emit("warning", "Something is being rendered: wait for it, or cancel it first")
+            session.message.emit("warning", BUSY)
             return None
         project, root, scale = session.project, session.document.root, SCALES[self.scale.currentText()]
         source = session.document.path

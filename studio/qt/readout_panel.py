@@ -24,6 +24,8 @@ class ReadoutPanel(QWidget):
         self._lasers.setToolTip("The laser that the read-outs are of")
         self._lasers.activated.connect(self._choose)
         self._hint = QLabel("Add a laser to the rig to see what it measures.", wordWrap=True)
+        self.problem = QLabel("Not of the scene as it is set: the scene tree marks what cannot be.", wordWrap=True)
+        self.problem.setObjectName("warning")
         self._hint.setObjectName("muted")
         self._labels: dict[str, tuple[QLabel, QLabel, QLabel]] = {}
         inner = QFrame()
@@ -40,10 +42,13 @@ class ReadoutPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
-        for widget in (self._lasers, self._hint):
+        for widget in (self._lasers, self._hint, self.problem):
             layout.addWidget(widget)
         layout.addWidget(area, 1)
+        for label in (self._hint, self.problem):
+            label.setContentsMargins(10, 6, 10, 0)
         self._live.changed.connect(self._refresh)
+        session.problems_changed.connect(self._refresh)
         session.selection_changed.connect(self._follow_selection)
         theme.notice.changed.connect(self._paint)
         self._rows: tuple[Row, ...] = ()
@@ -74,6 +79,7 @@ class ReadoutPanel(QWidget):
         self._lasers.setCurrentIndex(self.laser if names else -1)
         self._lasers.setVisible(len(names) > 1)
         self._hint.setVisible(not names)
+        self.problem.setVisible(bool(names and self._session.problems))
         self._area.setVisible(bool(names))
         shown = rows(readouts(look, self.laser)) if names and self._live.ready else ()
         if shown != self._rows:

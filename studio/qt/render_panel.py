@@ -31,7 +31,7 @@ from studio.jobs import Job, Progress, State
 from studio.light_groups import group_lines, unfinished
 from studio.project import Project
 from studio.qt.history import History
-from studio.qt.jobs import RENDER, JobRunner
+from studio.qt.jobs import BUSY, RENDER, JobRunner
 from studio.qt.render_job import can_go_on, carried, render_frames
 from studio.qt.session import Render, Session
 from studio.qt.status import time_left
@@ -119,7 +119,7 @@ class RenderPanel(QWidget):
     def go_on(self) -> None:
         """Go on with the shown render where it was stopped."""
         render = self.session.shown
-        if self._job is not None or render is None or render.final or render.state is None:
+        if render is None or render.final or render.state is None or not self._may_start():
             return
         self._before, self._keep = render, True
         self._render = render
@@ -127,7 +127,7 @@ class RenderPanel(QWidget):
 
     def start(self, image_scale: float | None = None) -> None:
         """Render the project as it is now; one render at a time."""
-        if self._job is not None:
+        if not self._may_start():
             return
         session = self.session
         source, root, step = session.project, session.document.root, session.step
@@ -142,6 +142,12 @@ class RenderPanel(QWidget):
         self.errors.clear()
         self._warned = set()
         self._run(project, root, step, world, RenderState({}))
+
+    def _may_start(self) -> bool:
+        if self.runner.job(RENDER) is not None:
+            self.session.message.emit("warning", BUSY)
+            return False
+        return True
 
     def _run(self, project: Project, root: Path, step: int, world: World | None, state: RenderState) -> None:
         refined, limit, self._state = self._refined, self.limit.value() or None, state

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt, QTimer
@@ -36,6 +37,7 @@ from studio.forms import kind_label
 from studio.mesh_import import is_mesh
 from studio.project import Project
 from studio.qt import scene_actions, theme
+from studio.qt.drops import accept_copy, dragged_files
 from studio.qt.mesh_importer import import_meshes
 from studio.qt.scene_icons import icon_name, scene_icon
 from studio.qt.session import Session
@@ -57,6 +59,8 @@ class Node:
     icon: tuple[str, str] = ("", "")
     visible: bool | None = None
     """None: it cannot be hidden."""
+    problem: str = ""
+    """Why it is not as it is set."""
 
 
 def nodes(project: Project) -> list[Node]:
@@ -162,6 +166,7 @@ class SceneTree(QTreeWidget):
         self._filling = False
         self._dragged: FieldPath = ()
         session.project_changed.connect(self.refresh)
+        session.problems_changed.connect(self.refresh)
         session.selection_changed.connect(self._follow_selection)
         theme.notice.changed.connect(self._repaint)
         session.document_replaced.connect(self.expandAll)
@@ -176,7 +181,7 @@ class SceneTree(QTreeWidget):
 
     def refresh(self) -> None:
         """Show the project as it is now; in place while the same items are there."""
-        now = nodes(self.session.project)
+        now = [self._with_problem(node) for node in nodes(self.session.project)]
         if now == self._nodes:
             return
         self._filling = True
@@ -188,6 +193,10 @@ class SceneTree(QTreeWidget):
         self._filling = False
         self._keep_selection()
         self._follow_selection()
+
+    def _with_problem(self, node: Node) -> Node:
+        text = self.session.problem_of(node.path) if in_list(node.path) else ""
+        return replace(node, problem=text) if text else node
 
     def _repaint(self) -> None:
         """Another theme holds: what was given a colour of its own takes the new one."""
@@ -222,14 +231,17 @@ class SceneTree(QTreeWidget):
     def _fill(self, item: QTreeWidgetItem, node: Node) -> None:
         item.setText(NAME, node.name)
         item.setData(NAME, DETAIL, node.detail)
-        item.setIcon(NAME, scene_icon(*node.icon))
-        item.setToolTip(NAME, f"{node.name}, {node.detail}" if node.detail else node.name)
+        wrong = bool(node.problem)
+        item.setIcon(NAME, scene_icon("problem") if wrong else scene_icon(*node.icon))
+        told = node.problem or node.detail
+        item.setToolTip(NAME, f"<p>{escape(node.name)}: {escape(told)}</p>" if told else node.name)
         if node.visible is not None:
             item.setIcon(EYE, scene_icon("eye" if node.visible else "hidden"))
             item.setToolTip(EYE, "Hide" if node.visible else "Show")
         shown = node.visible is not False
+        colour = theme.colours().error if wrong else None if shown else theme.colours().muted
         # nothing for a shown one: the palette of whatever theme holds
-        item.setData(NAME, Qt.ItemDataRole.ForegroundRole, None if shown else QColor(theme.colours().muted))
+        item.setData(NAME, Qt.ItemDataRole.ForegroundRole, None if colour is None else QColor(colour))
 
     def _keep_selection(self) -> None:
         """A selected item that is gone (an undo) hands its place to the next above that is there."""
@@ -341,12 +353,16 @@ class SceneTree(QTreeWidget):
         self._dragged = ()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        if self._dragged or _meshes(event):
+        if _meshes(event):
+            accept_copy(event)
+        elif self._dragged:
             event.acceptProposedAction()
 
     def dragMoveEvent(self, event: QDragMoveEvent) -> None:
         super().dragMoveEvent(event)  # it scrolls, and draws where the item would go
-        if _meshes(event) or self._place(event.position().toPoint()) is not None:
+        if _meshes(event):
+            accept_copy(event)
+        elif self._place(event.position().toPoint()) is not None:
             event.acceptProposedAction()
         else:
             event.ignore()
@@ -355,7 +371,7 @@ class SceneTree(QTreeWidget):
         path, files, place = self._dragged, _meshes(event), self._place(event.position().toPoint())
         self.setState(self.State.NoState)
         if files:
-            event.acceptProposedAction()
+            accept_copy(event)
             import_meshes(self.session, files, self)
         elif path and place is not None:
             event.acceptProposedAction()
@@ -389,5 +405,4 @@ def _is_object(project: Project, path: FieldPath) -> bool:
 
 def _meshes(event: QDropEvent) -> list[Path]:
     """The mesh files among what is dragged in."""
-    files = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-    return [file for file in files if is_mesh(file)]
+    return [file for file in dragged_files(event) if is_mesh(file)]

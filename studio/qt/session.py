@@ -69,6 +69,8 @@ class Session(QObject):
     """The shown render was developed and measured again (power, exposure, method)."""
     render_asked = Signal()
     """A panel other than the render panel asks for a render with the present settings."""
+    problems_changed = Signal()
+    """`problems` are others."""
     message = Signal(str, str)
     """level ("info", "warning", "error") and text, for log and status bar."""
     document_replaced = Signal()
@@ -82,6 +84,8 @@ class Session(QObject):
         self.step = 0
         self.renders: list[Render] = []
         self.shown: Render | None = None
+        self.problems: dict[FieldPath, str] = {}
+        """What the live preview cannot show as it is set: by the path of the field, why."""
         self.document = document
         document.listeners.append(self.project_changed.emit)
 
@@ -136,6 +140,15 @@ class Session(QObject):
             self.message.emit("error", str(error))
             return False
         return True
+
+    def tell_problems(self, problems: dict[FieldPath, str]) -> None:
+        if problems != self.problems:
+            self.problems = problems
+            self.problems_changed.emit()
+
+    def problem_of(self, path: FieldPath) -> str:
+        """Why an item of the scene is not as it is set; empty: it is."""
+        return "\n".join(text for field, text in self.problems.items() if path and field[: len(path)] == path)
 
     def add_render(self, render: Render) -> None:
         self.renders.append(render)

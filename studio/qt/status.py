@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 from typing import Any
 
-from PySide6.QtCore import QTimer, Signal
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QMouseEvent, QMoveEvent, QResizeEvent
 from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QToolButton, QWidget
 
 from studio.jobs import Job, State
@@ -16,6 +17,8 @@ from studio.qt.session import Session
 
 SHORT = 0.4
 """Seconds; work that ends sooner is not worth a progress bar."""
+WIDEST, MARGIN = 720, 6
+"""px, of a message that stands above the bar."""
 MESSAGE_SECONDS = {"info": 8, "warning": 20, "error": 60}
 
 
@@ -37,10 +40,17 @@ class StatusBar(QStatusBar):
         self.left = QLabel()
         self.left.setObjectName("muted")
         self.pause = self._button("pause", "Pause", self.toggle_pause)
-        self.cancel = self._button("cancel", "Cancel (Esc)", self.cancel_work)
+        self.cancel = self._button("cancel", "Cancel (Shift+F5)", self.cancel_work)
         self.text = _Message()
         self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.text.clicked.connect(self.log_asked)
+        self.text.resized.connect(self._place_whole)
+        self.whole = _Message(parent)
+        self.whole.setWordWrap(True)
+        self.whole.setProperty("note", True)
+        self.whole.hide()
+        self.whole.clicked.connect(self.log_asked)
+        self.whole.clicked.connect(self.whole.hide)
         self.plan = QLabel()
         self.plan.setObjectName("muted")
         for widget in (self.work, self.bar, self.left, self.pause, self.cancel):
@@ -48,7 +58,7 @@ class StatusBar(QStatusBar):
         self.addWidget(self.text, 1)
         self.addPermanentWidget(self.plan)
         self._fade = QTimer(self, singleShot=True)
-        self._fade.timeout.connect(lambda: self.text.setText(""))
+        self._fade.timeout.connect(lambda: self._say("", "message"))
         self._show_work(False)
         session.message.connect(self.show_text)
         runner.progress.connect(self.follow)
@@ -93,12 +103,35 @@ class StatusBar(QStatusBar):
 
     def show_text(self, level: str, text: str) -> None:
         """A message, for a while; a click on it opens the log."""
-        self.text.setObjectName(level if level in ("warning", "error") else "message")
-        self.text.style().unpolish(self.text)
-        self.text.style().polish(self.text)
-        self.text.setText(text.splitlines()[0] if text else "")
-        self.text.setToolTip(text)
+        self._say(text, level if level in ("warning", "error") else "message")
         self._fade.start(1000 * MESSAGE_SECONDS.get(level, 8))
+
+    def _say(self, text: str, name: str) -> None:
+        line = text.splitlines()[0] if text else ""
+        for label in (self.text, self.whole):
+            label.setObjectName(name)
+            label.style().unpolish(label)
+            label.style().polish(label)
+        self.whole.setText(line)
+        self.text.setToolTip(f"<p>{escape(text)}</p>" if text else "")
+        self._place_whole()
+
+    def moveEvent(self, event: QMoveEvent) -> None:
+        super().moveEvent(event)
+        self._place_whole()
+
+    def _place_whole(self) -> None:
+        """A message that is longer than the bar has room for stands above it, wrapped: the panels keep their sizes."""
+        whole = self.whole
+        seen = self.text.fontMetrics().elidedText(whole.text(), Qt.TextElideMode.ElideRight, self.text.width())
+        cut = seen != whole.text() and self.isVisible()
+        self.text.setText(seen)
+        if cut:
+            width = min(WIDEST, self.width() - 2 * MARGIN)
+            whole.resize(width, whole.heightForWidth(width))
+            whole.move(self.x() + MARGIN, self.y() - whole.height() - MARGIN)
+            whole.raise_()
+        whole.setVisible(cut)
 
     def _button(self, name: str, tip: str, handler: Callable[[], None]) -> QToolButton:
         button = QToolButton()
@@ -110,6 +143,11 @@ class StatusBar(QStatusBar):
 
 class _Message(QLabel):
     clicked = Signal()
+    resized = Signal()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.resized.emit()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.clicked.emit()

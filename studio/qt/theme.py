@@ -175,6 +175,7 @@ def style_sheet(c: Colours) -> str:
     QTableView {{ gridline-color: {c.line}; border: none; }}
     QProgressBar {{ background: {c.base}; border: 1px solid {c.line}; border-radius: 4px; text-align: center; }}
     QProgressBar::chunk {{ background: {c.accent}; border-radius: 3px; }}
+    QLabel[note="true"] {{ background: {c.raised}; border: 1px solid {c.line}; border-radius: 5px; padding: 6px 9px; }}
     QLabel#muted {{ color: {c.muted}; }}
     QLabel#warning {{ color: {c.warning}; }}
     QLabel#error {{ color: {c.error}; }}

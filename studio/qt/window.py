@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, Qt, QTimer
-from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QScrollArea, QSizePolicy, QToolBar, QToolButton, QWidget
 
 from studio.autosave import Autosave
@@ -17,6 +17,7 @@ from studio.preferences import PreferencesFile
 from studio.qt import scene_actions, theme
 from studio.qt.actions import Actions
 from studio.qt.dialogs import about, show_trouble
+from studio.qt.drops import accept_copy, dragged_files
 from studio.qt.error_cloud import ErrorCloud
 from studio.qt.export_actions import ExportActions
 from studio.qt.file_actions import FileActions
@@ -31,7 +32,7 @@ from studio.qt.session import Session
 from studio.qt.shortcuts import CheatSheet
 from studio.qt.status import StatusBar
 from studio.qt.tour import Step, Tour
-from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, share_out, workspace
+from studio.qt.workspaces import WORKSPACES, arrange, remembered, restore, sealed, share_out, unsealed, workspace
 from studio.trouble import trouble
 
 TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
@@ -87,11 +88,11 @@ class MainWindow(QMainWindow):
             self._remember_arrangement()
         wanted = workspace(key)
         self.workspace = wanted.key
-        arrange(self, self.docks, wanted)
-        if restore(self, self.preferences.values.arrangements.get(wanted.key, "")):
-            self.panels["viewport"].setVisible(wanted.viewport)
-        else:
-            QTimer.singleShot(0, self, lambda: share_out(self, self.docks, wanted))
+        # before the panels come: all together they may need more room than the window has, and it would grow
+        self.panels["viewport"].setVisible(wanted.viewport)
+        if not self._restore_panels():
+            self.rearrange()
+            QTimer.singleShot(0, self, self._fit_panels)
         self.commands[SWITCH[wanted.key]].setChecked(True)
         self.cloud.pin(wanted.key == "measure")
         self.preferences.change(workspace=wanted.key)
@@ -129,15 +130,15 @@ class MainWindow(QMainWindow):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        if not event.spontaneous() and self.workspace not in self.preferences.values.arrangements:
-            QTimer.singleShot(0, self, lambda: share_out(self, self.docks, workspace(self.workspace)))
+        if not event.spontaneous():
+            QTimer.singleShot(0, self, self._fit_panels)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.files.may_close():
             event.ignore()
             return
         self._remember_arrangement()
-        self.preferences.change(geometry=bytes(self.saveGeometry().toBase64().data()).decode())
+        self.preferences.change(geometry=sealed(self.saveGeometry()))
         if self.tour is not None:
             self.tour.end()
         self.runner.close()
@@ -148,13 +149,13 @@ class MainWindow(QMainWindow):
         event.accept()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        paths = dragged_files(event)
         if any(is_mesh(path) or path.suffix.lower() == ".json" or path.is_dir() for path in paths):
-            event.acceptProposedAction()
+            accept_copy(event)
 
     def dropEvent(self, event: QDropEvent) -> None:
-        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-        event.acceptProposedAction()
+        paths = dragged_files(event)
+        accept_copy(event)
         # after the drop has ended: a dialog inside it would hold up the program that the file comes from
         QTimer.singleShot(0, self, lambda: self.take(paths))
 
@@ -176,6 +177,9 @@ class MainWindow(QMainWindow):
             dock = QDockWidget(panel.title, self)
             dock.setObjectName(panel.key)
             dock.setWidget(_scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
+            # added here once; from now on Qt moves docks only by restoring a state
+            self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
+            dock.hide()
             self.commands.submenus["panels"].addAction(dock.toggleViewAction())
             docks[panel.key] = dock
         return docks
@@ -252,7 +256,7 @@ class MainWindow(QMainWindow):
             "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
             "render": session.render_asked.emit,
             "pause": self.status.toggle_pause,
-            "cancel": self._escape,
+            "cancel": self.status.cancel_work,
             "scan": self._scan,
             "frame_points": self.cloud.frame,
             "log": lambda: self.show_panel("log"),
@@ -276,6 +280,7 @@ class MainWindow(QMainWindow):
         }
         for key, fill in filled.items():
             menus[key].aboutToShow.connect(lambda menu=menus[key], fill=fill: (menu.clear(), fill(menu)))
+        QShortcut(Qt.Key.Key_Escape, self).activated.connect(self._escape)
         self.status.log_asked.connect(lambda: self.show_panel("log"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
@@ -289,8 +294,10 @@ class MainWindow(QMainWindow):
     def _escape(self) -> None:
         if self.tour is not None:
             self.tour.end()
-        else:
-            self.status.cancel_work()
+        elif self.status.job is not None:
+            # it leaves fields, menus and drags: once too often must not cost an hour of work
+            keys = self.commands["cancel"].shortcut().toString()
+            self.session.message.emit("info", f"Esc does not stop the {self.status.job.name}; {keys} does")
 
     def _rename(self) -> None:
         self.show_panel("scene")
@@ -312,9 +319,20 @@ class MainWindow(QMainWindow):
 
     def _restore(self) -> None:
         values = self.preferences.values
-        if values.geometry:
-            self.restoreGeometry(QByteArray.fromBase64(QByteArray(values.geometry.encode())))
+        # the panels first: of what is restored into a window that is hidden and maximized, Qt keeps a second copy, and
+        # lays it out again after another state has freed the docks' places in it
         self.switch_to(values.workspace)
+        geometry = unsealed(values.geometry)
+        if geometry is not None:
+            self.restoreGeometry(geometry)
+
+    def _restore_panels(self) -> bool:
+        return restore(self, self.preferences.values.arrangements.get(self.workspace, ""))
+
+    def _fit_panels(self) -> None:
+        """Once more, in the size that the window has come to."""
+        if not self._restore_panels():
+            share_out(self, self.docks, workspace(self.workspace))
 
     def _remember_arrangement(self) -> None:
         kept = {**self.preferences.values.arrangements, self.workspace: remembered(self)}

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import base64
+import zlib
 from dataclasses import dataclass
+from typing import TypeVar
 
 from PySide6.QtCore import QByteArray, Qt
-from PySide6.QtWidgets import QDockWidget, QMainWindow
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
+
+Named = TypeVar("Named", bound=QWidget)
 
 Area = Qt.DockWidgetArea
 LEFT, RIGHT, BOTTOM = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
@@ -84,31 +89,44 @@ def workspace(key: str) -> Workspace:
 
 def arrange(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspace) -> None:
     """Put every dock where the workspace has it."""
+    window.restoreState(first_state(window, docks, wanted), VERSION)
+    share_out(window, docks, wanted)
+
+
+def first_state(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspace) -> QByteArray:
+    """The workspace's own arrangement as Qt saves one, of a window with toolbars and docks of these names.
+
+    It is made with empty docks, so that those of the window are added once and never taken out.
+    """
+    model = QMainWindow()
+    for bar in window.findChildren(QToolBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
+        model.addToolBar(window.toolBarArea(bar), _named(QToolBar(), bar.objectName()))
     corners = (LEFT, RIGHT) if wanted.sides_reach_down else (BOTTOM, BOTTOM)
-    window.setCorner(Qt.Corner.BottomLeftCorner, corners[0])
-    window.setCorner(Qt.Corner.BottomRightCorner, corners[1])
+    model.setCorner(Qt.Corner.BottomLeftCorner, corners[0])
+    model.setCorner(Qt.Corner.BottomRightCorner, corners[1])
+    empty = {name: _named(QDockWidget(), dock.objectName()) for name, dock in docks.items()}
     shown = {name for column in wanted.columns for name, _ in column.docks}
-    for name, dock in docks.items():
-        dock.setFloating(False)
-        window.removeDockWidget(dock)
+    for name, dock in empty.items():
         if name not in shown:
-            window.addDockWidget(BOTTOM if name in WIDE else RIGHT, dock)
+            model.addDockWidget(BOTTOM if name in WIDE else RIGHT, dock)
             dock.hide()
-    window.tabifyDockWidget(docks[WIDE[0]], docks[WIDE[1]])
-    # before the panels come: all together they may need more room than the window has, and it would grow
-    if (middle := window.centralWidget()) is not None:
-        middle.setVisible(wanted.viewport)
+    model.tabifyDockWidget(empty[WIDE[0]], empty[WIDE[1]])
     for column in wanted.columns:
         beside = Qt.Orientation.Horizontal if column.area == BOTTOM else Qt.Orientation.Vertical
         before: QDockWidget | None = None
         for name, _ in column.docks:
             if before is None:
-                window.addDockWidget(column.area, docks[name])
+                model.addDockWidget(column.area, empty[name])
             else:
-                window.splitDockWidget(before, docks[name], beside)
-            before = docks[name]
-            docks[name].show()
-    share_out(window, docks, wanted)
+                model.splitDockWidget(before, empty[name], beside)
+            before = empty[name]
+            empty[name].show()
+    return model.saveState(VERSION)
+
+
+def _named(widget: Named, name: str) -> Named:
+    widget.setObjectName(name)
+    return widget
 
 
 def share_out(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Workspace) -> None:
@@ -129,9 +147,26 @@ def share_out(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Worksp
 
 def remembered(window: QMainWindow) -> str:
     """The arrangement as text."""
-    return bytes(window.saveState(VERSION).toBase64().data()).decode()
+    return sealed(window.saveState(VERSION))
 
 
 def restore(window: QMainWindow, text: str) -> bool:
-    """Bring back a remembered arrangement; False: it is not one, or of another version."""
-    return bool(text) and window.restoreState(QByteArray.fromBase64(QByteArray(text.encode())), VERSION)
+    """Bring back a remembered arrangement; False: it is not one, damaged, or of another version."""
+    state = unsealed(text)
+    return state is not None and window.restoreState(state, VERSION)
+
+
+def sealed(data: QByteArray) -> str:
+    """What Qt saved, as text with a checksum."""
+    raw = bytes(data.data())
+    return f"{zlib.crc32(raw):08x}:{base64.b64encode(raw).decode()}"
+
+
+def unsealed(text: str) -> QByteArray | None:
+    """None: it is not as it was sealed. Of damaged bytes Qt makes what it can, which may be a segmentation fault."""
+    checksum, _, encoded = text.partition(":")
+    try:
+        raw = base64.b64decode(encoded, validate=True)
+    except ValueError:
+        return None
+    return QByteArray(raw) if raw and checksum == f"{zlib.crc32(raw):08x}" else None

@@ -12,6 +12,7 @@ from render.curve import laser_curve
 from render.direct import direct_image
 from render.errors import InputError
 from render.laser import LineLaser
+from render.material import Lambertian, Texture
 from render.motion import LinearStage
 from render.pose import Pose
 from render.scene import SceneObject
@@ -20,6 +21,7 @@ from render.truth import truth_images
 from render.world import build_world
 from studio.document import replaced
 from studio.preview import Look, Preview
+from studio.problem_fields import problem_fields
 from studio.project import Project
 from studio.templates import DESCRIPTIONS
 
@@ -207,6 +209,35 @@ def test_a_missing_mesh_is_named_and_the_rest_still_shown(crowded: tuple[Project
     assert list(preview.errors) == ["lost"] and isinstance(preview.errors["lost"], InputError)
     preview.look(project, root)
     assert preview.errors == {}
+
+
+def test_a_part_of_an_impossible_material_stays_in_grey_and_is_named(crowded: tuple[Project, Path]) -> None:
+    project, root = crowded
+    lost = Lambertian(albedo=Texture(path="nowhere.png"))
+    preview = Preview(1)
+    whole = preview.look(project, root)
+    for i, item in enumerate(project.scene.objects):
+        look = preview.look(replaced(project, (*OBJECTS, i, "material"), lost), root)
+        assert [one.index for one in look.placed] == [one.index for one in whole.placed]
+        assert list(preview.errors) == [item.name]
+        assert np.array_equal(look.lit_curve(0).point, whole.lit_curve(0).point)
+        assert [path[:4] for path in problem_fields(look, preview.errors)] == [(*OBJECTS, i, "material")]
+
+
+def test_an_error_is_put_down_to_the_field_it_names() -> None:
+    project, root = sample("plane")
+    preview = Preview(1)
+    item = project.scene.objects[0]
+    for where, field in (
+        (f"object {item.name!r}: material.base.albedo.path", ("material", "base", "albedo", "path")),
+        (f"object {item.name!r}: material/plane.stl", ("material",)),
+        (f"object {item.name!r}", ("material",)),
+    ):
+        look = preview.look(project, root)
+        told = problem_fields(look, {item.name: InputError("it cannot be", where=where, cure="choose another")})
+        assert told == {(*OBJECTS, 0, *field): f"{', '.join(field).capitalize()}: it cannot be; choose another"}
+    empty = preview.look(replaced(project, (*OBJECTS, 0, "visible"), False), root)
+    assert list(problem_fields(empty, {item.name: InputError("lost")})) == [(*OBJECTS, 0, "shape")]
 
 
 def test_nothing_is_loaded_when_the_caller_cannot_wait(crowded: tuple[Project, Path]) -> None:

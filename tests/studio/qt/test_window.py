@@ -3,26 +3,39 @@
 from __future__ import annotations
 
 import json
+import random
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QMimeData, QPointF, Qt, QTimer, QUrl
-from PySide6.QtGui import QDropEvent
-from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPushButton, QWidget
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMessageBox, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from render.errors import Cancelled
+from render.material import Texture
+from render.threads import Cancel
 from studio.autosave import Autosave
 from studio.document import Document
+from studio.fault_log import Fault
+from studio.jobs import Progress
 from studio.preferences import PreferencesFile
 from studio.project import Project
 from studio.qt import theme
 from studio.qt.actions import COMMANDS, Command
+from studio.qt.fault_notice import FaultNotice, offer
 from studio.qt.help import FOLDER, PAGES
+from studio.qt.live import live
 from studio.qt.panels import PANELS
+from studio.qt.session import Render
 from studio.qt.window import MainWindow
-from studio.qt.workspaces import WORKSPACES
+from studio.qt.workspaces import WORKSPACES, remembered, restore
+from tests.studio.qt.small_session import small_project as sphere
+from tests.studio.qt.small_session import small_render
 
 POWER = ("scene", "rig", "lasers", 0, "power")
 
@@ -89,10 +102,145 @@ class TestWorkspaces:
         again.close()
         again.deleteLater()
 
+    def test_panels_are_not_restored_into_a_window_that_is_hidden_and_maximized(
+        self, own_window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """There Qt keeps pointers to docks' places that it frees with the next state: a segmentation fault, later."""
+        own_window.showMaximized()
+        own_window.switch_to("render")
+        own_window.close()
+        into: list[tuple[bool, bool]] = []
+        real = QMainWindow.restoreState
+
+        def restore(window: QMainWindow, *given: Any) -> bool:
+            into.append((window.isVisible(), window.isMaximized()))
+            return real(window, *given)
+
+        monkeypatch.setattr(MainWindow, "restoreState", restore)
+        again = MainWindow(own_window.session, PreferencesFile(tmp_path / "config"), Autosave(tmp_path / "state"))
+        again.show()
+        again.switch_to("measure")
+        assert again.isMaximized()
+        assert len(into) >= 2 and (False, True) not in into
+        again.close()
+        again.deleteLater()
+
+    def test_a_damaged_arrangement_never_reaches_qt(self, window: MainWindow, monkeypatch: pytest.MonkeyPatch) -> None:
+        """It would end in a segmentation fault, at this start and at every other."""
+        whole, chance = remembered(window), random.Random(1)
+        assert restore(window, whole)
+        monkeypatch.setattr(window, "restoreState", lambda *_: pytest.fail("given to Qt"))
+        for _ in range(2000):
+            at, new = chance.randrange(len(whole)), chr(chance.randrange(256))
+            damaged = whole[:at] + new + whole[at + chance.randrange(2) :]
+            assert damaged == whole or not restore(window, damaged)
+        for text in ("", ":", "00000000:", whole[9:], whole[:-4], "\udcff", 10**5 * "["):
+            assert not restore(window, text)
+
+    def test_no_dock_is_ever_taken_out(self, window: MainWindow, monkeypatch: pytest.MonkeyPatch) -> None:
+        moved: list[object] = []
+        for name in ("addDockWidget", "removeDockWidget", "splitDockWidget", "tabifyDockWidget"):
+            monkeypatch.setattr(window, name, lambda *given: moved.append(given))
+        for each in WORKSPACES:
+            window.switch_to(each.key)
+            window.rearrange()
+        assert not moved
+
     def test_every_panel_is_the_real_one(self, window: MainWindow) -> None:
         assert {panel.key: type(window.panels[panel.key]).__name__ for panel in PANELS} == {
             panel.key: panel.name for panel in PANELS
         }
+
+
+class TestWork:
+    """Jobs that a person meets with keys and files."""
+
+    def test_escape_leaves_it_alone_and_says_what_cancels(self, window: MainWindow, qtbot: QtBot) -> None:
+        job = window.runner.run("export", "export report.pdf", until_cancelled)
+        qtbot.waitUntil(lambda: window.status.job is job)
+        with qtbot.waitSignal(window.session.message) as told:
+            qtbot.keyClick(window, Qt.Key.Key_Escape)
+        assert "Shift+F5" in told.args[1] and not job.cancel_asked
+        with qtbot.waitSignal(window.runner.cancelled):
+            qtbot.keyClick(window, Qt.Key.Key_F5, Qt.KeyboardModifier.ShiftModifier)
+
+    def test_another_render_is_not_refused_in_silence(self, window: MainWindow, qtbot: QtBot) -> None:
+        window.runner.run("render", "scan", until_cancelled)
+        with qtbot.waitSignal(window.session.message) as told:
+            qtbot.keyClick(window, Qt.Key.Key_F5)
+        assert told.args[0] == "warning" and "being rendered" in told.args[1]
+        with qtbot.waitSignal(window.runner.cancelled):
+            window.runner.cancel("render")
+        assert not window.runner.busy, "nor does it wait for the scan to end"
+
+    def test_a_cancelled_export_writes_nothing_and_says_so(
+        self, window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        from studio import export
+
+        def slow(path: Path, what: export.Exported) -> list[Path]:
+            path.write_text("half of it")
+            window.runner.cancel("export")
+            return [path]
+
+        monkeypatch.setattr(export, "export_points", slow)
+        world, frame = small_render()
+        window.session.add_render(Render(1, sphere(), world, frame))
+        with qtbot.waitSignals([window.runner.cancelled, window.session.message]):
+            window.exports.write("export_csv", tmp_path / "out" / "points.csv")
+        assert not (tmp_path / "out").exists()
+        assert window.panels["log"].as_text().endswith("No file was written")  # type: ignore[attr-defined]
+
+
+class TestImpossibleMaterial:
+    """It is told where it is, and the part stays."""
+
+    MATERIAL = ("scene", "objects", 0, "material")
+
+    @pytest.fixture
+    def told(self, window: MainWindow, qtbot: QtBot) -> Iterator[MainWindow]:
+        session = window.session
+        session.select(self.MATERIAL[:3])
+        session.set((*self.MATERIAL, "albedo"), Texture(path="textures/nowhere.png"))
+        qtbot.waitUntil(lambda: bool(session.problems))
+        yield window
+        session.document.undo()
+        qtbot.waitUntil(lambda: not session.problems and not live(session).is_loading)
+        assert window.panels["inspector"].problem.isHidden()  # type: ignore[attr-defined]
+
+    def test_the_part_stays(self, told: MainWindow) -> None:
+        look = live(told.session).look
+        assert len(look.placed) == len(told.session.project.scene.visible_objects)
+
+    def test_tree_and_field_are_marked(self, told: MainWindow) -> None:
+        item = told.panels["scene"].item(self.MATERIAL[:3])  # type: ignore[attr-defined]
+        assert item.foreground(0).color().name() == theme.colours().error.lower()
+        assert "nowhere.png" in item.toolTip(0) or "texture" in item.toolTip(0)
+        inspector = told.panels["inspector"]
+        assert inspector.problem.isVisible() and inspector.problem.wordWrap()  # type: ignore[attr-defined]
+        form = inspector.form  # type: ignore[attr-defined]
+        marked = [path for path, kind in form.kinds.items() if kind.invalid]
+        for path, rows in form.rows.items():
+            marked += [path for row in rows for editor, _ in row._parts() if getattr(editor, "invalid", False)]
+        assert len(marked) == 1 and marked[0][:4] == self.MATERIAL
+
+    def test_estimates_are_not_passed_off_as_those_of_the_scene(self, told: MainWindow) -> None:
+        camera, design = told.panels["camera"], told.panels["readout"]
+        assert "not of the scene" in camera.badge_text.text() and camera.badge.isVisible()  # type: ignore[attr-defined]
+        assert design.problem.isVisible()  # type: ignore[attr-defined]
+
+    def test_a_long_message_wraps_within_the_window(self, told: MainWindow, qtbot: QtBot) -> None:
+        text = "object 'part': material: " + 40 * "why it will not do, " + "choose another"
+        told.session.message.emit("error", text)
+        whole = told.status.whole
+        assert whole.isVisible() and whole.text() == text
+        assert told.rect().contains(whole.geometry()) and whole.height() > 2 * whole.fontMetrics().height()
+        size = told.panels["scene"].size()
+        qtbot.mouseClick(whole, Qt.MouseButton.LeftButton)
+        assert not whole.isVisible() and told.docks["log"].isVisible()
+        told.docks["log"].hide()
+        told.session.message.emit("info", "short")
+        assert not whole.isVisible() and told.panels["scene"].size() == size
 
 
 class TestTheme:
@@ -217,6 +365,22 @@ class TestFiles:
         qtbot.waitUntil(lambda: window.session.project.name == "Other")
         assert "Other" in window.windowTitle()
 
+    def test_files_are_copied_from_and_never_moved(self, window: MainWindow, small_project: Path) -> None:
+        data = files(small_project)
+        buttons, shift = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.ShiftModifier
+        either = Qt.DropAction.CopyAction | Qt.DropAction.MoveAction
+        for actions, taken in ((Qt.DropAction.MoveAction, False), (either, True)):
+            entered = QDragEnterEvent(QPoint(9, 9), actions, data, buttons, shift)
+            entered.setDropAction(Qt.DropAction.MoveAction)
+            entered.ignore()
+            window.dragEnterEvent(entered)
+            assert entered.isAccepted() == taken
+        assert entered.dropAction() == Qt.DropAction.CopyAction
+        dropped = QDropEvent(QPointF(9, 9), either, data, buttons, shift)
+        dropped.setDropAction(Qt.DropAction.MoveAction)
+        window.dropEvent(dropped)
+        assert dropped.isAccepted() and dropped.dropAction() == Qt.DropAction.CopyAction
+
     def test_recent_projects_are_in_the_menu(self, window: MainWindow, small_project: Path) -> None:
         assert window.files.open(small_project)
         menu = window.commands.submenus["recent"]
@@ -320,6 +484,31 @@ class TestBadInput:
         assert "division by zero" in log and "again" in log
 
 
+class TestCrash:
+    """What an earlier process left is offered, and in no one's way."""
+
+    @pytest.fixture
+    def notice(self, window: MainWindow) -> FaultNotice:
+        return offer(window, Fault("2026-11-22 10:31", "Fatal Python error: Segmentation fault\n  in arrange"))
+
+    def test_it_is_shown_among_the_messages(self, window: MainWindow, qtbot: QtBot, notice: FaultNotice) -> None:
+        assert notice.isVisible() and QApplication.activeModalWidget() is None
+        with qtbot.waitSignal(notice.destroyed):
+            qtbot.mouseClick(notice.show_button, Qt.MouseButton.LeftButton)
+        assert window.docks["log"].isVisible()
+        assert "in arrange" in window.panels["log"].as_text()  # type: ignore[attr-defined]
+
+    def test_it_is_copied_with_the_versions(self, window: MainWindow, qtbot: QtBot, notice: FaultNotice) -> None:
+        with qtbot.waitSignal(notice.destroyed):
+            qtbot.mouseClick(notice.copy_button, Qt.MouseButton.LeftButton)
+        text = QApplication.clipboard().text()
+        assert "10:31" in text and "Segmentation fault" in text and "Qt 6" in text
+
+    def test_it_is_put_away(self, qtbot: QtBot, notice: FaultNotice) -> None:
+        with qtbot.waitSignal(notice.destroyed):
+            qtbot.mouseClick(notice.close_button, Qt.MouseButton.LeftButton)
+
+
 class TestPreferences:
     def test_the_latest_project_is_first_and_ten_are_kept(self, tmp_path: Path) -> None:
         preferences = PreferencesFile(tmp_path)
@@ -359,9 +548,20 @@ def test_a_bad_project_on_the_command_line_is_told_over_the_sample(
     window.deleteLater()
 
 
-def drop(window: QWidget, path: Path) -> None:
+def files(*paths: Path) -> QMimeData:
     data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(path))])
+    data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
+    return data
+
+
+def until_cancelled(progress: Progress, cancelled: Cancel) -> None:
+    while not cancelled():
+        time.sleep(0.005)
+    raise Cancelled
+
+
+def drop(window: QWidget, path: Path) -> None:
+    data = files(path)
     buttons, keys = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
     window.dropEvent(QDropEvent(QPointF(9, 9), Qt.DropAction.CopyAction, data, buttons, keys))
 
