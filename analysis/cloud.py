@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analysis.error import Errors
 from analysis.triangulate import Points
 from render.errors import InputError
-from render.files import atomic_write
+from render.files import atomic_write, check_regular
 from render.pose import invert, transform_points
 from render.scene import Scene
 
@@ -42,6 +42,9 @@ PLY_TYPES = {
     "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
 LONGEST_HEADER = 65536
+PIECE = 1 << 16
+"""Points read at a time."""
+MOST_BYTES = 2**36
 
 
 def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: Scene | None = None) -> Cloud:
@@ -76,6 +79,14 @@ def at_first_step(world: Float, scene: Scene, step: int) -> Float:
     return transform_points(motion.displacement(0) @ invert(motion.displacement(step)), world)
 
 
+def at_step(first: Float, scene: Scene, step: int) -> Float:
+    """The inverse of `at_first_step`: (m, 3) points as they stand at step 0, moved with the objects to a step."""
+    motion = scene.motion
+    if motion.kind == "none" or motion.moves != "objects":
+        return first
+    return transform_points(motion.displacement(step) @ invert(motion.displacement(0)), first)
+
+
 def merge(clouds: Sequence[Cloud]) -> Cloud:
     """One after the other; no cloud at all gives empty columns."""
     if not clouds:
@@ -105,12 +116,35 @@ def write_ply(path: Path | str, columns: Mapping[str, Column]) -> None:
 
 def read_ply(path: Path | str) -> Cloud:
     """The scalar columns of a binary little-endian PLY's vertices, as float64 or int32. InputError: it is none."""
+    return merge(list(ply_pieces(path)))
+
+
+def ply_pieces(path: Path | str, rows: int = PIECE) -> Iterator[Cloud]:
+    """As `read_ply`, so many points at a time, at least one piece: for clouds that do not fit in memory."""
     where = str(path)
+    check_regular(Path(path), MOST_BYTES, "point cloud")
     try:
-        data = Path(path).read_bytes()
+        with open(path, "rb") as file:
+            count, dtype = _ply_header(file, where)
+            for start in range(0, max(count, 1), rows):
+                size = min(rows, count - start) * dtype.itemsize
+                data = file.read(size)
+                if len(data) < size:
+                    raise InputError("the PLY file is cut short", where=where, found=f"fewer than {count} points")
+                yield _columns(np.frombuffer(data, dtype=dtype))
     except OSError as error:
         raise InputError("the file cannot be read", where=where, found=error.strerror or error) from error
-    end = data.find(b"end_header\n", 0, LONGEST_HEADER)
+
+
+def _columns(table: NDArray[Any]) -> Cloud:
+    kinds = {name: np.float64 if table[name].dtype.kind == "f" else np.int32 for name in table.dtype.names or ()}
+    return {name: table[name].astype(kind) for name, kind in kinds.items()}
+
+
+def _ply_header(file: BinaryIO, where: str) -> tuple[int, np.dtype[Any]]:
+    """Number and layout of the vertices; the file is left at the first of them."""
+    data = file.read(LONGEST_HEADER)
+    end = data.find(b"end_header\n")
     if not data.startswith(b"ply\n") or end < 0:
         raise InputError("not a PLY file", where=where, allowed="a PLY header")
     count = 0
@@ -127,12 +161,10 @@ def read_ply(path: Path | str) -> Cloud:
             if len(words) != 3 or words[1] not in PLY_TYPES or words[2] in dict(fields):
                 raise InputError("a property is not read", where=where, found=text, allowed="scalars, each name once")
             fields.append((words[2], PLY_TYPES[words[1]]))
-    dtype = np.dtype(fields)
-    body = data[end + len(b"end_header\n") :]
-    if not fields or len(body) < count * dtype.itemsize:
-        raise InputError("the PLY file is cut short", where=where, found=f"{len(body)} bytes of {count} points")
-    table = np.frombuffer(body, dtype=dtype, count=count)
-    return {name: table[name].astype(np.float64 if table[name].dtype.kind == "f" else np.int32) for name, _ in fields}
+    if not fields:
+        raise InputError("the PLY file has no points", where=where, allowed="scalar properties of a vertex")
+    file.seek(end + len(b"end_header\n"))
+    return count, np.dtype(fields)
 
 
 def write_csv(path: Path | str, columns: Mapping[str, Column]) -> None:

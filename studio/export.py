@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.cloud import Cloud, cloud, merge, write_csv, write_ply
-from analysis.report.model import Extraction, FrameResult, LaserResult
 from render.develop import Image
 from render.errors import InputError
 from render.files import atomic_write
@@ -17,11 +15,8 @@ from render.frame import Frame
 from render.frame_files import write_frame
 from render.world import World, build_world
 from studio.project import Project
+from studio.remarks import Measurements, best, frame_result, scale_notes
 from studio.results import now, report_input
-from studio.stages import Measurement
-
-Measurements = Mapping[str, Sequence[Measurement]]
-"""By method: one for each laser."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +32,17 @@ class Exported:
     frame: Frame
     images: tuple[Image, ...]
     measurements: Measurements
+    image_scale: float = 1.0
+    """Of the image, to the scanner's."""
 
 
 def export_report(path: Path, what: Exported) -> list[Path]:
     """One .html or .pdf file, by the suffix. InputError: nothing is measured, or the file cannot be written."""
     from analysis.report.write import render_page, write_report
 
-    data = report_input(what.project, _first_world(what), [frame_result(what)], {}, notes=(), created=now())
+    result = frame_result(what.project, what.frame, what.measurements, what.images)
+    notes = scale_notes(what.image_scale)
+    data = report_input(what.project, _first_world(what), [result], {}, notes=notes, created=now())
     if path.suffix.lower() != ".pdf":
         with atomic_write(path) as temporary:
             temporary.write_text(render_page(data), encoding="utf-8")
@@ -88,29 +87,8 @@ def export_points(path: Path, what: Exported) -> list[Path]:
 
 def point_clouds(what: Exported) -> list[Cloud]:
     """One for each laser, by the project's method."""
-    found = _best(what)
+    found = best(what.measurements, what.project)
     return [cloud(one.points, one.errors, one.laser, one.step, what.project.scene) for one in found]
-
-
-def frame_result(what: Exported) -> FrameResult:
-    """As a report takes it, the project's own method first. InputError: nothing is measured."""
-    _best(what)
-    own = what.project.extraction.method
-    order = [own, *(method for method in what.measurements if method != own)]
-    lasers = []
-    for i, curve in enumerate(what.frame.curves):
-        found = [what.measurements[method][i] for method in order if method in what.measurements]
-        extractions = tuple(Extraction(one.line, one.points, one.errors) for one in found)
-        lasers.append(LaserResult(curve, extractions, what.images[i].pixels if i < len(what.images) else None))
-    frame = what.frame
-    return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=frame.seconds, counts=frame.counts)
-
-
-def _best(what: Exported) -> Sequence[Measurement]:
-    if not what.measurements:
-        raise InputError("nothing is measured yet", cure="render first, and wait for the measurement")
-    own = what.project.extraction.method
-    return what.measurements.get(own) or next(iter(what.measurements.values()))
 
 
 def _first_world(what: Exported) -> World:

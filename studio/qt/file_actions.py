@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QMessageBox, QWidget
 
 from render.errors import InputError
@@ -14,7 +14,10 @@ from studio.document import Document, replaced
 from studio.preferences import PreferencesFile, recovery_folder
 from studio.project import Project, project_file
 from studio.qt.dialogs import TemplateDialog, ask_recovery, ask_unsaved, show_trouble, suggested
+from studio.qt.scan_steps import scan_steps
 from studio.qt.session import Session
+from studio.scan_folder import open_folder
+from studio.scan_results import holds_scan, image_scale_of, is_scan_of
 from studio.templates import template_folder
 from studio.trouble import trouble
 
@@ -39,6 +42,9 @@ def template(key: str, autosave: Autosave) -> Document:
 
 class FileActions(QObject):
     """Every change of the session's document as a whole goes through here, and asks before work is lost."""
+
+    results_opened = Signal()
+    """Those of a scan: they are shown as soon as they are read."""
 
     def __init__(
         self, window: QWidget, session: Session, preferences: PreferencesFile, autosave: Autosave | None = None
@@ -72,7 +78,10 @@ class FileActions(QObject):
         return bool(name) and self.open(Path(name))
 
     def open(self, path: Path, ask: bool = True) -> bool:
-        """Open a project file or a folder with one; what is open stays when it cannot be."""
+        """Open a project file, a folder with one, or the results of a scan; what is open stays when it cannot be."""
+        scan = holds_scan(path)
+        if scan is not None:
+            return self.open_results(scan, ask)
         if ask and not self.may_close():
             return False
         try:
@@ -87,6 +96,36 @@ class FileActions(QObject):
             return False
         self.replace(document)
         self.preferences.add_recent(file)
+        return True
+
+    def open_results_dialog(self) -> bool:
+        name = QFileDialog.getExistingDirectory(self.window, "Open the results of a scan", self._folder())
+        return bool(name) and self.open_results(Path(name))
+
+    def open_results(self, folder: Path, ask: bool = True) -> bool:
+        """Look at a finished scan, with its own project where the open one is another."""
+        session = self.session
+        try:
+            found = open_folder(folder)
+            own = is_scan_of(found, session.project)
+            document = Document(found.project, None, found.root)
+            gone = [] if own else missing_files(found.project.scene, found.root)
+            if gone:
+                cure = "put the project's folder back to where it was when it was scanned"
+                raise InputError("a file of the scanned project is missing", where=str(gone[0][1]), cure=cure)
+        except (InputError, OSError, MemoryError) as error:
+            self.preferences.forget_recent(folder)
+            self._tell(error, f"open {folder.name}")
+            return False
+        if own:
+            scan_steps(session).show(found, session.project, image_scale_of(found))
+        else:
+            if ask and not self.may_close():
+                return False
+            self.replace(document)
+            scan_steps(session).show(found)
+        self.preferences.add_recent(folder)
+        self.results_opened.emit()
         return True
 
     def replace(self, document: Document) -> None:

@@ -23,6 +23,7 @@ from render.ambient_plan import AMBIENT_SAMPLES
 from render.tone import Picture, grey
 from studio.qt.compare_view import CompareView
 from studio.qt.session import Render, Session
+from studio.remarks import scale_name, scale_notes
 
 THUMBNAIL = QSize(64, 54)
 NEW_LINE = "\u2028"
@@ -39,7 +40,10 @@ def title(render: Render) -> str:
 def describe(render: Render) -> str:
     """Size, quality and time, in one line."""
     height, width = render.frame.shape
-    parts = [f"{width} x {height}"]
+    small = scale_name(render.scanner_scale)
+    parts = [f"{width} x {height}" + (f", {small}" if small else "")]
+    if render.scan is not None:
+        parts.insert(0, f"step {render.frame.step + 1} of {render.scan.count}")
     counts = render.frame.counts
     errors = [counts.get(f"relative error, {laser.name}") for laser in render.project.scene.lasers]
     known = [error for error in errors if error is not None]
@@ -169,7 +173,8 @@ class History(QWidget):
 
     def _fill(self, item: QListWidgetItem, render: Render) -> None:
         item.setText(title(render))
-        item.setToolTip(f"{describe(render)}, {render.created}" if render.created else describe(render))
+        when = f", {render.created}" if render.created else ""
+        item.setToolTip("\n".join([f"{describe(render)}{when}", *scale_notes(render.scanner_scale)]))
         picture = thumbnail(render)
         if picture is not None:
             height, width = picture.shape

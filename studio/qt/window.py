@@ -210,6 +210,7 @@ class MainWindow(QMainWindow):
         made = ErrorCloud(self.session, self.panels["viewport"].view)  # type: ignore[attr-defined]
         results, motion = self.panels["results"], self.panels["motion"]
         results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
+        results.scan_bar.scope_changed.connect(made.show_all_steps)  # type: ignore[attr-defined]
         motion.began.connect(made.clear)  # type: ignore[attr-defined]
         motion.grew.connect(made.grow)  # type: ignore[attr-defined]
         return made
@@ -237,6 +238,7 @@ class MainWindow(QMainWindow):
         handlers: dict[str, Callable[[], object]] = {
             "new": files.new,
             "open": files.open_dialog,
+            "open_results": files.open_results_dialog,
             "save": files.save,
             "save_as": files.save_as,
             "quit": self.close,
@@ -277,6 +279,7 @@ class MainWindow(QMainWindow):
         for key, fill in filled.items():
             menus[key].aboutToShow.connect(lambda menu=menus[key], fill=fill: (menu.clear(), fill(menu)))
         self.status.log_asked.connect(lambda: self.show_panel("log"))
+        files.results_opened.connect(lambda: self.switch_to("measure"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
         session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))

@@ -1,0 +1,65 @@
+"""What a reader should notice about a measured render: at which scale it was, and what its numbers say. Qt-free."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
+from analysis.report.summary import remarks
+from render.develop import Image
+from render.errors import InputError
+from render.frame import Frame
+from studio.project import Project
+from studio.stages import Measurement
+
+Measurements = Mapping[str, Sequence[Measurement]]
+"""By method: one for each laser."""
+
+
+def scale_name(image_scale: float) -> str:
+    """ "0.25 x the scanner's image"; empty at the scanner's own size."""
+    return "" if image_scale == 1.0 else f"{image_scale:.3g} x the scanner's image"
+
+
+def scale_notes(image_scale: float) -> tuple[str, ...]:
+    """What to say of figures that were measured at another image scale than the scanner's; nothing at its own."""
+    if image_scale == 1.0:
+        return ()
+    larger = f", each pixel {1 / image_scale:.3g} times as large" if image_scale < 1.0 else ""
+    return (
+        f"Measured at {scale_name(image_scale)}{larger}: errors, widths and counts are not the scanner's. "
+        "At full size they are.",
+    )
+
+
+def frame_remarks(project: Project, frame: Frame, measurements: Measurements) -> list[str]:
+    """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be."""
+    result = frame_result(project, frame, measurements)
+    none = np.zeros((0, 3))
+    # of a report only its frames are looked at
+    data = ReportInput(project.name, project.scene, (result,), none, none.astype(np.int32), np.zeros(0, np.int32))
+    return [*frame.warnings, *remarks(data)]
+
+
+def frame_result(
+    project: Project, frame: Frame, measurements: Measurements, images: Sequence[Image] = ()
+) -> FrameResult:
+    """As a report takes it, the project's own method first. InputError: nothing is measured."""
+    best(measurements, project)
+    own = project.extraction.method
+    order = [own, *(method for method in measurements if method != own)]
+    lasers = []
+    for i, curve in enumerate(frame.curves):
+        found = [measurements[method][i] for method in order if method in measurements]
+        extractions = tuple(Extraction(one.line, one.points, one.errors) for one in found)
+        lasers.append(LaserResult(curve, extractions, images[i].pixels if i < len(images) else None))
+    return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=frame.seconds, counts=frame.counts)
+
+
+def best(measurements: Measurements, project: Project) -> Sequence[Measurement]:
+    """By the project's own method, else by the first. InputError: nothing is measured."""
+    if not measurements:
+        raise InputError("nothing is measured yet", cure="render first, and wait for the measurement")
+    return measurements.get(project.extraction.method) or next(iter(measurements.values()))
