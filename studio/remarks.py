@@ -19,19 +19,22 @@ Measurements = Mapping[str, Sequence[Measurement]]
 
 
 def scale_name(image_scale: float) -> str:
-    """ "0.25 x the scanner's image"; empty at the scanner's own size."""
-    return "" if image_scale == 1.0 else f"{image_scale:.3g} x the scanner's image"
+    """ "0.25 times the scanner's image size"; empty at the scanner's own."""
+    return "" if image_scale == 1.0 else f"{image_scale:.3g} times the scanner's image size"
+
+
+def scale_head(image_scale: float) -> str:
+    """The one sentence above figures that were measured at another image scale; empty at the scanner's own."""
+    name = scale_name(image_scale)
+    return f"Measured at {name}: not the scanner's figures." if name else ""
 
 
 def scale_notes(image_scale: float) -> tuple[str, ...]:
     """What to say of figures that were measured at another image scale than the scanner's; nothing at its own."""
     if image_scale == 1.0:
         return ()
-    larger = f", each pixel {1 / image_scale:.3g} times as large" if image_scale < 1.0 else ""
-    return (
-        f"Measured at {scale_name(image_scale)}{larger}: errors, widths and counts are not the scanner's. "
-        "At full size they are.",
-    )
+    each = f"Each pixel is {1 / image_scale:.3g} times as large there; full" if image_scale < 1.0 else "Full"
+    return (f"{scale_head(image_scale)} {each} size gives those.",)
 
 
 def frame_remarks(project: Project, frame: Frame, measurements: Measurements) -> list[str]:

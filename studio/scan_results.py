@@ -14,7 +14,7 @@ from analysis.cloud import INTEGERS, Cloud, merge, ply_pieces
 from render.errors import InputError
 from render.frame import Frame
 from render.frame_files import read_frame
-from render.scene import Scene
+from render.settings import RenderSettings
 from render.shape import MeshFile
 from render.threads import Cancel
 from render.world import World
@@ -29,6 +29,8 @@ Float = NDArray[np.float64]
 MOST_POINTS = 200_000
 """Of a scan in memory, evenly spread over its steps; the statistics are of all points."""
 LARGEST = 1e12
+MOST_FILES = 50
+"""Project files of a folder that are looked at for the one that was scanned."""
 COLUMNS = {"depth": "error_depth", "surface": "error_distance"}
 """Kind of error -> the column of the points that holds it; the error in the image is not among them."""
 NEEDED = {name: "i" if name in INTEGERS else "f" for name in ("x", "y", "z", *INTEGERS, *COLUMNS.values())}
@@ -141,8 +143,20 @@ def image_scale_of(found: ScanFolder) -> float:
 
 
 def is_scan_of(found: ScanFolder, project: Project) -> bool:
-    """The scan is of this very project, at the scan's image scale."""
-    return _unsigned(scaled(project, image_scale_of(found))) == _unsigned(found.project)
+    """The scan is of this project, brought to the scan's image scale."""
+    return _comparable(scaled(project, image_scale_of(found))) == _comparable(found.project)
+
+
+def source_of(found: ScanFolder) -> Path | None:
+    """The project file that the scan was made from, if it still says the same."""
+    files = sorted(found.root.glob("*.json"), key=lambda file: (file.name != "project.json", file.name))
+    for file in files[:MOST_FILES]:
+        try:
+            if is_scan_of(found, Project.load(file)):
+                return file
+        except InputError:
+            continue
+    return None
 
 
 def is_unfinished(folder: Path, project: Project) -> bool:
@@ -150,21 +164,21 @@ def is_unfinished(folder: Path, project: Project) -> bool:
     if (folder / MANIFEST).exists() or not (folder / PROJECT).is_file():
         return False
     try:
-        return _unsigned(Project.load(folder / PROJECT)) == _unsigned(project)
+        return _comparable(Project.load(folder / PROJECT)) == _comparable(project)
     except InputError:
         return False
 
 
-def _unsigned(project: Project) -> Project:
-    """Without the digests of its meshes, which only a saved project has."""
-    scene: Scene = project.scene
+def _comparable(project: Project) -> Project:
+    """Without what changes no measure: the name, how well it is rendered, and mesh digests, which only files have."""
     objects = tuple(
         item.model_copy(update={"shape": item.shape.model_copy(update={"sha256": None})})
         if isinstance(item.shape, MeshFile)
         else item
-        for item in scene.objects
+        for item in project.scene.objects
     )
-    return project.model_copy(update={"scene": scene.model_copy(update={"objects": objects})})
+    scene = project.scene.model_copy(update={"objects": objects})
+    return project.model_copy(update={"name": "project", "scene": scene, "render": RenderSettings(), "seed": 0})
 
 
 def _add(sums: dict[str, Float], piece: Cloud) -> None:

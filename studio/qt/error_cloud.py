@@ -88,9 +88,9 @@ class ErrorCloud(QObject):
         self._draw()
 
     def frame(self) -> None:
-        """Bring the points into the middle of the view."""
+        """Bring the points into the middle of the view; a few far outliers must not make the others a speck."""
         if len(self.points):
-            low, high = self.points.min(axis=0), self.points.max(axis=0)
+            low, high = np.percentile(self.points, (1.0, 99.0), axis=0)
             self.view.look_from(self.view.eye.framed(low, high, self.view.pixels))
 
     def refresh(self) -> None:

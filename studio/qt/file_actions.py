@@ -16,11 +16,12 @@ from studio.project import Project, project_file
 from studio.qt.dialogs import TemplateDialog, ask_recovery, ask_unsaved, show_trouble, suggested
 from studio.qt.scan_steps import scan_steps
 from studio.qt.session import Session
-from studio.scan_folder import open_folder
-from studio.scan_results import holds_scan, image_scale_of, is_scan_of
+from studio.scan_folder import ScanFolder, open_folder
+from studio.scan_results import holds_scan, image_scale_of, is_scan_of, source_of
 from studio.templates import template_folder
 from studio.trouble import trouble
 
+MAX_NAME = 200
 FILTER = "Blazer project (*.json)"
 AFTER_A_CHANGE = 2.0
 """Seconds of rest after an edit until it is kept."""
@@ -38,6 +39,25 @@ def template(key: str, autosave: Autosave) -> Document:
     except InputError:  # nothing can be imported into it then, but it can be looked at and saved elsewhere
         root = source
     return Document(project, None, root)
+
+
+def _scanned(found: ScanFolder) -> Document:
+    """The project of a scan: the file it was made from, or, where that has changed since, what the scan kept of it.
+
+    InputError: meshes or textures are missing.
+    """
+    source = source_of(found)
+    project = found.project if source is None else Project.load(source)
+    gone = missing_files(project.scene, found.root)
+    if gone:
+        cure = "put the project's folder back to where it was when it was scanned"
+        raise InputError("a file of the scanned project is missing", where=str(gone[0][1]), cure=cure)
+    if source is not None:
+        return Document(project, source)
+    scale = image_scale_of(found)
+    # its camera is the scan's: the name says so, wherever it is shown or saved
+    name = project.name if scale == 1.0 else f"{project.name} at {scale:.3g} x"
+    return Document(project.model_copy(update={"name": name[:MAX_NAME]}), None, found.root)
 
 
 class FileActions(QObject):
@@ -107,22 +127,19 @@ class FileActions(QObject):
         session = self.session
         try:
             found = open_folder(folder)
-            own = is_scan_of(found, session.project)
-            document = Document(found.project, None, found.root)
-            gone = [] if own else missing_files(found.project.scene, found.root)
-            if gone:
-                cure = "put the project's folder back to where it was when it was scanned"
-                raise InputError("a file of the scanned project is missing", where=str(gone[0][1]), cure=cure)
+            scale = image_scale_of(found)
+            document = session.document if is_scan_of(found, session.project) else _scanned(found)
         except (InputError, OSError, MemoryError) as error:
             self.preferences.forget_recent(folder)
             self._tell(error, f"open {folder.name}")
             return False
-        if own:
-            scan_steps(session).show(found, session.project, image_scale_of(found))
-        else:
+        if document is not session.document:
             if ask and not self.may_close():
                 return False
             self.replace(document)
+        if is_scan_of(found, document.project):
+            scan_steps(session).show(found, document.project, scale)
+        else:
             scan_steps(session).show(found)
         self.preferences.add_recent(folder)
         self.results_opened.emit()

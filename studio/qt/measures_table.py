@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
 from analysis.report.colour import method_name
+from analysis.report.units import digits
 from studio.qt import theme
 
 COVERED = "Within 2 sigma"
@@ -28,6 +29,13 @@ EXPLAINED = {
     "moves the line. Less: something else moves it too, as texture and edges under the line, or too few pixels.",
 }
 
+ROW_PX = 22
+
+
+def shown(value: float) -> str:
+    """Three digits, or all of a whole number."""
+    return "-" if math.isnan(value) else f"{value:.0f}" if value == round(value) else digits(value)
+
 
 class MeasuresTable(QTableWidget):
     """Read only; rows can be selected and copied."""
@@ -38,7 +46,7 @@ class MeasuresTable(QTableWidget):
         self.setSelectionMode(QAbstractItemView.SelectionMode.ContiguousSelection)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
-        self.verticalHeader().setDefaultSectionSize(24)
+        self.verticalHeader().setDefaultSectionSize(ROW_PX)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
         self.setMinimumWidth(360)
 
@@ -52,10 +60,10 @@ class MeasuresTable(QTableWidget):
             heading.setToolTip(f"<p>{EXPLAINED[name]}</p>")
             self.setVerticalHeaderItem(row, heading)
             for column, value in enumerate(values):
-                text = "-" if math.isnan(value) else f"{value:.0f}" if value == round(value) else f"{value:.3g}"
-                item = QTableWidgetItem(text)
+                item = QTableWidgetItem(shown(value))
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 item.setToolTip(f"<p>{EXPLAINED[name]}</p>")
                 if name == COVERED and value < HONEST:
                     item.setForeground(QColor(theme.colours().warning))
                 self.setItem(row, column, item)
+        self.setMaximumHeight(self.horizontalHeader().sizeHint().height() + ROW_PX * len(rows) + 2 * self.frameWidth())

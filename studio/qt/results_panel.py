@@ -11,7 +11,7 @@ from html import escape
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent, QColor, QPixmap
+from PySide6.QtGui import QCloseEvent, QColor, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -28,6 +28,7 @@ from PySide6.QtWidgets import (
 )
 
 from analysis.report.colour import TRUTH, method_colour, method_name
+from analysis.report.units import digits
 from studio.qt import theme
 from studio.qt.measures_table import MeasuresTable
 from studio.qt.results_histogram import ErrorHistogram
@@ -37,7 +38,7 @@ from studio.qt.results_steps import StepsPlot
 from studio.qt.scan_bar import ScanBar
 from studio.qt.scan_steps import scan_steps
 from studio.qt.session import Session
-from studio.remarks import frame_remarks, scale_notes
+from studio.remarks import frame_remarks, scale_head, scale_notes
 from studio.result_series import (
     ERROR_VIEWS,
     ErrorView,
@@ -55,8 +56,10 @@ NOTHING = (
     "line, points and errors appear here."
 )
 BY_STEP_ONLY = "The scan's files hold this error in sum only; choose This step"
-PROFILE, HISTOGRAM, STEPS, NOTICE = range(4)
+STEPS, NOTICE = 2, 3
 """Tabs."""
+TALL = 480
+"""px of height from which there is room below the measures."""
 
 
 class ResultsPanel(QWidget):
@@ -85,9 +88,10 @@ class ResultsPanel(QWidget):
         self.scan_bar = ScanBar(session)
         self.scan_steps = scan_steps(session)
         self.head = QFrame()
-        self.head_text = QLabel(wordWrap=True)
-        self.notice = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
-        self.notice.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.head_text = QLabel()
+        self.head_text.setMinimumWidth(1)  # a narrow panel may cut it off: it is among the remarks as well
+        self.notices = _Remarks(), _Remarks()
+        """What a reader should notice: below the measures, and in a tab where there is no room below them."""
         self._lay_out()
         self.laser.currentIndexChanged.connect(self.refresh)
         self.error.currentIndexChanged.connect(self.refresh)
@@ -109,6 +113,10 @@ class ResultsPanel(QWidget):
     def closeEvent(self, event: QCloseEvent) -> None:
         self.scan_steps.close()
         super().closeEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._place_remarks()
 
     @property
     def view(self) -> ErrorView:
@@ -175,16 +183,18 @@ class ResultsPanel(QWidget):
     def _tell_remarks(self, remarks: list[str]) -> None:
         """What a reader should notice, as the report has it."""
         self.tabs.setTabText(NOTICE, f"Worth noticing ({len(remarks)})" if remarks else "Worth noticing")
-        listed = "".join(f"<li style='margin-bottom: 6px'>{escape(text)}</li>" for text in remarks)
-        self.notice.setText(f"<ul style='margin-left: -22px'>{listed}</ul>" if remarks else "Nothing out of the way.")
+        for notice in self.notices:
+            notice.show_texts(remarks)
 
     def _tell_head(self) -> None:
         """Above all figures: why they are not the scanner's, or not of the step that was asked for."""
         render = self.session.shown
-        told = [] if render is None else [*scale_notes(render.scanner_scale)]
+        told = [] if render is None else [scale_head(render.scanner_scale)]
         if self.scan_steps.problem:
             told.insert(0, f"Step {self.session.step + 1} cannot be shown: {self.scan_steps.problem}")
-        self.head_text.setText("\n".join(told))
+        told = [text for text in told if text]
+        self.head_text.setText("   ".join(told))
+        self.head_text.setToolTip("".join(f"<p>{escape(text)}</p>" for text in told))
         self.head.setVisible(bool(told))
 
     def _another_render(self) -> None:
@@ -211,7 +221,11 @@ class ResultsPanel(QWidget):
             for i in np.flatnonzero(one.points.index == (-1 if scan_line is None else scan_line))[:1]:
                 error = float(error_values(one.errors, view)[i])
                 depth = 1e3 * float(one.points.depth_z[i])
-                said = f"{error:+.3g} {view.unit}" if math.isfinite(error) else "no truth here"
+                said = (
+                    f"{'+' if error > 0 else ''}{digits(error)} {view.unit}"
+                    if math.isfinite(error)
+                    else "no truth here"
+                )
                 parts.append(f"<span style='color:{method_colour(method)}'>●</span> {depth:.3f} mm ({said})")
                 first = error if first is None and math.isfinite(error) else first
         self.histogram.mark(first)
@@ -256,6 +270,11 @@ class ResultsPanel(QWidget):
         self.hidden.discard(method) if on else self.hidden.add(method)
         self.refresh()
 
+    def _place_remarks(self) -> None:
+        tall = self.height() >= TALL
+        self.notices[0].setVisible(tall)
+        self.tabs.setTabVisible(NOTICE, not tall)
+
     def _repaint(self) -> None:
         for plot in (self.rows, self.profile, self.histogram, self.by_step):
             plot.repaint_theme()
@@ -277,10 +296,16 @@ class ResultsPanel(QWidget):
         tabs.addTab(self.profile, "Profile")
         tabs.addTab(self.histogram, "Histogram")
         tabs.addTab(self.by_step, "Steps")
-        tabs.addTab(_scrolling(self.notice), "Worth noticing")
+        tabs.addTab(self.notices[1], "Worth noticing")
         self.tabs = tabs
         across = QSplitter(Qt.Orientation.Horizontal)
-        parts: list[tuple[QWidget, int]] = [(self.rows, 5), (tabs, 4), (self.table, 3)]
+        measures = QWidget()
+        column = QVBoxLayout(measures)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.table, 2)
+        column.addWidget(self.notices[0], 1)
+        column.addStretch(0)
+        parts: list[tuple[QWidget, int]] = [(self.rows, 5), (tabs, 4), (measures, 3)]
         for i, (part, stretch) in enumerate(parts):
             across.addWidget(part)
             across.setStretchFactor(i, stretch)
@@ -291,8 +316,10 @@ class ResultsPanel(QWidget):
         head = QVBoxLayout(self.head)
         head.setContentsMargins(8, 3, 8, 3)
         head.addWidget(self.head_text)
-        inside.addWidget(self.head)
-        inside.addWidget(self.scan_bar)
+        top = QHBoxLayout()
+        top.addWidget(self.scan_bar, 1)
+        top.addWidget(self.head, 1)
+        inside.addLayout(top)
         inside.addLayout(bar)
         inside.addWidget(across, 1)
         nothing = QLabel(NOTHING, alignment=Qt.AlignmentFlag.AlignCenter, wordWrap=True)
@@ -302,13 +329,21 @@ class ResultsPanel(QWidget):
         self.stack.addWidget(content)
 
 
-def _scrolling(text: QLabel) -> QScrollArea:
-    area = QScrollArea(widgetResizable=True)
-    area.setFrameShape(QFrame.Shape.NoFrame)
-    text.setAlignment(Qt.AlignmentFlag.AlignTop)
-    text.setContentsMargins(8, 8, 8, 8)
-    area.setWidget(text)
-    return area
+class _Remarks(QScrollArea):
+    """Sentences, one below the other."""
+
+    def __init__(self) -> None:
+        super().__init__(widgetResizable=True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
+        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.text.setContentsMargins(8, 8, 8, 8)
+        self.setWidget(self.text)
+
+    def show_texts(self, texts: list[str]) -> None:
+        listed = "".join(f"<p style='margin: 0 0 6px 0'>{escape(text)}</p>" for text in texts)
+        self.text.setText(f"<p style='margin: 0 0 6px 0'><b>Worth noticing</b></p>{listed}" if texts else "")
 
 
 def _dot(colour: str) -> QPixmap:
