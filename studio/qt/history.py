@@ -37,6 +37,11 @@ def title(render: Render) -> str:
     return render.name or f"Render {render.number}"
 
 
+def named(render: Render) -> str:
+    """Its title, with its image scale where that is not the scanner's."""
+    return title(render) + (f" ({render.scanner_scale:.3g} x)" if render.scanner_scale != 1.0 else "")
+
+
 def describe(render: Render) -> str:
     """Size, quality and time, in one line."""
     height, width = render.frame.shape
@@ -111,6 +116,7 @@ class History(QWidget):
         layout.addWidget(self.list, 1)
         session.renders_changed.connect(self.refresh)
         session.developed.connect(self._new_images)
+        session.document_replaced.connect(self._forget_comparison)
         self.list.itemClicked.connect(self._clicked)
         self.list.itemChanged.connect(self._renamed)
         self.list.itemSelectionChanged.connect(self._show_buttons)
@@ -167,9 +173,13 @@ class History(QWidget):
         later, earlier = pair
         if self.comparison is None:
             self.comparison = CompareView(self)
-        self.comparison.compare(earlier, title(earlier), later, title(later))
+        self.comparison.compare(earlier, named(earlier), later, named(later))
         self.comparison.show()
         self.comparison.raise_()
+
+    def _forget_comparison(self) -> None:
+        if self.comparison is not None:
+            self.comparison.forget()
 
     def _fill(self, item: QListWidgetItem, render: Render) -> None:
         item.setText(title(render))
