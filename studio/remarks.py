@@ -39,11 +39,16 @@ def scale_notes(image_scale: float) -> tuple[str, ...]:
 
 def frame_remarks(project: Project, frame: Frame, measurements: Measurements) -> list[str]:
     """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be."""
-    result = frame_result(project, frame, measurements)
+    return [*frame.warnings, *result_remarks(project, [frame_result(project, frame, measurements)])]
+
+
+def result_remarks(project: Project, results: Sequence[FrameResult]) -> list[str]:
+    """The report's remarks on the errors of one frame or of a whole scan."""
     none = np.zeros((0, 3))
     # of a report only its frames are looked at
-    data = ReportInput(project.name, project.scene, (result,), none, none.astype(np.int32), np.zeros(0, np.int32))
-    return [*frame.warnings, *remarks(data)]
+    return remarks(
+        ReportInput(project.name, project.scene, tuple(results), none, none.astype(np.int32), np.zeros(0, np.int32))
+    )
 
 
 def frame_result(

@@ -21,6 +21,7 @@ from render.world import build_world
 from studio import scan_folder
 from studio.light_groups import group_lines
 from studio.project import Project
+from studio.remarks import result_remarks
 from studio.results import extraction_notes, measure_frame, now, write_points, write_reports
 from studio.resume import Refined, frame_of_step, made_of, settle
 from studio.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world
@@ -162,6 +163,7 @@ def run_scan(
         if measure:
             files += write_points(out, project, results, clock)
             result["results"] = summarise(results, project.scene)
+            result["remarks"] = result_remarks(project, results)
             if report:
                 reports = write_reports(
                     out, project, first, results, clock, notes=[*told, *notes], created=result["created"]

@@ -105,8 +105,8 @@ class ScanResults:
         return [row["method"] for row in rows], found
 
     def remarks(self) -> list[str]:
-        """What the scan itself noted."""
-        kept = [self.found.manifest.get(key) for key in ("notes", "extraction")]
+        """What the scan noted of itself and of its errors."""
+        kept = [self.found.manifest.get(key) for key in ("notes", "extraction", "remarks")]
         return [text for texts in kept if isinstance(texts, list) for text in texts if isinstance(text, str)]
 
 

@@ -40,6 +40,8 @@ class ErrorCloud(QObject):
         self.rows: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
         self.steps: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
         self.limit = 1.0
+        self.image_scale = 1.0
+        """At which the points were measured, to the scanner's image."""
         self._clouds: list[Cloud] = []
         self._of_scan = False
         self._data, self._actor = _point_actor(POINT_PX)
@@ -80,6 +82,11 @@ class ErrorCloud(QObject):
         self._clouds, self._of_scan = [], False
         self._draw()
 
+    def begin_scan(self, image_scale: float) -> None:
+        """Points of a running scan are to come; those of an earlier one go."""
+        self.clear()
+        self.image_scale = image_scale
+
     def grow(self, columns: Cloud) -> None:
         """More points of a running scan."""
         if not self._of_scan:
@@ -107,7 +114,7 @@ class ErrorCloud(QObject):
             if not self._of_scan:
                 self.clear()
             return
-        self._of_scan = False
+        self._of_scan, self.image_scale = False, render.scanner_scale
         self._draw()
 
     def _draw(self) -> None:
@@ -124,7 +131,7 @@ class ErrorCloud(QObject):
             self.rows = self.steps = np.zeros(0, dtype=np.int32)
         self.limit = symmetric_limit(self.errors)
         _give(self._data, self.points, diverging(self.errors, self.limit))
-        self.bar.show_range(self.error_view, self.limit)
+        self.bar.show_range(self.error_view, self.limit, self.image_scale)
         self._mark()
         self._show_or_hide()
 
@@ -180,13 +187,14 @@ class ColourBar(QWidget):
     def __init__(self, view: QWidget) -> None:
         super().__init__(view)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.title, self.unit, self.limit = "", "", 1.0
-        self.resize(QSize(128, 190))
+        self.title, self.unit, self.limit, self.note = "", "", 1.0, ""
+        self.resize(QSize(128, 208))
         view.installEventFilter(self)
         self._place()
 
-    def show_range(self, view: ErrorView, limit: float) -> None:
+    def show_range(self, view: ErrorView, limit: float, image_scale: float = 1.0) -> None:
         self.title, self.unit, self.limit = view.title, view.unit, limit
+        self.note = f"at {image_scale:.3g} x size" if image_scale != 1.0 else ""
         self.update()
 
     def eventFilter(self, watched: QObject, event: object) -> bool:
@@ -203,13 +211,16 @@ class ColourBar(QWidget):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(back)
         painter.drawRoundedRect(QRectF(self.rect()), 6, 6)
-        bar = QRect(14, 34, 14, self.height() - 52)
+        bar = QRect(14, 34, 14, self.height() - 70)
         gradient = QLinearGradient(QPointF(bar.topLeft()), QPointF(bar.bottomLeft()))
         for i, (red, green, blue) in enumerate(diverging(np.linspace(1.0, -1.0, 21), 1.0).tolist()):
             gradient.setColorAt(i / 20, QColor(red, green, blue))
         painter.fillRect(bar, gradient)
         painter.setPen(QColor(c.text))
         painter.drawText(QRect(12, 6, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.title)
+        painter.setPen(QColor(c.warning))
+        painter.drawText(QRect(12, self.height() - 24, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.note)
+        painter.setPen(QColor(c.text))
         for share, text in ((0.0, f"+{self.limit:g}"), (0.5, "0"), (1.0, f"\u2212{self.limit:g}")):
             y = bar.top() + round(share * bar.height())
             painter.drawLine(bar.right() + 2, y, bar.right() + 6, y)

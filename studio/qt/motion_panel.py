@@ -59,8 +59,8 @@ class MotionPanel(QWidget):
 
     grew = Signal(object)
     """A `Cloud`: the points of one more step of the running scan."""
-    began = Signal()
-    """A scan began: what was shown of an earlier one goes."""
+    began = Signal(float)
+    """A scan began, at this image scale: what was shown of an earlier one goes."""
     _measured = Signal(object, object)
 
     def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
@@ -161,7 +161,7 @@ class MotionPanel(QWidget):
         self.stopped = None
         for button in (self.open, self.go_on):
             button.hide()
-        self.began.emit()
+        self.began.emit(order.image_scale)
         job = self.runner.run(RENDER, "scan", work, lambda result: self._done(result, order))
         self._running = job, order
         return job

@@ -153,7 +153,7 @@ class ResultsPanel(QWidget):
             self.table.show_measures(list(shown), table(list(shown.values()), view))
             remarks = frame_remarks(render.project, render.frame, render.measurements) if render.measurements else []
         self._show_by_step(render.scan, laser)
-        self._tell_remarks([*scale_notes(render.scanner_scale), *remarks])
+        self._tell_remarks(list(dict.fromkeys([*scale_notes(render.scanner_scale), *remarks])))
         self._tell_head()
         self._mark()
 

@@ -211,7 +211,7 @@ class MainWindow(QMainWindow):
         results, motion = self.panels["results"], self.panels["motion"]
         results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
         results.scan_bar.scope_changed.connect(made.show_all_steps)  # type: ignore[attr-defined]
-        motion.began.connect(made.clear)  # type: ignore[attr-defined]
+        motion.began.connect(made.begin_scan)  # type: ignore[attr-defined]
         motion.grew.connect(made.grow)  # type: ignore[attr-defined]
         return made
 

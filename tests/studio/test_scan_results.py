@@ -21,7 +21,7 @@ from studio.result_series import ERROR_VIEWS
 from studio.scan_folder import ScanFolder, open_folder
 from studio.scan_results import holds_scan, is_scan_of, is_unfinished, read_results, source_of
 from studio.stages import scaled
-from tests.studio.small_scan import SCALE, small_scan
+from tests.studio.scan_of_steps import SCALE, small_scan
 
 DEPTH, SURFACE, POSITION = ERROR_VIEWS
 
@@ -72,6 +72,11 @@ def test_the_measures_of_all_steps_are_those_of_the_scan(scanned: tuple[Path, Pa
         assert told["Points"] == row["points"]
         assert told["RMSE"] == pytest.approx(view.scale * row[key]["rmse"])
         assert told["RMSE"] ** 2 == pytest.approx(told["Bias"] ** 2 + told["Sigma"] ** 2)
+
+
+def test_what_the_report_remarks_on_is_kept_with_the_scan(scanned: tuple[Path, Path]) -> None:
+    found = open_folder(scanned[1])
+    assert found.manifest["remarks"] and read_results(found).remarks()[-1] == found.manifest["remarks"][-1]
 
 
 def test_only_a_sample_of_the_points_is_held_but_all_are_counted(
@@ -172,7 +177,7 @@ def test_a_manifest_that_says_nothing_of_use_leaves_gaps(copy: Path, written: ob
     name = found.project.scene.lasers[0].name
     if isinstance(written, list):
         written = [{**row, "laser": name} if isinstance(row, dict) and "method" in row else row for row in written]
-    edit_manifest(copy, results=written, notes=[None, "a note"], extraction=5, image_scale="half")
+    edit_manifest(copy, results=written, notes=[None, "a note"], extraction=5, remarks=None, image_scale="half")
     results = read_results(open_folder(copy))
     methods, rows = results.table(0, DEPTH)
     assert len(methods) <= 1

@@ -24,7 +24,7 @@ from studio.qt.results_panel import ResultsPanel
 from studio.qt.session import Render
 from studio.qt.window import MainWindow
 from studio.scan_folder import open_folder
-from tests.studio.small_scan import SCALE, small_project, small_scan
+from tests.studio.scan_of_steps import SCALE, small_project, small_scan
 
 
 @pytest.fixture(scope="module")
@@ -121,6 +121,7 @@ class TestOpened:
         assert render is not None and render.scanner_scale == SCALE
         assert "0.5 times" in panel.head_text.text() and panel.head.isVisible()
         assert "not the scanner's" in unescape(panel.notices[0].text.text())
+        assert "0.5 x" in opened.cloud.bar.note
         assert "0.5 times" in describe(render) and "step 1 of 3" in describe(render)
         asked: list[str] = []
 
