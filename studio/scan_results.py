@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.cloud import INTEGERS, Cloud, merge, ply_pieces
+from analysis.cloud import INTEGERS, Cloud, ply_pieces
 from render.errors import InputError
 from render.frame import Frame
 from render.frame_files import read_frame
@@ -18,6 +18,7 @@ from render.settings import RenderSettings
 from render.shape import MeshFile
 from render.threads import Cancel
 from render.world import World
+from studio.point_sample import PointSample
 from studio.project import Project
 from studio.result_series import MEASURED, ErrorView
 from studio.scan import never
@@ -26,8 +27,6 @@ from studio.stages import scaled, step_world
 
 Float = NDArray[np.float64]
 
-MOST_POINTS = 200_000
-"""Of a scan in memory, evenly spread over its steps; the statistics are of all points."""
 LARGEST = 1e12
 MOST_FILES = 50
 """Project files of a folder that are looked at for the one that was scanned."""
@@ -121,8 +120,7 @@ def read_results(found: ScanFolder, cancelled: Cancel = never) -> ScanResults:
     path = found.folder / "points.ply"
     lasers, steps = len(found.project.scene.lasers), len(found.frames)
     sums = {kind: np.zeros((lasers, steps, 3)) for kind in COLUMNS}
-    kept: list[Cloud] = []
-    stride = 1
+    sample = PointSample()
     for piece in ply_pieces(path) if path.exists() else ():
         if cancelled():
             break
@@ -130,10 +128,8 @@ def read_results(found: ScanFolder, cancelled: Cancel = never) -> ScanResults:
         if missing:
             raise InputError("the points lack columns", where=str(path), found=f"no {', '.join(missing)}")
         _add(sums, piece)
-        kept.append({name: column[::stride] for name, column in piece.items()})
-        while sum(len(part["x"]) for part in kept) > MOST_POINTS:
-            kept, stride = [{name: column[::2].copy() for name, column in merge(kept).items()}], 2 * stride
-    return ScanResults(found, image_scale_of(found), merge(kept), sums)
+        sample.add(piece)
+    return ScanResults(found, image_scale_of(found), sample.points, sums)
 
 
 def image_scale_of(found: ScanFolder) -> float:

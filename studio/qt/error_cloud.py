@@ -12,6 +12,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from analysis.cloud import Cloud, at_step, cloud
 from studio.diverging import diverging
+from studio.point_sample import PointSample
 from studio.qt import theme
 from studio.qt.session import Session
 from studio.qt.view3d import View3D
@@ -44,6 +45,7 @@ class ErrorCloud(QObject):
         """At which the points were measured, to the scanner's image."""
         self._clouds: list[Cloud] = []
         self._of_scan = False
+        self._sample = PointSample()
         self._data, self._actor = _point_actor(POINT_PX)
         self._marks, self._mark_actor = _point_actor(MARK_PX)
         for actor in (self._actor, self._mark_actor):
@@ -90,8 +92,9 @@ class ErrorCloud(QObject):
     def grow(self, columns: Cloud) -> None:
         """More points of a running scan."""
         if not self._of_scan:
-            self._clouds, self._of_scan = [], True
-        self._clouds.append(columns)
+            self._sample, self._of_scan = PointSample(), True
+        self._sample.add(columns)
+        self._clouds = [self._sample.points]
         self._draw()
 
     def frame(self) -> None:

@@ -38,6 +38,7 @@ from studio.qt.results_steps import StepsPlot
 from studio.qt.scan_bar import ScanBar
 from studio.qt.scan_steps import scan_steps
 from studio.qt.session import Session
+from studio.redevelop import is_developed_otherwise
 from studio.remarks import frame_remarks, scale_head, scale_notes
 from studio.result_series import (
     ERROR_VIEWS,
@@ -56,6 +57,7 @@ NOTHING = (
     "line, points and errors appear here."
 )
 BY_STEP_ONLY = "The scan's files hold this error in sum only; choose This step"
+AS_SCANNED = "All steps are as they were scanned; what was changed since in exposure or extraction is in This step."
 STEPS, NOTICE = 2, 3
 """Tabs."""
 TALL = 480
@@ -148,6 +150,8 @@ class ResultsPanel(QWidget):
         if render.scan is not None and self.scan_bar.all_steps:
             self._show_all_steps(render.scan, laser)
             remarks = render.scan.remarks()
+            if is_developed_otherwise(render.project, self.session.project, render.image_scale):
+                remarks.insert(0, AS_SCANNED)
         else:
             self.histogram.show_errors(errors, view)
             self.table.show_measures(list(shown), table(list(shown.values()), view))
@@ -246,6 +250,8 @@ class ResultsPanel(QWidget):
     def _make_switches(self) -> None:
         """One button for each method of the render, in its colour."""
         render = self.session.shown
+        if render is not None and not render.measurements:
+            return  # it is about to be measured: those of the render before may stay
         wanted = [] if render is None else list(render.measurements)
         there = [item.widget() for i in range(self.switches.count()) if (item := self.switches.itemAt(i)) is not None]
         buttons = [button for button in there if button is not None]
@@ -253,6 +259,7 @@ class ResultsPanel(QWidget):
             return
         for button in buttons:
             self.switches.removeWidget(button)
+            button.hide()
             button.deleteLater()
         for method in wanted:
             switch = QToolButton()

@@ -16,6 +16,7 @@ from render.errors import InputError
 from render.frame_files import read_frame
 from studio import scan_results
 from studio.document import replaced
+from studio.point_sample import PointSample
 from studio.project import Project
 from studio.result_series import ERROR_VIEWS
 from studio.scan_folder import ScanFolder, open_folder
@@ -84,7 +85,7 @@ def test_only_a_sample_of_the_points_is_held_but_all_are_counted(
 ) -> None:
     found = open_folder(scanned[1])
     whole = read_results(found)
-    monkeypatch.setattr(scan_results, "MOST_POINTS", 60)
+    monkeypatch.setattr(scan_results, "PointSample", lambda: PointSample(60))
     sample = read_results(found)
     assert 30 <= len(sample.points["x"]) <= 60
     assert set(sample.points["step"]) == {0, 1, 2}
@@ -92,7 +93,7 @@ def test_only_a_sample_of_the_points_is_held_but_all_are_counted(
 
 
 def test_a_longer_scan_takes_no_more_memory(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scan_results, "MOST_POINTS", 1000)
+    monkeypatch.setattr(scan_results, "PointSample", lambda: PointSample(1000))
     points = read_ply(copy / "points.ply")
     peaks = []
     for times in (400, 1600):

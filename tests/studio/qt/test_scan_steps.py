@@ -136,6 +136,17 @@ class TestOpened:
         assert "0.5 times the scanner" in (tmp_path / "report.html").read_text()
         assert "not the scanner's" in opened.panels["log"].as_text()  # type: ignore[attr-defined]
 
+    def test_what_was_changed_since_is_said_to_be_in_the_step_alone(self, opened: MainWindow, qtbot: QtBot) -> None:
+        panel = results_of(opened)
+        said = panel.notices[0].text
+        assert "as they were scanned" not in said.text()
+        with qtbot.waitSignal(opened.session.measured, timeout=20_000):
+            opened.session.set(("sensor", "bits"), 8)
+        assert "as they were scanned" in said.text()
+        panel.scan_bar.scope.setCurrentIndex(1)
+        assert "as they were scanned" not in said.text()
+        opened.files.give_up()
+
     def test_a_folder_that_is_dropped_is_opened(
         self, window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot
     ) -> None:
@@ -183,6 +194,18 @@ class TestOpened:
         assert "no finished scan" in f"{box.text()}\n{box.informativeText()}"  # type: ignore[attr-defined]
         box.close()
         assert window.session.document is before
+
+
+def test_the_command_line_opens_them(qtbot: QtBot, scanned: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    from studio.qt import app, faults
+
+    monkeypatch.setattr(faults, "catch_faults", lambda *_: None)  # it would take the place of the test's own
+    window = app.start(scanned[1])
+    qtbot.waitExposed(window)
+    shown(window, qtbot, 0)
+    assert window.workspace == "measure" and window.session.document.path == scanned[0].resolve()
+    window.close()
+    window.deleteLater()
 
 
 class TestRun:
