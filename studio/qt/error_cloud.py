@@ -45,7 +45,7 @@ class ErrorCloud(QObject):
         """At which the points were measured, to the scanner's image."""
         self._clouds: list[Cloud] = []
         self._of_scan = False
-        self._sample = PointSample()
+        self._sample, self._scan_scale = PointSample(), 1.0
         self._data, self._actor = _point_actor(POINT_PX)
         self._marks, self._mark_actor = _point_actor(MARK_PX)
         for actor in (self._actor, self._mark_actor):
@@ -86,15 +86,14 @@ class ErrorCloud(QObject):
 
     def begin_scan(self, image_scale: float) -> None:
         """Points of a running scan are to come; those of an earlier one go."""
+        self._sample, self._scan_scale = PointSample(), image_scale
         self.clear()
-        self.image_scale = image_scale
 
     def grow(self, columns: Cloud) -> None:
         """More points of a running scan."""
-        if not self._of_scan:
-            self._sample, self._of_scan = PointSample(), True
         self._sample.add(columns)
         self._clouds = [self._sample.points]
+        self._of_scan, self.image_scale = True, self._scan_scale
         self._draw()
 
     def frame(self) -> None:
@@ -147,7 +146,7 @@ class ErrorCloud(QObject):
     def _mark(self) -> None:
         render, hovered = self.session.shown, self.session.hovered
         here = self.rows == hovered if hovered is not None else np.zeros(len(self.rows), bool)
-        if render is not None and render.scan is not None:
+        if render is not None and render.scan is not None and not self._of_scan:
             here &= self.steps == render.frame.step
         text = QColor(theme.colours().accent)
         colour = np.tile(np.array([[text.red(), text.green(), text.blue()]], np.uint8), (int(here.sum()), 1))

@@ -331,7 +331,7 @@ class RenderPanel(QWidget):
             session.renders_changed.emit()
         elif render is not None and not (self._keep and job.state is State.CANCELLED):
             session.renders = [other for other in session.renders if other is not render]
-            session.show(self._before if session.shown is render else session.shown)
+            session.show(session.present(self._before) if session.shown is render else session.shown)
         elif render is not None:
             session.renders_changed.emit()
         if job.state is State.FAILED and job.problem is not None:

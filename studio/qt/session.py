@@ -158,6 +158,13 @@ class Session(QObject):
             self.hover(None)
         self.renders_changed.emit()
 
+    def present(self, render: Render | None) -> Render | None:
+        """What stands for a render in the history now: a scan may be at another step; None: it is there no longer."""
+        scan = None if render is None else render.scan
+        return next(
+            (other for other in self.renders if other is render or (scan is not None and other.scan is scan)), None
+        )
+
     def look_at_scan(self, scan: ScanResults, frame: Frame, world: World) -> None:
         """Another step of a scan that is among the renders; what was measured of the one before goes with it."""
         for i, other in enumerate(self.renders):

@@ -7,7 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from analysis.cloud import UNITS, at_first_step, cloud, merge, ply_pieces, read_csv, read_ply, write_csv, write_ply
+from analysis.cloud import (
+    UNITS,
+    at_first_step,
+    at_step,
+    cloud,
+    merge,
+    ply_pieces,
+    read_csv,
+    read_ply,
+    write_csv,
+    write_ply,
+)
 from analysis.triangulate import PointFlag, Points
 from render.camera import Camera
 from render.errors import InputError
@@ -87,8 +98,10 @@ def test_points_on_moving_objects_go_back_to_the_first_step():
     scene = Scene(rig=Rig(camera=camera), motion=quarter)
     turned = np.array([[0.1, 0.0, 0.2], [0.5, 0.2, 0.5]])
     assert np.allclose(at_first_step(turned, scene, 1), on_part, atol=1e-15)
+    assert np.allclose(at_step(on_part, scene, 1), turned, atol=1e-15), "and from there to any other"
     still = Scene(rig=Rig(camera=camera), motion=LinearStage(moves="rig"))
     assert np.array_equal(at_first_step(on_part, still, 3), on_part)
+    assert np.array_equal(at_step(on_part, still, 3), on_part)
 
 
 @pytest.mark.parametrize(

@@ -136,6 +136,14 @@ class TestOpened:
         assert "0.5 times the scanner" in (tmp_path / "report.html").read_text()
         assert "not the scanner's" in opened.panels["log"].as_text()  # type: ignore[attr-defined]
 
+    def test_a_scan_is_found_again_at_another_step(self, opened: MainWindow, qtbot: QtBot) -> None:
+        before = opened.session.shown
+        opened.session.look_at_step(1)
+        now = shown(opened, qtbot, 1)
+        assert now is not before and opened.session.present(before) is now
+        opened.session.renders = []
+        assert opened.session.present(before) is None
+
     def test_what_was_changed_since_is_said_to_be_in_the_step_alone(self, opened: MainWindow, qtbot: QtBot) -> None:
         panel = results_of(opened)
         said = panel.notices[0].text
@@ -228,6 +236,18 @@ class TestRun:
         assert render.scan is not None and render.scan.count == 3 and render.source == window.session.project
         window.switch_to("measure")
         assert results_of(window).scan_bar.isVisible()
+
+    def test_looking_at_a_render_meanwhile_loses_none_of_its_points(
+        self, moving: MotionPanel, window: MainWindow, opened: MainWindow, qtbot: QtBot
+    ) -> None:
+        cloud = window.cloud
+        points = {name: column[:30] for name, column in opened.session.shown.scan.points.items()}  # type: ignore[union-attr]
+        cloud.begin_scan(0.25)
+        cloud.grow(points)
+        cloud.refresh()
+        assert len(cloud.points) > 30 and "0.5 x" in cloud.bar.note
+        cloud.grow(points)
+        assert len(cloud.points) == 60 and "0.25 x" in cloud.bar.note
 
     def test_progress_says_which_frame_it_is(
         self, moving: MotionPanel, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
