@@ -216,7 +216,7 @@ def cli(context: click.Context) -> None:
 @common
 @click.pass_context
 def open_project(context: click.Context, /, project: Path | None, **_: Any) -> None:
-    """Open the studio on a project, as `main.py PROJECT` does."""
+    """Open the studio on a project, as `main.py PROJECT` does, or on the folder of a finished scan."""
     from studio.qt.app import open_studio
 
     context.exit(open_studio(project))

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from analysis.error import Errors
 from analysis.spool import Spool
 from analysis.triangulate import Points
 from render.errors import InputError
-from render.files import atomic_write, read_bytes
+from render.files import atomic_write, check_regular, read_bytes
 from render.pose import invert, transform_points
 from render.scene import Scene
 
@@ -47,7 +47,8 @@ PLY_TYPES = {
 }  # fmt: skip
 LONGEST_HEADER = 65536
 PART = 1 << 16
-"""Points of a spooled cloud that are in memory at a time."""
+"""Points that are in memory at a time, of a spooled cloud or of a file."""
+MOST_BYTES = 2**36
 
 
 def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: Scene | None = None) -> Cloud:
@@ -80,6 +81,14 @@ def at_first_step(world: Float, scene: Scene, step: int) -> Float:
     if motion.kind == "none" or motion.moves != "objects":
         return world
     return transform_points(motion.displacement(0) @ invert(motion.displacement(step)), world)
+
+
+def at_step(first: Float, scene: Scene, step: int) -> Float:
+    """The inverse of `at_first_step`: (m, 3) points as they stand at step 0, moved with the objects to a step."""
+    motion = scene.motion
+    if motion.kind == "none" or motion.moves != "objects":
+        return first
+    return transform_points(motion.displacement(step) @ invert(motion.displacement(0)), first)
 
 
 def merge(clouds: Sequence[Cloud]) -> Cloud:
@@ -151,9 +160,35 @@ def write_ply(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
 
 def read_ply(path: Path | str) -> Cloud:
     """The scalar columns of a binary little-endian PLY's vertices, as float64 or int32. InputError: it is none."""
+    return merge(list(ply_pieces(path)))
+
+
+def ply_pieces(path: Path | str, rows: int = PART) -> Iterator[Cloud]:
+    """As `read_ply`, so many points at a time, at least one piece: for clouds that do not fit in memory."""
     where = str(path)
-    data = read_bytes(Path(path), MAX_BYTES, "point cloud")
-    end = data.find(b"end_header\n", 0, LONGEST_HEADER)
+    check_regular(Path(path), MOST_BYTES, "point cloud")
+    try:
+        with open(path, "rb") as file:
+            count, dtype = _ply_header(file, where)
+            for start in range(0, max(count, 1), rows):
+                size = min(rows, count - start) * dtype.itemsize
+                data = file.read(size)
+                if len(data) < size:
+                    raise InputError("the PLY file is cut short", where=where, found=f"fewer than {count} points")
+                yield _columns(np.frombuffer(data, dtype=dtype))
+    except OSError as error:
+        raise InputError("the file cannot be read", where=where, found=error.strerror or error) from error
+
+
+def _columns(table: NDArray[Any]) -> Cloud:
+    kinds = {name: np.float64 if table[name].dtype.kind == "f" else np.int32 for name in table.dtype.names or ()}
+    return {name: table[name].astype(kind) for name, kind in kinds.items()}
+
+
+def _ply_header(file: BinaryIO, where: str) -> tuple[int, np.dtype[Any]]:
+    """Number and layout of the vertices; the file is left at the first of them."""
+    data = file.read(LONGEST_HEADER)
+    end = data.find(b"end_header\n")
     if not data.startswith(b"ply\n") or end < 0:
         raise InputError("not a PLY file", where=where, allowed="a PLY header")
     count = 0
@@ -170,12 +205,10 @@ def read_ply(path: Path | str) -> Cloud:
             if len(words) != 3 or words[1] not in PLY_TYPES or words[2] in dict(fields):
                 raise InputError("a property is not read", where=where, found=text, allowed="scalars, each name once")
             fields.append((words[2], PLY_TYPES[words[1]]))
-    dtype = np.dtype(fields)
-    body = data[end + len(b"end_header\n") :]
-    if not fields or len(body) < count * dtype.itemsize:
-        raise InputError("the PLY file is cut short", where=where, found=f"{len(body)} bytes of {count} points")
-    table = np.frombuffer(body, dtype=dtype, count=count)
-    return {name: table[name].astype(np.float64 if table[name].dtype.kind == "f" else np.int32) for name, _ in fields}
+    if not fields:
+        raise InputError("the PLY file has no points", where=where, allowed="scalar properties of a vertex")
+    file.seek(end + len(b"end_header\n"))
+    return count, np.dtype(fields)
 
 
 def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> None:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.cloud import Cloud, cloud, merge, write_csv, write_ply
-from analysis.report.model import Extraction, FrameResult, LaserResult
 from analysis.report.record import record_of
 from render.develop import Image
 from render.errors import Cancelled, InputError
@@ -22,12 +21,9 @@ from studio.cautions import Cautions
 from studio.inputs import input_files
 from studio.own_files import check_not_read, check_replaceable
 from studio.project import Project
+from studio.remarks import Measurements, best, frame_result
 from studio.results import now, report_input
-from studio.stages import Measurement
 from studio.summary import summarise
-
-Measurements = Mapping[str, Sequence[Measurement]]
-"""By method: one for each laser."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class Exported:
     images: tuple[Image, ...]
     measurements: Measurements
     image_scale: float = 1.0
-    """At which it was rendered."""
+    """Of the image, to the scanner's."""
 
 
 Writer = Callable[[Path, Exported], list[Path]]
@@ -56,7 +52,7 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     from analysis.report.write import render_page, write_report
 
     _spare_inputs(what, [path])
-    record = record_of(what.project.scene, [frame_result(what)])
+    record = record_of(what.project.scene, [frame_result(what.project, what.frame, what.measurements, what.images)])
     cautions = Cautions(
         what.rendered.model_copy(update={"sensor": what.project.sensor}),
         what.image_scale,
@@ -133,34 +129,13 @@ def export_unless(cancelled: Cancel, write: Writer, path: Path, what: Exported) 
 
 def point_clouds(what: Exported) -> list[Cloud]:
     """One for each laser, by the project's method."""
-    found = _best(what)
+    found = best(what.measurements, what.project)
     return [cloud(one.points, one.errors, one.laser, one.step, what.project.scene) for one in found]
-
-
-def frame_result(what: Exported) -> FrameResult:
-    """As a report takes it, the project's own method first. InputError: nothing is measured."""
-    _best(what)
-    own = what.project.extraction.method
-    order = [own, *(method for method in what.measurements if method != own)]
-    lasers = []
-    for i, curve in enumerate(what.frame.curves):
-        found = [what.measurements[method][i] for method in order if method in what.measurements]
-        extractions = tuple(Extraction(one.line, one.points, one.errors) for one in found)
-        lasers.append(LaserResult(curve, extractions, what.images[i].pixels if i < len(what.images) else None))
-    frame = what.frame
-    return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=frame.seconds, counts=frame.counts)
 
 
 def _spare_inputs(what: Exported, targets: Sequence[Path]) -> None:
     """InputError: a target is a mesh or a texture of the project."""
     check_not_read(targets, input_files(what.project.scene, what.root).values())
-
-
-def _best(what: Exported) -> Sequence[Measurement]:
-    if not what.measurements:
-        raise InputError("nothing is measured yet", cure="render first, and wait for the measurement")
-    own = what.project.extraction.method
-    return what.measurements.get(own) or next(iter(what.measurements.values()))
 
 
 def _first_world(what: Exported) -> World:

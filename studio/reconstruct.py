@@ -16,6 +16,7 @@ from studio.cautions import Cautions
 from studio.measuring import Measuring
 from studio.project import Project
 from studio.redevelop import development
+from studio.remarks import result_remarks
 from studio.results import now
 from studio.stages import Clock, develop_step, step_world
 from studio.summary import summarise
@@ -82,6 +83,7 @@ def _measured(
             figures = summarise(measuring.record)
             notes = cautions.notes(figures)
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
+            measured["remarks"] = result_remarks(measuring.record)
             if (asked.sensor, asked.extraction) != (found.project.sensor, found.project.extraction):
                 measured["measured_with"] = asked.model_dump(mode="json", include={"sensor", "extraction"})
             if report:

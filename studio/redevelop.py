@@ -82,6 +82,15 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
     return Development(rendered.model_copy(update=update), tuple(allowed))
 
 
+def is_developed_otherwise(rendered: Project, now: Project, image_scale: float = 1.0) -> bool:
+    """`now` develops or measures a frame of `rendered` otherwise than that itself does."""
+    how, before = development(rendered, now, image_scale), development(rendered, rendered)
+    return (how.project.model_copy(update={"seed": rendered.seed}), how.laser_power) != (
+        before.project,
+        before.laser_power,
+    )
+
+
 def develop_again(
     frame: Frame, how: Development, *, noise: bool = True, threads: int | None = None, cancelled: Cancel | None = None
 ) -> list[Image]:

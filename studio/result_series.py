@@ -58,6 +58,16 @@ ERROR_VIEWS = (
 )
 
 
+MEASURED = (
+    ("Bias", "bias"),
+    ("Sigma", "sigma"),
+    ("RMSE", "rmse"),
+    ("Robust sigma", "robust_sigma"),
+    ("95 % within", "p95"),
+)
+"""Rows of the table of measures in the view's unit, and what each is called elsewhere."""
+
+
 def true_series(curve: LaserCurve, scene: Scene, laser: int) -> Series:
     """The exact line, broken where it is interrupted."""
     made = _series(curve.index.astype(np.float64), curve.position, curve.depth_z, curve.point, scene, laser)
@@ -121,13 +131,7 @@ def table(found: list[Measurement], view: ErrorView) -> list[tuple[str, str, lis
         ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
     ]
     of = [measures(one.errors, view.kind) for one in found]
-    for name, attribute in (
-        ("Bias", "bias"),
-        ("Sigma", "sigma"),
-        ("RMSE", "rmse"),
-        ("Robust sigma", "robust_sigma"),
-        ("95 % within", "p95"),
-    ):
+    for name, attribute in MEASURED:
         rows.append((name, view.unit, [view.scale * getattr(one, attribute) for one in of]))
     rows.append(("Outliers", "%", [100.0 * one.outlier_rate for one in of]))
     rows.append(("Within 2 sigma", "%", [100.0 * one.coverage for one in of]))

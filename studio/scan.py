@@ -23,6 +23,7 @@ from studio.inputs import input_hashes
 from studio.light_groups import group_lines
 from studio.measuring import Measuring
 from studio.project import Project
+from studio.remarks import result_remarks
 from studio.rendered_from import made_of
 from studio.results import now
 from studio.resume import Refined, frame_of_step, settle
@@ -147,6 +148,7 @@ def run_scan(
         if measuring:
             written.files += measuring.write_points(out)
             result["results"] = summarise(measuring.record)
+            result["remarks"] = result_remarks(measuring.record)
         result["notes"] = cautions.notes(result.get("results", ()))
 
         def finish(reports: list[Path]) -> dict[str, Any]:

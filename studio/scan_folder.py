@@ -28,7 +28,7 @@ from studio.strict_json import pretty, read_object
 MANIFEST, PROJECT = "scan.json", "scan_project.json"
 POINTS, REPORT = ("points.ply", "points.csv"), ("report.html", "report.pdf")
 FORMAT, FORMAT_VERSION = "blazer-scan", 2
-MEASURED = ("results", "extraction", "notes", "measured_with")
+MEASURED = ("results", "extraction", "notes", "remarks", "measured_with")
 """What a manifest tells of points, beside the report's files."""
 FRAME = re.compile(r"frame_(\d{4,})(\.state\.npz|\.png|\.exr|\.json)")
 """A PNG goes before the files that tell whose it is."""

@@ -30,6 +30,7 @@ SEPARATOR = "-"
 COMMANDS: tuple[Command | str, ...] = (
     Command("new", "File", "New from &template…", "Ctrl+N", "new", "Start from a project that comes with the program"),
     Command("open", "File", "&Open…", "Ctrl+O", "open", "Open a project file"),
+    Command("open_results", "File", "Open res&ults…", "Ctrl+Shift+O", "", "Look at the folder of a finished scan"),
     Command("recent", "File", "Open &recent"),
     "File/-",
     Command("save", "File", "&Save", "Ctrl+S", "save", "Save the project"),

@@ -68,6 +68,8 @@ class CameraView(QWidget):
         self._last_shown: Render | None = None
         self._size = (0, 0)
         self._fitted = False
+        self._cursor: tuple[int, int] | None = None
+        """Column and row that are read out."""
         self._hover = pg.SignalProxy(self.view.scene().sigMouseMoved, rateLimit=HOVER_HZ, slot=self._moved)
         self._lay_out()
         self._connect()
@@ -173,7 +175,8 @@ class CameraView(QWidget):
         session.problems_changed.connect(self._show_badge)
         session.developed.connect(self._developed)
         session.measured.connect(self._draw_overlay)
-        session.hover_changed.connect(self._draw_hover)
+        session.hover_changed.connect(self._hover_changed)
+        session.document_replaced.connect(lambda: self._read_out(None))
         self.live.changed.connect(self._live_changed)
         self.live.loading.connect(lambda on: self._show_badge())
         self.choice.activated.connect(self._choose)
@@ -200,7 +203,9 @@ class CameraView(QWidget):
         self._last_shown = shown
         if new:
             self._set_live(shown is None or self.stale)
+            self._read_out(None)
         self._fill_choice()
+        self._profile_of_view()
         self.refresh()
 
     def _project_changed(self) -> None:
@@ -234,10 +239,14 @@ class CameraView(QWidget):
         self._set_live(index == 0)
         if index > 0:
             self._chosen = index
-            view = self.choice.itemData(index)
-            self.profile.show_laser(view.laser if view.kind in ("image", "laser") else 0)
+            self._profile_of_view()
         self._show_badge()
         self.refresh()
+
+    def _profile_of_view(self) -> None:
+        """The row profile is of the laser that is looked at."""
+        view = self.choice.itemData(self._chosen)
+        self.profile.show_laser(view.laser if view is not None and view.kind in ("image", "laser") else 0)
 
     def _show_badge(self) -> None:
         shown = self.session.shown
@@ -317,6 +326,7 @@ class CameraView(QWidget):
             self.view.fit()
         elif before != size:
             self.view.keep_place(before, size)
+        self._read_out(self._cursor if before == size else None)
 
     def _draw_overlay(self) -> None:
         shown = self.session.shown
@@ -333,20 +343,39 @@ class CameraView(QWidget):
         axis = self.session.project.extraction.axis
         self.overlay.show_hover(self.session.hovered, axis)
 
+    def _hover_changed(self) -> None:
+        """What is read out is on the hovered scan line, or on none."""
+        self._draw_hover()
+        if self._cursor is not None and self.session.hovered != self._scan_line(*self._cursor) and not self.is_live:
+            self._read_out(None)
+
+    def _scan_line(self, column: int, row: int) -> int:
+        shown = self.session.shown
+        project = self.session.project if shown is None else shown.project
+        return row if project.extraction.axis == "rows" else column
+
     def _moved(self, event: tuple[QPointF]) -> None:
         where = self.view.box.mapSceneToView(event[0])
         column, row = round(where.x()), round(where.y())
         width, height = self._size
         if not (0 <= column < width and 0 <= row < height):
+            self._read_out(None)
+            return
+        self._read_out((column, row))
+        if not self.is_live and self.session.shown is not None:
+            self.session.hover(self._scan_line(column, row))
+
+    def _read_out(self, cursor: tuple[int, int] | None) -> None:
+        """The values at a pixel (column, row) of what is shown now; None: the cursor is at none."""
+        self._cursor = cursor
+        if cursor is None:
             self.readout.clear()
             return
-        shown = self.session.shown
+        (column, row), shown = cursor, self.session.shown
         if self.is_live or shown is None:
             self.readout.setText(readout_text(self._live_values(row, column)))
-            return
-        axis = shown.project.extraction.axis
-        self.session.hover(row if axis == "rows" else column)
-        self.readout.setText(readout_text(at_pixel(shown.project.scene, shown.frame, shown.images, row, column)))
+        else:
+            self.readout.setText(readout_text(at_pixel(shown.project.scene, shown.frame, shown.images, row, column)))
 
     def _live_values(self, row: int, column: int) -> list[tuple[str, str]]:
         look = self.live.look

@@ -80,6 +80,11 @@ class CompareView(QWidget):
         self._fitted = False
         self._compute()
 
+    def forget(self) -> None:
+        """Close, and hold neither of the renders."""
+        self._pair = self.comparison = None
+        self.close()
+
     def _lay_out(self) -> None:
         bar = QHBoxLayout()
         bar.setContentsMargins(8, 6, 8, 6)
@@ -132,6 +137,8 @@ class CompareView(QWidget):
     def _take(self, drawn: Drawn | None) -> None:
         if drawn is None:
             self.told.setText("one of the renders has no image yet")
+            return
+        if self._pair is None:  # forgotten meanwhile
             return
         self.comparison, *self._levels, self._limit = drawn
         self._show_mode()

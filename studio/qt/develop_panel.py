@@ -48,6 +48,8 @@ class DevelopPanel(QWidget):
         self.session = session
         self.runner = JobRunner(self)
         self.develop_seconds = 0.0
+        self._told_of: Render | None = None
+        """The render that brightness and measures are of."""
         self._to_measure: tuple[Render, Development, list[Image], tuple[Method, ...]] | None = None
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
@@ -217,13 +219,15 @@ class DevelopPanel(QWidget):
     def refresh(self) -> None:
         """Develop and measure the shown render; what is asked for meanwhile is done once, with the latest values."""
         render = self.session.shown
+        if render is not self._told_of:
+            self._told_of = render
+            for label in (self.told, self.table, self.noted):
+                label.clear()
         if render is None:
             self._rest.stop()
             self.runner.cancel("develop")
             self.runner.cancel("measure")
             self.told.setText("Render the scene, then change these as often as you like.")
-            self.table.clear()
-            self.noted.clear()
             return
         frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()
         how = development(render.project, self.session.project, render.image_scale)
@@ -272,7 +276,8 @@ class DevelopPanel(QWidget):
         self.runner.run("measure", "measuring", work, then, interrupt=True)
 
     def _tell_measures(self, found: dict[str, list[Measurement]]) -> None:
-        rows = ["<tr><th align='left'>RMSE&nbsp;</th><th>px</th><th>depth</th><th>rows</th></tr>"]
+        small = f" at {self._told_of.scanner_scale:.3g} x" if self._told_of and self._told_of.scanner_scale != 1 else ""
+        rows = [f"<tr><th align='left'>RMSE{small}&nbsp;</th><th>px</th><th>depth</th><th>rows</th></tr>"]
         for method, by_laser in found.items():
             for item in by_laser:
                 name = method_name(method) + (f", {item.laser + 1}" if len(by_laser) > 1 else "")

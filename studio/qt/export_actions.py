@@ -16,6 +16,7 @@ from studio.qt.dialogs import show_trouble, suggested
 from studio.qt.jobs import JobRunner
 from studio.qt.session import Session
 from studio.redevelop import development
+from studio.remarks import scale_notes
 from studio.trouble import trouble
 
 KINDS = {
@@ -60,7 +61,10 @@ class ExportActions(QObject):
     def ask(self, key: str) -> None:
         """Ask for a file, then write it."""
         name_filter, suffix, _ = KINDS[key]
-        name = f"{self.session.project.name.replace('/', '-')}{suffix}"
+        render = self.session.shown
+        # the name says what the figures inside are of
+        size = f" at {render.scanner_scale:.3g} x" if render is not None and render.scanner_scale != 1.0 else ""
+        name = f"{self.session.project.name.replace('/', '-')}{size}{suffix}"
         start = suggested(self.preferences.values.folder, name)
         chosen, _ = QFileDialog.getSaveFileName(self.window, "Export", start, name_filter)
         if chosen:
@@ -89,7 +93,7 @@ class ExportActions(QObject):
             render.frame,
             tuple(render.images),
             dict(render.measurements),
-            render.image_scale,
+            render.scanner_scale,
         )
         writers: dict[str, export.Writer] = {
             "report": export.export_report,
@@ -103,7 +107,8 @@ class ExportActions(QObject):
             progress(path.name, 0.3)
             return export.export_unless(cancelled, writer, path, what)
 
-        self._job = self.runner.run(LANE, f"export {path.name}", work, self._tell)
+        notes = scale_notes(render.scanner_scale)
+        self._job = self.runner.run(LANE, f"export {path.name}", work, lambda written: self._tell(written, notes))
         self.preferences.change(folder=str(path.parent))
 
     def screenshot(self) -> None:
@@ -124,5 +129,6 @@ class ExportActions(QObject):
         if job is self._job:
             self.session.message.emit("info", f"Cancelled: {job.name}. No file was written")
 
-    def _tell(self, written: list[Path]) -> None:
-        self.session.message.emit("info", f"Wrote {', '.join(str(path) for path in written)}")
+    def _tell(self, written: list[Path], notes: tuple[str, ...]) -> None:
+        names = ", ".join(str(path) for path in written)
+        self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QMessageBox, QWidget
 
 from render.errors import InputError
@@ -14,10 +14,14 @@ from studio.document import Document, replaced
 from studio.preferences import PreferencesFile, recovery_folder
 from studio.project import Project, project_file
 from studio.qt.dialogs import TemplateDialog, ask_recovery, ask_unsaved, show_trouble, suggested
+from studio.qt.scan_steps import scan_steps
 from studio.qt.session import Session
+from studio.scan_folder import ScanFolder, open_folder
+from studio.scan_results import holds_scan, image_scale_of, is_scan_of, source_of
 from studio.templates import template_folder
 from studio.trouble import trouble
 
+MAX_NAME = 200
 FILTER = "Blazer project (*.json)"
 AFTER_A_CHANGE = 2.0
 """Seconds of rest after an edit until it is kept."""
@@ -37,8 +41,30 @@ def template(key: str, autosave: Autosave) -> Document:
     return Document(project, None, root)
 
 
+def _scanned(found: ScanFolder) -> Document:
+    """The project of a scan: the file it was made from, or, where that has changed since, what the scan kept of it.
+
+    InputError: meshes or textures are missing.
+    """
+    source = source_of(found)
+    project = found.project if source is None else Project.load(source)
+    gone = missing_files(project.scene, found.root)
+    if gone:
+        cure = "put the project's folder back to where it was when it was scanned"
+        raise InputError("a file of the scanned project is missing", where=str(gone[0][1]), cure=cure)
+    if source is not None:
+        return Document(project, source)
+    scale = image_scale_of(found)
+    # its camera is the scan's: the name says so, wherever it is shown or saved
+    name = project.name if scale == 1.0 else f"{project.name} at {scale:.3g} x"
+    return Document(project.model_copy(update={"name": name[:MAX_NAME]}), None, found.root)
+
+
 class FileActions(QObject):
     """Every change of the session's document as a whole goes through here, and asks before work is lost."""
+
+    results_opened = Signal()
+    """Those of a scan: they are shown as soon as they are read."""
 
     def __init__(
         self, window: QWidget, session: Session, preferences: PreferencesFile, autosave: Autosave | None = None
@@ -72,7 +98,10 @@ class FileActions(QObject):
         return bool(name) and self.open(Path(name))
 
     def open(self, path: Path, ask: bool = True) -> bool:
-        """Open a project file or a folder with one; what is open stays when it cannot be."""
+        """Open a project file, a folder with one, or the results of a scan; what is open stays when it cannot be."""
+        scan = holds_scan(path)
+        if scan is not None:
+            return self.open_results(scan, ask)
         if ask and not self.may_close():
             return False
         try:
@@ -87,6 +116,33 @@ class FileActions(QObject):
             return False
         self.replace(document)
         self.preferences.add_recent(file)
+        return True
+
+    def open_results_dialog(self) -> bool:
+        name = QFileDialog.getExistingDirectory(self.window, "Open the results of a scan", self._folder())
+        return bool(name) and self.open_results(Path(name))
+
+    def open_results(self, folder: Path, ask: bool = True) -> bool:
+        """Look at a finished scan, with its own project where the open one is another."""
+        session = self.session
+        try:
+            found = open_folder(folder)
+            scale = image_scale_of(found)
+            document = session.document if is_scan_of(found, session.project) else _scanned(found)
+        except (InputError, OSError, MemoryError) as error:
+            self.preferences.forget_recent(folder)
+            self._tell(error, f"open {folder.name}")
+            return False
+        if document is not session.document:
+            if ask and not self.may_close():
+                return False
+            self.replace(document)
+        if is_scan_of(found, document.project):
+            scan_steps(session).show(found, document.project, scale)
+        else:
+            scan_steps(session).show(found)
+        self.preferences.add_recent(folder)
+        self.results_opened.emit()
         return True
 
     def replace(self, document: Document) -> None:

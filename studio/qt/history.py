@@ -23,6 +23,7 @@ from render.counts import AMBIENT_SAMPLES, DIRECT_ERROR
 from render.tone import Picture, grey
 from studio.qt.compare_view import CompareView
 from studio.qt.session import Render, Session
+from studio.remarks import scale_name, scale_notes
 
 THUMBNAIL = QSize(64, 54)
 NEW_LINE = "\u2028"
@@ -36,10 +37,18 @@ def title(render: Render) -> str:
     return render.name or f"Render {render.number}"
 
 
+def named(render: Render) -> str:
+    """Its title, with its image scale where that is not the scanner's."""
+    return title(render) + (f" ({render.scanner_scale:.3g} x)" if render.scanner_scale != 1.0 else "")
+
+
 def describe(render: Render) -> str:
     """Size, quality and time, in one line."""
     height, width = render.frame.shape
-    parts = [f"{width} x {height}"]
+    small = scale_name(render.scanner_scale)
+    parts = [f"{width} x {height}" + (f", {small}" if small else "")]
+    if render.scan is not None:
+        parts.insert(0, f"step {render.frame.step + 1} of {render.scan.count}")
     counts = render.frame.counts
     errors = [counts.get(DIRECT_ERROR.of(i)) for i in range(len(render.project.scene.lasers))]
     known = [error for error in errors if error is not None]
@@ -107,6 +116,7 @@ class History(QWidget):
         layout.addWidget(self.list, 1)
         session.renders_changed.connect(self.refresh)
         session.developed.connect(self._new_images)
+        session.document_replaced.connect(self._forget_comparison)
         self.list.itemClicked.connect(self._clicked)
         self.list.itemChanged.connect(self._renamed)
         self.list.itemSelectionChanged.connect(self._show_buttons)
@@ -163,13 +173,18 @@ class History(QWidget):
         later, earlier = pair
         if self.comparison is None:
             self.comparison = CompareView(self)
-        self.comparison.compare(earlier, title(earlier), later, title(later))
+        self.comparison.compare(earlier, named(earlier), later, named(later))
         self.comparison.show()
         self.comparison.raise_()
 
+    def _forget_comparison(self) -> None:
+        if self.comparison is not None:
+            self.comparison.forget()
+
     def _fill(self, item: QListWidgetItem, render: Render) -> None:
         item.setText(title(render))
-        item.setToolTip(f"{describe(render)}, {render.created}" if render.created else describe(render))
+        when = f", {render.created}" if render.created else ""
+        item.setToolTip("\n".join([f"{describe(render)}{when}", *scale_notes(render.scanner_scale)]))
         picture = thumbnail(render)
         if picture is not None:
             height, width = picture.shape

@@ -6,11 +6,13 @@ import math
 
 import pyqtgraph as pg
 from PySide6.QtCore import QLineF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPen
+from PySide6.QtGui import QColor, QImage, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
 from render.tone import Picture
 
+MARGIN = 0.01
+"""About a fitted picture, as a share of it."""
 GRID_FROM = 14.0
 """Screen pixels a pixel from which the grid is drawn."""
 
@@ -109,9 +111,20 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
         self.setBackground(self.palette().color(self.backgroundRole()))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
+    def resizeEvent(self, event: QResizeEvent | None) -> None:
+        fitted = hasattr(self, "item") and self._is_fitted(*self.item.size)
+        super().resizeEvent(event)
+        if fitted:
+            self.fit()
+
     def fit(self) -> None:
-        """The whole picture."""
-        self.box.setRange(self.item.boundingRect(), padding=0.01)
+        """The whole picture; it stays whole in a view of another size, until a person zooms."""
+        self.box.setRange(self.item.boundingRect(), padding=MARGIN)
+
+    def _is_fitted(self, width: int, height: int) -> bool:
+        """The view shows a picture of this size whole, and as large as it can."""
+        seen, whole = self.box.viewRect(), QRectF(-0.5, -0.5, width, height)
+        return bool(seen.contains(whole) and min(seen.width() / width, seen.height() / height) < 1.0 + 3.0 * MARGIN)
 
     def one_to_one(self) -> None:
         """One screen pixel a pixel, about the middle of what is seen."""
@@ -128,6 +141,9 @@ class PictureView(pg.GraphicsView):  # type: ignore[misc]
 
     def keep_place(self, before: tuple[int, int], now: tuple[int, int]) -> None:
         """Show the same part of a picture whose size in pixels has changed."""
+        if self._is_fitted(*before):
+            self.fit()
+            return
         sx, sy = now[0] / before[0], now[1] / before[1]
         rect = self.box.viewRect()
         self.box.setRange(

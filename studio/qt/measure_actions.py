@@ -7,6 +7,7 @@ from PySide6.QtCore import QObject
 
 from studio.qt.actions import Actions
 from studio.qt.session import Session
+from studio.remarks import best
 from studio.stages import Measurement
 
 
@@ -55,6 +56,5 @@ class MeasureActions(QObject):
         render = self.session.shown
         if render is None or not render.measurements:
             return None
-        own = render.measurements.get(self.session.project.extraction.method)
-        found = own or next(iter(render.measurements.values()))
+        found = best(render.measurements, self.session.project)
         return found[0] if found else None

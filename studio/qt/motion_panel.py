@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, QUrl, Signal
+from PySide6.QtCore import QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QComboBox,
@@ -13,28 +14,45 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QSizePolicy,
-    QSlider,
     QStackedLayout,
-    QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
-from analysis.cloud import cloud
+from analysis.cloud import Cloud, cloud
 from analysis.report.model import FrameResult
 from render.errors import InputError
 from render.motion import LinearStage, NoMotion, Turntable
 from render.threads import Cancel
 from studio.console import FRAMES, frame_of
+from studio.document import Document
 from studio.jobs import Job, Progress
-from studio.qt.icons import icon
+from studio.project import Project
 from studio.qt.jobs import BUSY, RENDER, JobRunner
+from studio.qt.scan_steps import scan_steps
 from studio.qt.session import Session
+from studio.qt.step_bar import StepBar
 from studio.scan import ScanResult, run_scan
+from studio.scan_folder import open_folder
+from studio.scan_results import is_unfinished
 from studio.scene_edits import set_motion
+from studio.stages import scaled
 
-PLAY_MS = 100
 SCALES = {"full size": 1.0, "half size": 0.5, "quarter size": 0.25}
+
+
+@dataclass(frozen=True)
+class Order:
+    """A scan as it was asked for, so that it can go on as it began."""
+
+    document: Document
+    """What was open."""
+    project: Project
+    """At full scale."""
+    root: Path
+    folder: Path
+    image_scale: float
+    report: bool
 
 
 class MotionPanel(QWidget):
@@ -42,17 +60,15 @@ class MotionPanel(QWidget):
 
     grew = Signal(object)
     """A `Cloud`: the points of one more step of the running scan."""
-    began = Signal()
-    """A scan began: what was shown of an earlier one goes."""
-    _measured = Signal(object)
+    began = Signal(float)
+    """A scan began, at this image scale: what was shown of an earlier one goes."""
+    _measured = Signal(object, object)
 
     def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.session, self.runner = session, runner
         self.report: Path | None = None
-        self.slider = QSlider(Qt.Orientation.Horizontal)
-        self.slider.valueChanged.connect(session.look_at_step)
-        self.play = self._button("play", "Play the motion", self.toggle_play)
+        self.steps = StepBar(session)
         self.told = QLabel()
         self.told.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.scale = QComboBox()
@@ -62,14 +78,21 @@ class MotionPanel(QWidget):
         self.run = QPushButton("Run the scan…")
         self.run.setToolTip("Render and measure every step, into a folder, with points and report")
         self.run.clicked.connect(lambda: self.ask_and_run())
+        self.go_on = QPushButton("Resume")
+        self.go_on.clicked.connect(self.resume)
+        self.go_on.hide()
+        self.stopped: Order | None = None
+        """The scan that was cancelled, or failed, before its end."""
+        self._running: tuple[Job[ScanResult], Order] | None = None
         self.open = QPushButton("Open the report")
         self.open.clicked.connect(self._open_report)
         self.open.hide()
-        self._timer = QTimer(self, interval=PLAY_MS)
-        self._timer.timeout.connect(self._next)
         self._lay_out()
-        self._measured.connect(self.grew)
+        self._measured.connect(self._grow)
+        for signal in (runner.cancelled, runner.failed):
+            signal.connect(self._stop)
         session.project_changed.connect(self.refresh)
+        session.document_replaced.connect(self._forget)
         session.step_changed.connect(self._follow_step)
         self.refresh()
 
@@ -78,24 +101,10 @@ class MotionPanel(QWidget):
         scene = self.session.project.scene
         moves = not isinstance(scene.motion, NoMotion)
         self.stack.setCurrentIndex(1 if moves else 0)
-        self.slider.blockSignals(True)
-        self.slider.setMaximum(scene.frame_count - 1)
-        self.slider.blockSignals(False)
+        self.steps.set_count(scene.frame_count)
         if self.session.step >= scene.frame_count:
             self.session.look_at_step(scene.frame_count - 1)
-        if not moves and self._timer.isActive():
-            self.toggle_play()
         self._follow_step()
-
-    def toggle_play(self) -> None:
-        """Play to the end, from the start where it stands at the end; or stop."""
-        if self._timer.isActive():
-            self._timer.stop()
-        else:
-            if self.session.step == self.slider.maximum():
-                self.session.look_at_step(0)
-            self._timer.start()
-        self.play.setIcon(icon("pause" if self._timer.isActive() else "play"))
 
     def ask_and_run(self) -> None:
         """Ask for the folder of the results, then run the scan."""
@@ -106,21 +115,26 @@ class MotionPanel(QWidget):
             self.run_into(Path(chosen))
 
     def run_into(self, folder: Path, report: bool = True) -> Job[ScanResult] | None:
-        """Run the scan into a folder; None: something else is being rendered."""
-        session = self.session
+        """Run the scan into a folder; None: something else is being rendered. What the folder holds of it is kept."""
+        session, scale = self.session, SCALES[self.scale.currentText()]
+        order = Order(session.document, session.project, session.document.root, folder, scale, report)
+        return self._start(order, resume=is_unfinished(folder, scaled(order.project, scale)))
+
+    def resume(self) -> Job[ScanResult] | None:
+        """Go on with the scan that was stopped, as it was asked for, whatever has changed in the project since."""
+        return None if self.stopped is None else self._start(self.stopped, resume=True)
+
+    def _start(self, order: Order, resume: bool) -> Job[ScanResult] | None:
         if self.runner.job(RENDER) is not None:
-            session.message.emit("warning", BUSY)
+            self.session.message.emit("warning", BUSY)
             return None
-        project, root, scale = session.project, session.document.root, SCALES[self.scale.currentText()]
-        source = session.document.path
+        count, source = order.project.scene.frame_count, order.document.path
 
         def each(frame: FrameResult) -> None:
-            clouds = [
-                cloud(laser.extractions[0].points, laser.extractions[0].errors, i, frame.step, project.scene)
-                for i, laser in enumerate(frame.lasers)
-            ]
-            for one in clouds:
-                self._measured.emit(one)
+            for i, laser in enumerate(frame.lasers):
+                best = laser.extractions[0]
+                points = cloud(best.points, best.errors, i, frame.step, order.project.scene)
+                self._measured.emit(order, points)
 
         def work(progress: Progress, cancelled: Cancel) -> ScanResult:
             at, where = 0.0, ""
@@ -129,48 +143,76 @@ class MotionPanel(QWidget):
                 nonlocal at, where
                 at = max(at, share(stage, done) or 0.0)
                 if stage == FRAMES:
-                    where = f"{frame_of(done, project.scene.frame_count)}: " if done < 1.0 else ""
+                    where = f"{frame_of(done, count)}: " if done < 1.0 else ""
                 else:
                     progress(where + stage, at)
 
             return run_scan(
-                project,
-                root,
-                out=folder,
-                image_scale=scale,
+                order.project,
+                order.root,
+                out=order.folder,
+                image_scale=order.image_scale,
                 progress=tell,
                 cancelled=cancelled,
                 each=each,
-                report=report,
+                report=order.report,
+                resume=resume,
                 source=source,
             )
 
-        self.open.hide()
-        self.began.emit()
-        return self.runner.run(RENDER, "scan", work, self._done)
+        self.stopped = None
+        for button in (self.open, self.go_on):
+            button.hide()
+        self.began.emit(order.image_scale)
+        job = self.runner.run(RENDER, "scan", work, lambda result: self._done(result, order))
+        self._running = job, order
+        return job
 
-    def _done(self, result: ScanResult) -> None:
+    def _grow(self, order: Order, points: Cloud) -> None:
+        """More points, unless another project was opened meanwhile."""
+        if order.document is self.session.document:
+            self.grew.emit(points)
+
+    def _done(self, result: ScanResult, order: Order) -> None:
+        self._running = None
+        self.session.message.emit("info", f"The scan is done: {result.folder}")
+        if self.session.document is not order.document:
+            return
         self.report = next((path for path in result.report if path.suffix == ".html"), None)
         self.open.setVisible(self.report is not None)
         for text in result.manifest["notes"]:
             self.session.message.emit("warning", text)
         self.session.message.emit("info", f"The scan is done: {result.folder}")
+        try:
+            found = open_folder(result.folder)
+        except InputError as error:
+            self.session.message.emit("error", str(error))
+        else:
+            scan_steps(self.session).show(found, order.project, order.image_scale)
+
+    def _stop(self, job: Job[ScanResult]) -> None:
+        """It was cancelled, or could not go on."""
+        if self._running is None or self._running[0] is not job:
+            return
+        order, self._running = self._running[1], None
+        if order.document is self.session.document:
+            self.stopped = order
+            self.go_on.setToolTip(f"Go on where the scan into {order.folder} was stopped")
+            self.go_on.show()
+            self.session.message.emit("info", f"The scan was stopped; Resume in Motion goes on: {order.folder}")
+
+    def _forget(self) -> None:
+        """Another project was opened: what was scanned of the one before goes."""
+        self.report = self.stopped = None
+        for button in (self.open, self.go_on):
+            button.hide()
 
     def _open_report(self) -> None:
         if self.report is not None:
             QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.report)))
 
-    def _next(self) -> None:
-        if self.session.step >= self.slider.maximum():
-            self.toggle_play()
-        else:
-            self.session.look_at_step(self.session.step + 1)
-
     def _follow_step(self) -> None:
         scene, step = self.session.project.scene, self.session.step
-        self.slider.blockSignals(True)
-        self.slider.setValue(step)
-        self.slider.blockSignals(False)
         self.told.setText(f"step {step + 1} of {scene.frame_count}: {describe(scene.motion, step)}")
 
     def _set_motion(self, kind: type[LinearStage] | type[Turntable]) -> None:
@@ -181,13 +223,6 @@ class MotionPanel(QWidget):
             return
         self.session.document.apply("add motion", project)
         self.session.select(path)
-
-    def _button(self, name: str, tip: str, handler: object) -> QToolButton:
-        button = QToolButton()
-        button.setIcon(icon(name))
-        button.setToolTip(tip)
-        button.clicked.connect(handler)
-        return button
 
     def _lay_out(self) -> None:
         still = QWidget()
@@ -204,18 +239,11 @@ class MotionPanel(QWidget):
         moving = QWidget()
         inside = QVBoxLayout(moving)
         inside.setContentsMargins(8, 4, 8, 6)
-        top, bottom = QHBoxLayout(), QHBoxLayout()
-        look = self.session.look_at_step
-        top.addWidget(self._button("first", "First step", lambda: look(0)))
-        top.addWidget(self._button("previous", "Step back", lambda: look(self.session.step - 1)))
-        top.addWidget(self.play)
-        top.addWidget(self._button("next", "Step on", lambda: look(self.session.step + 1)))
-        top.addWidget(self._button("last", "Last step", lambda: look(self.slider.maximum())))
-        top.addWidget(self.slider, 1)
+        bottom = QHBoxLayout()
         bottom.addStretch(1)
-        for widget in (self.open, self.scale, self.run):
+        for widget in (self.open, self.go_on, self.scale, self.run):
             bottom.addWidget(widget)
-        inside.addLayout(top)
+        inside.addWidget(self.steps)
         inside.addWidget(self.told)
         inside.addLayout(bottom)
         inside.addStretch(1)

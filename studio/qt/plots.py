@@ -36,6 +36,11 @@ def paint(plot: pg.PlotItem) -> None:
         axis.label.setDefaultTextColor(pg.mkColor(c.muted))
 
 
+def set_title(plot: pg.PlotItem, text: str) -> None:
+    """What a plot is of, where its place does not say; empty: no title, and no room for one."""
+    plot.setTitle(text or None, size="9pt", color=theme.colours().muted)
+
+
 def cursor(plot: pg.PlotItem, angle: float = 90.0) -> pg.InfiniteLine:
     """A thin line across a plot, hidden until it is placed."""
     line = pg.InfiniteLine(angle=angle, movable=False)

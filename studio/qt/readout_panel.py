@@ -88,6 +88,10 @@ class ReadoutPanel(QWidget):
 
     def _paint(self) -> None:
         colours = theme.colours()
+        keys = {row.key for row in self._rows}
+        for key, labels in self._labels.items():
+            for label in labels:
+                label.setVisible(key in keys)
         tints = {"": colours.text, "warning": colours.warning, "error": colours.error}
         for row in self._rows:
             name, value, note = self._labels.get(row.key) or self._add(row.key)

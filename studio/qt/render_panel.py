@@ -35,6 +35,7 @@ from studio.qt.jobs import BUSY, RENDER, JobRunner
 from studio.qt.render_job import can_go_on, carried, render_frames
 from studio.qt.session import Render, Session
 from studio.qt.status import time_left
+from studio.redevelop import is_stale
 from studio.stages import scaled
 
 SCALES = (0.125, 0.25, 0.5, 1.0)
@@ -139,7 +140,6 @@ class RenderPanel(QWidget):
         self._render, self._before, self._keep = None, session.shown, False
         number = max([render.number for render in session.renders], default=0) + 1
         self._template = (number, project, source, image_scale)
-        self.errors.clear()
         self._warned = set()
         self._run(project, root, step, world, RenderState({}))
 
@@ -159,6 +159,7 @@ class RenderPanel(QWidget):
 
         self._job = self.runner.run(RENDER, "render", work)
         self._show_state()
+        self._tell_render()
 
     def pause(self) -> None:
         """Hold the render, or let it go on."""
@@ -243,6 +244,7 @@ class RenderPanel(QWidget):
         self.start_button.clicked.connect(lambda: self.start())
         self.continue_button.clicked.connect(self.go_on)
         session.renders_changed.connect(self._show_state)
+        session.renders_changed.connect(self._tell_render)
         self.pause_button.clicked.connect(self.pause)
         self.keep_button.clicked.connect(self.keep)
         self.cancel_button.clicked.connect(self.cancel)
@@ -275,6 +277,14 @@ class RenderPanel(QWidget):
         project = self.session.project
         scale = self.scale.currentData()
         self.plan.setText(plan_text(plan(project.scene.scaled(scale if scale is not None else 1.0), project.render)))
+
+    def _tell_render(self) -> None:
+        """What was computed of the running render, else of the shown one, and how well it is known."""
+        render = self.session.shown if self._job is None else self._render
+        self.errors.setText("" if render is None else error_text(render))
+        self.errors.setVisible(bool(self.errors.text()))
+        if render is not None and not is_stale(render.source or render.project, self.session.project):
+            self.plan.setText(plan_text(tuple(render.frame.plan.splitlines())))
 
     def _document_replaced(self) -> None:
         self._render, self._before = None, None
@@ -311,8 +321,6 @@ class RenderPanel(QWidget):
             if text not in self._warned:
                 self._warned.add(text)
                 self.session.message.emit("warning", text)
-        self.errors.setText(error_text(self._render))
-        self.plan.setText(plan_text(tuple(frame.plan.splitlines())))
 
     def _tell_progress(self, job: Job[None]) -> None:
         if job is self._job:
@@ -334,12 +342,13 @@ class RenderPanel(QWidget):
             session.renders_changed.emit()
         elif render is not None and not (self._keep and job.state is State.CANCELLED):
             session.renders = [other for other in session.renders if other is not render]
-            session.show(self._before if session.shown is render else session.shown)
+            session.show(session.present(self._before) if session.shown is render else session.shown)
         elif render is not None:
             session.renders_changed.emit()
         if job.state is State.FAILED and job.problem is not None:
             session.message.emit("error", job.problem.text)
         self._show_state()
+        self._tell_render()
 
     def _show_state(self) -> None:
         job = self._job
@@ -352,7 +361,6 @@ class RenderPanel(QWidget):
         self.pause_button.setText("Go on" if job is not None and job.state is State.PAUSED else "Pause")
         self.bar.setVisible(running)
         self.stage.setVisible(running)
-        self.errors.setVisible(running or bool(self.errors.text()))
         if not running:
             self.bar.setValue(0)
             self.stage.clear()

@@ -29,8 +29,9 @@ class ErrorHistogram(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self._outlines: list[Any] = []
         self.repaint_theme()
 
-    def show_errors(self, measured: dict[str, Float], view: ErrorView) -> None:
+    def show_errors(self, measured: dict[str, Float], view: ErrorView, title: str = "") -> None:
         """measured: errors in the view's unit, by method; what lies beyond the axis is counted at its ends."""
+        plots.set_title(self.plot, title)
         for item in self._outlines:
             self.plot.removeItem(item)
         self._outlines = []

@@ -26,7 +26,7 @@ class RowPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         super().__init__()
         self.position = plots.new_plot("", "Position", "px")
         self.depth = plots.new_plot("", "Depth", "mm")
-        self.error = plots.new_plot("Row", "Depth error", "µm")
+        self.error = plots.new_plot("Row", "Error", "µm")
         self.plots = (self.position, self.depth, self.error)
         for row, plot in enumerate(self.plots):
             self.addItem(plot, row=row, col=0)
@@ -58,7 +58,7 @@ class RowPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self._shown = measured
         self.error.setLabel("bottom", "Row" if axis == "rows" else "Column")
         self.position.setLabel("left", f"{'u' if axis == 'rows' else 'v'} / px")
-        self.error.setLabel("left", f"{view.title} / {view.unit}")
+        self.error.setLabel("left", f"Error / {view.unit}")
         for method, (series, error) in reversed(measured.items()):  # the first method on top
             for plot, values in ((self.position, series.position), (self.depth, series.depth), (self.error, error)):
                 here = np.isfinite(values)

@@ -5,7 +5,7 @@ Panels never talk to each other: they change the session, and follow its signals
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
@@ -18,6 +18,7 @@ from render.world import World
 from studio.document import Document, FieldPath
 from studio.project import Project
 from studio.scan import Measurement
+from studio.scan_results import ScanResults
 
 
 @dataclass
@@ -45,6 +46,13 @@ class Render:
     """The project at full scale, None: `project` is."""
     images: list[Image] = field(default_factory=list)
     """As developed last: one for each laser, or one without any."""
+    scan: ScanResults | None = None
+    """The scan that the frame is a step of; None: it was rendered alone."""
+
+    @property
+    def scanner_scale(self) -> float:
+        """Of the image, to the scanner's."""
+        return self.image_scale if self.scan is None else self.scan.image_scale
 
 
 class Session(QObject):
@@ -102,6 +110,8 @@ class Session(QObject):
         self.document_replaced.emit()
         self.project_changed.emit()
         self.selection_changed.emit()
+        self.hover_changed.emit()
+        self.step_changed.emit()
         self.renders_changed.emit()
 
     def select(self, path: FieldPath) -> None:
@@ -152,9 +162,27 @@ class Session(QObject):
 
     def add_render(self, render: Render) -> None:
         self.renders.append(render)
-        self.shown = render
-        self.renders_changed.emit()
+        self.show(render)
 
     def show(self, render: Render | None) -> None:
-        self.shown = render
+        """Look at another render; a scan line of an image of another size is no longer the hovered one."""
+        before, self.shown = self.shown, render
+        if before is not None and (render is None or render.frame.shape != before.frame.shape):
+            self.hover(None)
         self.renders_changed.emit()
+
+    def present(self, render: Render | None) -> Render | None:
+        """What stands for a render in the history now: a scan may be at another step; None: it is there no longer."""
+        scan = None if render is None else render.scan
+        return next(
+            (other for other in self.renders if other is render or (scan is not None and other.scan is scan)), None
+        )
+
+    def look_at_scan(self, scan: ScanResults, frame: Frame, world: World) -> None:
+        """Another step of a scan that is among the renders; what was measured of the one before goes with it."""
+        for i, other in enumerate(self.renders):
+            if other.scan is scan:
+                self.renders[i] = replace(other, frame=frame, world=world, measurements={}, images=[])
+                self.shown = self.renders[i] if self.shown is other else self.shown
+                self.renders_changed.emit()
+                return

@@ -214,7 +214,8 @@ class MainWindow(QMainWindow):
         made = ErrorCloud(self.session, self.panels["viewport"].view)  # type: ignore[attr-defined]
         results, motion = self.panels["results"], self.panels["motion"]
         results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
-        motion.began.connect(made.clear)  # type: ignore[attr-defined]
+        results.scan_bar.scope_changed.connect(made.show_all_steps)  # type: ignore[attr-defined]
+        motion.began.connect(made.begin_scan)  # type: ignore[attr-defined]
         motion.grew.connect(made.grow)  # type: ignore[attr-defined]
         return made
 
@@ -241,6 +242,7 @@ class MainWindow(QMainWindow):
         handlers: dict[str, Callable[[], object]] = {
             "new": files.new,
             "open": files.open_dialog,
+            "open_results": files.open_results_dialog,
             "save": files.save,
             "save_as": files.save_as,
             "quit": self.close,
@@ -282,6 +284,7 @@ class MainWindow(QMainWindow):
             menus[key].aboutToShow.connect(lambda menu=menus[key], fill=fill: (menu.clear(), fill(menu)))
         QShortcut(Qt.Key.Key_Escape, self).activated.connect(self._escape)
         self.status.log_asked.connect(lambda: self.show_panel("log"))
+        files.results_opened.connect(lambda: self.switch_to("measure"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
         session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))

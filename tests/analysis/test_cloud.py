@@ -7,7 +7,19 @@ import math
 import numpy as np
 import pytest
 
-from analysis.cloud import UNITS, SpooledCloud, at_first_step, cloud, merge, read_csv, read_ply, write_csv, write_ply
+from analysis.cloud import (
+    UNITS,
+    SpooledCloud,
+    at_first_step,
+    at_step,
+    cloud,
+    merge,
+    ply_pieces,
+    read_csv,
+    read_ply,
+    write_csv,
+    write_ply,
+)
 from analysis.triangulate import PointFlag, Points
 from render.camera import Camera
 from render.errors import InputError
@@ -36,6 +48,14 @@ def test_a_cloud_comes_back_bit_for_bit(tmp_path, write, read, name, count):
     for key, column in columns.items():
         assert back[key].dtype == column.dtype
         assert np.array_equal(back[key], column, equal_nan=column.dtype.kind == "f")
+
+
+def test_a_cloud_is_read_in_pieces_that_are_no_larger_than_asked_for(tmp_path):
+    columns = cloud(some_points(300), None, laser=1, step=0)
+    write_ply(tmp_path / "p.ply", columns)
+    pieces = list(ply_pieces(tmp_path / "p.ply", rows=100))
+    assert [len(piece["x"]) for piece in pieces] == [100, 100, 57]
+    assert np.array_equal(merge(pieces)["sigma"], columns["sigma"])
 
 
 def test_only_points_with_coordinates_are_kept():
@@ -79,8 +99,10 @@ def test_points_on_moving_objects_go_back_to_the_first_step():
     scene = Scene(rig=Rig(camera=camera), motion=quarter)
     turned = np.array([[0.1, 0.0, 0.2], [0.5, 0.2, 0.5]])
     assert np.allclose(at_first_step(turned, scene, 1), on_part, atol=1e-15)
+    assert np.allclose(at_step(on_part, scene, 1), turned, atol=1e-15), "and from there to any other"
     still = Scene(rig=Rig(camera=camera), motion=LinearStage(moves="rig"))
     assert np.array_equal(at_first_step(on_part, still, 3), on_part)
+    assert np.array_equal(at_step(on_part, still, 3), on_part)
 
 
 @pytest.mark.parametrize(

@@ -209,3 +209,19 @@ def test_keeping_the_place_when_the_size_changes(qtbot, made):
     after = view.box.viewRect()
     assert after.left() + 0.5 == pytest.approx(2 * (before.left() + 0.5), abs=0.5)
     assert after.width() == pytest.approx(2 * before.width(), rel=1e-6)
+
+
+def test_what_is_fitted_stays_fitted_until_a_person_zooms(qtbot, made):
+    def seen():
+        shown, whole = made.view.box.viewRect(), made.view.item.boundingRect()
+        return sorted((shown.width() / whole.width(), shown.height() / whole.height()))
+
+    made.view.fit()
+    for size in ((500, 900), (900, 500), (800, 700)):
+        made.resize(*size)
+        qtbot.waitUntil(lambda width=size[0]: abs(made.view.width() - width) < 10)
+        assert 1.0 < seen()[0] < 1.03, "one side fills the view, the other has room"
+    made.view.box.scaleBy((0.5, 0.5))
+    made.resize(500, 900)
+    qtbot.waitUntil(lambda: made.view.width() < 510)
+    assert seen()[0] < 0.9, "what is zoomed to stays"

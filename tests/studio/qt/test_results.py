@@ -189,17 +189,17 @@ class TestMotion:
         from studio.qt.motion_panel import MotionPanel
 
         panel = moving.panels["motion"]
-        assert isinstance(panel, MotionPanel) and panel.slider.maximum() == 2
-        panel.slider.setValue(2)
+        assert isinstance(panel, MotionPanel) and panel.steps.slider.maximum() == 2
+        panel.steps.slider.setValue(2)
         assert moving.session.step == 2
         qtbot.waitUntil(lambda: live(moving.session).look.step == 2)
         assert "step 3 of 3" in panel.told.text() and "4.00" in panel.told.text()
 
     def test_playing_goes_to_the_end_and_stops(self, moving: MainWindow, qtbot: QtBot) -> None:
         panel = moving.panels["motion"]
-        panel._timer.setInterval(1)  # type: ignore[attr-defined]
-        qtbot.mouseClick(panel.play, Qt.MouseButton.LeftButton)  # type: ignore[attr-defined]
-        qtbot.waitUntil(lambda: moving.session.step == 2 and not panel._timer.isActive())  # type: ignore[attr-defined]
+        panel.steps._timer.setInterval(1)  # type: ignore[attr-defined]
+        qtbot.mouseClick(panel.steps.play, Qt.MouseButton.LeftButton)  # type: ignore[attr-defined]
+        qtbot.waitUntil(lambda: moving.session.step == 2 and not panel.steps._timer.isActive())  # type: ignore[attr-defined]
 
     def test_undoing_the_motion_leads_back_to_a_step_that_is_there(self, moving: MainWindow) -> None:
         moving.session.look_at_step(2)

@@ -1,0 +1,69 @@
+"""What a reader should notice about a measured render: at which scale it was, and what its numbers say. Qt-free."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from analysis.report.model import Extraction, FrameResult, LaserResult
+from analysis.report.record import ScanRecord, record_of
+from analysis.report.summary import remarks
+from analysis.report.total import total
+from render.develop import Image
+from render.errors import InputError
+from render.frame import Frame
+from studio.project import Project
+from studio.stages import Measurement
+
+Measurements = Mapping[str, Sequence[Measurement]]
+"""By method: one for each laser."""
+
+
+def scale_name(image_scale: float) -> str:
+    """ "0.25 times the scanner's image size"; empty at the scanner's own."""
+    return "" if image_scale == 1.0 else f"{image_scale:.3g} times the scanner's image size"
+
+
+def scale_head(image_scale: float) -> str:
+    """The one sentence above figures that were measured at another image scale; empty at the scanner's own."""
+    name = scale_name(image_scale)
+    return f"Measured at {name}: not the scanner's figures." if name else ""
+
+
+def scale_notes(image_scale: float) -> tuple[str, ...]:
+    """What to say of figures that were measured at another image scale than the scanner's; nothing at its own."""
+    if image_scale == 1.0:
+        return ()
+    each = f"Each pixel is {1 / image_scale:.3g} times as large there; full" if image_scale < 1.0 else "Full"
+    return (f"{scale_head(image_scale)} {each} size gives those.",)
+
+
+def frame_remarks(project: Project, frame: Frame, measurements: Measurements) -> list[str]:
+    """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be."""
+    return [*frame.warnings, *result_remarks(record_of(project.scene, [frame_result(project, frame, measurements)]))]
+
+
+def result_remarks(record: ScanRecord) -> list[str]:
+    """The report's remarks on the errors of one frame or of a whole scan."""
+    return remarks(total(record.chosen()))
+
+
+def frame_result(
+    project: Project, frame: Frame, measurements: Measurements, images: Sequence[Image] = ()
+) -> FrameResult:
+    """As a report takes it, the project's own method first. InputError: nothing is measured."""
+    best(measurements, project)
+    own = project.extraction.method
+    order = [own, *(method for method in measurements if method != own)]
+    lasers = []
+    for i, curve in enumerate(frame.curves):
+        found = [measurements[method][i] for method in order if method in measurements]
+        extractions = tuple(Extraction(one.line, one.points, one.errors) for one in found)
+        lasers.append(LaserResult(curve, extractions, images[i].pixels if i < len(images) else None))
+    return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=frame.seconds, counts=frame.counts)
+
+
+def best(measurements: Measurements, project: Project) -> Sequence[Measurement]:
+    """By the project's own method, else by the first. InputError: nothing is measured."""
+    if not measurements:
+        raise InputError("nothing is measured yet", cure="render first, and wait for the measurement")
+    return measurements.get(project.extraction.method) or next(iter(measurements.values()))
