@@ -6,6 +6,7 @@ python -m tests.mutations mesh 17 --keep FOLDER    one case again, with its file
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import re
 import time
@@ -33,9 +34,12 @@ def main() -> None:
         return
     began = time.monotonic()
     cases = [case for case in share(given.count, given.first) if given.kind in (None, case[0])]
-    verdicts = list(run_all(cases, given.runners))
+    verdicts: list[Verdict] = []
+    with contextlib.suppress(KeyboardInterrupt):
+        for verdict in run_all(cases, given.runners):
+            verdicts.append(verdict)
     print(summary(verdicts))
-    print(f"{len(verdicts)} cases in {time.monotonic() - began:.0f} s")
+    print(f"{len(verdicts)} of {len(cases)} cases in {time.monotonic() - began:.0f} s")
 
 
 def summary(verdicts: list[Verdict]) -> str:

@@ -24,23 +24,9 @@ NUMBERS = (
     "100000", "true",
 )  # fmt: skip
 WORDS = (
-    "",
-    " ",
-    "\x1b[31m",
-    "[/red]",
-    "[bold]",
-    "é",
-    os.fsdecode(b"\xff"),
-    "a\nb",
-    "x" * 5000,
-    "None",
-    "auto ",
-    "AUTO",
-    "%s",
-    "{}",
-    "-",
-    "--",
-)
+    "", " ", "\x1b[31m", "[/red]", "[bold]", "é", os.fsdecode(b"\xff"), "a\nb", "x" * 5000, "None", "auto ", "AUTO",
+    "%s", "{}", "-", "--",
+)  # fmt: skip
 HDR = (
     "8,2", "8", "", ",", "8,2,", "nan,1", "inf,1", "0,1", "-1,1", "1e300,1e-300", "1e308,1e-308", "1,1", "a,b", "8;2",
     "1e400,1", "5e-324,1", "8,2,0.5", "\x1b[31m,1",
@@ -71,17 +57,20 @@ def option(sources: Sources, place: Path, rng: Random, harm: bool) -> list[str]:
     if command == "reconstruct" and rng.random() < 0.4:
         argv[1:2] = ["image.png", "--project", "project.json"]
     offered = [option for option in main.cli.commands[command].params if option.name not in ("report", "debug")]
+    places = [option.name for option in offered if isinstance(option, click.Argument)]
     for _ in range(rng.choice((1, 1, 1, 2, 3)) if harm else 0):
-        option = rng.choice(offered)
-        argv += [rng.choice(option.opts + option.secondary_opts)] if isinstance(option, click.Option) else []
-        if isinstance(option, click.Argument) or (not option.is_flag and rng.random() < 0.97):
-            argv.append(_option_value(option, rng))
+        chosen = rng.choice(offered)
+        if isinstance(chosen, click.Argument):
+            argv[1 + places.index(chosen.name)] = _option_value(chosen, rng)
+        elif isinstance(chosen, click.Option):
+            argv.append(rng.choice(chosen.opts + chosen.secondary_opts))
+            argv += [_option_value(chosen, rng)] if not chosen.is_flag and rng.random() < 0.97 else []
+    asked = json_or_not(rng)
+    argv[1:1] = asked  # first, where no option can take it for its value
     if harm and rng.random() < 0.06:
-        argv.insert(
-            rng.randrange(1, len(argv)),
-            rng.choice(("--nope", "--", "-", "", "-q", "--json", "--json=1", "extra", "--out")),
-        )
-    return [*argv, *json_or_not(rng)]
+        odd = rng.choice(("--nope", "--", "-", "", "-q", "--json", "--json=1", "extra", "--out"))
+        argv.insert(rng.randrange(1 + len(asked), len(argv) + 1), odd)
+    return argv
 
 
 def _option_value(option: click.Parameter, rng: Random) -> str:

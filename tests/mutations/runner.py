@@ -73,19 +73,23 @@ def run_all(cases: Iterable[Named], runners: int) -> Iterator[Verdict]:
         finally:
             free.put(runner)
 
+    pool = ThreadPoolExecutor(runners)
     try:
-        with ThreadPoolExecutor(runners) as pool:
-            yield from pool.map(one, cases)
+        yield from pool.map(one, cases)
     finally:
+        pool.shutdown(cancel_futures=True)
         for runner in started:
             runner.close()
 
 
 def share(count: int, first: int = 1) -> list[Named]:
-    """About so many cases of all kinds, each by its weight and at least one, with the seeds from `first` on."""
+    """About so many cases of all kinds, each by its weight and at least one, mixed; their seeds begin with `first`."""
     whole = sum(WEIGHTS.values())
     numbers = {kind: max(1, round(count * weight / whole)) for kind, weight in WEIGHTS.items()}
-    return [(kind, first + k) for kind, number in numbers.items() for k in range(number)]
+    return sorted(
+        ((kind, first + k) for kind, number in numbers.items() for k in range(number)),
+        key=lambda case: (case[1] - first + 0.5) / numbers[case[0]],
+    )
 
 
 def serve(folder: str) -> None:
