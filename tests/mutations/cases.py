@@ -43,8 +43,8 @@ class Case:
     seed: int
     folder: Path
     argv: list[str]
-    rewrites: bool = False
-    """The command may change files that were there."""
+    rewrites: tuple[str, ...]
+    """What the command may change of the files that were there: beginnings of names relative to `folder`."""
 
 
 def make(kind: str, seed: int, sources: Sources, folder: Path) -> Case:
@@ -53,6 +53,9 @@ def make(kind: str, seed: int, sources: Sources, folder: Path) -> Case:
     place = folder / "work"
     furnish(place, sources)
     argv = KINDS[kind](sources, place, rng, seed > 0)
-    scanning = argv[0] in ("reconstruct", "report") and "--out" not in argv
-    own = argv[0] in ("preferences", "recovery")
-    return Case(kind, seed, place, argv, rewrites=own or scanning or "--resume" in argv or "--force" in argv)
+    rewrites = {"preferences": ("preferences.json",), "recovery": ("recovery/",)}.get(argv[0], ())
+    if "--force" in argv:
+        rewrites = ("",)
+    elif "--resume" in argv or "--out" not in argv:
+        rewrites += ("scan/",)
+    return Case(kind, seed, place, argv, rewrites)

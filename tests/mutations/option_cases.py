@@ -105,10 +105,13 @@ def preferences(sources: Sources, place: Path, rng: Random, harm: bool) -> list[
 
 def recovery(sources: Sources, place: Path, rng: Random, harm: bool) -> list[str]:
     data = {
-        "format": "blazer-recovery", "format_version": 1, "path": "/a/project.json", "root": str(place),
+        "format": "blazer-recovery", "format_version": 1, "path": "/a/project.json", "root": "/a",
         "when": "2026-01-01 00:00:00+00:00", "project": sources.projects[rng.choice(sorted(sources.projects))],
     }  # fmt: skip
     (place / "recovery").mkdir()
     content = values.mutated(data, rng, sources.limits) if harm else json.dumps(data).encode()
+    if harm and rng.random() < 0.3:  # what goes with the file when it is not wanted
+        data["root"] = str(place / "recovery" / rng.choice(("..", ".", "1-00000000-a", "../textures", "", "a/../..")))
+        content = json.dumps(data).encode()
     (place / "recovery" / "1-00000000.json").write_bytes(content)
     return ["recovery", "recovery"]

@@ -19,7 +19,7 @@ from queue import SimpleQueue
 
 import main
 from tests.mutations.cases import WEIGHTS, Case, make
-from tests.mutations.fork import FUNCTIONS, exit_code, run_forked
+from tests.mutations.fork import exit_code, run_forked
 from tests.mutations.sources import make_sources
 from tests.mutations.verdict import HASHED, Verdict, faults, place_of, state
 
@@ -130,7 +130,7 @@ def _judge(case: Case, place: Path) -> Verdict:
     ended = run_forked(case.argv, case.folder, place)
     found = faults(case, ended, before, state(case.folder))
     where = place_of(ended.err)
-    if found and not where and case.argv[0] not in FUNCTIONS:
+    if found and not where:
         where = _place_again(case, place.with_name(f"{place.name}-again"))
     return Verdict(
         kind=case.kind,

@@ -39,10 +39,14 @@ class Sources:
         return np.asarray(cv2.imread(str(self.folder / "still" / "scan" / "frame_0000.png"), cv2.IMREAD_UNCHANGED))
 
     @cached_property
-    def limits(self) -> tuple[float, ...]:
-        """Every limit of a number in the project's schema."""
-        text = json.dumps(Project.model_json_schema())
-        return tuple(sorted({float(limit) for limit in re.findall(r'(?:in|ax)imum": ([-+.\de]+)', text)}))
+    def limits(self) -> dict[str, list[float]]:
+        """The limits of every number in the project's schema, by the field's name."""
+        found: dict[str, list[float]] = {}
+        for model in Project.model_json_schema()["$defs"].values():
+            for name, field in model.get("properties", {}).items():
+                limits = re.findall(r'imum": ([-+.\de]+)', json.dumps(field))
+                found.setdefault(name, []).extend(float(limit) for limit in limits)
+        return found
 
 
 def make_sources(folder: Path, call: Callable[..., None]) -> Sources:

@@ -6,7 +6,7 @@ import copy
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from random import Random
 from typing import Any
 
@@ -46,12 +46,17 @@ FAMILIES = (
 """Values of `kind` that may stand in one place, with some that no program knows."""
 PLACEHOLDER = "placeholder of what is no JSON"
 
+Limits = Mapping[Any, Sequence[float]]
+"""Least and most that the fields of a name may hold."""
 Place = tuple[Any, Any]
 """A container and the key or index of one value in it."""
 
 
-def mutated(data: Any, rng: Random, numbers: Sequence[float] = ()) -> bytes:
-    """The bytes of a JSON file that was damaged in one to five ways. numbers: limits to try besides the extremes."""
+def mutated(data: Any, rng: Random, limits: Limits | None = None) -> bytes:
+    """The bytes of a JSON file that was damaged in one to five ways.
+
+    limits: of the field of a name, to try besides EXTREMES.
+    """
     data = copy.deepcopy(data)
     ways = rng.choices(
         (_another_number, _another_text, _odd, _no_json, _delete, _add, _rename, _swap, _graft, _resize, _kind),
@@ -61,7 +66,7 @@ def mutated(data: Any, rng: Random, numbers: Sequence[float] = ()) -> bytes:
     raw: list[str] = []
     for way in ways:
         if isinstance(data, dict | list) and data:
-            way(data, rng, numbers or EXTREMES, raw)
+            way(data, rng, limits or {}, raw)
     if rng.random() < 0.02:
         data = rng.choice(ODD)
     text = json.dumps(data, ensure_ascii=rng.random() < 0.5, indent=rng.choice((None, 2)))
@@ -96,18 +101,20 @@ def place(data: Any, rng: Random, kind: type | tuple[type, ...] = object) -> Pla
     return None
 
 
-def _another_number(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _another_number(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     found = place(data, rng, (int, float))
     if found is None:
         return
     container, key = found
     old = container[key]
-    limit = rng.choice(numbers)
+    limit = rng.choice(limits.get(key) or EXTREMES)
     container[key] = rng.choice(
         (
             lambda: rng.choice(EXTREMES),
             lambda: limit,
+            lambda: limit,
             lambda: math.nextafter(limit, rng.choice((-math.inf, math.inf))),
+            lambda: limit * 10.0 ** rng.randint(-3, 3) if abs(limit) < 1e300 else limit,
             lambda: min(max(old * 10.0 ** rng.randint(-12, 12), -1e308), 1e308),
             lambda: -old,
             lambda: old + rng.choice((-1, 1, 0.5)),
@@ -117,7 +124,7 @@ def _another_number(data: Any, rng: Random, numbers: Sequence[float], raw: list[
     )()
 
 
-def _another_text(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _another_text(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     found = place(data, rng, str)
     if found is not None:
         container, key = found
@@ -125,25 +132,25 @@ def _another_text(data: Any, rng: Random, numbers: Sequence[float], raw: list[st
         container[key] = rng.choice((odd, odd, container[key] + odd, container[key].upper(), container[key][:-1]))
 
 
-def _odd(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _odd(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     container, key = place(data, rng) or (data, next(iter(data), 0))
     container[key] = copy.deepcopy(rng.choice(ODD))
 
 
-def _no_json(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _no_json(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     found = place(data, rng)
     if found is not None:
         found[0][found[1]] = PLACEHOLDER
         raw.append(rng.choice(NO_JSON))
 
 
-def _delete(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _delete(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     found = place(data, rng)
     if found is not None:
         del found[0][found[1]]
 
 
-def _add(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _add(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     found = place(data, rng, dict) if rng.random() < 0.8 else None
     target = data if found is None else found[0][found[1]]
     if isinstance(target, dict):
@@ -153,14 +160,14 @@ def _add(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> No
             target[name] = copy.deepcopy(rng.choice(ODD))
 
 
-def _rename(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _rename(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     found = place(data, rng)
     if found is not None and isinstance(found[0], dict):
         container, key = found
         container[rng.choice((key[:-1], key.upper(), key + "s", " " + key))] = container.pop(key)
 
 
-def _swap(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _swap(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     first, second = place(data, rng), place(data, rng)
     if first is not None and second is not None:
         a, b = copy.deepcopy(first[0][first[1]]), copy.deepcopy(second[0][second[1]])
@@ -168,13 +175,13 @@ def _swap(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> N
         second[0][second[1]] = a
 
 
-def _graft(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _graft(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     source, target = place(data, rng), place(data, rng)
     if source is not None and target is not None:
         target[0][target[1]] = copy.deepcopy(source[0][source[1]])
 
 
-def _resize(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _resize(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     found = place(data, rng, list)
     if found is not None:
         values = found[0][found[1]]
@@ -191,7 +198,7 @@ def _resize(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) ->
             values.clear()
 
 
-def _kind(data: Any, rng: Random, numbers: Sequence[float], raw: list[str]) -> None:
+def _kind(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
     """Another kind of the same thing, with its defaults or with the old one's fields."""
     found = []
 

@@ -65,9 +65,8 @@ class Verdict:
 def faults(case: Case, ended: Ended, before: State, after: State) -> list[str]:
     """In words, none if all is well. before, after: `state` of the case's folder."""
     found = list(_of_ending(case, ended))
-    if not case.rewrites:
-        changed = sorted(name for name in before if after.get(name) != before[name])
-        found += [f"changed or removed its input {name!r}" for name in changed[:3]]
+    changed = sorted(name for name in before if after.get(name) != before[name] and not name.startswith(case.rewrites))
+    found += [f"changed or removed its input {name!r}" for name in changed[:3]]
     new = sorted(after.keys() - before.keys())
     found += [f"left {name!r} behind" for name in new if Path(name).name.startswith(".")][:3]
     if ended.code == 0:
