@@ -20,7 +20,8 @@ WORK = {"segments": 512, "triangles": 20_000, "ambient_samples": 4, "light_paths
 
 def project(sources: Sources, place: Path, rng: Random, harm: bool) -> list[str]:
     data = sources.projects[rng.choice(sorted(sources.projects)) if harm else "plane"]
-    content = values.mutated(data, rng, sources.limits) if harm else json.dumps(data).encode()
+    change = values.extreme if rng.random() < 0.5 else values.mutated
+    content = change(data, rng, sources.limits) if harm else json.dumps(data).encode()
     return look_or_run(content, place, rng)
 
 

@@ -84,6 +84,14 @@ def mutated(data: Any, rng: Random, limits: Limits | None = None) -> bytes:
     return content
 
 
+def extreme(data: Any, rng: Random, limits: Limits) -> bytes:
+    """The bytes of a JSON file with one to four values that are extreme, though most of them allowed."""
+    data = copy.deepcopy(data)
+    for way in rng.choices((_limit, _kind), (5, 1), k=rng.choice((1, 1, 2, 4))):
+        way(data, rng, limits, [])
+    return json.dumps(data).encode()
+
+
 def place(data: Any, rng: Random, kind: type | tuple[type, ...] = object) -> Place | None:
     """Where a value of a kind is, found by descent, so that a long list counts no more than one field beside it."""
     for _ in range(40):
@@ -122,6 +130,19 @@ def _another_number(data: Any, rng: Random, limits: Limits, raw: list[str]) -> N
             lambda: int(min(max(old, -(2**70)), 2**70)),
         )
     )()
+
+
+def _limit(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
+    """A number at the least or most that its field allows, or between; without a limit, any number."""
+    found = place(data, rng, (int, float))
+    if found is None or isinstance(found[0][found[1]], bool):
+        return
+    container, key = found
+    own = limits.get(key)
+    low, high = (min(own), max(own)) if own else (-1e3, 1e3)
+    between = low + (high - low) * 10.0 ** rng.uniform(-12, 0)
+    value = rng.choice((low, high, between, between)) if own else rng.choice((rng.choice(EXTREMES), between))
+    container[key] = round(value) if isinstance(container[key], int) and math.isfinite(value) else value
 
 
 def _another_text(data: Any, rng: Random, limits: Limits, raw: list[str]) -> None:
