@@ -23,7 +23,7 @@ def atomic_write(path: Path | str) -> Iterator[Path]:
 
     The folder is made if missing. On any failure, Ctrl-C included, the temporary file goes and `path` stays as it was.
 
-    InputError: the folder or the file cannot be written (permission, full disk, a folder of that name).
+    InputError: the folder or the file cannot be written (permission, full disk, a folder or a device of that name).
     """
     target = Path(os.path.realpath(path))  # through a symlink, as plain writing would
     temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}{target.suffix}")
@@ -31,6 +31,8 @@ def atomic_write(path: Path | str) -> Iterator[Path]:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
             raise IsADirectoryError(None, "a folder of that name exists")
+        if target.exists() and not target.is_file():  # renaming would take a device's place
+            raise OSError(None, "a device or a pipe of that name exists")
         temporary.touch(exist_ok=False)
         yield temporary
         with open(temporary, "r+b") as written:
