@@ -23,7 +23,7 @@ def atomic_write(path: Path | str) -> Iterator[Path]:
 
     The folder is made if missing. On any failure, Ctrl-C included, the temporary file goes and `path` stays as it was.
 
-    InputError: the folder or the file cannot be written (permission, full disk, a folder of that name).
+    InputError: the folder or the file cannot be written (permission, full disk, a folder or a device of that name).
     """
     target = Path(os.path.realpath(path))  # through a symlink, as plain writing would
     temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}{target.suffix}")

@@ -116,6 +116,18 @@ def test_a_neighbour_whose_name_begins_alike_is_outside(tmp_path: Path) -> None:
         inside(tmp_path / "project", "../project-2/part.ply", "path")
 
 
+@pytest.mark.parametrize("linked", [False, True])
+def test_a_device_or_a_pipe_is_never_replaced(linked: bool, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    path = tmp_path / "link" if linked else tmp_path / "pipe"
+    if linked:
+        path.symlink_to("pipe")
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(InputError, match="a device or a pipe of that name exists"), atomic_write(path) as temporary:
+        temporary.write_text("never")
+    assert (tmp_path / "pipe").is_fifo() and sorted(tmp_path.iterdir()) == before
+
+
 def test_sha256_is_that_of_the_bytes(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"laser" * 100_000)
     assert sha256(tmp_path / "a") == hashlib.sha256(b"laser" * 100_000).hexdigest()

@@ -234,7 +234,8 @@ def compilation(folder: Path, kills: Kills, count: int) -> None:
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     words = [sys.executable, "main.py", "run", str(kills.files["weak"]), "--out", str(out), *OPTIONS]
     for n in range(count + 1):
-        child = subprocess.Popen(words, cwd=tree, env=environment, stderr=subprocess.PIPE, start_new_session=True)
+        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE}
+        child = subprocess.Popen(words, cwd=tree, env=environment, start_new_session=True, **pipes)
         try:
             _, told = child.communicate(timeout=None if n == count else kills.chance.uniform(1.0, COMPILE_SECONDS))
         except subprocess.TimeoutExpired:
