@@ -266,6 +266,10 @@ def _print_results(result: dict[str, Any]) -> None:
     header = ("Depth error", "points", "complete", "false", "bias", "RMSE", "robust sigma", "P95")
     if rows:
         print_table(result["name"], rows, header=header)
+    for row in result.get("results", [])[:1]:
+        if row["sampled_scan_lines"] < row["scan_lines"]:
+            sample = f"a sample of {row['sampled_scan_lines']} of {row['scan_lines']} scan lines"
+            print(f"robust sigma and P95 are those of {sample}, all else of every point")
 
 
 def _project_rows(project: Project, found: Inspection) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,17 +45,18 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     """One .html or .pdf file, by the suffix. InputError: nothing is measured, or the file cannot be written."""
     from analysis.report.write import render_page, write_report
 
-    record = record_of(what.project.scene, [frame_result(what)])
-    data = report_input(what.project, _first_world(what), record, {}, notes=(), created=now())
-    if path.suffix.lower() != ".pdf":
-        with atomic_write(path) as temporary:
-            temporary.write_text(render_page(data), encoding="utf-8")
+    first = _first_world(what)
+    with closing(record_of(what.project.scene, [frame_result(what)])) as record:
+        data = report_input(what.project, first, record, {}, notes=(), created=now())
+        if path.suffix.lower() != ".pdf":
+            with atomic_write(path) as temporary:
+                temporary.write_text(render_page(data), encoding="utf-8")
+            return [path]
+        with tempfile.TemporaryDirectory() as folder:
+            _, pdf = write_report(folder, data)
+            with atomic_write(path) as temporary:
+                shutil.copyfile(pdf, temporary)
         return [path]
-    with tempfile.TemporaryDirectory() as folder:
-        _, pdf = write_report(folder, data)
-        with atomic_write(path) as temporary:
-            shutil.copyfile(pdf, temporary)
-    return [path]
 
 
 def export_frame(path: Path, what: Exported) -> list[Path]:
