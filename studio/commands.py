@@ -273,6 +273,10 @@ def _print_results(result: dict[str, Any]) -> None:
     title = result["name"] + ("" if scale == 1.0 else f", image scale {scale:g}: not the scanner's figures")
     if rows:
         print_table(title, rows, header=header)
+    for row in result.get("results", [])[:1]:
+        if row["sampled_scan_lines"] < row["scan_lines"]:
+            sample = f"a sample of {row['sampled_scan_lines']} of {row['scan_lines']} scan lines"
+            print(f"robust sigma and P95 are those of {sample}, all else of every point")
     for text in result.get("notes", ()):
         print(f"warning: {text}")
 

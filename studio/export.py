@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,31 +53,26 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     from analysis.report.write import render_page, write_report
 
     _spare_inputs(what, [path])
-    record = record_of(what.project.scene, [frame_result(what.project, what.frame, what.measurements, what.images)])
+    first = _first_world(what)
     cautions = Cautions(
         what.rendered.model_copy(update={"sensor": what.project.sensor}),
         what.image_scale,
         [laser.power for laser in what.project.scene.lasers],
     )
     cautions.look(what.frame, what.frame.warnings)
-    data = report_input(
-        what.project,
-        _first_world(what),
-        record,
-        {},
-        notes=cautions.notes(summarise(record)),
-        created=now(),
-        image_scale=what.image_scale,
-    )
-    if path.suffix.lower() != ".pdf":
-        with atomic_write(path) as temporary:
-            temporary.write_text(render_page(data), encoding="utf-8")
+    result = frame_result(what.project, what.frame, what.measurements, what.images)
+    with closing(record_of(what.project.scene, [result])) as record:
+        notes = cautions.notes(summarise(record))
+        data = report_input(what.project, first, record, {}, notes=notes, created=now(), image_scale=what.image_scale)
+        if path.suffix.lower() != ".pdf":
+            with atomic_write(path) as temporary:
+                temporary.write_text(render_page(data), encoding="utf-8")
+            return [path]
+        with tempfile.TemporaryDirectory() as folder:
+            _, pdf = write_report(folder, data)
+            with atomic_write(path) as temporary:
+                shutil.copyfile(pdf, temporary)
         return [path]
-    with tempfile.TemporaryDirectory() as folder:
-        _, pdf = write_report(folder, data)
-        with atomic_write(path) as temporary:
-            shutil.copyfile(pdf, temporary)
-    return [path]
 
 
 def export_frame(path: Path, what: Exported) -> list[Path]:

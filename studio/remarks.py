@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 
 from analysis.report.model import Extraction, FrameResult, LaserResult
 from analysis.report.record import ScanRecord, record_of
-from analysis.report.summary import remarks
+from analysis.report.summary import remarks, scale_head, scale_note
 from analysis.report.total import total
 from render.develop import Image
 from render.errors import InputError
@@ -14,32 +15,26 @@ from render.frame import Frame
 from studio.project import Project
 from studio.stages import Measurement
 
+__all__ = ["best", "frame_remarks", "frame_result", "result_remarks", "scale_head", "scale_name", "scale_notes"]
+
 Measurements = Mapping[str, Sequence[Measurement]]
 """By method: one for each laser."""
 
 
 def scale_name(image_scale: float) -> str:
-    """ "0.25 times the scanner's image size"; empty at the scanner's own."""
-    return "" if image_scale == 1.0 else f"{image_scale:.3g} times the scanner's image size"
-
-
-def scale_head(image_scale: float) -> str:
-    """The one sentence above figures that were measured at another image scale; empty at the scanner's own."""
-    name = scale_name(image_scale)
-    return f"Measured at {name}: not the scanner's figures." if name else ""
+    """ "image scale 0.25"; empty at the scanner's own."""
+    return "" if image_scale == 1.0 else f"image scale {image_scale:.3g}"
 
 
 def scale_notes(image_scale: float) -> tuple[str, ...]:
     """What to say of figures that were measured at another image scale than the scanner's; nothing at its own."""
-    if image_scale == 1.0:
-        return ()
-    each = f"Each pixel is {1 / image_scale:.3g} times as large there; full" if image_scale < 1.0 else "Full"
-    return (f"{scale_head(image_scale)} {each} size gives those.",)
+    return tuple(filter(None, [scale_note(image_scale)]))
 
 
 def frame_remarks(project: Project, frame: Frame, measurements: Measurements) -> list[str]:
     """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be."""
-    return [*frame.warnings, *result_remarks(record_of(project.scene, [frame_result(project, frame, measurements)]))]
+    with closing(record_of(project.scene, [frame_result(project, frame, measurements)])) as record:
+        return [*frame.warnings, *result_remarks(record)]
 
 
 def result_remarks(record: ScanRecord) -> list[str]:

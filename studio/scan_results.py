@@ -18,11 +18,12 @@ from render.settings import RenderSettings
 from render.shape import MeshFile
 from render.threads import Cancel
 from render.world import World
+from studio.inputs import check_unchanged
 from studio.point_sample import PointSample
 from studio.project import Project
 from studio.result_series import MEASURED, ErrorView
 from studio.scan import never
-from studio.scan_folder import MANIFEST, PROJECT, ScanFolder
+from studio.scan_folder import MANIFEST, PROJECT, ScanFolder, check_frame
 from studio.stages import scaled, step_world
 
 Float = NDArray[np.float64]
@@ -70,6 +71,7 @@ class ScanResults:
     def read_step(self, step: int, before: World | None) -> tuple[Frame, World]:
         """Frame and placed triangles of a step; before: those of another step. InputError: not there, or damaged."""
         path = self.found.frames[step]
+        check_frame(self.found, path)
         frame = read_frame(path)
         if frame.step != step:
             raise InputError("the frame is of another step", where=str(path), found=frame.step, allowed=str(step))
@@ -116,7 +118,9 @@ def holds_scan(path: Path) -> Path | None:
 
 
 def read_results(found: ScanFolder, cancelled: Cancel = never) -> ScanResults:
-    """Go once through the scan's points, a piece at a time. InputError: they are damaged."""
+    """Go once through the scan's points, a piece at a time. InputError: they are damaged, or an input file changed."""
+    cure = "restore them, or run the project again"
+    check_unchanged(found.inputs, found.project.scene, found.root, cure=cure)
     path = found.folder / "points.ply"
     lasers, steps = len(found.project.scene.lasers), len(found.frames)
     sums = {kind: np.zeros((lasers, steps, 3)) for kind in COLUMNS}

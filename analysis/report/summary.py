@@ -46,14 +46,19 @@ def headline(report: ReportInput) -> str:
     )
 
 
-def scale_note(image_scale: float) -> str:
-    """That figures at another image scale are not the scanner's; empty at 1."""
+def scale_head(image_scale: float) -> str:
+    """The one sentence above figures that were measured at another image scale; empty at the scanner's own."""
     if image_scale == 1.0:
         return ""
-    return (
-        f"Measured at image scale {image_scale:g}, with {image_scale:g} times the scanner's pixels a side: these "
-        "figures are not the scanner's. Measure at scale 1 for those."
-    )
+    return f"Measured at image scale {image_scale:.3g}: not the scanner's figures."
+
+
+def scale_note(image_scale: float) -> str:
+    """What figures at another image scale than the scanner's are worth; empty at its own."""
+    if image_scale == 1.0:
+        return ""
+    each = f"Each pixel is {1 / image_scale:.3g} times as large there; full" if image_scale < 1.0 else "Full"
+    return f"{scale_head(image_scale)} {each} size (image scale 1) gives those."
 
 
 def little_found(completeness: float | None, points: int, name: str = "") -> str:

@@ -273,7 +273,7 @@ def test_a_report_at_another_image_scale_says_at_its_head_that_it_is_not_the_sca
     report = dataclasses.replace(make_report(), image_scale=0.25)
     page = render_page(report)
     head = page[: page.index("<figure")]
-    assert "image scale 0.25: not the scanner" in head and "Measure at scale 1" in head
+    assert "image scale 0.25: not the scanner" in head and "4 times as large" in head
     assert "image scale" not in render_page(make_report())
 
 

@@ -49,7 +49,9 @@ def narrow(frames: int) -> Project:
     wall = SceneObject(name="wall", shape=Plane(width=2.0, height=2.0), T_world_object=Pose(translation=(0, 0, 0.8)))
     motion = LinearStage(moves="rig", step=(1e-5, 0.0, 0.0), steps=frames)
     scene = Scene(
-        rig=Rig(camera=camera, lasers=(LineLaser(fan_angle=0.6, T_rig_laser=pose),)), objects=(wall,), motion=motion
+        rig=Rig(camera=camera, lasers=(LineLaser(power=5e-4, fan_angle=0.6, T_rig_laser=pose),)),
+        objects=(wall,),
+        motion=motion,
     )
     return Project(
         name="long", scene=scene, sensor=SENSOR, render=RenderSettings(transport="direct", truth_images=False)

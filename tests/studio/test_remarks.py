@@ -19,7 +19,7 @@ from studio.templates import template_folder
 def test_figures_at_another_scale_are_said_not_to_be_the_scanners() -> None:
     assert scale_notes(1.0) == () and scale_head(1.0) == ""
     (note,) = scale_notes(0.25)
-    assert "0.25 times the scanner's image size" in note and "not the scanner's" in note and "4 times as large" in note
+    assert "image scale 0.25" in note and "not the scanner's" in note and "4 times as large" in note
     assert note.startswith(scale_head(0.25))
     assert "as large" not in scale_notes(2.0)[0]
 
