@@ -79,7 +79,7 @@ def start(seed: int, switches: int, home: str) -> bool:
         flush=True,
     )
     if code:
-        print(told, flush=True)
+        print(told[-20_000:], flush=True)
     return code == 0
 
 
@@ -103,16 +103,20 @@ def switch_about(seed: int, switches: int) -> int:
             time.sleep(0.002)
 
     idle(chance.uniform(0.0, 6.0))
-    for _ in range(switches):
-        window.commands[chance.choice(("setup", "render_workspace", "measure"))].trigger()
+    for i in range(switches):
+        key = chance.choice(("setup", "render_workspace", "measure"))
+        print(f"switch {i} to {key}", flush=True)  # told of a start that does not end in order
+        window.commands[key].trigger()
         idle(chance.choice((0.0, 0.0, 0.02, 0.3)))
         disarrange(window, chance)
         idle(chance.choice((0.0, 0.02)))
         if chance.random() < 0.05:
             window.panels["render"].start(0.125)
+    print("closing", flush=True)
     window.files.give_up()
     window.close()
     app.processEvents()
+    print("closed", flush=True)
     return 0
 
 
