@@ -40,13 +40,13 @@ clean:
 
 # Names what the machine lacks, or installs it where the user is root on Debian or Ubuntu.
 system:
-	@$(if $(PYTHON),,$(error no Python found; install it with: apt-get update && apt-get install -y python3.11 python3.11-venv))$(PYTHON) studio/system.py
+	@$(if $(PYTHON),,$(error no Python found; install it with: apt-get update && apt-get install -y python3.11 python3.11-venv))$(PYTHON) studio/runtime/system.py
 
 system-tests: system
-	@$(PYTHON) studio/system.py --tests
+	@$(PYTHON) studio/runtime/system.py --tests
 
 system-validation: system
-	@$(PYTHON) studio/system.py --validation
+	@$(PYTHON) studio/runtime/system.py --validation
 
 $(INSTALLED): pyproject.toml $(CONSTRAINTS) | system
 	$(PYTHON) -m venv $(VENV)

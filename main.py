@@ -19,12 +19,12 @@ from typing import Any
 try:
     import click
 
-    from studio.streams import finish, print_json, streams
-    from studio.system import message, missing_needs, missing_python_package, why_not_in_this_folder
+    from studio.runtime.streams import finish, print_json, streams
+    from studio.runtime.system import message, missing_needs, missing_python_package, why_not_in_this_folder
 except KeyboardInterrupt:
     sys.exit(130)
 except ModuleNotFoundError as missing:
-    from studio.system import missing_python_package
+    from studio.runtime.system import missing_python_package
 
     print(missing_python_package(missing.name), file=sys.stderr)
     sys.exit(2)
@@ -87,7 +87,7 @@ class Commands(click.Group):
 
 def _report_error(error: BaseException, debug: bool, as_json: bool) -> int:
     """Say what happened, on standard error and, where asked for, as JSON; return the exit code."""
-    from render.errors import Cancelled, InputError
+    from render.base.errors import Cancelled, InputError
 
     details: dict[str, Any] = {}
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
@@ -204,7 +204,7 @@ def cli(context: click.Context) -> None:
         return
     reason = why_no_studio()
     if reason is None:
-        from studio.qt.app import open_studio
+        from studio.qt.shell.app import open_studio
 
         context.exit(open_studio())
     click.echo(f"The studio does not open here: {reason}. Running the sample scan without it.", err=True)
@@ -217,7 +217,7 @@ def cli(context: click.Context) -> None:
 @click.pass_context
 def open_project(context: click.Context, /, project: Path | None, **_: Any) -> None:
     """Open the studio on a project, as `main.py PROJECT` does, or on the folder of a finished scan."""
-    from studio.qt.app import open_studio
+    from studio.qt.shell.app import open_studio
 
     context.exit(open_studio(project))
 
@@ -228,12 +228,12 @@ def why_no_studio() -> str | None:
 
     if find_spec("PySide6") is None:
         return "the Qt library (PySide6) is not installed"
-    from studio.display import why_no_display
+    from studio.runtime.display import why_no_display
 
     reason = why_no_display()
     if reason is not None:
         return reason
-    from studio.qt.app import why_not
+    from studio.qt.shell.app import why_not
 
     return why_not()
 
@@ -246,7 +246,7 @@ def why_no_studio() -> str | None:
 def run(project: Path | None, **options: Any) -> None:
     """Scan a project: render, extract the line, triangulate, compare with the truth, report. Default: the sample."""
     _require_system()
-    from studio.commands import run_project
+    from studio.commands.commands import run_project
 
     run_project(project, **options)
 
@@ -257,7 +257,7 @@ def run(project: Path | None, **options: Any) -> None:
 def render(project: Path | None, **options: Any) -> None:
     """Render the frames of a project with their truth, and stop there."""
     _require_system()
-    from studio.commands import render_project
+    from studio.commands.commands import render_project
 
     render_project(project, **options)
 
@@ -277,7 +277,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
     Several photographs are the steps of the project's motion, or, with --hdr, exposures of one scene.
     """
     _require_system()
-    from studio.commands import reconstruct_source
+    from studio.commands.commands import reconstruct_source
 
     reconstruct_source(sources, **options)
 
@@ -316,7 +316,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 def extract(images: tuple[Path, ...], **options: Any) -> None:
     """The laser line in image files of a real scanner (PNG, TIFF, EXR, JPEG, BMP), as a table for each."""
     _require_system()
-    from studio.extract_command import extract_images
+    from studio.commands.extract import extract_images
 
     if extract_images(images, **options):
         click.get_current_context().exit(BAD_INPUT)
@@ -329,7 +329,7 @@ def extract(images: tuple[Path, ...], **options: Any) -> None:
 def report(folder: Path, **options: Any) -> None:
     """Rebuild the report of a finished scan from its folder."""
     _require_system()
-    from studio.commands import rebuild_report
+    from studio.commands.commands import rebuild_report
 
     rebuild_report(folder, **options)
 
@@ -340,7 +340,7 @@ def report(folder: Path, **options: Any) -> None:
 def inspect(project: Path | None, **options: Any) -> None:
     """What is in a project, whether it is sane, and what the camera will see."""
     _require_system()
-    from studio.commands import inspect_project
+    from studio.commands.commands import inspect_project
 
     inspect_project(project, **options)
 
@@ -352,7 +352,7 @@ def inspect(project: Path | None, **options: Any) -> None:
 @common
 def new(template: str | None, folder: Path | None, **options: Any) -> None:
     """Start a project from a template; without a template, list them."""
-    from studio.commands import start_project
+    from studio.commands.commands import start_project
 
     start_project(template, folder, **options)
 
@@ -361,7 +361,7 @@ def _require_system() -> None:
     """Before heavy imports: name the system libraries that are missing, and the command that brings them."""
     missing, reason = missing_needs(), why_not_in_this_folder()
     if missing or reason:
-        from render.errors import InputError
+        from render.base.errors import InputError
 
         raise InputError(reason or f"the system lacks libraries\n{message(missing)}")
 

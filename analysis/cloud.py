@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from analysis.error import Errors
 from analysis.spool import Spool
 from analysis.triangulate import Points
-from render.errors import InputError
-from render.files import atomic_write, check_regular, read_bytes
-from render.pose import invert, transform_points
-from render.scene import Scene
+from render.base.errors import InputError
+from render.base.files import atomic_write, check_regular, read_bytes
+from render.base.pose import invert, transform_points
+from render.scene.scene import Scene
 
 Float = NDArray[np.float64]
 Column = NDArray[Any]

@@ -11,8 +11,8 @@ from analysis.distance import signed_distance
 from analysis.line.result import Line
 from analysis.measures import Measures, measure, outliers
 from analysis.triangulate import Points
-from render.errors import InputError
-from render.finite import check_finite
+from render.base.errors import InputError
+from render.base.finite import check_finite
 from render.frame import LaserCurve
 
 Float = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from render.errors import InputError
+from render.base.errors import InputError
 
 IN_MEMORY = 1 << 23
 """Bytes that need no file."""

@@ -1,5 +1,5 @@
 """What is there and what light does: scene model, exact truth, light transport, sensor."""
 
-from render.kernel_cache import keep_kernels
+from render.base.kernel_cache import keep_kernels
 
 keep_kernels()

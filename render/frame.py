@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from render.counts import Counts
-from render.finite import check_finite
+from render.base.counts import Counts
+from render.base.finite import check_finite
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -79,7 +79,7 @@ class Frame:
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage."""
     warnings: tuple[str, ...] = field(default=(), kw_only=True)
-    """What may make a sensible picture of the wrong thing (`render.material_checks`)."""
+    """What may make a sensible picture of the wrong thing (`render.world.material_checks`)."""
     counts: Counts = field(default_factory=dict)
     """Rays, samples, lit pixels, seconds inside embree, estimated relative error."""
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from render.base.progress import Clock
+from render.base.threads import Cancel
+from render.checkpoint import RenderState
 from render.frame import Axis, Frame
-from render.refine import frames
-from render.saved import RenderState
+from render.progressive import frames
 from render.scan_plan import ScanPlan
-from render.scene import Scene
-from render.settings import RenderSettings
-from render.stage_clock import Clock
-from render.threads import Cancel
-from render.world import World, build_world
+from render.scene.scene import Scene
+from render.scene.settings import RenderSettings
+from render.world.world import World, build_world
 
 StageProgress = Callable[[str, float], None]
 
@@ -63,8 +63,9 @@ def render_world(
 ) -> Frame:
     """Render a world placed for `step`; `axis` is the scan axis of the exact line.
 
-    progress: of each stage. seconds, state: see `render.refine.refine`. refined: hears of every frame, the last is the
-    result. scan: the plan of a whole scan; None: a pilot decides for this frame alone. Raises InputError, Cancelled.
+    progress: of each stage. seconds, state: see `render.progressive.refine`. refined: hears of every frame, the last is
+    the result. scan: the plan of a whole scan; None: a pilot decides for this frame alone. Raises InputError,
+    Cancelled.
     """
     settings = settings or RenderSettings()
     clock, targets = Clock(progress), (settings.laser_error,)

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from render.ambient_plan import AmbientPlan, ambient_plan_of, has_ambient, onward_share
-from render.direct import direct_image
-from render.plan import RUNGS, Plan, direct_plan, pilot_shares, plan_of
-from render.scene import Scene
-from render.settings import RenderSettings
-from render.threads import Cancel, Progress
-from render.world import World
+from render.ambient.transport_plan import AmbientPlan, ambient_plan_of, has_ambient, onward_share
+from render.base.threads import Cancel, Progress
+from render.laser_direct.integrator import direct_image
+from render.laser_indirect.transport_plan import RUNGS, Plan, direct_plan, pilot_shares, plan_of
+from render.scene.scene import Scene
+from render.scene.settings import RenderSettings
+from render.world.world import World
 
 FRAMES = 5
 """Frames that are looked at."""

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from render.shape import StepBlock, VGroove
+from render.scene.shape import StepBlock, VGroove
 
 Array = NDArray[np.float64]
 

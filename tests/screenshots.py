@@ -23,7 +23,7 @@ from virtual_display import display
 
 ROOT = Path(__file__).resolve().parents[1]
 if TYPE_CHECKING:
-    from studio.qt.window import MainWindow
+    from studio.qt.shell.window import MainWindow
 
 SIZE = (1440, 900)
 README = {"setup_dark": "setup.png", "render_dark": "render.png", "measure_light": "measure.png"}
@@ -45,9 +45,9 @@ def main() -> int:
 
 
 def take(folder: Path, scale: float, readme: bool) -> None:
-    from studio.qt import app as desktop
-    from studio.qt.app import application, start
-    from studio.qt.shortcuts import CheatSheet
+    from studio.qt.shell import app as desktop
+    from studio.qt.shell.app import application, start
+    from studio.qt.shell.shortcuts import CheatSheet
 
     app = application()
     desktop.FIRST_LOOK_MS = 10**8  # the render below takes its place
@@ -130,7 +130,7 @@ def write_small(source: Path, target: Path) -> None:
     """As the README shows it: smaller, with a palette, so that the repository stays small."""
     from PIL import Image
 
-    from render.files import atomic_write
+    from render.base.files import atomic_write
 
     with Image.open(source) as image:
         height = round(image.height * README_WIDTH / image.width)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from render.pose import rotation_matrix
-from render.shape import StepBlock, VGroove
+from render.base.pose import rotation_matrix
+from render.scene.shape import StepBlock, VGroove
 from tests.closed_forms import (
     Array,
     cylinder_conic,

@@ -17,8 +17,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 import main
-from render.errors import Cancelled, InputError
-from studio.templates import DESCRIPTIONS, template_folder
+from render.base.errors import Cancelled, InputError
+from studio.project.templates import DESCRIPTIONS, template_folder
 
 ROOT = Path(__file__).resolve().parents[1]
 PATIENCE = 600.0
@@ -43,7 +43,7 @@ class TestHelp:
         imported = {line.rsplit("|", 1)[1].strip() for line in errors.splitlines() if line.startswith("import time:")}
         own = {name for name in imported if name.split(".")[0] in ("render", "analysis", "studio")}
         assert {name.split(".")[0] for name in imported} & HEAVY == set()
-        assert "click" in imported and own == {"studio", "studio.streams", "studio.system"}
+        assert "click" in imported and own == {"studio", "studio.runtime.streams", "studio.runtime.system"}
 
     def test_help_with_json_is_json(self) -> None:
         answer = json.loads(call("run", "--json", "--help").stdout)
@@ -75,7 +75,7 @@ class TestExitCodes:
         def fail(*_: object, **__: object) -> None:
             raise error
 
-        monkeypatch.setattr("studio.commands.inspect_project", fail)
+        monkeypatch.setattr("studio.commands.commands.inspect_project", fail)
         done = call("inspect", "--json")
         assert done.exit_code == code
         assert text in done.stderr and "Traceback" not in done.output
@@ -83,7 +83,7 @@ class TestExitCodes:
         assert answer["ok"] is False and answer["exit_code"] == code and text in answer["error"]["message"]
 
     def test_debug_shows_where_it_happened(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("studio.commands.inspect_project", lambda *_, **__: 1 / 0)
+        monkeypatch.setattr("studio.commands.commands.inspect_project", lambda *_, **__: 1 / 0)
         done = call("inspect", "--debug")
         assert done.exit_code == 3 and "Traceback" in done.stderr and "ZeroDivisionError" in done.stderr
 
@@ -113,13 +113,13 @@ class TestExitCodes:
         def fail(*_: object, **__: object) -> None:
             raise EOFError("Ran out of input")
 
-        monkeypatch.setattr("studio.commands.inspect_project", fail)
+        monkeypatch.setattr("studio.commands.commands.inspect_project", fail)
         assert call("inspect").exit_code == 3
 
     @pytest.mark.parametrize("value", ["nan", "-nan", "inf", "-inf", "1e400", "0x1p3"])
     @pytest.mark.parametrize("option", ["--scale", "--time-limit", "--exposure-ratio", "--nearest", "--farthest"])
     def test_a_number_that_is_none_is_bad_input(self, option: str, value: str, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("studio.commands.run_project", lambda *_, **__: None)
+        monkeypatch.setattr("studio.commands.commands.run_project", lambda *_, **__: None)
         assert call("run", option, "2").exit_code == 0
         done = call("run", option, value)
         assert done.exit_code == 2 and option in done.stderr and "Traceback" not in done.output
@@ -135,7 +135,7 @@ class TestExitCodes:
     def test_a_missing_system_library_is_named_before_anything_is_imported(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        from studio.system import LIBRARIES
+        from studio.runtime.system import LIBRARIES
 
         monkeypatch.setattr(main, "missing_needs", lambda: [LIBRARIES[0]])
         done = call("inspect")
@@ -203,7 +203,7 @@ class TestStudio:
         ran: list[object] = []
         monkeypatch.delenv("DISPLAY", raising=False)
         monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-        monkeypatch.setattr("studio.commands.run_project", lambda *given, **_: ran.append(given))
+        monkeypatch.setattr("studio.commands.commands.run_project", lambda *given, **_: ran.append(given))
         done = call()
         assert done.exit_code == 0 and "does not open here" in done.stderr and ran == [(None,)]
 

@@ -15,7 +15,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import main
-from studio.project import Project
+from studio.project.project import Project
 
 ROOT = Path(__file__).resolve().parents[1]
 TOP_LEVEL = {
@@ -87,7 +87,7 @@ def test_pins_satisfy_the_declared_ranges() -> None:
 
 
 def test_no_set_up_file_writes_an_index_address() -> None:
-    for name in ("Makefile", "pyproject.toml", ".ci/run", ".ci/constraints.txt", "studio/system.py"):
+    for name in ("Makefile", "pyproject.toml", ".ci/run", ".ci/constraints.txt", "studio/runtime/system.py"):
         text = (ROOT / name).read_text(encoding="utf-8")
         assert not re.search(r"https?://|index-url|find-links|trusted-host", text), name
 
@@ -114,7 +114,7 @@ def test_the_entry_imports_nothing_but_click_at_its_top() -> None:
     modules = {alias.name for node in statements if isinstance(node, ast.Import) for alias in node.names}
     modules |= {node.module or "" for node in statements if isinstance(node, ast.ImportFrom)}
     standard = {name for name in modules if name.split(".")[0] in sys.stdlib_module_names}
-    assert modules - standard == {"click", "studio.streams", "studio.system"}
+    assert modules - standard == {"click", "studio.runtime.streams", "studio.runtime.system"}
 
 
 def test_only_the_desktop_knows_qt_and_only_one_file_embree() -> None:
@@ -126,7 +126,7 @@ def test_only_the_desktop_knows_qt_and_only_one_file_embree() -> None:
     ]:
         text = path.read_text(encoding="utf-8")
         relative = path.relative_to(ROOT).as_posix()
-        assert relative == "render/embree.py" or not re.search(r"^\s*(import|from) embreex", text, re.M), relative
+        assert relative == "render/world/embree.py" or not re.search(r"^\s*(import|from) embreex", text, re.M), relative
         if not relative.startswith("studio/qt/"):
             assert not re.search(r"^\s*(import|from) (PySide6|PyQt\d|pyvistaqt|qtpy)", text, re.M), relative
 

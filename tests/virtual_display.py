@@ -11,7 +11,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from studio.system import VIRTUAL_DISPLAY, message
+from studio.runtime.system import VIRTUAL_DISPLAY, message
 
 SIZE = (1920, 1200)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.line.channel import Lines
+from analysis.line.detection.channel import Lines
 from analysis.line.measure import measure
 from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings, Method

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.line.channel import COLOURS, MISSING, scan_lines
+from analysis.line.detection.channel import COLOURS, MISSING, scan_lines
+from analysis.line.detection.noise import FULL_SCALES, NoiseModel, image_saturation
 from analysis.line.measure import measure
-from analysis.line.noise import FULL_SCALES, NoiseModel, image_saturation
 from analysis.line.result import Line
 from analysis.line.settings import ExtractionSettings
-from render.errors import InputError
+from render.base.errors import InputError
 
 LINES = 256
 """Scan lines looked at."""

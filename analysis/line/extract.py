@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from analysis.line.channel import check_image, scan_lines
 from analysis.line.choose import choose_method
-from analysis.line.continuity import follow, pick
+from analysis.line.detection.channel import check_image, scan_lines
+from analysis.line.detection.noise import NoiseModel
 from analysis.line.estimate import estimate_noise
-from analysis.line.geometry import WorkingVolume, consistent
 from analysis.line.measure import measure
-from analysis.line.noise import NoiseModel
 from analysis.line.result import Axis, Line
+from analysis.line.selection.continuity import follow, pick
+from analysis.line.selection.geometry import WorkingVolume, consistent
 from analysis.line.settings import ExtractionSettings, Method, Select
-from render.errors import InputError
-from render.finite import check_finite
+from render.base.errors import InputError
+from render.base.finite import check_finite
 
 CANDIDATES = 5
 """Peaks that one is selected from, unless the settings ask for more."""

@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.line.centre_of_mass import weigh_seeds
-from analysis.line.channel import MISSING, Lines, smoothing_correlation
-from analysis.line.derivative import differentiate_seeds
-from analysis.line.detect import SEED_COLUMNS, detect
-from analysis.line.fir import cross_seeds
-from analysis.line.fit import fit_seeds
-from analysis.line.half_energy import halve_seeds
-from analysis.line.log_fit import fit_logarithms
-from analysis.line.matched_filter import response_gain
-from analysis.line.phase import turn_seeds
+from analysis.line.detection.channel import MISSING, Lines, smoothing_correlation
+from analysis.line.detection.detect import SEED_COLUMNS, detect
+from analysis.line.detection.matched_filter import response_gain
+from analysis.line.methods.blais_rioux import cross_seeds
+from analysis.line.methods.centre_of_mass import weigh_seeds
+from analysis.line.methods.derivative import differentiate_seeds
+from analysis.line.methods.gaussian_fit import fit_seeds
+from analysis.line.methods.half_energy import halve_seeds
+from analysis.line.methods.log_fit import fit_logarithms
+from analysis.line.methods.phase import turn_seeds
+from analysis.line.methods.steger_2d import HALO, fill_gaps, ridge_seeds
+from analysis.line.methods.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, interpolate_seeds
+from analysis.line.methods.threshold import FRACTION, weigh_above
 from analysis.line.result import Flag, Line
-from analysis.line.ridge import HALO, fill_gaps, ridge_seeds
 from analysis.line.settings import ExtractionSettings
-from analysis.line.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, interpolate_seeds
-from analysis.line.threshold import FRACTION, weigh_above
-from render.threads import map_chunks
+from render.base.threads import map_chunks
 
 Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]

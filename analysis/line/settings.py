@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from render.model import Model, quantity
+from render.base.model import Model, quantity
 
 Method = Literal[
     "auto",

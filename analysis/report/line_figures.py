@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from analysis.report.colour import TRUTH, method_colour, method_name
 from analysis.report.model import Extraction, LaserResult
 from analysis.report.style import WIDTH, figure, png_uri
+from render.base.pose import invert, transform_points
 from render.frame import LaserCurve
-from render.pose import invert, transform_points
 
 Float = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from analysis.error import Errors
 from analysis.line.result import Line
 from analysis.triangulate import Points
-from render.counts import Counts
+from render.base.counts import Counts
 from render.frame import LaserCurve
-from render.scene import Scene
-from render.sensor import Sensor
+from render.scene.scene import Scene
+from render.sensor.sensor import Sensor
 
 if TYPE_CHECKING:
     from analysis.report.record import ScanRecord

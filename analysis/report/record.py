@@ -15,8 +15,8 @@ from analysis.report.sample import IMAGE, MOST_LINES, ROW, Rows, Sample, rows_of
 from analysis.report.sums import Sums
 from analysis.report.total import Chosen, depth_measures
 from analysis.spool import Spool
-from render.counts import Quantity
-from render.scene import Scene
+from render.base.counts import Quantity
+from render.scene.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.cloud import at_first_step
 from analysis.report.model import Extraction
-from render.scene import Scene
+from render.scene.scene import Scene
 
 Rows = NDArray[np.void]
 """(m,) of `ROW`, in the order of `Points`."""

@@ -22,8 +22,8 @@ from analysis.report.units import (
     percent,
     seconds,
 )
-from render.laser import Divergence
-from render.material import (
+from render.laser.laser import Divergence
+from render.material.material import (
     BaseMaterial,
     Blend,
     Coated,
@@ -37,7 +37,7 @@ from render.material import (
     Subsurface,
     Texture,
 )
-from render.shape import MeshFile
+from render.scene.shape import MeshFile
 
 MOST_STEPS = 24
 MEASURE_COLUMNS = ("n", "bias", "sigma", "RMSE", "robust sigma", "P95", "outliers", "lag 1", "within ±2 sigma")

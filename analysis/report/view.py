@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from analysis.report.colour import wavelength_colour
 from analysis.report.model import FrameResult, ReportInput
+from render.base.pose import invert, transform_points
 from render.frame import LaserCurve
-from render.pose import invert, transform_points
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]

@@ -28,7 +28,7 @@ from analysis.report.tables import (
 from analysis.report.total import Total, total
 from analysis.report.units import count, micrometres, percent
 from analysis.report.view import cloud_view, placed_vertices, scene_view
-from render.files import atomic_write
+from render.base.files import atomic_write
 
 MOST_DETAILS = 4
 """Lasers shown in detail."""

@@ -21,10 +21,10 @@ from analysis.cloud import (
     write_ply,
 )
 from analysis.triangulate import PointFlag, Points
-from render.camera import Camera
-from render.errors import InputError
-from render.motion import LinearStage, Turntable
-from render.scene import Rig, Scene
+from render.base.errors import InputError
+from render.camera.camera import Camera
+from render.scene.motion import LinearStage, Turntable
+from render.scene.scene import Rig, Scene
 
 
 def some_points(count: int, seed: int = 0) -> Points:

@@ -15,8 +15,8 @@ from analysis.error import compare, match
 from analysis.line.result import Flag, Line
 from analysis.measures import measure
 from analysis.triangulate import triangulate
-from render.camera import Camera
-from render.errors import InputError
+from render.base.errors import InputError
+from render.camera.camera import Camera
 from render.frame import LaserCurve
 
 THETA, BASELINE, DEPTH = math.radians(13), 0.2, 0.85

@@ -9,9 +9,9 @@ import pytest
 
 from analysis.line.result import Flag, Line
 from analysis.triangulate import CALIBRATION, PointFlag, triangulate
-from render.camera import Camera
-from render.errors import InputError
-from render.pose import Pose, invert, transform_points
+from render.base.errors import InputError
+from render.base.pose import Pose, invert, transform_points
+from render.camera.camera import Camera
 
 F, BASELINE, THETA = 3478.26, 0.2, math.radians(13)
 CAMERA = Camera(width=2448, height=2048, fx=F, fy=F, cx=1223.5, cy=1023.5)

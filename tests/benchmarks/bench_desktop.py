@@ -24,21 +24,21 @@ from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 from virtual_display import display
 
-from render.refine import refine
-from render.tone import pyramid
-from render.world import build_world
-from studio.document import Document
-from studio.project import Project
-from studio.qt.camera_view import CameraView
-from studio.qt.develop_panel import DevelopPanel
-from studio.qt.inspector import Inspector
-from studio.qt.jobs import RENDER, JobRunner
-from studio.qt.live import live
-from studio.qt.render_panel import RenderPanel
-from studio.qt.session import Session
-from studio.redevelop import develop_again, development, measure_again
-from studio.views import picture, views
-from studio.warm_up import needed, warm_up
+from render.output.tone_mapping import pyramid
+from render.progressive import refine
+from render.world.world import build_world
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.qt.core.jobs import RENDER, JobRunner
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session
+from studio.qt.image.camera_view import CameraView
+from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.render.render_panel import RenderPanel
+from studio.qt.scene.inspector import Inspector
+from studio.scan.frame_views import picture, views
+from studio.scan.kernel_warm_up import needed, warm_up
+from studio.scan.redevelop import develop_again, development, measure_again
 
 PROJECT = Path(__file__).parents[2] / "assets/projects/weld_seam/project.json"
 TICK_MS = 16

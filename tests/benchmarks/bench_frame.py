@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from render.ambient import ambient_image, ambient_images
-from render.curve import laser_curve
-from render.direct import direct_image
-from render.truth import truth_images
-from render.world import build_world
-from studio.project import Project
+from render.ambient.integrator import ambient_image, ambient_images
+from render.laser_direct.integrator import direct_image
+from render.truth.laser_curve import laser_curve
+from render.truth.pixel_truth import truth_images
+from render.world.world import build_world
+from studio.project.project import Project
 
 PROJECT = Path(__file__).parents[2] / "assets/projects/weld_seam/project.json"
 

@@ -17,11 +17,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
-from analysis.line.noise import NoiseModel
-from analysis.line.ridges import find_ridges
+from analysis.line.ridges.ridges import find_ridges
 from analysis.line.settings import Method
-from tests.analysis.line_images import expected, exposed
+from tests.analysis.line.line_images import expected, exposed
 
 ROWS, WIDTH, REPEATS = 2048, 2448, 15
 SIGMA, SOME = 1.5, 100

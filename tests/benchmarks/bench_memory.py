@@ -17,19 +17,19 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from render.camera import Camera
-from render.laser import LineLaser
-from render.motion import LinearStage
-from render.pose import Pose
-from render.scene import Rig, Scene, SceneObject
-from render.settings import RenderSettings
-from render.shape import Plane
-from render.world import build_world
-from studio.measuring import Measuring
-from studio.project import Project
-from studio.stages import Clock, develop_step, render_step
-from studio.summary import summarise
-from studio.warm_up import SENSOR
+from render.base.pose import Pose
+from render.camera.camera import Camera
+from render.laser.laser import LineLaser
+from render.scene.motion import LinearStage
+from render.scene.scene import Rig, Scene, SceneObject
+from render.scene.settings import RenderSettings
+from render.scene.shape import Plane
+from render.world.world import build_world
+from studio.project.project import Project
+from studio.scan.kernel_warm_up import SENSOR
+from studio.scan.measuring import Measuring
+from studio.scan.stages import Clock, develop_step, render_step
+from studio.scan.summary import summarise
 
 BAR = 0.05
 ROWS, WIDTH = 2048, 64

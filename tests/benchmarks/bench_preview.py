@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from render.shape import Sphere
-from studio.document import replaced, value_at
-from studio.preview import Preview
-from studio.project import Project
-from studio.readouts import readouts
+from render.scene.shape import Sphere
+from studio.preview.preview import Preview
+from studio.preview.readouts import readouts
+from studio.project.document import replaced, value_at
+from studio.project.project import Project
 
 PROJECT = Path(__file__).parents[2] / "assets/projects/sphere/project.json"
 BAR_MS = 33.0

@@ -42,8 +42,8 @@ def main() -> int:
 def soak(seconds: float, folder: Path) -> bool:
     from PySide6.QtCore import QCoreApplication, QEvent, qInstallMessageHandler
 
-    from studio.qt import app as desktop
-    from studio.qt.file_actions import template as new
+    from studio.qt.shell import app as desktop
+    from studio.qt.shell.file_actions import template as new
 
     app = desktop.application()
     desktop.FIRST_LOOK_MS = 10**8
@@ -92,9 +92,9 @@ def soak(seconds: float, folder: Path) -> bool:
 
 def cycle(window: object, template: str, folder: Path, wait: Callable[..., None]) -> None:
     """What a person does in some minutes, on one project."""
-    from studio.qt.file_actions import template as new
-    from studio.qt.live import live
-    from studio.qt.window import MainWindow
+    from studio.qt.core.live_preview import live
+    from studio.qt.shell.file_actions import template as new
+    from studio.qt.shell.window import MainWindow
 
     assert isinstance(window, MainWindow)
     session = window.session

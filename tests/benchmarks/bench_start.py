@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from virtual_display import display
 
-from render.kernel_cache import source_key
+from render.base.kernel_cache import source_key
 
 ROOT = Path(__file__).resolve().parents[2]
 BAR_SECONDS, HELP_SECONDS, KEY_SECONDS = 3.0, 0.3, 0.01

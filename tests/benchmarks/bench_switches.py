@@ -86,7 +86,7 @@ def start(seed: int, switches: int, home: str) -> bool:
 def switch_about(seed: int, switches: int) -> int:
     """One start, in this process."""
     faulthandler.enable()
-    from studio.qt import app as desktop
+    from studio.qt.shell import app as desktop
 
     app = desktop.application()
     window = desktop.start(None)
@@ -124,7 +124,7 @@ def disarrange(window: object, chance: random.Random) -> None:
     """What a person does to panels, now and then."""
     from PySide6.QtCore import QPoint, Qt
 
-    from studio.qt.window import MainWindow
+    from studio.qt.shell.window import MainWindow
 
     assert isinstance(window, MainWindow)
     dock, other = chance.sample(list(window.docks.values()), 2)

@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import main
-from render.errors import InputError
-from studio.autosave import find, sweep
-from studio.mesh_import import import_mesh
-from studio.preferences import PreferencesFile
+from render.base.errors import InputError
+from studio.project.autosave import find, sweep
+from studio.project.mesh_import import import_mesh
+from studio.runtime.preferences import PreferencesFile
 
 MOST_SECONDS = 20
 """Of processor time, all threads together."""

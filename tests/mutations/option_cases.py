@@ -11,7 +11,7 @@ from random import Random
 import click
 
 import main
-from studio.templates import DESCRIPTIONS
+from studio.project.templates import DESCRIPTIONS
 from tests.mutations import values
 from tests.mutations.image_cases import METHODS
 from tests.mutations.project_cases import QUICK, json_or_not

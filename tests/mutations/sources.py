@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from studio.project import Project
-from studio.templates import DESCRIPTIONS, template_folder
+from studio.project.project import Project
+from studio.project.templates import DESCRIPTIONS, template_folder
 from tests.mutations.images import Image
 
 VERSIONS = Path(__file__).resolve().parents[1] / "studio" / "projects"

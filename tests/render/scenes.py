@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from render.camera import Camera
-from render.laser import Divergence, LineLaser
-from render.mesh import Mesh
-from render.pose import Pose, invert
-from render.scene import Rig, Scene, SceneObject
-from render.shape import Plane
-from render.world import World, place_meshes
+from render.base.pose import Pose, invert
+from render.camera.camera import Camera
+from render.laser.laser import Divergence, LineLaser
+from render.mesh.mesh import Mesh
+from render.scene.scene import Rig, Scene, SceneObject
+from render.scene.shape import Plane
+from render.world.world import World, place_meshes
 
 BASELINE = Pose(translation=(0.2, 0.0, 0.0), rotation=(0.0, -math.radians(13), 0.0))
 

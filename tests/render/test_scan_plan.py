@@ -7,14 +7,14 @@ import math
 import pytest
 
 from render import scan_plan
-from render.material import Conductor
-from render.motion import LinearStage
-from render.plan import RUNGS, pilot_shares
+from render.laser_indirect.path_vertex import PLAIN
+from render.laser_indirect.transport_plan import RUNGS, pilot_shares
+from render.material.material import Conductor
 from render.scan_plan import looked_at, plan_scan
-from render.settings import RenderSettings
-from render.vertex import PLAIN
+from render.scene.motion import LinearStage
+from render.scene.settings import RenderSettings
+from tests.render.laser_indirect.test_integrator import setting, turned_groove
 from tests.render.scenes import paper_camera
-from tests.render.test_bidirectional import setting, turned_groove
 
 CAMERA = paper_camera(0.04)
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from render.motion import LinearStage
-from studio.document import replaced
-from studio.project import Project
-from studio.scan import run_scan
-from studio.stages import scaled
-from studio.templates import template_folder
+from render.scene.motion import LinearStage
+from studio.project.document import replaced
+from studio.project.project import Project
+from studio.project.templates import template_folder
+from studio.scan.scan import run_scan
+from studio.scan.stages import scaled
 
 SCALE = 0.5
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from render.material import Lambertian, Texture
-from render.motion import LinearStage
-from render.scene import SceneObject
-from render.shape import MeshFile
-from studio.project import Project
-from studio.scan import ScanResult, run_scan
-from studio.templates import template_folder
+from render.material.material import Lambertian, Texture
+from render.scene.motion import LinearStage
+from render.scene.scene import SceneObject
+from render.scene.shape import MeshFile
+from studio.project.project import Project
+from studio.project.templates import template_folder
+from studio.scan.scan import ScanResult, run_scan
 
 SCALE = 0.05
 PLATE = """v -0.15 -0.15 0\nv 0.15 -0.15 {rise}\nv 0.15 0.15 {rise}\nv -0.15 0.15 0

@@ -24,10 +24,10 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 import main  # noqa: E402
-from render.errors import InputError  # noqa: E402
-from studio import scan_folder  # noqa: E402
-from studio.document import replaced  # noqa: E402
-from studio.project import Project  # noqa: E402
+from render.base.errors import InputError  # noqa: E402
+from studio.project.document import replaced  # noqa: E402
+from studio.project.project import Project  # noqa: E402
+from studio.scan import scan_folder  # noqa: E402
 from tests.studio.small_scan import SCALE, contents, scan, small_project  # noqa: E402
 
 POWERS = {"weak": 0.001, "strong": 0.01}

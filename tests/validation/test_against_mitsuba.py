@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from render.direct import direct_image
+from render.laser_direct.integrator import direct_image
 from tests.render.scenes import centroids, paper_camera, paper_laser, plane_mesh, scene_of, world_of
 from tests.validation.laser_projector import projector
 

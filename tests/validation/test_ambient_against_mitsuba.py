@@ -7,14 +7,14 @@ import pytest
 import trimesh
 from scipy.stats import t
 
-from render.ambient import ambient_image
-from render.lights import Environment, RectangleLight
-from render.material import Conductor, Glass, Lambertian
-from render.pose import Pose
-from render.primitives import primitive_mesh
-from render.shape import Box, Sphere
+from render.ambient.integrator import ambient_image
+from render.base.pose import Pose
+from render.material.material import Conductor, Glass, Lambertian
+from render.mesh.primitives import primitive_mesh
+from render.scene.lights import Environment, RectangleLight
+from render.scene.shape import Box, Sphere
+from tests.render.ambient.test_path_kernels import scene_with
 from tests.render.scenes import moved, paper_camera, plane_mesh
-from tests.render.test_path import scene_with
 
 pytestmark = pytest.mark.validation
 mitsuba = pytest.importorskip("mitsuba", reason="make validate installs it")

@@ -13,16 +13,16 @@ import pytest
 import trimesh
 from scipy.stats import binom, t
 
-from render.bidirectional import ALL_KINDS, indirect_image
-from render.camera import Camera
-from render.direct import direct_image
-from render.material import Conductor, Glass, Lambertian
-from render.primitives import primitive_mesh
-from render.shape import Box, Sphere
-from render.vertex import BENT, PLAIN
+from render.camera.camera import Camera
+from render.laser_direct.integrator import direct_image
+from render.laser_indirect.integrator import ALL_KINDS, indirect_image
+from render.laser_indirect.path_vertex import BENT, PLAIN
+from render.material.material import Conductor, Glass, Lambertian
+from render.mesh.primitives import primitive_mesh
+from render.scene.shape import Box, Sphere
+from tests.render.ambient.test_path_kernels import patch
+from tests.render.laser_indirect.test_integrator import setting
 from tests.render.scenes import moved, paper_laser, plane_mesh
-from tests.render.test_bidirectional import setting
-from tests.render.test_path import patch
 from tests.validation.laser_projector import projector
 from tests.validation.test_ambient_against_mitsuba import bsdf
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.line.extract import extract
-from tests.analysis.line_images import cramer_rao, electrons, expected, exposed
+from tests.analysis.line.line_images import cramer_rao, electrons, expected, exposed
 
 pytestmark = pytest.mark.validation
 

@@ -12,7 +12,7 @@ import pytest
 from analysis.line import measure
 from analysis.line.extract import extract
 from analysis.line.settings import ExtractionSettings
-from tests.analysis.line_images import cramer_rao, electrons, expected, exposed
+from tests.analysis.line.line_images import cramer_rao, electrons, expected, exposed
 
 pytestmark = pytest.mark.validation
 

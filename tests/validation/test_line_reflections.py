@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from render.material import Conductor
-from render.world import build_world
-from studio.line import extract_line
-from studio.project import Project
-from studio.stages import Clock, develop_step, render_step, scaled
-from studio.templates import template_folder
+from render.material.material import Conductor
+from render.world.world import build_world
+from studio.project.project import Project
+from studio.project.templates import template_folder
+from studio.scan.line_extraction import extract_line
+from studio.scan.stages import Clock, develop_step, render_step, scaled
 
 pytestmark = pytest.mark.validation
 

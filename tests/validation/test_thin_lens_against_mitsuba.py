@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from render.ambient import ambient_image
-from render.camera import Lens
-from render.direct import direct_image
-from render.lights import Environment
-from render.primitives import primitive_mesh
-from render.shape import Box
+from render.ambient.integrator import ambient_image
+from render.camera.camera import Lens
+from render.laser_direct.integrator import direct_image
+from render.mesh.primitives import primitive_mesh
+from render.scene.lights import Environment
+from render.scene.shape import Box
 from tests.render.scenes import moved, paper_camera, paper_laser, plane_mesh, scene_of, world_of
 from tests.validation.laser_projector import projector
 

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
+from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
-from analysis.line.noise import NoiseModel
 from analysis.triangulate import triangulate
-from render.curve import laser_curve
-from render.direct import direct_image
+from render.laser_direct.integrator import direct_image
+from render.truth.laser_curve import laser_curve
+from tests.render.laser_direct.test_integrator import SURFACES
 from tests.render.scenes import paper_camera, paper_laser, scene_of, world_of
-from tests.render.test_direct import SURFACES
 
 pytestmark = pytest.mark.validation
 

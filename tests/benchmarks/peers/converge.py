@@ -20,8 +20,8 @@ DIRECT, SEED = 0.0005, 990_000
 
 
 def main() -> None:
-    from render.bidirectional import indirect_images
-    from render.direct import direct_image
+    from render.laser_direct.integrator import direct_image
+    from render.laser_indirect.integrator import indirect_images
 
     name, seconds = sys.argv[1], float(sys.argv[2])
     scene, world = our_scene(scenes.setting(name, BALL_SEGMENTS))

@@ -22,13 +22,13 @@ BALL_SEGMENTS = 512
 
 def our_scene(setting: scenes.Setting):
     """Scene and world of ours for a setting."""
-    from render.camera import Camera
-    from render.laser import Divergence, LineLaser
-    from render.mesh import Mesh
-    from render.pose import Pose
-    from render.scene import Rig, Scene, SceneObject
-    from render.shape import Plane
-    from render.world import place_meshes
+    from render.base.pose import Pose
+    from render.camera.camera import Camera
+    from render.laser.laser import Divergence, LineLaser
+    from render.mesh.mesh import Mesh
+    from render.scene.scene import Rig, Scene, SceneObject
+    from render.scene.shape import Plane
+    from render.world.world import place_meshes
 
     w, h = scenes.WIDTH, scenes.HEIGHT
     camera = Camera(width=w, height=h, fx=scenes.FOCAL, fy=scenes.FOCAL, cx=(w - 1) / 2, cy=(h - 1) / 2)
@@ -50,7 +50,7 @@ def our_scene(setting: scenes.Setting):
 
 
 def material(m: scenes.Material):
-    from render import material as ours
+    from render.material import material as ours
 
     if m.kind == "diffuse":
         return ours.Lambertian(albedo=m.albedo)
@@ -61,8 +61,8 @@ def material(m: scenes.Material):
 
 def conductor(m: scenes.Material):
     """A metal of the scene's own index: the table's iron is given it in this process."""
-    from render.material import Conductor
-    from render.material_rows import metals
+    from render.material.material import Conductor
+    from render.material.parameters import metals
 
     metals()["iron"] |= {"wavelength_nm": [200.0, 2000.0], "n": [m.n, m.n], "k": [m.k, m.k]}
     return Conductor(metal="iron", roughness=m.alpha)
@@ -76,8 +76,8 @@ DIRECT_BELOW = 0.01
 
 def images(scene, world, name: str, seed: int) -> Iterator[np.ndarray]:
     """All light of the laser (h, w), ever better: the one place that knows how ours renders."""
-    from render.bidirectional import indirect_images
-    from render.direct import direct_image
+    from render.laser_direct.integrator import direct_image
+    from render.laser_indirect.integrator import indirect_images
 
     parts = (world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0))
     if name == "s1":

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from pytestqt.qtbot import QtBot
 
-from studio.display import why_no_display
+from studio.runtime.display import why_no_display
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication, QWidget
 
-    from studio.qt.window import MainWindow
+    from studio.qt.shell.window import MainWindow
 
 os.environ.setdefault("QT_API", "pyside6")
 os.environ.setdefault("QT_QPA_PLATFORM", "xcb")
@@ -69,7 +69,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def kernels() -> None:
     """Compiled, or read from their cache, before any window asks for them: a compiler cannot be cancelled."""
-    from studio.warm_up import STEPS, warm_up
+    from studio.scan.kernel_warm_up import STEPS, warm_up
 
     warm_up(STEPS, lambda stage, done: None, lambda: False)
 
@@ -88,9 +88,9 @@ def no_thread_is_left(request: pytest.FixtureRequest) -> Iterator[None]:
 @pytest.fixture
 def small_project(tmp_path: Path) -> Path:
     """A file with the step block, seen in 244 x 204 px, so that a render takes a fraction of a second."""
-    from studio.project import Project
-    from studio.stages import scaled
-    from studio.templates import template_folder
+    from studio.project.project import Project
+    from studio.project.templates import template_folder
+    from studio.scan.stages import scaled
 
     project = scaled(Project.load(template_folder("step_block") / "project.json"), 0.1)
     settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05})
@@ -111,13 +111,13 @@ def one_window(qapp: QApplication, tmp_path_factory: pytest.TempPathFactory) -> 
 
 def new_window(folder: Path, template: str) -> MainWindow:
     """A window with preferences and recovery files of its own."""
-    from studio.autosave import Autosave
-    from studio.document import Document
-    from studio.preferences import PreferencesFile
-    from studio.project import Project
-    from studio.qt.session import Session
-    from studio.qt.window import MainWindow
-    from studio.templates import template_folder
+    from studio.project.autosave import Autosave
+    from studio.project.document import Document
+    from studio.project.project import Project
+    from studio.project.templates import template_folder
+    from studio.qt.core.session import Session
+    from studio.qt.shell.window import MainWindow
+    from studio.runtime.preferences import PreferencesFile
 
     file = template_folder(template) / "project.json"
     session = Session(Document(Project.load(file), None, file.parent))
@@ -129,12 +129,12 @@ def window(qtbot: QtBot, one_window: MainWindow, small_project: Path, tmp_path: 
     """The whole desktop on the small project, on the screen, nothing remembered, nothing running."""
     from PySide6.QtWidgets import QApplication, QDialog
 
-    from studio.document import Document
-    from studio.preferences import Preferences
-    from studio.project import Project
-    from studio.qt import theme
-    from studio.qt.live import live
-    from studio.qt.workspaces import workspace
+    from studio.project.document import Document
+    from studio.project.project import Project
+    from studio.qt.core import theme
+    from studio.qt.core.live_preview import live
+    from studio.qt.shell.workspaces import workspace
+    from studio.runtime.preferences import Preferences
 
     if theme.colours() != theme.LIGHT:
         theme.apply("light")

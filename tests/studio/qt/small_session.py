@@ -6,12 +6,12 @@ from functools import lru_cache
 
 from render.frame import Frame
 from render.render import render_world
-from render.world import World, build_world
-from studio.document import Document
-from studio.project import Project
-from studio.qt.session import Render, Session
-from studio.stages import scaled
-from studio.templates import template_folder
+from render.world.world import World, build_world
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.project.templates import template_folder
+from studio.qt.core.session import Render, Session
+from studio.scan.stages import scaled
 
 FOLDER = template_folder("sphere")
 

@@ -1,0 +1,1 @@
+"""Where a line may be: colour channel, noise, candidate peaks."""

@@ -1,0 +1,1 @@
+"""Where in the pixels the line is: one estimator a file."""

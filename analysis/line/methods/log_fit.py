@@ -1,0 +1,149 @@
+"""A parabola fitted to the logarithm of the line: Caruana's unweighted fit and Guo's iterated weights.
+
+    minimise  sum w^2 (ln y - (a + b x + c x^2))^2,   u = -b / 2c,   sigma^2 = -1 / 2c
+
+Caruana, Searle, Heller & Shupack, Anal. Chem. 58 (1986): w = 1. Guo, IEEE Signal Process. Mag. 28 (2011), eq. 9 to 12:
+w = y at first, then the fitted model, which makes it equal to least squares on y itself. Both need pixels above the
+background; saturated ones are left out.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, PLATEAU, REACH, WIDTH
+from analysis.line.methods.line_profile import linear_variance
+from analysis.line.methods.window import brightest
+from analysis.line.result import Flag
+
+Float32 = NDArray[np.float32]
+Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+
+FRACTION = 0.2
+"""Caruana takes the pixels above this part of the brightest, and its two neighbours in any case."""
+WINDOW = 3.0
+"""Guo takes the pixels within so many sigmas that are above the background."""
+ITERATIONS = 12
+STEADY = 0.3
+"""Relative noise of a pixel at Caruana's level above which its logarithm leans, and no sigma is claimed."""
+NARROWEST = 0.55
+"""px; for narrower lines sampled logarithms bend, and no sigma is claimed."""
+
+_SATURATED, _TOO_FEW = int(Flag.SATURATED), int(Flag.TOO_FEW_PIXELS)
+_NOT_CONVERGED, _OUT_OF_WINDOW = int(Flag.NOT_CONVERGED), int(Flag.OUT_OF_WINDOW)
+_AT_BORDER = int(Flag.AT_BORDER)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _parabola(x: Array, z: Array, weight: Array, n: int, p: Array, inverse: Array) -> bool:
+    """Weighted fit of z (n,) by p[0] + p[1] x + p[2] x^2, with the inverse (3, 3) of the normal matrix."""
+    m0 = m1 = m2 = m3 = m4 = r0 = r1 = r2 = 0.0
+    for i in range(n):
+        w = weight[i]
+        x2 = x[i] * x[i]
+        m0 += w
+        m1 += w * x[i]
+        m2 += w * x2
+        m3 += w * x2 * x[i]
+        m4 += w * x2 * x2
+        r0 += w * z[i]
+        r1 += w * z[i] * x[i]
+        r2 += w * z[i] * x2
+    c00, c01, c02 = m2 * m4 - m3 * m3, m2 * m3 - m1 * m4, m1 * m3 - m2 * m2
+    determinant = m0 * c00 + m1 * c01 + m2 * c02
+    if not abs(determinant) > 1e-12 * m0 * m2 * m4:
+        return False
+    c11, c12, c22 = m0 * m4 - m2 * m2, m1 * m2 - m0 * m3, m0 * m2 - m1 * m1
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = c00 / determinant, c01 / determinant, c02 / determinant
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = c01 / determinant, c11 / determinant, c12 / determinant
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = c02 / determinant, c12 / determinant, c22 / determinant
+    for j in range(3):
+        p[j] = inverse[j, 0] * r0 + inverse[j, 1] * r1 + inverse[j, 2] * r2
+    return True
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _run(signal: Float32, mask: Mask, top: int, half: int, level: float) -> tuple[int, int]:
+    """First and last pixel of the run around `top` that is above a level, at least a pixel on either side."""
+    first = last = top
+    while first > max(0, top - half) and (mask[first - 1] or signal[first - 1] > level):
+        first -= 1
+    while last < min(signal.shape[0] - 1, top + half) and (mask[last + 1] or signal[last + 1] > level):
+        last += 1
+    return min(first, top - 1), max(last, top + 1)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def fit_logarithms(
+    signal: Float32, mask: Mask, floor: Float32, seeds: Array, flags: Mask, guo: bool, correlation: Array, out: Array
+) -> None:
+    """Scan lines (n, w) and seeds (n, k, 6) -> out (n, k, 6): u, sigma_u, width, amplitude, background, NaN."""
+    w = signal.shape[1]
+    x, y, z, weight, variance = np.empty(w), np.empty(w), np.empty(w), np.empty(w), np.empty(w)
+    p, inverse = np.empty(3), np.empty((3, 3))
+    for row in range(signal.shape[0]):
+        for k in range(seeds.shape[1]):
+            for j in range(6):
+                out[row, k, j] = np.nan
+            if flags[row, k] > _SATURATED:
+                continue
+            seed = seeds[row, k]
+            base = seed[BACKGROUND]
+            top = brightest(signal[row], mask[row], seed)
+            if top < 1 or top > w - 2:
+                flags[row, k] = _AT_BORDER
+                continue
+            half = max(1, math.ceil(min(WINDOW * seed[WIDTH] + seed[PLATEAU], seed[REACH])))
+            level = 0.0 if guo else FRACTION * max(signal[row, top] - base, 0.0)
+            count = 0
+            first, last = _run(signal[row], mask[row], top, half, base + level) if not guo else (top - half, top + half)
+            for i in range(max(0, first), min(w - 1, last) + 1):
+                value = signal[row, i] - base
+                if mask[row, i] == 0 and (value > level or (value > 0.0 and abs(i - top) < 2)):
+                    still = float(floor[row, min(i, floor.shape[1] - 1)])
+                    x[count], y[count], z[count] = i - top, value, math.log(value)
+                    variance[count] = max(signal[row, i] + still, 0.1 * abs(still))
+                    weight[count] = value * value if guo else 1.0
+                    count += 1
+            if count < 3:
+                flags[row, k] = _TOO_FEW
+                continue
+            good = _parabola(x, z, weight, count, p, inverse) and p[2] < 0.0
+            last = np.inf
+            for _ in range(ITERATIONS if guo else 0):
+                if not good:
+                    break
+                u = -0.5 * p[1] / p[2]
+                if abs(u - last) < 1e-5:
+                    break
+                last = u
+                highest = p[0] - 0.25 * p[1] * p[1] / p[2]
+                for i in range(count):
+                    weight[i] = math.exp(2.0 * (p[0] + (p[1] + p[2] * x[i]) * x[i] - highest))
+                good = _parabola(x, z, weight, count, p, inverse) and p[2] < 0.0
+            if not good:
+                flags[row, k] = _NOT_CONVERGED
+                continue
+            u = -0.5 * p[1] / p[2]
+            if abs(u) > half:
+                flags[row, k] = _OUT_OF_WINDOW
+                continue
+            sigma = np.nan
+            weakest = FRACTION * seed[AMPLITUDE]
+            still = max(base + float(floor[row, min(top, floor.shape[1] - 1)]), 0.0)
+            if seed[WIDTH] >= NARROWEST and (guo or math.sqrt(weakest + still) < STEADY * weakest):
+                for i in range(count):
+                    d1 = inverse[1, 0] + (inverse[1, 1] + inverse[1, 2] * x[i]) * x[i]
+                    d2 = inverse[2, 0] + (inverse[2, 1] + inverse[2, 2] * x[i]) * x[i]
+                    # du = -(db + 2 u dc) / 2c, and ln y moves by 1 / y (by 1 / model where the weights are its square)
+                    model = math.exp(p[0] + (p[1] + p[2] * x[i]) * x[i]) if guo else y[i]
+                    weight[i] *= -(d1 + 2.0 * u * d2) / (2.0 * p[2] * model)
+                sigma = math.sqrt(linear_variance(weight, variance, x, count, correlation))
+            out[row, k, 0], out[row, k, 1] = top + u, sigma
+            out[row, k, 2], out[row, k, 3] = math.sqrt(-0.5 / p[2]), math.exp(p[0] - 0.25 * p[1] * p[1] / p[2])
+            out[row, k, 4] = base

@@ -1,0 +1,112 @@
+"""The pixels around a seed as one piece without gaps, and the noise of whatever is computed from them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from analysis.line.detection.channel import MISSING, SATURATED
+from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, WIDTH
+from analysis.line.methods.line_profile import linear_variance
+
+Float32 = NDArray[np.float32]
+Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def brightest(signal: Float32, mask: Mask, seed: Array) -> int:
+    """The brightest usable pixel of a scan line (w,) within a sigma of the seed; a plateau's middle."""
+    w = signal.shape[0]
+    middle = round(seed[CENTRE])
+    if seed[PLATEAU] > 0.0:
+        return middle
+    reach = max(2, math.ceil(seed[WIDTH]))
+    best, top = middle, -np.inf
+    for i in range(max(0, middle - reach), min(w, middle + reach + 1)):
+        if mask[i] & MISSING == 0 and signal[i] > top:
+            best, top = i, signal[i]
+    return best
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def load_window(signal: Float32, mask: Mask, first: int, last: int, base: float, y: Array) -> int:
+    """Pixels first..last less the background -> y; gaps filled linearly. Returns how many were there, -1 off the image.
+
+    The pixels at either side of a gap that reaches the window's end are looked for outside it.
+    """
+    w = signal.shape[0]
+    if first < 0 or last > w - 1:
+        return -1
+    usable = 0
+    for i in range(first, last + 1):
+        if mask[i] & MISSING == 0:
+            y[i - first] = signal[i] - base
+            usable += 1
+        else:
+            left, right, t = _neighbours(mask, i)
+            y[i - first] = (1.0 - t) * signal[left] + t * signal[right] - base if left >= 0 else 0.0
+    return usable
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _neighbours(mask: Mask, i: int) -> tuple[int, int, float]:
+    """The usable pixels left and right of a gap and where i lies between them, 0 to 1; left -1: there are none."""
+    w = mask.shape[0]
+    left, right = i - 1, i + 1
+    while left >= 0 and mask[left] & MISSING:
+        left -= 1
+    while right < w and mask[right] & MISSING:
+        right += 1
+    if left < 0 and right >= w:
+        return -1, -1, 0.0
+    if left < 0:
+        return right, right, 0.0
+    if right >= w:
+        return left, left, 0.0
+    return left, right, (i - left) / (right - left)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def any_saturated(mask: Mask, first: int, last: int) -> bool:
+    """Whether a pixel of first..last only says "at least this much"."""
+    found = np.uint8(0)
+    for i in range(max(first, 0), min(last, mask.shape[0] - 1) + 1):
+        found |= mask[i] & np.uint8(SATURATED)
+    return bool(found > 0)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def position_sigma(
+    signal: Float32, mask: Mask, floor: Float32, first: int, n: int, weight: Array, correlation: Array
+) -> float:
+    """Standard deviation of a position that moves by weight[i] px for one electron more in pixel first + i.
+
+    Gaps hand their weight on to the pixels they were filled from. weight (n,) is changed.
+    """
+    x, variance = np.empty(n), np.empty(n)
+    for i in range(n):
+        pixel = first + i
+        if mask[pixel] & MISSING:
+            left, right, t = _neighbours(mask, pixel)
+            if first <= left < first + n:
+                weight[left - first] += (1.0 - t) * weight[i]
+            if first <= right < first + n:
+                weight[right - first] += t * weight[i]
+            weight[i] = 0.0
+    for i in range(n):
+        pixel = first + i
+        still = float(floor[min(pixel, floor.shape[0] - 1)])
+        x[i] = pixel
+        variance[i] = max(signal[pixel] + still, 0.1 * abs(still))
+    return math.sqrt(linear_variance(weight, variance, x, n, correlation))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def write_peak(seed: Array, u: float, sigma_u: float, out: Array) -> None:
+    """A position with the seed's width, amplitude and background -> out (6,)."""
+    out[0], out[1] = u, sigma_u
+    out[2], out[3], out[4], out[5] = seed[WIDTH], seed[AMPLITUDE], seed[BACKGROUND], np.nan

@@ -1,0 +1,1 @@
+"""Lines of any direction, as points with their normal."""

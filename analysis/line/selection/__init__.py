@@ -1,0 +1,1 @@
+"""Which candidate is the line: continuity along it, and geometry of the working volume."""

@@ -1,0 +1,1 @@
+"""Lines of several images: exposures, laser on and off, space-time."""

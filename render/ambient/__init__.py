@@ -1,0 +1,1 @@
+"""The light of lamps and sky: path tracing with NEE and MIS."""

@@ -1,0 +1,120 @@
+"""The state of a wavefront of paths from the camera, how paths begin, and how what they see is added up."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.camera.distortion import tilt_matrix
+from render.camera.lens import chief_ray, lens_direction, lens_point, lens_position
+from render.sampling.low_discrepancy import LENGTH, pair, pair_at, pair_draw
+from render.world.triangles import View
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+
+ON_IMAGE, ON_LENS, FIRST_SURFACE, EACH_SURFACE = 0, 1, 2, 4
+"""Dimensions of the sequence: two pairs for the camera, then four for each surface."""
+DROPPED, CLAMPED = 0, 1
+"""A tally (2,): contributions that were no number, infinite or negative; those clamped."""
+CUT = 3
+"""Sums (.., 4): R, G, B, and the mean of what the clamp took of them."""
+
+
+class Wave(NamedTuple):
+    """The paths under way, one a row."""
+
+    origin: Float32
+    """(n, 3) m, from the centre of the scene."""
+    direction: Float32
+    """(n, 3) unit."""
+    weight: Float32
+    """(n, 3) what a radiance seen by the ray adds to its pixel."""
+    density: Float32
+    """(n,) with which the direction was drawn, 1/sr; -1: a single direction, or the camera's."""
+    owner: Int
+    """(n,) twice the pixel's place in the chunk, and the half of its samples (0 or 1)."""
+    sample: Int
+    """(n,) number of the sample in its half."""
+    medium: Int
+    """(n,) one more than the material that the ray is within; 0: in the open."""
+
+
+class Shadows(NamedTuple):
+    """Rays that add `light` (.., 3) to their owner's pixel if nothing is met before `far`."""
+
+    origin: Float32
+    direction: Float32
+    far: Float32
+    light: Float32
+    owner: Int
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def launch(
+    view: View, table: Float32, seed: int, pixels: Int, first: Int, count: Int, centre: Float, wave: Wave
+) -> int:
+    """Rays of samples first .. first + count of both halves, (m, 2), of pixels (m,) -> wave. Returns how many."""
+    k = view.distortion
+    tilt, distorted = tilt_matrix(k[12], k[13]), bool(np.any(k))
+    fx, fy, cx, cy, skew = view.intrinsics
+    n, draw = 0, np.uint64(0)
+    for i in range(pixels.shape[0]):
+        column, row = pixels[i] % view.width, pixels[i] // view.width
+        for half in range(2):
+            index, start = 2 * pixels[i] + half, first[i, half]
+            for s in range(start, start + count[i, half]):
+                if s == start or s % LENGTH == 0:
+                    draw = pair_draw(seed, index, s, ON_IMAGE)
+                u, v = pair_at(table, draw, s)
+                u, v = column - 0.5 + u, row - 0.5 + v
+                y = (v - cy) / fy
+                x = (u - cx - skew * y) / fx
+                if distorted:
+                    x, y, ok = chief_ray(view, tilt, distorted, u, v)
+                    if not ok:
+                        continue
+                a = b = 0.0
+                if view.lens[0] > 0.0:
+                    u, v = pair(table, seed, index, s, ON_LENS)
+                    a, b = lens_point(view.lens[0], u, v)
+                o0, o1, o2 = lens_position(view, a, b)
+                d0, d1, d2 = lens_direction(view, x, y, a, b)
+                scale = 1.0 / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+                wave.origin[n, 0], wave.origin[n, 1], wave.origin[n, 2] = o0 - centre[0], o1 - centre[1], o2 - centre[2]
+                wave.direction[n, 0], wave.direction[n, 1], wave.direction[n, 2] = scale * d0, scale * d1, scale * d2
+                wave.weight[n, 0] = wave.weight[n, 1] = wave.weight[n, 2] = 1.0
+                wave.density[n], wave.owner[n], wave.sample[n], wave.medium[n] = -1.0, 2 * i + half, s, 0
+                n += 1
+    return n
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def deposit(sums: Float, tally: Float, owner: int, limit: float, r: float, g: float, b: float) -> None:
+    """Add a contribution to its owner; what is no number, infinite or negative is dropped and counted."""
+    if not (r >= 0.0 and g >= 0.0 and b >= 0.0 and r + g + b < np.inf):
+        tally[DROPPED] += 1.0
+        return
+    largest = max(r, g, b)
+    if largest > limit:
+        scale = limit / largest
+        tally[CLAMPED] += 1.0
+        sums[owner, CUT] += (1.0 - scale) * (r + g + b) / 3.0
+        r, g, b = scale * r, scale * g, scale * b
+    sums[owner, 0] += r
+    sums[owner, 1] += g
+    sums[owner, 2] += b
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def add_clear(shadows: Shadows, occluded: NDArray[np.bool_], limit: float, sums: Float, tally: Float) -> None:
+    """Add what every clear shadow ray sees to its owner (.., 4)."""
+    for j in range(occluded.shape[0]):
+        if not occluded[j]:
+            light = shadows.light[j]
+            deposit(sums, tally, shadows.owner[j], limit, light[0], light[1], light[2])

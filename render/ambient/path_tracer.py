@@ -1,0 +1,153 @@
+"""Paths from the camera through a scene, in waves: intersect, shade, connect, until none is left."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.ambient.light_sampling import Lights, pack_lights
+from render.ambient.path_kernels import shade_diffuse, shade_glossy
+from render.ambient.path_state import Shadows, Wave, add_clear, launch
+from render.ambient.random_walk import wander
+from render.base.errors import Cancelled
+from render.base.threads import Cancel
+from render.laser_indirect.random_walk import MOST_STEPS
+from render.sampling.low_discrepancy import pair_table
+from render.scene.scene import Scene
+from render.world.embree import RayScene
+from render.world.triangles import Surface, View, has_gloss, has_medium
+from render.world.world import World
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+
+WAVE = 1 << 15
+"""Rays: their states stay in the cache, and a pass through a room full of mirrors is cancelled in time."""
+UNBOUNDED = 1 << 30
+
+
+@dataclass(frozen=True)
+class CameraPaths:
+    """A scene and a camera, ready to be sampled."""
+
+    surface: Surface
+    rays: RayScene
+    lights: Lights
+    environment: Float
+    view: View
+    surfaces: int
+    """The most that light may meet, counted as in `render.ambient.path_kernels`."""
+    limit: float
+    """The most radiance that a contribution by way of two and more surfaces may add; infinite: no clamp."""
+    seed: int
+    _scratch: threading.local = field(default_factory=threading.local, repr=False, compare=False)
+
+    def add(self, pixels: Int, first: Int, count: Int, sums: Float, tally: Float, cancelled: Cancel | None) -> None:
+        """Samples first .. first + count, (m, 2) for both halves, of the pixels (m,), at most WAVE in all.
+
+        Their radiance is added to sums (2 m, 4), halves side by side. Raises Cancelled.
+        """
+        wave, shadows = self._arrays()
+        rays, glossy, media = self.rays, has_gloss(self.surface), has_medium(self.surface)
+        shade = shade_glossy if glossy else shade_diffuse
+        table = pair_table()
+        n = launch(self.view, table, self.seed, pixels, first, count, rays.centre, wave)
+        depth = 0
+        while n > 0:
+            if cancelled is not None and cancelled():
+                raise Cancelled
+            # only rays of neighbouring pixels go much the same way, and those from where they meet a surface to a lamp
+            side_by_side = depth == 0
+            triangle, distance = rays.intersect(wave.origin[:n], wave.direction[:n], coherent=side_by_side)
+            if media:
+                self._walk(wave, n, depth, pixels, triangle, distance, cancelled)
+            n, asked = shade(
+                self.surface,
+                self.lights,
+                self.environment,
+                table,
+                self.seed,
+                pixels,
+                rays.centre,
+                rays.surface_offset,
+                depth,
+                self.surfaces,
+                self.limit,
+                triangle,
+                wave,
+                shadows,
+                sums,
+                tally,
+            )
+            if asked:
+                blocked = rays.occluded(
+                    shadows.origin[:asked], shadows.direction[:asked], shadows.far[:asked], coherent=side_by_side
+                )
+                add_clear(shadows, blocked, self.limit if depth > 0 else np.inf, sums, tally)
+            depth += 1
+
+    def _walk(
+        self, wave: Wave, n: int, depth: int, pixels: Int, triangle: Int, distance: Float32, cancelled: Cancel | None
+    ) -> None:
+        """Take every path within a medium to its boundary."""
+        walking = np.flatnonzero(wave.medium[:n]).astype(np.int32)
+        distance = distance[walking]
+        for step in range(MOST_STEPS):
+            left = wander(walking, distance, self.surface.rows, self.seed, pixels, depth, step, wave, triangle)
+            if not left:
+                break
+            if cancelled is not None and cancelled():
+                raise Cancelled
+            walking = walking[:left]
+            triangle[walking], distance = self.rays.intersect(wave.origin[walking], wave.direction[walking])
+
+    def _arrays(self) -> tuple[Wave, Shadows]:
+        """Of this thread: fresh ones would cost as much as tracing, in pages that the system must clear."""
+        arrays: tuple[Wave, Shadows] | None = getattr(self._scratch, "arrays", None)
+        if arrays is None:
+            m = 2 * WAVE
+            wave = Wave(
+                origin=np.empty((WAVE, 3), np.float32),
+                direction=np.empty((WAVE, 3), np.float32),
+                weight=np.empty((WAVE, 3), np.float32),
+                density=np.empty(WAVE, np.float32),
+                owner=np.empty(WAVE, np.int32),
+                sample=np.empty(WAVE, np.int32),
+                medium=np.empty(WAVE, np.int32),
+            )
+            shadows = Shadows(
+                origin=np.empty((m, 3), np.float32),
+                direction=np.empty((m, 3), np.float32),
+                far=np.empty(m, np.float32),
+                light=np.empty((m, 3), np.float32),
+                owner=np.empty(m, np.int32),
+            )
+            arrays = self._scratch.arrays = wave, shadows
+        return arrays
+
+
+def camera_paths(
+    world: World,
+    scene: Scene,
+    view: View,
+    *,
+    surfaces: int | None = 1,
+    clamp: float | None = None,
+    seed: int = 0,
+) -> CameraPaths:
+    """surfaces: None for as many as roulette lets a path meet; clamp in W/(m^2 sr)."""
+    surface = world.surface
+    return CameraPaths(
+        surface,
+        world.rays,
+        pack_lights(scene, surface),
+        np.array(scene.environment.radiance, dtype=np.float64),
+        view,
+        UNBOUNDED if surfaces is None else surfaces,
+        np.inf if clamp is None else clamp,
+        seed,
+    )

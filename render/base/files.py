@@ -1,0 +1,142 @@
+"""Files that are either whole or absent, and paths that stay inside the project folder."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import secrets
+import stat
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path, PureWindowsPath
+
+from render.base.errors import InputError
+
+TEMPORARY = re.compile(r"\.(?P<stem>.+)\.[0-9a-f]{8}(?P<suffix>(\.[^.]*)?)")
+
+
+@contextmanager
+def atomic_write(path: Path | str) -> Iterator[Path]:
+    """Yield a temporary path beside `path` (same suffix) to write to; on success it replaces `path` in one step.
+
+    The folder is made if missing. On any failure, Ctrl-C included, the temporary file goes and `path` stays as it was.
+
+    InputError: the folder or the file cannot be written (permission, full disk, a folder or a device of that name).
+    """
+    target = Path(os.path.realpath(path))  # through a symlink, as plain writing would
+    temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(4)}{target.suffix}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir():
+            raise IsADirectoryError(None, "a folder of that name exists")
+        if target.exists() and not target.is_file():  # replacing it would take a device from the system
+            raise OSError(None, "it is a device or a pipe, not a regular file")
+        temporary.touch(exist_ok=False)
+        yield temporary
+        with open(temporary, "r+b") as written:
+            os.fsync(written.fileno())
+        os.replace(temporary, target)
+    except OSError as error:
+        named = {None, str(temporary), str(target), *map(str, target.parents)}
+        if (None if error.filename is None else str(error.filename)) not in named:
+            raise  # about another file, which the writer was reading
+        raise InputError(
+            "the file cannot be written",
+            where=str(path),
+            found=error.strerror or error,
+            cure="choose a folder that you may write to and that has free space",
+        ) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink()
+
+
+def unfinished_write(name: str) -> str | None:
+    """The file's name that a temporary file of `atomic_write` was to get; None: the name is of no such file.
+
+    A program that is killed leaves one behind; whoever knows that nobody writes there any more may remove it.
+    """
+    found = TEMPORARY.fullmatch(name)
+    return found["stem"] + found["suffix"] if found else None
+
+
+def inside(root: Path, relative: str, where: str) -> Path:
+    """The resolved path of `relative` below the folder `root`; it need not exist.
+
+    where: the field that holds the path, for the message.
+    InputError: `relative` is absolute, or leaves `root` by `..` or by a symbolic link.
+    """
+    base = os.path.realpath(root)
+    allowed = "a path relative to the project file, inside its folder"
+    cure = "copy the file into the project folder"
+    # Windows' rules are asked as well, so that a project is as safe there as here.
+    if not relative or "\0" in relative or os.path.isabs(relative) or PureWindowsPath(relative).anchor:
+        raise InputError("the path is not relative", where=where, found=relative, allowed=allowed, cure=cure)
+    resolved = Path(os.path.realpath(os.path.join(base, relative)))
+    if not resolved.is_relative_to(base):
+        raise InputError("the path leaves the project folder", where=where, found=relative, allowed=allowed, cure=cure)
+    return resolved
+
+
+def read_bytes(path: Path, most: int, what: str = "file", where: str | None = None) -> bytes:
+    """The bytes of a regular file of at most `most` bytes; its size is looked at before anything is read.
+
+    where: the field that names it, for the message; without one, its path.
+    InputError: missing, a folder, a device or a pipe, larger than that, or not readable.
+    """
+    where = str(path) if where is None else where
+    try:
+        # a pipe that nobody writes to would block the opening itself
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        try:
+            _check_regular(os.fstat(descriptor), most, what, where)
+            with open(descriptor, "rb", closefd=False) as file:
+                data = file.read(most + 1)  # it may have grown since
+        finally:
+            os.close(descriptor)
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"there is no such {what}", where=where) from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"the {what} cannot be read", where=where, found=reason) from None
+    if len(data) > most:
+        raise InputError(f"the {what} is too big", where=where, found=f"over {most} bytes", allowed=f"{most} bytes")
+    return data
+
+
+def check_regular(path: Path, most: int, what: str = "file", where: str | None = None) -> None:
+    """InputError: `path` is no regular file of at most `most` bytes. For readers that open the file themselves."""
+    where = str(path) if where is None else where
+    try:
+        _check_regular(os.stat(path), most, what, where)
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"there is no such {what}", where=where) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"the {what} cannot be read", where=where, found=reason) from None
+
+
+def _check_regular(status: os.stat_result, most: int, what: str, where: str) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise InputError(f"the {what} is a folder", where=where)
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(f"the {what} is not a regular file", where=where, found="a device or a pipe")
+    if status.st_size > most:
+        found = f"{status.st_size} bytes"
+        raise InputError(f"the {what} is too big", where=where, found=found, allowed=f"{most} bytes")
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a regular file's bytes, 64 lower-case hexadecimal digits. InputError: it is none, or not readable."""
+    check_regular(path, sys.maxsize)
+    try:
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError("the file cannot be read", where=str(path), found=error.strerror or error) from error

@@ -1,0 +1,34 @@
+"""The guard between the stages: a number that is none ends the work, with stage and likely cause named."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.base.errors import InputError
+
+CURES = {
+    "render": "bring the scene's numbers (distances, widths, powers, distortion) nearer to those of a real scanner",
+    "sensor": "bring the sensor's numbers (exposure, gain, noise, full well) nearer to those of a real camera",
+    "line": "look for pixels that are no numbers in the image, or choose another extraction.method",
+    "points": "check the camera's distortion and the poses of camera and laser",
+    "errors": "check the poses of camera and laser, and the mesh",
+}
+
+
+def check_finite(stage: str, **arrays: NDArray[np.floating]) -> None:
+    """InputError: an array that `stage`, a key of `CURES`, hands on holds NaN or an infinity; keywords name them."""
+    for name, values in arrays.items():
+        # the sum of float32 cannot overflow float64, and needs no array of its own
+        with np.errstate(invalid="ignore", over="ignore"):
+            if np.isfinite(values.sum(dtype=np.float64)):
+                continue
+        bad = int(np.count_nonzero(~np.isfinite(values)))
+        if bad:
+            raise InputError(
+                f"the stage gave {name.replace('_', ' ')} that are no finite numbers",
+                where=f"stage {stage!r}",
+                found=f"{bad} of {values.size} values NaN or infinite",
+                allowed="finite numbers",
+                cure=CURES[stage],
+            )

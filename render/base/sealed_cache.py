@@ -1,0 +1,115 @@
+"""Kernels as files that are believed only as they were written: damage, or a full disk, costs compiling anew.
+
+Numba believes its cache: a damaged file stops the program (EOFError, or LLVM ends the process), and so does a folder
+that cannot be written. Here each file ends in a seal, which unpickling does not read: what fails it is not there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import warnings
+from typing import Any
+
+import numba
+from numba.core import caching
+
+from render.base.kernel_cache import ROOMS, ROOT, kept_in
+
+SEAL_BYTES = 16
+ROOM_PATHS = tuple(os.path.join(ROOT, room, "") for room in ROOMS)
+
+
+def cache_of(kernel: Any) -> caching.FunctionCache:
+    """The cache of a Python function: a sealed one for a kernel of this program, numba's own for any other."""
+    ours = os.path.abspath(kernel.__code__.co_filename).startswith(ROOM_PATHS)
+    return (KernelCache if ours else caching.FunctionCache)(kernel)
+
+
+class Locator(caching.UserProvidedCacheLocator):
+    """The folder of the kernels, whether or not it can be written."""
+
+    def __init__(self, kernel: Any, source: str) -> None:
+        super().__init__(kernel, source)
+        self._cache_path = os.path.join(kept_in(), self.get_suitable_cache_subpath(source))
+
+    @classmethod
+    def from_function(cls, kernel: Any, source: str) -> Locator:
+        return cls(kernel, source)
+
+
+class KernelImplementation(caching.CompileResultCacheImpl):
+    _locator_classes = (Locator,)
+
+
+class SealedFiles(caching.IndexDataCacheFile):
+    """The index and the machine code of one kernel."""
+
+    def save(self, key: Any, data: Any) -> None:
+        super().save(key, (key, data))
+
+    def load(self, key: Any) -> Any:
+        """The data, or None. Two processes that save at once may give two keys one file: it says whose it is."""
+        try:
+            found = super().load(key)
+        except Exception:  # of unpickling: what another version of some library wrote
+            return None
+        return found[1] if found is not None and found[0] == key else None
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            self._check(self._index_path)
+        except OSError:
+            return {}
+        return dict(super()._load_index())
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        version, content = pickle.dumps(self._version, protocol=-1), self._dump((self._source_stamp, overloads))
+        self._write(self._index_path, version + content)
+
+    def _load_data(self, name: str) -> Any:
+        self._check(self._data_path(name))
+        return super()._load_data(name)
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._data_path(name), self._dump(data))
+
+    def _write(self, path: str, content: bytes) -> None:
+        with self._open_for_write(path) as file:
+            file.write(content + _seal(path, content))
+
+    def _check(self, path: str) -> None:
+        """OSError: the file is missing, cannot be read or is not as it was written."""
+        with open(path, "rb") as file:
+            data = file.read()
+        if data[-SEAL_BYTES:] != _seal(path, data[:-SEAL_BYTES]):
+            raise OSError(f"{path} is damaged")
+
+
+class KernelCache(caching.FunctionCache):
+    """The cache of one kernel. Nothing that is wrong with its files is an error."""
+
+    _impl_class = KernelImplementation
+    _told = False
+
+    def __init__(self, kernel: Any) -> None:
+        super().__init__(kernel)
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file: Any = SealedFiles(self._cache_path, self._impl.filename_base, stamp)
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        try:
+            super().save_overload(signature, data)
+        except OSError as error:
+            if not KernelCache._told:
+                KernelCache._told = True
+                reason = f"{error.strerror or error}; they are compiled anew at the next start"
+                warnings.warn(f"compiled kernels cannot be kept in {kept_in()}: {reason}", UserWarning, stacklevel=2)
+
+
+def _seal(path: str, content: bytes) -> bytes:
+    """What the content of the file of that name ends in, 16 bytes."""
+    digest = hashlib.blake2b(f"{numba.__version__} {os.path.basename(path)}\0".encode(), digest_size=SEAL_BYTES)
+    digest.update(content)
+    return digest.digest()

@@ -1,0 +1,73 @@
+"""Work in chunks on threads. Results never depend on the number of threads: a chunk writes its own slice."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+
+from render.base.errors import Cancelled
+
+Cancel = Callable[[], bool]
+Progress = Callable[[float], None]
+
+
+def thread_count(threads: int | None) -> int:
+    """The number asked for, or the number of processors this process may use."""
+    if threads is not None:
+        return max(1, threads)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def map_chunks(
+    work: Callable[[int, int], None],
+    count: int,
+    chunk: int,
+    threads: int | None = None,
+    cancelled: Cancel | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Call work(start, stop) over range(count) in chunks. Raises Cancelled between chunks; progress gets 0..1.
+
+    The calling thread works as well, and alone it tells progress: a pool that it waits for would cost a short call more
+    than its work.
+    """
+    starts = range(0, count, chunk)
+    lock, left = threading.Lock(), iter(starts)
+    done = 0
+    failed: list[BaseException] = []
+
+    def some(told: Progress | None) -> None:
+        nonlocal done
+        while True:
+            with lock:
+                start = None if failed else next(left, None)
+            if start is None:
+                return
+            if cancelled is not None and cancelled():
+                raise Cancelled
+            work(start, min(start + chunk, count))
+            with lock:
+                done += 1
+            if told is not None:
+                told(done / len(starts))
+
+    def helper() -> None:
+        try:
+            some(None)
+        except BaseException as error:
+            failed.append(error)
+
+    helpers = [threading.Thread(target=helper) for _ in range(min(thread_count(threads), len(starts)) - 1)]
+    for thread in helpers:
+        thread.start()
+    try:
+        some(progress)
+    except BaseException as error:
+        failed.append(error)
+    for thread in helpers:
+        thread.join()
+    if failed:
+        raise failed[0]
+    if helpers and progress is not None:
+        progress(1.0)

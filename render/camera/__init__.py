@@ -1,0 +1,1 @@
+"""The camera: projection, distortion, thin lens, focus, and the rays of its pixels."""

@@ -1,0 +1,186 @@
+"""What a render has done so far, kept so that it can go on later: in memory, and in a file beside its frame.
+
+Only what took long is kept: the sums of the reflected and of the ambient light, and what they learnt. The rest is
+computed anew, with the same numbers. What goes on ends in the same image, bit for bit, as without interruption.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.base.errors import InputError
+from render.base.files import atomic_write, check_regular
+from render.base.kernel_cache import source_key
+from render.laser_indirect.accumulator import Gathered
+from render.scene.scene import Scene
+from render.scene.settings import RenderSettings
+from render.world.world import World
+
+Arrays = dict[str, NDArray[Any]]
+
+TARGETS = {"indirect_error", "light_paths", "ambient_error", "ambient_samples", "truth_images"}
+"""Settings that say when to end, which may be others when a render goes on."""
+MAX_BYTES = 2**33
+EVERY = 30.0
+"""s between two writings of the file."""
+
+
+class Part(Protocol):
+    """What can be kept: the sums of a light group."""
+
+    whole: bool
+    """False while it changes."""
+
+    def arrays(self) -> Arrays: ...
+
+
+@dataclass
+class RenderState:
+    """The state of one frame's render; hand it to the renderer, and again to go on."""
+
+    marks: dict[str, str]
+    """Of what it is a render."""
+    path: Path | None = None
+    """The file that follows; None: in memory only."""
+    lasers: dict[int, Gathered] = field(default_factory=dict)
+    """Reflected light of each laser."""
+    ambient: Arrays | None = None
+    """As read from a file, for `render.ambient.integrator` to go on from."""
+    film: Part | None = None
+    """The ambient light under way."""
+    written: float = field(default_factory=time.monotonic)
+
+    def keep_laser(self, index: int, gathered: Gathered) -> None:
+        self.lasers[index] = gathered
+        self._write_if_due()
+
+    def keep_film(self, film: Part) -> None:
+        self.film = film
+        self._write_if_due()
+
+    def pause(self) -> None:
+        """What is under way becomes what to go on from."""
+        if self.film is not None and self.film.whole:
+            self.ambient = self.film.arrays()
+        self.film = None
+        self.lasers = {i: gathered for i, gathered in self.lasers.items() if gathered.whole}
+
+    def write(self) -> bool:
+        """Bring the file up to date; False: there is nothing worth a file. InputError: it cannot be written."""
+        parts = {f"laser {i}": gathered.arrays() for i, gathered in self.lasers.items() if gathered.whole}
+        if self.film is not None and self.film.whole:
+            parts["ambient"] = self.film.arrays()
+        elif self.ambient is not None:
+            parts["ambient"] = self.ambient
+        if self.path is None or not parts:
+            return False
+        named = {f"{part}/{name}": array for part, arrays in parts.items() for name, array in arrays.items()}
+        marks = {f"of/{name}": np.array(mark) for name, mark in self.marks.items()}
+        with atomic_write(self.path) as temporary, open(temporary, "wb") as file:
+            np.savez(file, allow_pickle=False, **marks, **named)
+        self.written = time.monotonic()
+        return True
+
+    def remove(self) -> None:
+        """The frame is finished: no file stays."""
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
+
+    def _write_if_due(self) -> None:
+        if self.path is not None and time.monotonic() - self.written > EVERY:
+            self.write()
+
+
+def state_of(
+    world: World,
+    scene: Scene,
+    settings: RenderSettings,
+    *,
+    step: int = 0,
+    seed: int = 0,
+    path: Path | None = None,
+    plan: str | None = None,
+) -> RenderState:
+    """A render that has not begun; plan: the mark of a plan made for a whole scan (`render.scan_plan`)."""
+    marks = fingerprint(world, scene, settings, step=step, seed=seed)
+    return RenderState(marks if plan is None else {**marks, "plan of the light": plan}, path)
+
+
+def read_state(state: RenderState) -> RenderState:
+    """What the file of a new state holds; the state itself where there is no file.
+
+    InputError: the file is damaged, or of another scene, other settings or another version of the program.
+    """
+    if state.path is None or not state.path.is_file():
+        return state
+    where, cure = str(state.path), "delete it, or render without --resume"
+    check_regular(state.path, MAX_BYTES, "saved render")
+    try:
+        with np.load(state.path, allow_pickle=False) as file:
+            found: dict[str, Arrays] = {}
+            for key in file.files:
+                part, _, name = key.partition("/")
+                found.setdefault(part, {})[name] = file[key]
+        marks = {name: str(mark) for name, mark in found.pop("of").items()}
+    except Exception as error:  # a damaged archive fails in any way, also by asking for memory without end
+        found_bytes = "data cut short or changed"
+        raise InputError("the saved render is damaged", where=where, found=found_bytes, cure=cure) from error
+    others = [name for name, mark in state.marks.items() if marks.get(name) != mark]
+    if others:
+        raise InputError(
+            "the saved render is of something else",
+            where=where,
+            found=f"another {' and another '.join(others)}",
+            allowed="a render of the same scene with the same settings; only targets may differ",
+            cure=cure,
+        )
+    try:
+        lasers = {
+            int(name.split()[1]): Gathered.of_arrays(arrays) for name, arrays in found.items() if name != "ambient"
+        }
+    except (KeyError, ValueError, IndexError, TypeError):
+        told = "arrays that are missing or of another shape"
+        raise InputError("the saved render is damaged", where=where, found=told, cure=cure) from None
+    return RenderState(state.marks, state.path, lasers, found.get("ambient"))
+
+
+def fingerprint(
+    world: World, scene: Scene, settings: RenderSettings, *, step: int = 0, seed: int = 0
+) -> dict[str, str]:
+    """What of scene and settings decides the numbers of a render, part by part."""
+    arrays = [value for value in vars(world).values() if isinstance(value, np.ndarray)]
+    materials = "".join(f"{type(material).__name__}{material.model_dump_json()}" for material in world.materials)
+    rest = scene.model_dump(mode="json", exclude={"objects"})
+    return {
+        "mesh, place or texture": _digest(*arrays),
+        "material": _digest(materials),
+        "camera, laser, lamp or motion": _digest(repr(rest)),
+        "render setting": _digest(repr(settings.model_dump(mode="json", exclude=TARGETS))),
+        "step or seed": f"{step}, {seed}",
+        "version of the program": _program(),
+    }
+
+
+@cache
+def _program() -> str:
+    """Of the kernels as they were when they were loaded."""
+    return source_key()
+
+
+def _digest(*parts: NDArray[Any] | str) -> str:
+    digest = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, str):
+            digest.update(part.encode())
+        else:
+            digest.update(f"{part.shape}{part.dtype}".encode())
+            digest.update(np.ascontiguousarray(part).tobytes())
+    return digest.hexdigest()[:32]

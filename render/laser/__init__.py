@@ -1,0 +1,1 @@
+"""The line laser: its sheet, and the irradiance it makes."""

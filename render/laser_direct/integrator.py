@@ -1,0 +1,267 @@
+"""Direct light of a laser: each lit pixel's mean radiance under a box filter.
+
+A pixel is seen by one ray first (`render.laser_direct.centre_ray`). Where that is not enough (edges, shadows, strong
+curvature, texture) it is divided into n x n cells with one jittered ray each (`render.laser_direct.shading`). Each ray
+also predicts its whole pixel; the spread of these predictions is the error estimate, from which
+`render.laser_direct.adaptive_sampling` tells how many cells each pixel needs for the image's error to be below the
+target, until it is. Through a thin lens each ray has its own point of the aperture, and `render.laser_direct.aperture`
+takes the noise of that away.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import partial
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.base.pose import invert
+from render.base.threads import Cancel, Progress, map_chunks
+from render.camera.camera import Camera
+from render.camera.rays import camera_rays, lens_rays
+from render.laser.laser import LineLaser
+from render.laser_direct.adaptive_sampling import cells_needed, doubt_beside, graded
+from render.laser_direct.aperture import gather_aperture
+from render.laser_direct.centre_ray import gather_first, look_around
+from render.laser_direct.rasterise import reachable_pixels
+from render.laser_direct.shading import (
+    gather,
+    place,
+    shade_diffuse,
+    shade_diffuse_lens,
+    shade_glossy,
+    shade_glossy_lens,
+)
+from render.material.material import reflectance_weights
+from render.sampling.low_discrepancy import pair_table
+from render.world.triangles import Surface, has_gloss
+from render.world.world import World
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+Places = NDArray[np.int64]
+
+RAYS_A_JOB = 1 << 13
+"""Enough to hide Python's share, few enough to share work evenly and to keep what is known of them near."""
+AIM = 0.9
+"""Of the target: what an estimate promises does not always come."""
+LEAST = 0.25
+"""Of its equal share of the target: a pixel below cannot keep the image from it."""
+GROWTH = 4
+"""Times the cells a side that a pixel may get at once."""
+EDGE_ORDER, APERTURE_ORDER = 3.0, 2.25
+"""Powers of the cells a side with which the variance falls: of an edge, and of one seen through an aperture."""
+MISSED, MISSED_ORDER = 0.3, 5.0
+"""Of the jump at an edge: the error of a pixel beside, a corner of which may be beyond it between its rays."""
+BETWEEN = 0.35
+"""Of the radiance, over the square of the cells: the RMS area beyond an edge along a pixel's border that no ray met."""
+SAME_BLUR = 0.2
+"""Of the error of a pixel seen through an aperture: its neighbours', whose few rays may agree by chance, is no less."""
+
+
+@dataclass(frozen=True)
+class DirectImage:
+    """(h, w) float32 radiance W/(m^2 sr); the estimated relative RMS error over the lit pixels; what it took.
+
+    dropped: contributions that were no number, infinite or negative, and were left out.
+    """
+
+    radiance: Float32
+    error: float
+    pixels: int
+    samples: int
+    dropped: int
+
+
+def direct_image(
+    world: World,
+    camera: Camera,
+    laser: LineLaser,
+    T_world_camera: Float,
+    T_world_laser: Float,
+    *,
+    target: float = 0.01,
+    seed: int = 0,
+    threads: int | None = None,
+    cancelled: Cancel | None = None,
+    progress: Progress | None = None,
+) -> DirectImage:
+    """Direct radiance of one laser to a target relative RMS error over the lit pixels. Raises Cancelled."""
+    pixels = reachable_pixels(world, camera, laser, T_world_camera, T_world_laser, threads)
+    image = np.zeros(camera.height * camera.width, dtype=np.float32)
+    # through an aperture one ray knows but one point of it
+    aperture = bool(camera.view(T_world_camera).lens[0] > 0.0)
+    order = APERTURE_ORDER if aperture else EDGE_ORDER
+    n = len(pixels)
+    cells, wanted = np.zeros(n, np.int32), np.full(n, 2 if aperture else 1, np.int32)
+    first = 0 if aperture else n
+    task = _Task(
+        world,
+        world.surface_at((laser.wavelength_nm,) * 3),
+        camera,
+        laser,
+        T_world_camera,
+        T_world_laser,
+        seed,
+        pixels,
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(n),
+        np.empty((first, 4)),
+        np.empty(first),
+    )
+    samples, left = 0, 1.0
+
+    def part(done: float) -> None:
+        # how many levels there will be is not known: each takes half of what is left
+        if progress is not None:
+            progress(1.0 - left * (1.0 - 0.5 * done))
+
+    while True:
+        jobs, rays = share_out(cells, wanted)
+        map_chunks(partial(task.run, jobs), len(jobs), 1, threads, cancelled, part)
+        if samples == 0 and not aperture:
+            map_chunks(task.look, n, max(1024, math.ceil(n / 4)), threads)
+        samples += rays
+        cells = wanted
+        doubts = (
+            (task.doubt, APERTURE_ORDER, task.mean, 0.0) if aperture else (task.doubt, MISSED_ORDER, task.mean, BETWEEN)
+        )
+        doubt_beside(task.error, *doubts, cells, pixels, camera.width)
+        count, power, variance = tally(task.mean, task.error)
+        signal = math.sqrt(power / max(count, 1))
+        relative = math.sqrt(variance / count) / signal if count else 0.0
+        if relative > target:
+            allowed, least = (AIM * target * signal) ** 2 * count, LEAST * target * signal
+            wanted = cells_needed(task.error, cells, allowed, least, order, GROWTH)
+            wanted = graded(wanted, cells, pixels, camera.width)
+        if relative <= target or np.array_equal(wanted, cells):
+            dropped = sum(task.dropped) + place(pixels, task.mean, image)
+            return DirectImage(image.reshape(camera.height, camera.width), relative, count, samples, dropped)
+        left *= 0.5
+
+
+def share_out(cells: Int, wanted: Int) -> tuple[list[tuple[int, Places]], int]:
+    """Jobs of about RAYS_A_JOB rays for the pixels that want more cells than they have, the finest first.
+
+    A job is the cells a side and which of the (n,) pixels. Also the number of rays.
+    """
+    jobs, rays = [], 0
+    for level in range(int(wanted.max(initial=1)), 0, -1):
+        if level & (level - 1):
+            continue
+        chosen = np.flatnonzero((wanted == level) & (cells < level))
+        pieces = math.ceil(len(chosen) * level**2 / RAYS_A_JOB)
+        jobs += [(level, piece) for piece in np.array_split(chosen, pieces)] if pieces else []
+        rays += len(chosen) * level**2
+    return jobs, rays
+
+
+@numba.njit(nogil=True, cache=True)
+def tally(radiance: Float, error: Float) -> tuple[int, float, float]:
+    """Of (n,) pixels: how many are lit, the sum of their squares, and the sum of all squared errors."""
+    count, power, variance = 0, 0.0, 0.0
+    for i in range(radiance.shape[0]):
+        if radiance[i] > 0.0:
+            count += 1
+            power += radiance[i] * radiance[i]
+        variance += error[i] * error[i]
+    return count, power, variance
+
+
+@dataclass(frozen=True)
+class _Task:
+    """The (n,) pixels of an image and what is known of them: `run` does some, each job with its own buffers."""
+
+    world: World
+    surface: Surface
+    camera: Camera
+    laser: LineLaser
+    T_world_camera: Float
+    T_world_laser: Float
+    seed: int
+    pixels: Int
+    mean: Float
+    error: Float
+    doubt: Float
+    """What a pixel with several rays says of its neighbours: `render.laser_direct.adaptive_sampling.doubt_beside`."""
+    planes: Float
+    """(n, 4) where there is a first look, or (0, 4)."""
+    middle: Float
+    """(n,) where there is a first look, or (0,)."""
+    dropped: list[int] = field(default_factory=list)
+
+    def look(self, start: int, stop: int) -> None:
+        """After the first look has run: the errors it leaves."""
+        around = self.planes, self.middle, self.mean, self.error
+        look_around(start, stop, self.pixels, self.camera.width, *around)
+
+    def run(self, jobs: list[tuple[int, Places]], start: int, stop: int) -> None:
+        for cells, chosen in jobs[start:stop]:
+            self._trace(cells, chosen)
+
+    def _trace(self, cells: int, chosen: Places) -> None:
+        rays, n, pixels = self.world.rays, cells**2, self.pixels[chosen]
+        count = len(pixels) * n
+        view, surface = self.camera.view(self.T_world_camera), self.surface
+        aperture = bool(view.lens[0] > 0.0)
+        normalised, offsets = np.empty((count, 2)), np.empty((count, 2), np.float32)
+        directions = np.empty((count, 3), np.float32)
+        lens, planes = np.empty((count if aperture else 0, 2)), np.empty((0, 4))
+        if aperture:
+            planes = np.empty((count, 5))
+            origins = np.empty((count, 3), np.float32)
+            look = (rays.centre, normalised, offsets, lens, origins, directions)
+            lens_rays(view, pair_table(), pixels, cells, self.seed, *look)
+            triangle, _ = rays.intersect(origins, directions, coherent=True)
+        else:
+            if cells == 1:
+                planes = np.empty((count, 4))
+            camera_rays(view, pixels, cells, self.seed, cells > 1, normalised, offsets, directions)
+            triangle = rays.from_point(self.T_world_camera[:3, 3], directions)
+        values = np.empty((count, 2))
+        origins, towards = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+        far, sample = np.empty(count, np.float32), np.empty(count, np.int32)
+        if aperture:
+            shade = shade_glossy_lens if has_gloss(surface) else shade_diffuse_lens
+        else:
+            shade = shade_glossy if has_gloss(surface) else shade_diffuse
+        shadows, dropped = shade(
+            surface,
+            view,
+            triangle,
+            normalised,
+            offsets,
+            lens,
+            cells,
+            invert(self.T_world_laser),
+            self.T_world_laser[:3, 3].copy(),
+            self.laser.packed(),
+            np.array(reflectance_weights(self.laser.wavelength_nm)),
+            rays.centre,
+            rays.surface_offset,
+            values,
+            planes,
+            origins,
+            towards,
+            far,
+            sample,
+        )
+        self.dropped.append(dropped)
+        blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows], coherent=True)
+        mean, error, jump = (np.empty(len(pixels)) for _ in range(3))
+        if aperture:
+            gather_aperture(values, planes, lens, view.lens[0], blocked, sample, shadows, cells, mean, error)
+            self.doubt[chosen] = SAME_BLUR * error * cells ** (0.5 * APERTURE_ORDER)
+        elif cells == 1:
+            gather_first(values, blocked, sample, shadows, planes, mean)
+            self.planes[chosen], self.middle[chosen] = planes, mean
+            return
+        else:
+            gather(values, blocked, sample, shadows, cells, mean, error, jump)
+            self.doubt[chosen] = MISSED * jump
+        self.mean[chosen], self.error[chosen] = mean, error

@@ -1,0 +1,1 @@
+"""Laser light over several surfaces: bidirectional path tracing, guiding, photon merging."""

@@ -1,0 +1,1 @@
+"""What surfaces and media do to light: materials, BSDFs, Fresnel, microfacets."""

@@ -1,0 +1,1 @@
+"""Frames as files: OpenEXR layers, sidecars, tone mapping."""

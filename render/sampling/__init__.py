@@ -1,0 +1,1 @@
+"""Random numbers by counter, low-discrepancy points, Poisson counts."""

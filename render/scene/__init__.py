@@ -1,0 +1,1 @@
+"""The description of what is there: objects, lamps, motion, and how it shall be rendered."""

@@ -1,0 +1,1 @@
+"""From radiance to digital numbers: the sensor, its response, blur and speckle."""

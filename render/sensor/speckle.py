@@ -1,0 +1,213 @@
+"""Laser speckle as a multiplicative field on the sensor: gamma-distributed, with the correlation of a circular pupil.
+
+    |mu(d)|^2 = (2 J1(x) / x)^2,  x = pi d / (lambda N)                  coherence on the sensor, N the working f-number
+    C(m, n)   = its mean over two pixels (m, n) apart                    C(0, 0) is the squared contrast, 1 / M
+    W         = gamma quantile of shape M at Phi(z), z a normal field    whose correlation makes that of W equal to C
+
+Goodman, Speckle Phenomena in Optics (2007), 4.6 (integrated speckle is nearly gamma) and 4.5 (circular pupil). A
+depolarised surface throws two independent patterns, which halves C. Each pixel is cut into 2 x 2, over which the light
+is taken to run exponentially, since the flanks of a narrow line fill their pixels unevenly. Fully developed, from a
+surface rough against the wavelength; the grain does not depend on focus. A wide line's centre then scatters by
+C sqrt(A_c s / (4 sqrt(pi) p^2)) px, A_c = 4 (lambda N)^2 / pi.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.sampling.random import normal, wrapped
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+
+LARGEST_RADIUS = 12
+"""px; lags further out are left out, which only matters for grains of several pixels."""
+NEGLIGIBLE = 2e-3
+"""Correlation below which a lag is left out."""
+TABLE, LIMIT = 4097, 6.0
+"""Entries of the quantile table, and the normal deviate at its ends."""
+ORDERS, NODES = 24, 128
+CUTS = 2
+"""Parts of a pixel's side."""
+STEEPEST = 4.0
+"""Largest slope of the logarithm of the light, per pixel."""
+SURFACE = 0x53504543
+"""Keeps the surface's numbers apart from the sensor's."""
+_PATTERN = 16
+
+
+@dataclass(frozen=True)
+class Speckle:
+    """How one laser's light scintillates on one sensor."""
+
+    contrast: float
+    """Standard deviation over mean of one pixel."""
+    correlation: Float
+    """(2 r + 1, 2 r + 1) of the intensity between pixels, 1 in the middle."""
+    taps: Float
+    """(2 q + 1, 2 q + 1) filter that gives white normals the field's correlation; unit sum of squares."""
+    quantile: Float
+    """(2, TABLE) intensity over its mean for normal deviates -LIMIT..LIMIT, and the same for twice the variance."""
+    evenness: float
+    """How much uneven light in a part of a pixel adds to its variance: 1 for a fine grain, 0 for a coarse one."""
+
+
+@lru_cache(maxsize=16)
+def speckle(wavelength_nm: float, f_number: float, pixel_pitch: float, depolarised: bool = False) -> Speckle:
+    """Speckle of a laser through a circular pupil; f_number is the working one, pixel_pitch in m."""
+    from scipy.special import gammaincinv, ndtr
+
+    patterns = 2.0 if depolarised else 1.0
+    grain = wavelength_nm * 1e-9 * f_number / pixel_pitch
+    whole, _ = _covariance(grain)
+    part, evenness = _covariance(CUTS * grain)
+    middle, centre = whole.shape[0] // 2, part.shape[0] // 2
+    shape = patterns / part[centre, centre]
+    cumulative = ndtr(np.linspace(-LIMIT, LIMIT, TABLE))
+    quantile = np.stack([gammaincinv(k, cumulative) / k for k in (shape, 0.5 * shape)])
+    taps = _taps(_normal_correlation(part / part[centre, centre], shape))
+    variance = whole[middle, middle]
+    return Speckle(math.sqrt(variance / patterns), whole / variance, taps, quantile, evenness)
+
+
+def _covariance(grain: float) -> tuple[Float, float]:
+    """(2 r + 1, 2 r + 1) C(m, n) for lambda N in pixels, and the evenness."""
+    from scipy.special import j1
+
+    reach = min(LARGEST_RADIUS, math.ceil(1.0 + 4.0 * grain))
+    steps = max(8, math.ceil(10.0 / grain))
+    offset = (np.arange((reach + 1) * steps) + 0.5) / steps
+    x = np.pi * np.hypot(offset[:, None], offset) / grain
+    coherence = (2.0 * j1(x) / x) ** 2
+    lags = np.arange(reach + 1)
+    # pairs of points in two pixels: the distance between them has a triangle for its density
+    near = np.maximum(1.0 - np.abs(offset - lags[:, None]), 0.0) + np.maximum(1.0 - np.abs(offset + lags[:, None]), 0.0)
+    near /= steps
+    quarter = near @ coherence @ near.T
+    keep = max(1, int(np.max(np.nonzero(quarter[0] > NEGLIGIBLE * quarter[0, 0])[0], initial=1)))
+    mirrored = np.abs(np.arange(-keep, keep + 1))
+    # integral of x (x + d) over the pairs of points d apart in one pixel, about its centre
+    inside = np.maximum(1.0 - offset, 0.0)
+    product = (inside**3 / 12.0 - offset**2 * inside / 4.0) * 2.0 / steps
+    moment = float(product @ coherence @ near[0]) * 12.0 / quarter[0, 0]
+    return np.asarray(quarter[np.ix_(mirrored, mirrored)]), min(max(moment, 0.0), 1.0)
+
+
+def _normal_correlation(correlation: Float, shape: float) -> Float:
+    """Correlation of the normals whose gamma transforms have the correlation asked for (Hermite series)."""
+    from scipy.special import eval_hermitenorm, gammaincinv, ndtr
+
+    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+    values = gammaincinv(shape, np.clip(ndtr(nodes), 1e-300, 1.0 - 1e-16)) / shape
+    weights = weights / weights.sum()
+    power = np.array(
+        [(weights @ (values * eval_hermitenorm(k, nodes))) ** 2 / math.factorial(k) for k in range(1, ORDERS)]
+    )
+    normals = np.linspace(0.0, 1.0, 513)
+    gammas = np.polynomial.polynomial.polyval(normals, np.append(0.0, power)) / power.sum()
+    return np.asarray(np.interp(correlation, gammas, normals))
+
+
+def _taps(correlation: Float) -> Float:
+    """Symmetric filter whose autocorrelation is the one given, cut where it no longer matters."""
+    radius = correlation.shape[0] // 2
+    size = 8 * (radius + 2)
+    grid = np.zeros((size, size))
+    at = np.arange(-radius, radius + 1) % size
+    grid[np.ix_(at, at)] = correlation
+    spectrum = np.maximum(np.fft.fft2(grid).real, 0.0)
+    kernel = np.fft.fftshift(np.fft.ifft2(np.sqrt(spectrum)).real)
+    middle, reach = size // 2, radius + 1
+    cut = kernel[middle - reach : middle + reach + 1, middle - reach : middle + reach + 1]
+    return np.ascontiguousarray(cut / np.sqrt((cut**2).sum()))
+
+
+def scintillate(image: Float32, start: int, stop: int, field: Speckle, seed: int, step: int, laser: int) -> Float32:
+    """Rows start..stop of a laser's (h, w) image, with speckle.
+
+    Another seed, step or laser is another pattern; how the image is cut into rows changes nothing.
+    """
+    rows = image[start:stop]
+    lit = np.nonzero((rows > 0.0).any(axis=0))[0]
+    if len(lit) == 0:
+        return rows
+    out = rows.copy()
+    key = wrapped(seed ^ (SURFACE << 24))
+    first, last = int(lit[0]), int(lit[-1]) + 1
+    _scintillate(
+        image, start, first, last, field.taps, field.quantile, field.evenness, key, step, _PATTERN + laser, out
+    )
+    return out
+
+
+@numba.njit(nogil=True, cache=True)
+def _slope(before: float, here: float, after: float) -> float:
+    """Slope of the logarithm of the light at the middle of three pixels."""
+    least = 1e-4 * here
+    slope = 0.5 * math.log(max(after, least) / max(before, least))
+    return min(max(slope, -STEEPEST), STEEPEST)
+
+
+@numba.njit(nogil=True, cache=True)
+def _unevenness(slope: float) -> float:
+    """Mean square over squared mean of exp(slope x) over a part of a pixel."""
+    half = 0.5 * slope / CUTS
+    return 1.0 if abs(half) < 1e-6 else half / math.tanh(half)
+
+
+@numba.njit(nogil=True, cache=True)
+def _scintillate(
+    image: Float32,
+    start: int,
+    first: int,
+    last: int,
+    taps: Float,
+    quantile: Float,
+    evenness: float,
+    seed: int,
+    step: int,
+    dimension: int,
+    out: Float32,
+) -> None:
+    """Multiply columns first..last - 1 of out (n, w), rows start.. of the image (h, w), by the field."""
+    n, (h, w) = out.shape[0], image.shape
+    reach = taps.shape[0] // 2
+    white = np.empty((CUTS * n + 2 * reach, CUTS * (last - first) + 2 * reach))
+    for i in range(white.shape[0]):
+        for j in range(white.shape[1]):
+            # beyond the image too, where rows are told apart by a stride wider than any image
+            row, column = CUTS * start - reach + i + 4096, CUTS * first - reach + j + 4096
+            white[i, j] = normal(seed, np.int64(row) * 131072 + np.int64(column), step, dimension)
+    scale = (quantile.shape[1] - 1) / (2.0 * LIMIT)
+    for i in range(n):
+        y = start + i
+        for x in range(first, last):
+            light = image[y, x]
+            if light <= 0.0:
+                continue
+            across = _slope(image[y, max(x - 1, 0)], light, image[y, min(x + 1, w - 1)])
+            along = _slope(image[max(y - 1, 0), x], light, image[min(y + 1, h - 1), x])
+            more = 1.0 + (_unevenness(across) * _unevenness(along) - 1.0) * evenness
+            blend = min(max(more - 1.0, 0.0), 1.0)
+            total, weights = 0.0, 0.0
+            for a in range(CUTS):
+                for b in range(CUTS):
+                    weight = math.exp((across * (b - 0.5 * (CUTS - 1)) + along * (a - 0.5 * (CUTS - 1))) / CUTS)
+                    z, top, left = 0.0, CUTS * i + a, CUTS * (x - first) + b
+                    for v in range(taps.shape[0]):
+                        for u in range(taps.shape[1]):
+                            z += taps[v, u] * white[top + v, left + u]
+                    place = min(max((z + LIMIT) * scale, 0.0), quantile.shape[1] - 1.001)
+                    k = int(place)
+                    t = place - k
+                    plain = quantile[0, k] + t * (quantile[0, k + 1] - quantile[0, k])
+                    rough = quantile[1, k] + t * (quantile[1, k + 1] - quantile[1, k])
+                    total += weight * (plain + blend * (rough - plain))
+                    weights += weight
+            out[i, x] = light * total / weights

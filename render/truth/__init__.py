@@ -1,0 +1,1 @@
+"""The exact line and the truth of each pixel."""

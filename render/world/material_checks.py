@@ -1,0 +1,118 @@
+"""What materials and light cannot do together, found before any ray is traced: errors, and warnings worth reading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.base.errors import InputError
+from render.base.pose import invert, transform_points
+from render.laser.irradiance import SHEET_SIGMAS
+from render.laser.laser import LineLaser
+from render.material.material import Emitter
+from render.scene.scene import Scene
+from render.world.world import World
+
+Float = NDArray[np.float64]
+
+VISIBLE_PX = 0.1
+VISIBLE_ANGLE = math.radians(5.0)
+"""Facets that shading departs from by more than one of these are told."""
+
+
+def check_materials(world: World, scene: Scene) -> None:
+    """InputError: what an object is made of is not known at the wavelength of a laser or of the ambient light."""
+    for i, laser in enumerate(scene.lasers):
+        try:
+            world.surface_at((laser.wavelength_nm,) * 3)
+        except InputError as error:
+            found = f"{error.found}, the wavelength of scene.rig.lasers[{i}] ({laser.name})"
+            raise InputError(
+                error.what, where=error.where, found=found, allowed=error.allowed, cure=error.cure
+            ) from error
+    if has_ambient_source(scene):
+        _ = world.surface
+
+
+def scene_warnings(world: World, scene: Scene, step: int = 0) -> tuple[str, ...]:
+    """What may make a sensible picture of the wrong thing, a sentence each that names the object."""
+    return (*_light_warnings(world, scene, step), *_shading_warnings(world, scene, step))
+
+
+def has_ambient_source(scene: Scene) -> bool:
+    """There is a lamp, a sky or a shining object."""
+    shining = any(isinstance(item.material, Emitter) for item in scene.visible_objects)
+    return bool(scene.lights) or any(scene.environment.radiance) or shining
+
+
+def _light_warnings(world: World, scene: Scene, step: int) -> list[str]:
+    found = []
+    for i, laser in enumerate(scene.lasers):
+        if not sheet_meets(world, laser, scene.T_world_laser(i, step)):
+            found.append(
+                f"scene.rig.lasers[{i}] ({laser.name}): its light meets no object; move or turn the laser or an object"
+            )
+    if not has_ambient_source(scene) and len(found) == len(scene.lasers):
+        found.append("no light reaches the scene: every image is black; add a laser, a lamp or an environment")
+    return found
+
+
+def sheet_meets(world: World, laser: LineLaser, T_world_laser: Float) -> bool:
+    """Some triangle may be in a laser's sheet, within its fan and its power but 6e-7; false: certainly none is."""
+    x, y, z = transform_points(invert(T_world_laser), world.vertices).T
+    _, waist, focus, rayleigh, edge = laser.packed()[:5]
+    reach = SHEET_SIGMAS * (rayleigh * z if waist == 0.0 else waist * np.sqrt(1.0 + ((z - focus) / rayleigh) ** 2))
+    # each of these regions is convex: a triangle with all corners in one lies in it
+    outside = np.stack([z <= 0.0, x > reach, x < -reach, y > edge * z, y < -edge * z])
+    return bool(np.any(~np.any(np.all(outside[:, world.triangles], axis=2), axis=0)))
+
+
+@dataclass(frozen=True)
+class Departure:
+    """How far smooth shading departs from the facets of one object, at worst."""
+
+    angle: float
+    """rad, between a facet's normal and the one it is shaded by."""
+    depth: float
+    """m, by which the curved surface that shading shows lies off the facet."""
+    pixels: float
+    """By which that would shift the line of the farthest laser."""
+
+
+def departure(world: World, scene: Scene, index: int, step: int = 0) -> Departure | None:
+    """Of the visible object `index`, over its facets before the camera; None: it is shaded as it is."""
+    mine = world.object_id == index
+    if len(world.normals) == 0 or not mine.any() or not np.any(world.normals[mine][:1]):
+        return None
+    points = transform_points(invert(scene.T_world_camera(step)), world.vertices)
+    corners = points[world.triangles[mine]]
+    turned = world.normals[mine].astype(np.float64) @ scene.T_world_camera(step)[:3, :3]
+    facet = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facet /= np.maximum(np.linalg.norm(facet, axis=1, keepdims=True), 1e-300)
+    ahead = (corners[:, :, 2].min(axis=1) > 0.0) & (np.einsum("ij,ij->i", facet, corners[:, 0]) < 0.0)
+    if not ahead.any():
+        return None
+    corners, turned, facet = corners[ahead], turned[ahead], facet[ahead]
+    angle = np.arccos(np.clip(np.einsum("ijk,ik->ij", turned, facet), -1.0, 1.0)).max(axis=1)
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    # an arc that leaves its chord at this angle: the height of its middle
+    depth = 0.5 * longest * np.tan(0.5 * angle)
+    baseline = max((float(np.linalg.norm(scene.T_camera_laser(i)[:3, 3])) for i in range(len(scene.lasers))), default=0)
+    pixels = scene.camera.fx * baseline * depth / corners[:, :, 2].min(axis=1) ** 2
+    return Departure(float(angle.max()), float(depth.max()), float(pixels.max()))
+
+
+def _shading_warnings(world: World, scene: Scene, step: int) -> list[str]:
+    found = []
+    for i, item in enumerate(scene.visible_objects):
+        off = departure(world, scene, i, step)
+        if off is not None and (off.pixels > VISIBLE_PX or off.angle > VISIBLE_ANGLE):
+            found.append(
+                f"object {item.name!r}: smooth shading shows a surface that is not there, up to "
+                f"{math.degrees(off.angle):.1f} deg and {off.depth * 1e6:.3g} um ({off.pixels:.2g} px of the line) off "
+                "the facets that the truth is made of; use a finer mesh, or a smaller crease_angle"
+            )
+    return found

@@ -1,0 +1,199 @@
+"""What kernels are given: the placed triangles with their reflectance, and the camera's view."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.material.bsdf import EMITTED, EMITTER, LAMBERTIAN, SUBSURFACE
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+
+
+class Surface(NamedTuple):
+    """The world's triangles and materials; the arrays are described in `render.world.world.World`."""
+
+    vertices: Float
+    triangles: Int
+    object_id: Int
+    uv: Float32
+    albedo: Float
+    textures: Float32
+    texture_shape: Int
+    rows: Float
+    second: Int
+    mask_shape: Int
+    normals: Float32
+    detail: Int
+    maps: Int
+    relief: Float
+
+
+def has_gloss(surface: Surface) -> bool:
+    """Some material scatters otherwise than Lambert says, or is shaded on another normal than its facet's."""
+    plain = (surface.rows[:, 0] == LAMBERTIAN) | (surface.rows[:, 0] == EMITTER)
+    return not bool(np.all(plain & (surface.detail == 0)))
+
+
+def has_medium(surface: Surface) -> bool:
+    """Light scatters within some object."""
+    return bool(np.any(surface.rows[:, 0] == SUBSURFACE))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def emission(row: Float, cosine: float, rgb: Float) -> None:
+    """Radiance (W/(m^2 sr), RGB) that a material emits -> rgb (3,).
+
+    cosine: of the direction it leaves by with the mesh's own normal; an emitter's back is dark.
+    """
+    for band in range(3):
+        rgb[band] = row[EMITTED + band] if cosine > 0.0 else 0.0
+
+
+class View(NamedTuple):
+    """A camera in the world."""
+
+    width: int
+    intrinsics: Float
+    """fx, fy, cx, cy, skew."""
+    distortion: Float
+    """(14,)."""
+    folds: Float
+    """(720,) `render.camera.distortion.fold_radii`."""
+    T_world_camera: Float
+    lens: Float
+    """(4,) aperture's radius m (0: a pinhole), 1 / focus distance, slopes of the plane of focus (`render.camera.lens`).
+    """
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, rgb: Float) -> None:
+    """Albedo at the point p of triangle t -> rgb (3,): the object's constant colour or its texture."""
+    slot_reflectance(surface, surface.object_id[t], t, p0, p1, p2, rgb)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def scattering(surface: Surface, t: int, p0: float, p1: float, p2: float, choice: float, rgb: Float) -> int:
+    """The material (a row of `surface.rows`) at the point p of triangle t, and its reflectance -> rgb (3,).
+
+    A blend is one of its two materials, the second with the mask's value as its chance; `choice` is uniform in [0, 1).
+    """
+    slot = surface.object_id[t]
+    # one place to look textures up, for the mask first: a second would cost more than the texture itself
+    masked = surface.second[slot] >= 0
+    while True:
+        shape = surface.mask_shape if masked else surface.texture_shape
+        start, rows, columns = shape[slot, 0], shape[slot, 1], shape[slot, 2]
+        if rows > 0:
+            lookup(surface, start, rows, columns, t, p0, p1, p2, rgb)
+        else:
+            for band in range(3):
+                rgb[band] = surface.albedo[slot, band]
+        if not masked:
+            return slot
+        if choice < rgb[0]:
+            slot = surface.second[slot]
+        masked = False
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def slot_reflectance(surface: Surface, slot: int, t: int, p0: float, p1: float, p2: float, rgb: Float) -> None:
+    """Reflectance of one material at the point p of triangle t -> rgb (3,)."""
+    if surface.texture_shape[slot, 1] == 0:
+        for band in range(3):
+            rgb[band] = surface.albedo[slot, band]
+        return
+    shape = surface.texture_shape
+    lookup(surface, shape[slot, 0], shape[slot, 1], shape[slot, 2], t, p0, p1, p2, rgb)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def to_local(surface: Surface, t: int, row: Float, n0: float, n1: float, n2: float, frame: Float) -> None:
+    """Orthonormal axes (3, 3), one a row, z the normal n; x follows the texture's u where the material has a grain."""
+    x0 = x1 = x2 = 0.0
+    if row[1] != row[2] and surface.uv.shape[0] > 0:
+        a, b, c = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
+        v, uv = surface.vertices, surface.uv
+        # dP/du from the two edges
+        r1, r2 = uv[t, 1, 1] - uv[t, 0, 1], uv[t, 2, 1] - uv[t, 0, 1]
+        x0 = r2 * (v[b, 0] - v[a, 0]) - r1 * (v[c, 0] - v[a, 0])
+        x1 = r2 * (v[b, 1] - v[a, 1]) - r1 * (v[c, 1] - v[a, 1])
+        x2 = r2 * (v[b, 2] - v[a, 2]) - r1 * (v[c, 2] - v[a, 2])
+        along = x0 * n0 + x1 * n1 + x2 * n2
+        x0, x1, x2 = x0 - along * n0, x1 - along * n1, x2 - along * n2
+    length = math.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
+    if length > 0.0:
+        x0, x1, x2 = x0 / length, x1 / length, x2 / length
+    else:
+        # Duff et al. 2017
+        sign = 1.0 if n2 >= 0.0 else -1.0
+        k = -1.0 / (sign + n2)
+        x0, x1, x2 = 1.0 + sign * n0 * n0 * k, sign * n0 * n1 * k, -sign * n0
+    frame[0, 0], frame[0, 1], frame[0, 2] = x0, x1, x2
+    frame[1, 0], frame[1, 1], frame[1, 2] = n1 * x2 - n2 * x1, n2 * x0 - n0 * x2, n0 * x1 - n1 * x0
+    frame[2, 0], frame[2, 1], frame[2, 2] = n0, n1, n2
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def to_world(frame: Float, direction: Float) -> None:
+    """Turn a local direction (3,) into the world, in place."""
+    x, y, z = direction[0], direction[1], direction[2]
+    for axis in range(3):
+        direction[axis] = x * frame[0, axis] + y * frame[1, axis] + z * frame[2, axis]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def lookup(
+    surface: Surface, start: int, rows: int, columns: int, t: int, p0: float, p1: float, p2: float, rgb: Float
+) -> None:
+    """Bilinear value -> rgb (3,) of the texture of rows x columns from `start`, at the point p of triangle t."""
+    s, r = uv_at(surface, t, p0, p1, p2)
+    bilinear(surface.textures, start, rows, columns, s, r, rgb)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def uv_at(surface: Surface, t: int, p0: float, p1: float, p2: float) -> tuple[float, float]:
+    """UV of the point p of triangle t."""
+    a, b, c = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
+    v, uv = surface.vertices, surface.uv
+    ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
+    ac0, ac1, ac2 = v[c, 0] - v[a, 0], v[c, 1] - v[a, 1], v[c, 2] - v[a, 2]
+    q0, q1, q2 = p0 - v[a, 0], p1 - v[a, 1], p2 - v[a, 2]
+    bb, bc, cc = (
+        ab0 * ab0 + ab1 * ab1 + ab2 * ab2,
+        ab0 * ac0 + ab1 * ac1 + ab2 * ac2,
+        ac0 * ac0 + ac1 * ac1 + ac2 * ac2,
+    )
+    qb, qc = q0 * ab0 + q1 * ab1 + q2 * ab2, q0 * ac0 + q1 * ac1 + q2 * ac2
+    det = bb * cc - bc * bc
+    f, g = (cc * qb - bc * qc) / det, (bb * qc - bc * qb) / det
+    s = (1.0 - f - g) * uv[t, 0, 0] + f * uv[t, 1, 0] + g * uv[t, 2, 0]
+    r = (1.0 - f - g) * uv[t, 0, 1] + f * uv[t, 1, 1] + g * uv[t, 2, 1]
+    return s, r
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def bilinear(textures: Float32, start: int, rows: int, columns: int, s: float, r: float, rgb: Float) -> None:
+    """Value -> rgb (3,) of the texture of rows x columns from `start`, at the UV (s, r)."""
+    # texel centres at half integers; v points up, rows point down; repeated outside [0, 1]
+    x, y = (s - math.floor(s)) * columns - 0.5, (1.0 - (r - math.floor(r))) * rows - 0.5
+    i, j = int(math.floor(x)), int(math.floor(y))
+    fx, fy = x - i, y - j
+    rgb[0] = rgb[1] = rgb[2] = 0.0
+    for dj in range(2):
+        # wrap by comparison: a remainder costs more than the rest of the lookup
+        row = j + dj
+        row = row + rows if row < 0 else (row - rows if row >= rows else row)
+        for di in range(2):
+            column = i + di
+            column = column + columns if column < 0 else (column - columns if column >= columns else column)
+            texel = 3 * (start + row * columns + column)
+            weight = (fx if di else 1.0 - fx) * (fy if dj else 1.0 - fy)
+            for band in range(3):
+                rgb[band] += weight * textures[texel + band]

@@ -1,0 +1,328 @@
+"""What the commands of main.py do: find the project, show progress, print the result for a person or a program."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from render.base.errors import InputError
+from studio.commands.console import print_plan, print_table, stage_progress
+from studio.project.project import Project, project_file
+from studio.project.templates import DESCRIPTIONS, new_project, template_folder
+from studio.runtime.streams import print_json
+
+if TYPE_CHECKING:
+    from render.frame import Frame
+    from studio.preview.inspection import Inspection, LaserView
+
+SAMPLE = "weld_seam"
+OUTPUT = "scan-output"
+
+
+def chosen_file(path: Path | None) -> Path:
+    """The project file at a path (itself, or the one in a folder), or the sample's."""
+    return project_file(path if path is not None else template_folder(SAMPLE))
+
+
+def load_project(path: Path | None) -> tuple[Project, Path]:
+    """The project at a path (a file, or a folder with one project), or the sample; and its folder."""
+    file = chosen_file(path)
+    return Project.load(file), file.parent
+
+
+def start_project(template: str | None, folder: Path | None, *, force: bool, quiet: bool, as_json: bool) -> None:
+    """`new`: copy a template, or list them."""
+    if template is None:
+        if as_json:
+            print_json({"ok": True, "templates": DESCRIPTIONS})
+        else:
+            print_table("Templates", list(DESCRIPTIONS.items()))
+        return
+    made = new_project(template, folder if folder is not None else Path(template), force=force)
+    if as_json:
+        print_json({"ok": True, "project": made.project, "files": list(made.files)})
+    elif not quiet:
+        print(f"wrote {made.project}; next: python main.py inspect {made.project}")
+
+
+def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
+    """`inspect`: tables of what is there and what will be seen."""
+    from studio.preview.inspection import inspect
+
+    project, root = load_project(path)
+    with stage_progress(quiet or as_json) as progress:
+        progress("looking", 0.0)
+        found = inspect(project, root)
+        progress("looking", 1.0)
+    if as_json:
+        print_json({"ok": True, **found.as_dict()})
+        return
+    print_table(f"Project {found.name}", _project_rows(project, found))
+    print()
+    print_plan(found.plan)
+    for view in found.lasers:
+        print()
+        print_table(f"Laser {view.name}", _laser_rows(view, found.full_well))
+    for warning in found.warnings:
+        print(f"\nwarning: {warning}")
+
+
+def run_project(
+    path: Path | None,
+    *,
+    out: Path | None,
+    threads: int | None,
+    seed: int | None,
+    scale: float,
+    steps: int | None,
+    quiet: bool,
+    as_json: bool,
+    measure: bool = True,
+    report: bool = True,
+    resume: bool = False,
+    time_limit: float | None = None,
+    **extraction: Any,
+) -> None:
+    """`run`, and `render` with `measure` off. extraction: settings in place of the project's, None: the project's."""
+    file = chosen_file(path)
+    project, root = with_extraction(Project.load(file), extraction), file.parent
+    folder = out if out is not None else Path(OUTPUT) / folder_name(project.name)
+    check_output(folder)
+    from render.progressive import plan
+    from studio.scan.light_group_status import note
+    from studio.scan.scan import run_scan
+
+    shown: list[Frame] = []
+
+    def so_far(stage: str) -> str:
+        return note(stage, shown[-1], project.scene, project.render) if shown else ""
+
+    if not quiet:
+        print_plan(plan(project.scene.scaled(scale), project.render), to_errors=True)
+    frames = min(steps or project.scene.frame_count, project.scene.frame_count)
+    with stage_progress(quiet, so_far, frames=frames) as progress:
+        done = run_scan(
+            project,
+            root,
+            out=folder,
+            steps=steps,
+            threads=threads,
+            seed=seed,
+            image_scale=scale,
+            measure=measure,
+            report=report,
+            resume=resume,
+            seconds=time_limit,
+            refined=lambda frame: shown.__setitem__(slice(None), [frame]),
+            progress=progress,
+            source=file,
+        )
+    if as_json:
+        print_json({"ok": True, "folder": str(folder), "files": [str(file) for file in done.files], **done.manifest})
+        return
+    if not quiet:
+        _print_light(done.manifest["light"])
+    _print_results(done.manifest)
+    print(f"{len(done.manifest['frames'])} frame(s) in {folder}, {done.manifest['seconds']['all']:.1f} s")
+    for file in done.report:
+        print(f"report: {file}")
+
+
+def with_extraction(project: Project, options: dict[str, Any]) -> Project:
+    """The project with other extraction settings, where an option is given. InputError names the setting."""
+    if all(value is None for value in options.values()):
+        return project
+    from analysis.line.extract import settings_of
+
+    return project.model_copy(update={"extraction": settings_of(project.extraction, **options)})
+
+
+def render_project(path: Path | None, **options: Any) -> None:
+    """`render`: frames and truth only."""
+    run_project(path, measure=False, **options)
+
+
+def reconstruct_source(
+    sources: tuple[Path, ...],
+    *,
+    project: Path | None,
+    laser: int,
+    hdr: str | None,
+    out: Path | None,
+    threads: int | None,
+    quiet: bool,
+    as_json: bool,
+    **extraction: Any,
+) -> None:
+    """`reconstruct`: from a scan's folder, or from images with a project."""
+    from studio.commands.extract import exposure_times
+    from studio.photographs.reconstruct_images import reconstruct_images
+    from studio.scan.reconstruct import reconstruct_folder
+    from studio.scan.scan_folder import open_folder
+    from studio.scan.stages import Clock
+
+    missing = [source for source in sources if not source.exists()]
+    if missing:
+        raise InputError("there is no such image or scan folder", where=str(missing[0]))
+    source = sources[0]
+    if source.is_dir():
+        if len(sources) > 1:
+            raise InputError("a scan folder is measured alone", where=str(sources[1]), allowed="one folder, or images")
+        found = open_folder(source)
+        chosen, root = (found.project, found.root) if project is None else load_project(project)
+        chosen = with_extraction(chosen, extraction)
+        folder = out if out is not None else source
+        check_output(folder)
+        with stage_progress(quiet, frames=len(found.frames)) as progress:
+            clock = Clock(progress, never)
+            result = reconstruct_folder(found, chosen, root, folder, clock, report=False, threads=threads)
+    else:
+        if project is None:
+            raise InputError(
+                "an image does not say by which camera and laser it was taken",
+                where=str(source),
+                cure="give the project with --project",
+            )
+        chosen = with_extraction(load_project(project)[0], extraction)
+        folder = out if out is not None else source.parent
+        check_output(folder)
+        times = exposure_times(hdr, len(sources))
+        with stage_progress(quiet) as progress:
+            result = reconstruct_images(sources, chosen, laser, folder, Clock(progress, never), times, threads)
+    _print_reconstruction(result, as_json)
+
+
+def rebuild_report(folder: Path, *, threads: int | None, quiet: bool, as_json: bool) -> None:
+    """`report`: measure the frames of a finished scan again and write its report."""
+    from studio.scan.reconstruct import reconstruct_folder
+    from studio.scan.scan_folder import open_folder
+    from studio.scan.stages import Clock
+
+    found = open_folder(folder)
+    with stage_progress(quiet, frames=len(found.frames)) as progress:
+        clock = Clock(progress, never)
+        result = reconstruct_folder(found, found.project, found.root, folder, clock, report=True, threads=threads)
+    _print_reconstruction(result, as_json)
+
+
+def folder_name(name: str) -> str:
+    """A project's name as a folder: lower case, words joined by underscores."""
+    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "project"
+
+
+def check_output(folder: Path) -> None:
+    """InputError before any work where results could not be written afterwards."""
+    place = folder
+    while not place.exists() and place != place.parent:
+        place = place.parent
+    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
+        raise InputError(
+            "the output folder cannot be written",
+            where=str(folder),
+            found="a file of that name" if place.is_file() else f"no permission to write in {place}",
+            cure="choose another with --out",
+        )
+
+
+def never() -> bool:
+    """Ctrl-C raises KeyboardInterrupt; nothing else cancels a command."""
+    return False
+
+
+def _print_reconstruction(result: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print_json({"ok": True, **result})
+        return
+    _print_results(result)
+    for told in result["extraction"]:
+        print(told)
+    if "flags" in result:
+        print(f"{result['points']} points on {result['scan_lines']} scan lines")
+    for file in result["files"]:
+        print(f"wrote {file}")
+
+
+def _print_light(light: list[dict[str, Any]]) -> None:
+    """Plan and light groups of the first frame; of others only what differs from it in kind."""
+    print_plan(light[0]["plan"])
+    print_table("Light" + (", first frame" if len(light) > 1 else ""), list(light[0]["groups"].items()))
+
+
+def _print_results(result: dict[str, Any]) -> None:
+    """One line a laser and method."""
+
+    def micro(error: dict[str, float | None], name: str) -> str:
+        value = error[name]
+        return "-" if value is None else f"{value * 1e6:.1f} um"
+
+    rows = [
+        (
+            f"{row['laser']}: {row['method'].replace('_', ' ')}",
+            f"{row['points']}",
+            "-" if row["completeness"] is None else f"{row['completeness']:.1%}",
+            f"{row['false_scan_lines']}",
+            *(micro(row["depth_m"], name) for name in ("bias", "rmse", "robust_sigma", "p95")),
+        )
+        for row in result.get("results", [])
+    ]
+    header = ("Depth error", "points", "complete", "false", "bias", "RMSE", "robust sigma", "P95")
+    scale = result.get("image_scale", 1.0)
+    title = result["name"] + ("" if scale == 1.0 else f", image scale {scale:g}: not the scanner's figures")
+    if rows:
+        print_table(title, rows, header=header)
+    for row in result.get("results", [])[:1]:
+        if row["sampled_scan_lines"] < row["scan_lines"]:
+            sample = f"a sample of {row['sampled_scan_lines']} of {row['scan_lines']} scan lines"
+            print(f"robust sigma and P95 are those of {sample}, all else of every point")
+    for text in result.get("notes", ()):
+        print(f"warning: {text}")
+
+
+def _project_rows(project: Project, found: Inspection) -> list[tuple[str, str]]:
+    camera, sensor, settings = project.scene.camera, project.sensor, project.extraction
+    focus = camera.lens.focus_distance
+    rows = [
+        ("camera", f"{camera.width} x {camera.height} px, f {camera.fx * camera.pixel_pitch * 1e3:.2f} mm, "
+                   f"f/{camera.lens.f_number:g}, {camera.pixel_pitch * 1e6:.2f} um pixels"),
+        ("lens", f"focused {'far away' if focus is None else f'at {focus * 1e3:g} mm'}, rendered as a "
+                 + camera.lens.model.replace("-", " ")),
+        ("sensor", f"{sensor.colour}, {sensor.bits} bit, exposure {sensor.exposure_time * 1e3:.3g} ms, "
+                   f"full well {sensor.full_well:.0f} e-, read noise {sensor.read_noise:g} e-"),
+    ]  # fmt: skip
+    rows += [("object", f"{name}: {kind}, {count} triangles") for name, kind, count in found.objects]
+    rows.append(("frames", str(found.frames)))
+    rows.append(("extraction", f"{settings.method}, one position on each of the image's {settings.axis}"))
+    return rows
+
+
+def _laser_rows(view: LaserView, full_well: float) -> list[tuple[str, str]]:
+    def number(value: float | None, unit: float, form: str) -> str:
+        return "-" if value is None else form.format(value / unit)
+
+    degree = math.radians(1)
+    end = number(view.working_farthest, 1e-3, "{:.0f} mm") if view.working_farthest is not None else "no end"
+    return [
+        ("baseline", number(view.baseline, 1e-3, "{:.1f} mm")),
+        ("triangulation angle", number(view.triangulation_angle, degree, "about {:.1f} deg")),
+        ("working range", f"{number(view.working_nearest, 1e-3, '{:.0f}')} to {end} in depth"),
+        ("line seen", f"on {view.scan_lines_hit} of {view.scan_lines} scan lines"),
+        ("line length", f"{view.line_length_px:.0f} px, {view.line_length * 1e3:.1f} mm on the surface"),
+        (
+            "depth of the line",
+            f"{number(view.depth_nearest, 1e-3, '{:.1f}')} to {number(view.depth_farthest, 1e-3, '{:.1f}')} mm",
+        ),
+        ("depth per pixel", number(view.depth_per_px, 1e-6, "about {:.0f} um across the line")),
+        ("surface per pixel", number(view.along_line_per_px, 1e-6, "about {:.0f} um along the line")),
+        ("line width", number(view.width_px, 1, "sigma about {:.2f} px")),
+        (
+            "brightest pixels",
+            number(view.peak_electrons, 1, "about {:.0f} e-")
+            + number(view.peak_electrons_most, 1, ", at most {:.0f} e-")
+            + f" of {full_well:.0f} e-",
+        ),
+        ("saturated", number(view.saturated, 0.01, "{:.1f} % of the scan lines that are hit")),
+        ("steepest view", number(view.steepest_view, degree, "{:.1f} deg to camera or laser")),
+    ]

@@ -1,0 +1,98 @@
+"""Cameras, sensors, lasers and materials that come with the program, each with the source of its figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
+
+from render.camera.camera import Camera, Lens
+from render.laser.laser import LineLaser
+from render.scene.scene import SceneObject
+from render.sensor.sensor import Sensor
+from studio.editing.linked_fields import focal_length, with_focal_length, with_height, with_pixel_pitch, with_width
+from studio.project.document import FieldPath, replaced, value_at
+from studio.project.project import Project
+from studio.project.strict_json import read_object
+
+PresetKind = Literal["cameras", "sensors", "lasers", "materials"]
+FOLDER = Path(__file__).resolve().parents[2] / "assets" / "presets"
+
+CAMERA: FieldPath = ("scene", "rig", "camera")
+SENSOR: FieldPath = ("sensor",)
+
+
+@dataclass(frozen=True)
+class Preset:
+    """values: fields by model ("camera", "sensor", "laser", "object"), as stored (SI); what is left out stays."""
+
+    name: str
+    source: str
+    values: dict[str, dict[str, Any]]
+
+
+@lru_cache
+def presets(kind: PresetKind) -> tuple[Preset, ...]:
+    """Those of one kind, in the order of the menu."""
+    entries = read_object(FOLDER / f"{kind}.json", "presets file")["presets"]
+    return tuple(
+        Preset(entry["name"], entry["source"], {key: entry[key] for key in entry.keys() - {"name", "source"}})
+        for entry in entries
+    )
+
+
+def presets_for(project: Project, path: FieldPath) -> tuple[Preset, ...]:
+    """Those that fit the item at a path."""
+    item = value_at(project, path)
+    kinds: dict[type, PresetKind] = {
+        Camera: "cameras",
+        Sensor: "sensors",
+        LineLaser: "lasers",
+        SceneObject: "materials",
+    }
+    kind = kinds.get(type(item))
+    return presets(kind) if kind else ()
+
+
+def with_preset(project: Project, path: FieldPath, preset: Preset) -> Project:
+    """The project with a preset's values: the laser's or object's at `path`, the camera's and sensor's at their place.
+
+    Poses, names and exposure stay. A sensor without a lens keeps the camera's focal length. InputError: does not fit.
+    """
+    for at_path in preset.values.keys() & {"laser", "object"}:
+        project = _merged(project, path, preset.values[at_path])
+    if "camera" in preset.values:
+        camera = with_camera_values(project.scene.camera, preset.values["camera"])
+        project = _merged(project, CAMERA, camera)
+    if "sensor" in preset.values:
+        project = _merged(project, SENSOR, preset.values["sensor"])
+    return project
+
+
+def with_camera_values(camera: Camera, values: dict[str, Any]) -> dict[str, Any]:
+    """Fields of the camera for width, height, pixel_pitch, focal_length (all m or px), f_number, focus_distance.
+
+    Another sensor or lens has another distortion, so with a focal length it is cleared and the centre centred.
+    """
+    changed = camera
+    lens = {name: values[name] for name in values.keys() & Lens.model_fields.keys()}
+    if lens:
+        changed = changed.model_copy(update={"lens": camera.lens.model_copy(update=lens)})
+    if "focal_length" in values:
+        changed = changed.model_copy(update={"distortion": (), "skew": 0.0, "fy": changed.fx})
+        changed = changed.model_copy(update={"cx": (camera.width - 1) / 2, "cy": (camera.height - 1) / 2})
+    steps: tuple[tuple[Any, Any], ...] = (
+        (with_width, values.get("width", camera.width)),
+        (with_height, values.get("height", camera.height)),
+        (with_pixel_pitch, values.get("pixel_pitch", camera.pixel_pitch)),
+        (with_focal_length, values.get("focal_length", focal_length(camera))),
+    )
+    for step, value in steps:
+        changed = changed.model_copy(update=step(changed, value))
+    return {name: getattr(changed, name) for name in Camera.model_fields}
+
+
+def _merged(project: Project, path: FieldPath, values: dict[str, Any]) -> Project:
+    item = value_at(project, path)
+    return replaced(project, path, {name: getattr(item, name) for name in type(item).model_fields} | values)

@@ -1,0 +1,176 @@
+"""Edits of the scene's lists: project and path in, new project and the path of what was made out. No state, no Qt."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from pydantic import BaseModel
+
+from render.base.errors import InputError
+from render.base.pose import Pose
+from render.laser.laser import LineLaser
+from render.scene.lights import PointLight, RectangleLight
+from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
+from render.scene.scene import SceneObject
+from render.scene.shape import MeshFile, Plane
+from studio.editing.placement import (
+    Primitive,
+    field_of_view,
+    light_pose,
+    new_laser,
+    object_pose,
+    rounded,
+    sized,
+    target,
+    vector,
+)
+from studio.project.document import FieldPath, replaced, value_at
+from studio.project.project import Project
+
+LASERS: FieldPath = ("scene", "rig", "lasers")
+OBJECTS: FieldPath = ("scene", "objects")
+LIGHTS: FieldPath = ("scene", "lights")
+LISTS = (LASERS, OBJECTS, LIGHTS)
+"""Where items can be added, removed and put in another order."""
+
+Result = tuple[Project, FieldPath]
+Kind = type[Primitive]
+
+
+def in_list(path: FieldPath) -> bool:
+    """The path is an item of one of the lists."""
+    return path[:-1] in LISTS
+
+
+def unique_name(name: str, taken: set[str]) -> str:
+    """The name itself, or with the next free number: laser, laser 2, laser 3."""
+    if name not in taken:
+        return name
+    stem = re.sub(r" \d+$", "", name)[:90]
+    number = 2
+    while f"{stem} {number}" in taken:
+        number += 1
+    return f"{stem} {number}"
+
+
+def add_laser(project: Project) -> Result:
+    """A laser aimed at the middle of the working range, on the first free side of the camera."""
+    return _append(project, LASERS, new_laser(project.scene, unique_name("laser", _names(project, LASERS))))
+
+
+def add_primitive(project: Project, kind: type[Primitive]) -> Result:
+    """A shape on the camera's axis in the middle of the working range, a quarter of the view wide."""
+    from studio.editing.forms import kind_label
+
+    shape = sized(kind, field_of_view(project.scene) / 4)
+    name = unique_name(kind_label(kind).lower(), _names(project, OBJECTS))
+    pose = object_pose(project.scene, flat=kind is Plane)
+    return _append(project, OBJECTS, SceneObject(name=name, shape=shape, T_world_object=pose))
+
+
+def add_mesh(
+    project: Project, path: str, unit: str = "m", bounds: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+) -> Result:
+    """An object of a mesh file (relative to the project), its middle at the middle of the working range.
+
+    bounds: lowest and highest corner of the mesh in m, where known; else its origin is put there.
+    """
+    stem = path.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0] or "mesh"
+    name = unique_name(stem[:100], _names(project, OBJECTS))
+    place = target(project.scene)
+    if bounds is not None:
+        place = place - [(low + high) / 2 for low, high in zip(*bounds, strict=True)]
+    shape = MeshFile.model_validate({"path": path, "unit": unit})
+    return _append(
+        project, OBJECTS, SceneObject(name=name, shape=shape, T_world_object=Pose(translation=vector(place)))
+    )
+
+
+def add_light(project: Project, kind: type[PointLight] | type[RectangleLight]) -> Result:
+    """A lamp or a panel beside the camera that faces the working range, as bright as a well-lit bench."""
+    pose, distance = light_pose(project.scene)
+    names = _names(project, LIGHTS)
+    if kind is PointLight:
+        value = rounded(0.4 * distance**2)
+        lamp = PointLight(name=unique_name("lamp", names), intensity=(value,) * 3, T_world_light=pose)
+        return _append(project, LIGHTS, lamp)
+    side = rounded(distance / 3)
+    panel = RectangleLight(
+        name=unique_name("panel", names), radiance=(4.0, 4.0, 4.0), width=side, height=side, T_world_light=pose
+    )
+    return _append(project, LIGHTS, panel)
+
+
+def remove(project: Project, path: FieldPath) -> Result:
+    """Without an item; the path is the neighbour's that takes its place, or the list's owner."""
+    items = list(_items(project, path))
+    del items[_index(path)]
+    result = replaced(project, path[:-1], tuple(items))
+    if items:
+        return result, (*path[:-1], min(_index(path), len(items) - 1))
+    return result, path[:-1]
+
+
+def duplicate(project: Project, path: FieldPath) -> Result:
+    """A copy of an item right after it, under a new name, moved a little so that both can be seen."""
+    item = value_at(project, path)
+    name = unique_name(item.name, _names(project, path[:-1]))
+    field = next(name for name in type(item).model_fields if name.startswith("T_"))
+    shift = field_of_view(project.scene) / 10
+    pose: Pose = getattr(item, field)
+    x, y, z = pose.translation
+    moved = pose.model_copy(update={"translation": (x, round(y + shift, 9), z)})
+    items = list(_items(project, path))
+    items.insert(_index(path) + 1, item.model_copy(update={"name": name, field: moved}))
+    return replaced(project, path[:-1], tuple(items)), (*path[:-1], _index(path) + 1)
+
+
+def rename(project: Project, path: FieldPath, name: str) -> Project:
+    """InputError: empty, too long, or taken."""
+    name = name.strip()
+    if in_list(path) and name in _names(project, path[:-1]) - {value_at(project, path).name}:
+        taken = f"another {str(path[-2]).removesuffix('s')} has this name"
+        raise InputError(taken, found=name, allowed="one name each")
+    return replaced(project, (*path, "name"), name)
+
+
+def set_visible(project: Project, path: FieldPath, visible: bool) -> Project:
+    """Show or hide an object."""
+    return replaced(project, (*path, "visible"), visible)
+
+
+def move(project: Project, path: FieldPath, index: int) -> Result:
+    """An item to another place in its list."""
+    items = list(_items(project, path))
+    index = max(0, min(index, len(items) - 1))
+    items.insert(index, items.pop(_index(path)))
+    return replaced(project, path[:-1], tuple(items)), (*path[:-1], index)
+
+
+def set_motion(project: Project, kind: type[BaseModel]) -> Result:
+    """Another kind of motion; what both kinds have in common stays."""
+    from studio.editing.forms import Alternative, start_value
+
+    assert kind in (NoMotion, LinearStage, Turntable, PoseList)
+    motion = start_value(Alternative("", "", kind), project.scene.motion)
+    return replaced(project, ("scene", "motion"), motion), ("scene", "motion")
+
+
+def _append(project: Project, path: FieldPath, item: SceneObject | LineLaser | PointLight | RectangleLight) -> Result:
+    items = value_at(project, path)
+    return replaced(project, path, (*items, item)), (*path, len(items))
+
+
+def _names(project: Project, path: FieldPath) -> set[str]:
+    return {item.name for item in value_at(project, path)}
+
+
+def _items(project: Project, path: FieldPath) -> tuple[Any, ...]:
+    if not in_list(path):
+        raise KeyError(path)
+    return tuple(value_at(project, path[:-1]))
+
+
+def _index(path: FieldPath) -> int:
+    return int(path[-1])

@@ -1,0 +1,96 @@
+"""Which pose a selected item has, and in which frame that pose is given: what a gizmo or a typed number moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.base.model import Vector3
+from render.base.pose import Pose, invert
+from render.scene.motion import NoMotion
+from render.scene.scene import Scene
+from studio.project.document import FieldPath, value_at
+from studio.project.project import Project
+
+Float = NDArray[np.float64]
+
+RIG: FieldPath = ("scene", "rig")
+
+
+@dataclass(frozen=True)
+class Target:
+    """A pose that can be moved."""
+
+    path: FieldPath
+    """Of the pose in the project."""
+    name: str
+    pose: Pose
+    T_world_parent: Float
+    """(4, 4) frame in which the pose is given."""
+
+    @property
+    def T_world_item(self) -> Float:
+        """(4, 4)."""
+        return np.asarray(self.T_world_parent @ self.pose.matrix)
+
+    def moved(self, motion: Float) -> Pose:
+        """The pose after a motion (4, 4) in the world that only moves: the rotation stays, bit for bit."""
+        offset = self.T_world_parent[:3, :3].T @ motion[:3, 3]
+        return self.pose.model_copy(update={"translation": rounded(np.add(self.pose.translation, offset))})
+
+    def turned(self, motion: Float) -> Pose:
+        """The pose after a motion (4, 4) in the world that turns about the item's own origin, which stays."""
+        matrix = invert(self.T_world_parent) @ motion @ self.T_world_item
+        rotation = Pose.from_matrix(matrix).rotation
+        return self.pose.model_copy(update={"rotation": rotation})
+
+
+def target(project: Project, selection: FieldPath, step: int = 0) -> Target | None:
+    """The pose of what is selected at a step of the motion; None: it has none, or is not there any more."""
+    scene = project.scene
+    for length in range(len(selection), 1, -1):
+        head = selection[:length]
+        name = _pose_name(head)
+        if name is not None:
+            try:
+                item = value_at(project, head)
+                pose: Pose = getattr(item, name)
+            except (KeyError, AttributeError):
+                return None
+            return Target((*head, name), _title(head, item), pose, _parent(scene, head, step))
+    return None
+
+
+def rounded(values: Float) -> Vector3:
+    """To a nanometre: what a mouse says is no finer."""
+    x, y, z = (round(float(value), 9) + 0.0 for value in values)
+    return x, y, z
+
+
+def _pose_name(path: FieldPath) -> str | None:
+    if path == RIG:
+        return "T_world_rig"
+    if path == (*RIG, "camera"):
+        return "T_rig_camera"
+    if len(path) == 4 and path[:3] == (*RIG, "lasers"):
+        return "T_rig_laser"
+    if len(path) == 3 and path[1] == "objects":
+        return "T_world_object"
+    if len(path) == 3 and path[1] == "lights":
+        return "T_world_light"
+    return None
+
+
+def _title(path: FieldPath, item: object) -> str:
+    return getattr(item, "name", "") or str(path[-1])
+
+
+def _parent(scene: Scene, path: FieldPath, step: int) -> Float:
+    moves = None if isinstance(scene.motion, NoMotion) else scene.motion.moves
+    if path[:2] == RIG and len(path) > 2:
+        return scene.T_world_rig(step)
+    if (moves == "rig" and path == RIG) or (moves == "objects" and path[1] == "objects"):
+        return np.asarray(scene.motion.displacement(step))
+    return np.eye(4)

@@ -1,0 +1,1 @@
+"""The same for photographs of a real scanner."""

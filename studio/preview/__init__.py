@@ -1,0 +1,1 @@
+"""What is seen before anything is rendered: preview, read-outs, estimates."""

@@ -1,0 +1,300 @@
+"""What a project will show in its first frame: the line in the image, resolution, working range, width, exposure.
+
+All of it comes from the exact curve and the direct laser light, a fraction of a second's work; "about" is a median.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.ambient.transport_plan import expected_ambient
+from render.camera.camera import Camera
+from render.frame import Frame, LaserCurve
+from render.render import render_world
+from render.scene.lights import Environment
+from render.scene.motion import NoMotion
+from render.sensor.develop import expected_electrons
+from render.sensor.response import laser_response
+from render.world.material_checks import check_materials, scene_warnings
+from render.world.placement_checks import check_placement
+from render.world.world import build_world
+from studio.project.project import Project
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+
+PROBE_ERROR = 0.05
+"""Relative error of the light that is rendered to look at; ample for figures that are called about."""
+PROBE_REFLECTED = 0.3
+"""The same of reflected light."""
+WORKING_DISTANCES = np.geomspace(0.01, 100.0, 4001)
+NARROW_PX, WIDE_PX = 0.5, 6.0
+BROADEST_PX = 100.0
+"""Light this broad is no line; its width is not followed farther."""
+DIM_ELECTRONS = 100.0
+STEEP = math.radians(75)
+
+
+@dataclass(frozen=True)
+class LaserView:
+    """One laser as the camera sees it. Lengths m, angles rad; None where there is nothing to measure."""
+
+    name: str
+    baseline: float
+    """Distance from the camera's centre to the laser's origin."""
+    triangulation_angle: float | None
+    """Between the rays of camera and laser, about."""
+    scan_lines: int
+    scan_lines_hit: int
+    line_length: float
+    """On the surface, where the line is unbroken."""
+    line_length_px: float
+    depth_nearest: float | None
+    depth_farthest: float | None
+    working_nearest: float | None
+    working_farthest: float | None
+    """Depths along the fan's axis that fall into the image; no farthest: no end."""
+    depth_per_px: float | None
+    along_line_per_px: float | None
+    width_px: float | None
+    """Standard deviation of the light across the line, without the pixel's own, about."""
+    light_electrons: float | None
+    """Of the laser alone, without dark current, in the brightest pixel of a scan line, about."""
+    peak_electrons: float | None
+    """Of the brightest pixel of a scan line, about."""
+    peak_electrons_most: float | None
+    saturated: float | None
+    """Share of the scan lines that are hit whose brightest pixel exceeds the full well."""
+    ambient_saturated: float | None
+    """Share of the line's pixels that the ambient light alone saturates; None: it is not rendered."""
+    steepest_view: float | None
+    """Largest angle between a facet's normal and the camera or the laser."""
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What is in a project, and what it will show at step 0."""
+
+    name: str
+    objects: tuple[tuple[str, str, int], ...]
+    """Name, kind of shape, triangles."""
+    image_size: tuple[int, int]
+    frames: int
+    full_well: float
+    lasers: tuple[LaserView, ...]
+    warnings: tuple[str, ...]
+    plan: tuple[str, ...]
+    """Of the light: what a render computes and leaves out, by a pilot of the lasers' reflections."""
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def inspect(project: Project, root: Path, threads: int | None = None) -> Inspection:
+    """Load the meshes below `root` and look. InputError: what rendering would refuse as well."""
+    scene = project.scene
+    world = build_world(scene, root, 0)
+    check_placement(world, scene, 0)
+    check_materials(world, scene)
+    dark = scene.model_copy(update={"lights": (), "environment": Environment(), "motion": NoMotion()})
+    probe = {"laser_error": PROBE_ERROR, "indirect_error": PROBE_REFLECTED, "light_paths": 1 << 20}
+    settings = project.render.model_copy(update={**probe, "truth_images": False})
+    frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, threads=threads)
+    views = laser_views(project, frame)
+    counts = np.bincount(world.object_id, minlength=len(scene.visible_objects))
+    return Inspection(
+        name=project.name,
+        objects=tuple(
+            (item.name, item.shape.kind, int(count)) for item, count in zip(scene.visible_objects, counts, strict=True)
+        ),
+        image_size=(scene.camera.width, scene.camera.height),
+        frames=scene.frame_count,
+        full_well=project.sensor.full_well,
+        lasers=views,
+        warnings=(*_warnings(project, views), *scene_warnings(world, scene)),
+        plan=(
+            *(line for line in frame.plan.splitlines() if not line.startswith("ambient: none")),
+            *expected_ambient(scene, project.render),
+        ),
+    )
+
+
+def view_warnings(project: Project, frame: Frame, laser_power: Sequence[float] | None = None) -> list[str]:
+    """What `inspect` warns of, in a frame as it was rendered; laser_power: W of each laser in place of the scene's."""
+    return _warnings(project, laser_views(project, frame, laser_power), laser_power)
+
+
+def laser_views(project: Project, frame: Frame, laser_power: Sequence[float] | None = None) -> tuple[LaserView, ...]:
+    """Each laser in a rendered frame; ambient light, where the frame has it, counts for `ambient_saturated` alone."""
+    powers = [laser.power for laser in project.scene.lasers] if laser_power is None else laser_power
+    ambient = None
+    if frame.ambient is not None:
+        ambient = expected_electrons(frame, project.scene, project.sensor, laser_power=[0.0] * len(frame.curves))
+    alone = replace(frame, ambient=None)
+    return tuple(_laser_view(project, alone, i, power, ambient) for i, power in enumerate(powers))
+
+
+def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: Float32 | None) -> LaserView:
+    scene, curve = project.scene, frame.curves[i]
+    camera, rows = scene.camera, curve.axis == "rows"
+    origin = scene.T_camera_laser(i)[:3, 3]
+    plane = scene.laser_plane(i)
+    nearest, farthest = working_range(camera, scene.T_camera_laser(i))
+    hit = np.unique(curve.index)
+    light, width = _brightness(project, frame, i, power, hit)
+    peak = light + project.sensor.dark_current * project.sensor.exposure_time
+    length, length_px = _lengths(curve)
+    some = len(curve.point) > 0
+    depth_px, along_px = _resolution(camera, plane, curve) if some else (None, None)
+    return LaserView(
+        name=scene.lasers[i].name,
+        baseline=float(np.linalg.norm(origin)),
+        triangulation_angle=_between_rays(curve.point, origin) if some else None,
+        scan_lines=camera.height if rows else camera.width,
+        scan_lines_hit=len(hit),
+        line_length=length,
+        line_length_px=length_px,
+        depth_nearest=float(curve.depth_z.min()) if some else None,
+        depth_farthest=float(curve.depth_z.max()) if some else None,
+        working_nearest=nearest,
+        working_farthest=farthest,
+        depth_per_px=depth_px,
+        along_line_per_px=along_px,
+        width_px=float(np.median(width[light > 0.0])) if np.any(light > 0.0) else None,
+        light_electrons=float(np.median(light)) if some else None,
+        peak_electrons=float(np.median(peak)) if some else None,
+        peak_electrons_most=float(peak.max()) if some else None,
+        saturated=float(np.mean(peak > project.sensor.full_well)) if some else None,
+        ambient_saturated=_saturated_along(curve, ambient, project.sensor.full_well),
+        steepest_view=float(max(curve.camera_angle.max(), curve.laser_angle.max())) if some else None,
+    )
+
+
+def _between_rays(points: Float, origin: Float) -> float:
+    """Median angle at the surface between camera (at 0) and laser; (n, 3) points in the camera frame."""
+    to_laser = origin - points
+    cosine = -np.einsum("ij,ij->i", points, to_laser)
+    cosine /= np.linalg.norm(points, axis=1) * np.linalg.norm(to_laser, axis=1)
+    return float(np.median(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _saturated_along(curve: LaserCurve, electrons: Float32 | None, full_well: float) -> float | None:
+    """Share of the line's pixels above the full well."""
+    if electrons is None or len(curve.index) == 0:
+        return None
+    lines = electrons if curve.axis == "rows" else electrons.T
+    along = np.clip(np.round(curve.position).astype(np.intp), 0, lines.shape[1] - 1)
+    return float(np.mean(lines[curve.index, along] > full_well))
+
+
+def _brightness(
+    project: Project, frame: Frame, i: int, own_power: float, hit: NDArray[np.int32]
+) -> tuple[Float, Float]:
+    """Electrons of light in the brightest pixel, and the line's sigma in px, of each scan line that is hit."""
+    power = [own_power if k == i else 0.0 for k in range(len(frame.curves))]
+    light_alone = project.sensor.model_copy(update={"dark_current": 0.0})
+    electrons = expected_electrons(frame, project.scene, light_alone, laser_power=power)
+    lines = (electrons if frame.curves[i].axis == "rows" else electrons.T)[hit].astype(np.float64)
+    if len(hit) == 0:
+        return np.zeros(0), np.zeros(0)
+    peak = lines.max(axis=1)
+    if not np.any(peak > 0.0):
+        return peak, np.zeros(len(hit))
+    rough = float(np.median(lines[peak > 0.0].sum(axis=1) / (peak[peak > 0.0] * math.sqrt(2.0 * math.pi))))
+    # second moment within a window about the peak, less that of a pixel (Sheppard's correction)
+    half = math.ceil(6.0 * min(rough, BROADEST_PX)) + 1
+    reach = np.arange(-half, half + 1)
+    near = np.clip(lines.argmax(axis=1)[:, None] + reach, 0, lines.shape[1] - 1)
+    weight = np.take_along_axis(lines, near, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        weight /= weight.sum(axis=1, keepdims=True)
+    mean = weight @ reach
+    variance = np.einsum("ij,ij->i", weight, (reach - mean[:, None]) ** 2) - 1.0 / 12.0
+    return peak, np.sqrt(np.maximum(np.nan_to_num(variance), 0.0))
+
+
+def _lengths(curve: LaserCurve) -> tuple[float, float]:
+    """Length (m, px) of the line, summed over neighbouring scan lines where it does not jump."""
+    if len(curve.index) < 2:
+        return 0.0, 0.0
+    steps = np.linalg.norm(np.diff(curve.point, axis=0), axis=1)
+    pixels = np.hypot(np.diff(curve.index), np.diff(curve.position))
+    joined = (np.diff(curve.index) == 1) & (steps < 10.0 * np.median(steps) + 1e-12)
+    return float(steps[joined].sum()), float(pixels[joined].sum())
+
+
+def _resolution(camera: Camera, plane: Float, curve: LaserCurve) -> tuple[float | None, float | None]:
+    """Change of depth for one pixel across the line, and length on the surface from one scan line to the next, m."""
+    pixels = np.stack([curve.position, curve.index.astype(np.float64)], axis=1)
+    if curve.axis == "columns":
+        pixels = pixels[:, ::-1].copy()
+    half = np.array([0.5, 0.0] if curve.axis == "rows" else [0.0, 0.5])
+    depths = []
+    for shifted in (pixels - half, pixels + half):
+        rays, _ = camera.rays(shifted)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depths.append(-plane[3] * rays[:, 2] / (rays @ plane[:3]))
+    change = np.abs(depths[1] - depths[0])
+    steps = np.linalg.norm(np.diff(curve.point, axis=0), axis=1)[np.diff(curve.index) == 1]
+    depth = float(np.median(change[np.isfinite(change)])) if np.isfinite(change).any() else None
+    return depth, float(np.median(steps)) if len(steps) else None
+
+
+def working_range(camera: Camera, T_camera_laser: Float) -> tuple[float | None, float | None]:
+    """Nearest and farthest depth_z of the fan's axis in the image; the farthest is None where it never leaves."""
+    points = T_camera_laser[:3, 3] + WORKING_DISTANCES[:, None] * T_camera_laser[:3, 2]
+    pixels, valid = camera.project(points)
+    with np.errstate(invalid="ignore"):
+        seen = valid & (np.abs(pixels[:, 0] - (camera.width - 1) / 2) <= camera.width / 2)
+        seen &= np.abs(pixels[:, 1] - (camera.height - 1) / 2) <= camera.height / 2
+    if not seen.any():
+        return None, None
+    inside = np.flatnonzero(seen)
+    farthest = None if inside[-1] == len(points) - 1 else float(points[inside[-1], 2])
+    return float(points[inside[0], 2]), farthest
+
+
+def _warnings(project: Project, views: tuple[LaserView, ...], laser_power: Sequence[float] | None = None) -> list[str]:
+    """What a person should know before spending time on a scan, or before believing one."""
+    found = []
+    if not views:
+        found.append("the rig has no laser: there is no line to extract")
+    for i, view in enumerate(views):
+        if view.scan_lines_hit == 0:
+            found.append(f"{view.name}: no part of the line is both lit and seen")
+            continue
+        if view.ambient_saturated is not None and view.ambient_saturated > 0.01:
+            found.append(
+                f"{view.name}: the ambient light alone saturates {view.ambient_saturated:.0%} of the line; shorten "
+                "sensor.exposure_time, add a band-pass filter, or darken the lamps"
+            )
+        if view.saturated is not None and view.saturated > 0.01:
+            found.append(f"{view.name}: {view.saturated:.0%} of the line saturates; shorten sensor.exposure_time")
+        if view.light_electrons is not None and view.light_electrons < DIM_ELECTRONS:
+            power = project.scene.lasers[i].power if laser_power is None else laser_power[i]
+            found.append(f"{view.name}: {_why_dim(project, i, power, view.light_electrons)}")
+        if view.width_px is not None and not NARROW_PX <= view.width_px <= WIDE_PX:
+            found.append(f"{view.name}: the line's sigma is about {view.width_px:.2f} px; 0.5 to 6 px measure well")
+        if view.steepest_view is not None and view.steepest_view > STEEP:
+            found.append(
+                f"{view.name}: parts are seen or lit at {math.degrees(view.steepest_view):.0f} deg: expect bias"
+            )
+    return found
+
+
+def _why_dim(project: Project, i: int, power: float, electrons: float) -> str:
+    laser, none = project.scene.lasers[i], "none of its light reaches the image"
+    if power == 0.0:
+        return f"{none}: its power is 0 W"
+    if project.scene.camera.lens.transmission == 0.0:
+        return f"{none}: the camera's lens.transmission is 0"
+    if not np.any(laser_response(project.sensor, laser.wavelength_nm)):
+        return f"{none}: sensor.efficiency and sensor.band_pass let nothing of {laser.wavelength_nm:g} nm through"
+    return f"the line is dim, about {electrons:.2g} e-; lengthen the exposure"

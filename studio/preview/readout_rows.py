@@ -1,0 +1,207 @@
+"""Read-outs in words: label, value with its unit, how sensible it is, and what it means."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from studio.preview.estimates import SHARP_PX
+from studio.preview.inspection import DIM_ELECTRONS, NARROW_PX, WIDE_PX
+from studio.preview.readouts import Range, Readouts
+
+Level = Literal["", "warning", "error"]
+NOTHING = "-"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the panel."""
+
+    key: str
+    label: str
+    value: str
+    note: str
+    """The range along the line, or what goes with the value."""
+    level: Level
+    """Whether it is out of its sensible range."""
+    help: str
+
+
+def rows(r: Readouts) -> tuple[Row, ...]:
+    """All read-outs of a laser, in the order in which a designer asks."""
+    return (
+        Row(
+            "baseline",
+            "Baseline",
+            f"{_digits(1e3 * r.baseline)} mm",
+            "",
+            "",
+            "Distance between the camera's centre and the laser. More baseline: finer depth, more occlusion.",
+        ),
+        _ranged(
+            "angle",
+            "Triangulation angle",
+            r.triangulation_angle,
+            "°",
+            lambda value: f"{math.degrees(value):.1f}",
+            "Between the rays of camera and laser, at the surface. Below 10° depth is coarse; "
+            "above 60° much is occluded.",
+            _outside(math.radians(5), math.radians(10), math.radians(60), math.radians(75)),
+        ),
+        Row("working", "Working range", _working(r), "", *_working_level(r)),
+        _ranged(
+            "depth",
+            "Depth per pixel",
+            r.depth_per_px,
+            " µm",
+            _micrometres,
+            "Change of depth when the line moves by one pixel. A method that finds the line to 0.1 px "
+            "resolves a tenth of it." + _working_depth(r),
+        ),
+        _ranged(
+            "along",
+            "Along the line",
+            r.along_per_px,
+            " µm/px",
+            _micrometres,
+            "Length in the sheet from one scan line to the next: how finely a profile is sampled.",
+        ),
+        _ranged(
+            "width",
+            "Line width, sigma",
+            r.width_px,
+            " px",
+            lambda value: f"{value:.2f}",
+            f"Gaussian sigma of the line across a scan line, without defocus. {NARROW_PX:g} to {WIDE_PX:g} px "
+            "measure well: narrower lines are sampled too coarsely, wider ones waste light.",
+            _outside(NARROW_PX / 2, NARROW_PX, WIDE_PX, 2 * WIDE_PX),
+        ),
+        _peak(r),
+        _saturation(r),
+        _focus(r),
+        _sigma(r),
+        Row(
+            "occluded",
+            "Occluded",
+            NOTHING if r.occluded is None else f"{r.occluded:.0%}",
+            f"{r.scan_lines_hit} of {r.scan_lines} lines",
+            "" if r.occluded is None or r.occluded < 0.1 else "warning" if r.occluded < 0.4 else "error",
+            "Share of the lit line within the image that the camera cannot see because something stands before it, "
+            "or it lies on a side that faces away.",
+        ),
+    )
+
+
+def _ranged(
+    key: str,
+    label: str,
+    values: Range | None,
+    unit: str,
+    text: Callable[[float], str],
+    help: str,
+    level: Callable[[Range], Level] = lambda values: "",
+) -> Row:
+    if values is None:
+        return Row(key, label, NOTHING, "", "", help)
+    low, high = text(values.low), text(values.high)
+    note = f"{low} to {high}" if low != high else ""
+    return Row(key, label, f"{text(values.middle)}{unit}", note, level(values), help)
+
+
+def _outside(least: float, low: float, high: float, most: float) -> Callable[[Range], Level]:
+    def level(values: Range) -> Level:
+        if not least <= values.middle <= most:
+            return "error"
+        return "" if low <= values.middle <= high else "warning"
+
+    return level
+
+
+def _working(r: Readouts) -> str:
+    if r.working_nearest is None:
+        return "none"
+    far = "∞" if r.working_farthest is None else _digits(1e3 * r.working_farthest)
+    return f"{_digits(1e3 * r.working_nearest)} to {far} mm"
+
+
+def _working_level(r: Readouts) -> tuple[Level, str]:
+    help = "Depths at which the middle of the fan falls into the image."
+    if r.working_nearest is None:
+        return "error", f"{help} The camera never sees the middle of this sheet: turn one towards the other."
+    if r.distance is not None:
+        help += f" The line lies at {_digits(1e3 * r.distance.low)} to {_digits(1e3 * r.distance.high)} mm."
+    return "", help
+
+
+def _working_depth(r: Readouts) -> str:
+    if r.working_depth_per_px is None:
+        return ""
+    near, far = (_micrometres(value) for value in r.working_depth_per_px)
+    return f" Over the working range: {near} to {far} µm (as far as ten times the nearest depth)."
+
+
+def _peak(r: Readouts) -> Row:
+    help = "Electrons of the brightest pixel of a scan line, with the ambient light that no shadow takes away."
+    if r.peak_electrons is None:
+        return Row("peak", "Peak signal", NOTHING, "", "", help)
+    level: Level = "warning" if r.peak_electrons.middle < DIM_ELECTRONS else ""
+    help += f" Full well: {r.full_well:,.0f} e-."
+    if r.ambient_electrons is not None:
+        help += f" Ambient light and dark current give {r.ambient_electrons:,.0f} e- of it."
+    middle, low, high = r.peak_electrons.middle, r.peak_electrons.low, r.peak_electrons.high
+    return Row("peak", "Peak signal", f"{middle:,.0f} e-", f"{low:,.0f} to {high:,.0f}", level, help)
+
+
+def _saturation(r: Readouts) -> Row:
+    help = (
+        "Share of the scan lines whose brightest pixel exceeds the full well; shorten the exposure, or lower the power."
+    )
+    if r.saturated is None or r.peak_electrons is None:
+        return Row("saturated", "Saturated", NOTHING, "", "", help)
+    level: Level = "error" if r.saturated > 0.2 else "warning" if r.saturated > 0.01 else ""
+    full = r.peak_electrons.high / r.full_well
+    return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"{full:.0%} of full well", level, help)
+
+
+def _focus(r: Readouts) -> Row:
+    far = "∞" if math.isinf(r.sharp_farthest) else _digits(1e3 * r.sharp_farthest)
+    help = (
+        f"Diameter of the blur disc along the line. At most {SHARP_PX:g} px, which counts as sharp, on the axis from "
+        f"{_digits(1e3 * r.sharp_nearest)} to {far} mm. Set the focus distance to that of the line, or close the "
+        "aperture; a tilted sensor (tauX, tauY of the distortion) tilts the plane in focus. Images show it where the "
+        "camera's lens is rendered as a thin lens, or the sensor's defocus is switched on."
+    )
+    note = f"sharp {_digits(1e3 * r.sharp_nearest)} to {far}"
+    if r.blur_px is None:
+        return Row("blur", "Defocus blur", NOTHING, note, "", help)
+    worst = r.blur_px.high
+    level: Level = "" if worst <= SHARP_PX else "warning" if worst <= 4.0 * SHARP_PX else "error"
+    return Row("blur", "Defocus blur", f"{worst:.1f} px", note, level, help)
+
+
+def _sigma(r: Readouts) -> Row:
+    help = (
+        "Expected standard deviation of depth for the best possible extraction: Cramer-Rao bound of photon and read "
+        "noise, and speckle (laser light on a rough surface, fully developed). Images show "
+        "speckle where the sensor's is switched on."
+    )
+    if r.photon_sigma is None or r.speckle_sigma is None or r.depth_sigma is None:
+        return Row("sigma", "Depth noise, sigma", NOTHING, "", "", help)
+    photon, speckle = _micrometres(r.photon_sigma), _micrometres(r.speckle_sigma)
+    help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
+    note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
+    return Row("sigma", "Depth noise, sigma", f"{_micrometres(r.depth_sigma)} µm", note, "", help)
+
+
+def _micrometres(value: float) -> str:
+    return _digits(1e6 * value)
+
+
+def _digits(value: float) -> str:
+    """Three digits, at least those before the point."""
+    if not math.isfinite(value):
+        return "∞"
+    decimals = max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
+    return f"{value:,.{min(decimals, 3)}f}"

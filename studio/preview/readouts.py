@@ -1,0 +1,155 @@
+"""What a rig can do, read off its lit curve in milliseconds: resolution, width, electrons, focus, noise, occlusion."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.camera.camera import Camera
+from studio.preview import estimates
+from studio.preview.inspection import working_range
+from studio.preview.preview import Look
+
+Float = NDArray[np.float64]
+
+
+class Range(NamedTuple):
+    """Least, median and greatest along the lit line."""
+
+    low: float
+    middle: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Readouts:
+    """Of one laser; lengths m, angles rad. None: no line is both lit and seen, or as said."""
+
+    name: str
+    baseline: float
+    working_nearest: float | None
+    working_farthest: float | None
+    """Depths along the fan's axis that fall into the image; no farthest: no end. Known without any object."""
+    working_depth_per_px: tuple[float, float] | None
+    """`depth_per_px` at the ends of the working range (the far end at most ten times the near one)."""
+    sharp_nearest: float
+    sharp_farthest: float
+    """Depths between which the blur disc is at most `estimates.SHARP_PX`; inf: no end."""
+    full_well: float
+    occluded: float | None
+    """Share of the line within the image that the camera cannot see."""
+    scan_lines: int
+    scan_lines_hit: int
+    triangulation_angle: Range | None = None
+    """At the surface, between the rays of camera and laser."""
+    distance: Range | None = None
+    """depth_z of the lit line."""
+    depth_per_px: Range | None = None
+    """Change of depth_z for one pixel across the line."""
+    along_per_px: Range | None = None
+    """Length in the sheet from one scan line to the next."""
+    width_px: Range | None = None
+    """Gaussian sigma across the line, without defocus."""
+    peak_electrons: Range | None = None
+    """Of the brightest pixel of a scan line, before saturation."""
+    saturated: float | None = None
+    """Share of the scan lines that are hit."""
+    ambient_electrons: float | None = None
+    """Background of ambient light and dark current, unshadowed, median."""
+    blur_px: Range | None = None
+    """Diameter of the blur disc along the lit line."""
+    photon_sigma: float | None = None
+    """Expected standard deviation of depth_z from photon and read noise (Cramer-Rao bound), median."""
+    speckle_sigma: float | None = None
+    """The same from fully developed speckle, whether or not the sensor shows it."""
+
+    @property
+    def depth_sigma(self) -> float | None:
+        """Both noises together."""
+        if self.photon_sigma is None or self.speckle_sigma is None:
+            return None
+        return math.hypot(self.photon_sigma, self.speckle_sigma)
+
+
+def readouts(look: Look, laser: int) -> Readouts:
+    """Of one laser in one look at a project."""
+    scene, sensor = look.scene, look.project.sensor
+    camera, source = scene.camera, scene.lasers[laser]
+    T_camera_laser, plane = scene.T_camera_laser(laser), scene.laser_plane(laser)
+    rows = look.project.extraction.axis == "rows"
+    across, along = ((1.0, 0.0), (0.0, 1.0)) if rows else ((0.0, 1.0), (1.0, 0.0))
+    nearest, farthest = working_range(camera, T_camera_laser)
+    sharp = estimates.depth_of_field(camera)
+    lit = look.lit(laser)
+    curve = lit.curve
+    hit = np.unique(curve.index)
+    known = Readouts(
+        name=source.name,
+        baseline=float(np.linalg.norm(T_camera_laser[:3, 3])),
+        working_nearest=nearest,
+        working_farthest=farthest,
+        working_depth_per_px=_working_resolution(camera, T_camera_laser, plane, across, nearest, farthest),
+        sharp_nearest=sharp[0],
+        sharp_farthest=sharp[1],
+        full_well=sensor.full_well,
+        occluded=look.fan(laser).occluded,
+        scan_lines=camera.height if rows else camera.width,
+        scan_lines_hit=len(hit),
+    )
+    if len(curve.index) == 0:
+        return known
+    pixels = estimates.line_pixels(lit)
+    depth = estimates.resolution(camera, plane, pixels, across)[:, 2]
+    width = estimates.line_width_px(camera, source, T_camera_laser, lit, pixels, rows)
+    ambient = estimates.ambient_electrons(look, lit, pixels) + sensor.dark_current * sensor.exposure_time
+    amplitude = estimates.line_electrons(camera, source, sensor, lit, pixels)
+    peak = amplitude * estimates.pixel_share(curve.position, width) + ambient
+    bound = estimates.centre_bound_px(amplitude, width, ambient, estimates.read_variance(sensor))
+    # two independent patterns, of which a depolarising surface makes the sum, vary less by the root of two
+    contrast = math.sqrt(0.5) if sensor.speckle == "depolarised" else 1.0
+    return replace(
+        known,
+        triangulation_angle=_range(estimates.triangulation_angles(curve.point, T_camera_laser[:3, 3])),
+        distance=_range(curve.depth_z),
+        depth_per_px=_range(depth),
+        along_per_px=_range(np.linalg.norm(estimates.resolution(camera, plane, pixels, along), axis=1)),
+        width_px=_range(width),
+        peak_electrons=_range(peak),
+        saturated=len(np.unique(curve.index[peak > sensor.full_well])) / len(hit),
+        ambient_electrons=float(np.median(ambient)),
+        blur_px=_range(estimates.blur_px(camera, curve.point)),
+        photon_sigma=_median(bound * depth),
+        speckle_sigma=_median(contrast * estimates.speckle_px(camera, source.wavelength_nm, width) * depth),
+    )
+
+
+def _working_resolution(
+    camera: Camera,
+    T_camera_laser: Float,
+    plane: Float,
+    across: tuple[float, float],
+    nearest: float | None,
+    farthest: float | None,
+) -> tuple[float, float] | None:
+    axis, origin = T_camera_laser[:3, 2], T_camera_laser[:3, 3]
+    if nearest is None or axis[2] <= 0.0:
+        return None
+    far = min(farthest if farthest is not None else math.inf, 10.0 * nearest)
+    points = origin + ((np.array([nearest, far]) - origin[2]) / axis[2])[:, None] * axis
+    pixels, _ = camera.project(points)
+    change = estimates.resolution(camera, plane, pixels, across)[:, 2]
+    return float(change[0]), float(change[1])
+
+
+def _range(values: Float) -> Range | None:
+    known = values[np.isfinite(values)]
+    return Range(float(known.min()), float(np.median(known)), float(known.max())) if len(known) else None
+
+
+def _median(values: Float) -> float | None:
+    found = _range(values)
+    return None if found is None else found.middle

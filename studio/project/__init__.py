@@ -1,0 +1,1 @@
+"""The project file: its schema, versions, templates, meshes, autosave."""

@@ -1,0 +1,105 @@
+"""A mesh file from anywhere becomes part of the project: copied beside it with its side files, its unit judged."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from render.base.errors import InputError
+from render.base.files import atomic_write, check_regular, sha256
+from render.mesh.load import LARGE_EXTENT, load_mesh
+from render.mesh.mesh_headers import MAX_FILE_BYTES
+from render.mesh.trimesh_reader import EXTENSIONS, SideFiles, read_parts, side_files
+from render.scene.scene import SceneObject
+from render.scene.shape import UNITS, MeshFile, Unit
+
+FOLDER = "meshes"
+TOO_LARGE = 5.0
+"""Times the camera's view; a mesh larger than that in metres is taken for millimetres."""
+
+
+@dataclass(frozen=True)
+class ImportedMesh:
+    """path: relative to the project, with slashes; bounds: lowest and highest corner, m, in that unit."""
+
+    path: str
+    unit: Unit
+    bounds: tuple[tuple[float, ...], tuple[float, ...]]
+    triangles: int
+
+    @property
+    def size(self) -> tuple[float, ...]:
+        return tuple(high - low for low, high in zip(*self.bounds, strict=True))
+
+
+def is_mesh(file: Path) -> bool:
+    """By its suffix."""
+    return file.suffix[1:].lower() in EXTENSIONS
+
+
+def needs_copy(file: Path, root: Path) -> bool:
+    """The file is outside the project's folder, where a project may not read."""
+    return not file.resolve().is_relative_to(root.resolve())
+
+
+def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
+    """Copy a mesh (where needed), read and judge it. Takes as long as reading does.
+
+    root: the project's folder; a file from outside is copied into `meshes/` in it, with its material, buffer and image
+    files; view: width of what the camera sees, m, to tell metres from millimetres. What was copied is removed again if
+    the mesh is no good. InputError: no mesh, damaged, or the folder cannot be written.
+    """
+    if not is_mesh(file):
+        allowed = ", ".join(f".{name}" for name in EXTENSIONS)
+        raise InputError("this is not a mesh file", where=str(file), found=file.suffix or file.name, allowed=allowed)
+    check_regular(file, MAX_FILE_BYTES, "mesh file")
+    made: list[Path] = []
+    try:
+        inside = _copied(file, root / FOLDER, made) if needs_copy(file, root) else file.resolve()
+        return _judged(inside, root, view)
+    except BaseException:
+        for copy in made:
+            copy.unlink(missing_ok=True)
+        raise
+
+
+def copied_beside(file: Path, root: Path, folder: str) -> str:
+    """A file's path relative to the project; one from outside is copied into `folder` of it. InputError: cannot be."""
+    if not needs_copy(file, root):
+        return file.resolve().relative_to(root.resolve()).as_posix()
+    return _copied(file, root / folder, []).relative_to(root.resolve()).as_posix()
+
+
+def _copied(file: Path, folder: Path, made: list[Path]) -> Path:
+    """The file in a folder of the project; the same bytes there are used again, another file of that name is kept."""
+    check_regular(file, MAX_FILE_BYTES)
+    sides = side_files(file, file.parent) if is_mesh(file) else []
+    target, number = folder / file.name, 1
+    while target.exists() and sha256(target) != sha256(file):
+        number += 1
+        target = folder / (f"{file.stem} {number}{file.suffix}" if not sides else f"{file.stem} {number}/{file.name}")
+    for source, copy in [(file, target), *((file.parent / name, target.parent / name) for name in sides)]:
+        if copy.exists():
+            continue
+        check_regular(source, MAX_FILE_BYTES, "file that the mesh names")
+        with atomic_write(copy) as temporary:
+            shutil.copyfile(source, temporary)
+        made.append(copy)
+    return target.resolve()
+
+
+def _judged(file: Path, root: Path, view: float) -> ImportedMesh:
+    relative = file.relative_to(root.resolve()).as_posix()
+    where = f"mesh {relative}"
+    parts = read_parts(file, where, SideFiles(file, root, where), colours=False)
+    low = np.min([part.vertices.min(axis=0) for part in parts], axis=0)
+    high = np.max([part.vertices.max(axis=0) for part in parts], axis=0)
+    extent = float((high - low).max())
+    unit: Unit = "mm" if extent > min(LARGE_EXTENT, TOO_LARGE * view) else "m"
+    # the full checks, as rendering will make them
+    mesh = load_mesh(SceneObject(name=file.stem[:100] or "mesh", shape=MeshFile(path=relative, unit=unit)), root)
+    low, high = low * UNITS[unit], high * UNITS[unit]
+    return ImportedMesh(relative, unit, (tuple(low.tolist()), tuple(high.tolist())), len(mesh.triangles))

@@ -1,0 +1,91 @@
+"""The project: everything that decides a scan, in one JSON file beside the meshes and textures it names."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import ValidationError
+
+from analysis.line.settings import ExtractionSettings
+from render.base.errors import InputError
+from render.base.files import atomic_write, inside, sha256
+from render.base.model import Model, quantity
+from render.scene.scene import Scene
+from render.scene.settings import RenderSettings
+from render.scene.shape import MeshFile
+from render.sensor.sensor import Sensor
+from studio.project.migrations import migrate
+from studio.project.strict_json import parse_object, pretty, read_object
+from studio.project.validation_messages import input_error
+
+MAX_SEED = 2**63 - 1
+
+
+class Project(Model):
+    """Frozen; what a file leaves out takes the defaults, and what it should not hold is refused."""
+
+    schema_version: Literal[2] = 2
+    name: str = quantity("untitled", label="Name", min_length=1, max_length=200)
+    seed: int = quantity(0, label="Seed", help="Decides every random number of the scan.", ge=0, le=MAX_SEED)
+    scene: Scene
+    sensor: Sensor
+    render: RenderSettings = RenderSettings()
+    extraction: ExtractionSettings = ExtractionSettings()
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """Read, migrate and validate a project file. InputError: one message for all that is wrong with it."""
+        return cls.from_data(read_object(Path(path)), str(path))
+
+    @classmethod
+    def from_text(cls, text: str, where: str = "project") -> Self:
+        """As `load`, from the file's text. `where` names the source in messages."""
+        return cls.from_data(parse_object(text, where), where)
+
+    @classmethod
+    def from_data(cls, data: dict[str, Any], where: str = "project") -> Self:
+        """As `load`, from the file's JSON object."""
+        data = migrate(data, where)
+        try:
+            # through JSON text, because only there strict validation takes a list for a tuple
+            return cls.model_validate_json(json.dumps(data), strict=True)
+        except ValidationError as error:
+            raise input_error(error, cls, data, where) from None
+
+    def to_text(self) -> str:
+        """The file's text: every value written out, so that a project outlives a change of defaults."""
+        return pretty(self.model_dump(mode="json")) + "\n"
+
+    def save(self, path: Path | str) -> Self:
+        """Write the file, whole or not at all, with the digest of every mesh file; returns what was written."""
+        target = Path(path)
+        signed = self.with_digests(target.parent)
+        with atomic_write(target) as temporary:
+            temporary.write_text(signed.to_text(), encoding="utf-8")
+        return signed
+
+    def with_digests(self, root: Path) -> Self:
+        """The same project with the SHA-256 of each mesh file found below `root`; a missing mesh keeps what it had."""
+        objects = []
+        for i, item in enumerate(self.scene.objects):
+            if isinstance(item.shape, MeshFile):
+                file = inside(root, item.shape.path, f"scene.objects[{i}].shape.path")
+                if file.is_file():
+                    item = item.model_copy(update={"shape": item.shape.model_copy(update={"sha256": sha256(file)})})
+            objects.append(item)
+        scene = self.scene.model_copy(update={"objects": tuple(objects)})
+        return self.model_copy(update={"scene": scene})
+
+
+def project_file(path: Path) -> Path:
+    """The project file meant by a path: itself, or the only project in a folder. InputError: none, or several."""
+    if not path.is_dir():
+        return path
+    found = sorted(file for file in path.glob("*.json") if not file.name.startswith("."))  # no half-written ones
+    named = [file for file in found if file.name == "project.json"] or found
+    if len(named) != 1:
+        names = ", ".join(file.name for file in named[:5]) or "none"
+        raise InputError("the folder does not hold one project", where=str(path), found=names, allowed="one .json file")
+    return named[0]

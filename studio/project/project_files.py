@@ -1,0 +1,67 @@
+"""The files a project names, so that a project saved elsewhere takes them along. Qt-free."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from render.base.errors import InputError
+from render.base.files import atomic_write, inside, sha256
+from render.material.material import BumpMap, GreyTexture, NormalMap, Texture
+from render.mesh.trimesh_reader import side_files
+from render.scene.scene import Scene
+from render.scene.shape import MeshFile
+
+
+def named_files(item: BaseModel, where: str) -> dict[str, str]:
+    """Relative path -> the field that names it, of every mesh and texture in a model, however deep."""
+    if isinstance(item, MeshFile | Texture | GreyTexture | NormalMap | BumpMap):
+        return {item.path: f"{where}.path"}
+    found: dict[str, str] = {}
+    for name in type(item).model_fields:
+        value = getattr(item, name)
+        for i, each in enumerate(value if isinstance(value, tuple) else (value,)):
+            if isinstance(each, BaseModel):
+                place = f"{where}.{name}[{i}]" if isinstance(value, tuple) else f"{where}.{name}"
+                found = named_files(each, place) | found
+    return found
+
+
+def missing_files(scene: Scene, root: Path) -> list[tuple[int, Path]]:
+    """Visible objects whose mesh or texture is not there: index and file. InputError: a path that leaves the folder."""
+    found = []
+    for i, item in enumerate(scene.objects):
+        for path, where in named_files(item, f"scene.objects[{i}]").items():
+            file = inside(root, path, where)
+            if item.visible and not file.is_file():
+                found.append((i, file))
+    return found
+
+
+def carry(scene: Scene, root: Path, folder: Path) -> list[Path]:
+    """Copy the files the scene names from `root` to the same places below `folder`; returns what was written.
+
+    A file that is missing in `root` is passed over.
+    InputError: another file is in the way, or `folder` is not writable.
+    """
+    if root.resolve() == folder.resolve():
+        return []
+    pairs = []
+    for relative, where in named_files(scene, "scene").items():
+        beside = Path(relative).parent
+        for each in (relative, *(str(beside / name) for name in side_files(inside(root, relative, where), root))):
+            source, target = inside(root, each, where), inside(folder, each, where)
+            if not source.is_file():
+                continue
+            if not target.exists():
+                pairs.append((source, target))
+            elif sha256(source) != sha256(target):
+                raise InputError(
+                    "another file of that name is in the way", where=str(target), cure="save into another folder"
+                )
+    for source, target in pairs:
+        with atomic_write(target) as temporary:
+            shutil.copyfile(source, temporary)
+    return [target for _, target in pairs]

@@ -1,0 +1,145 @@
+"""Every command of the menus in one table, with its shortcut, icon and help; toolbar and cheat sheet read it too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QMainWindow, QMenu
+
+from studio.qt.core.icons import icon
+
+
+@dataclass(frozen=True)
+class Command:
+    """One thing a person can ask for; `menu` is where it stands, "File/Export" for a submenu."""
+
+    key: str
+    menu: str
+    text: str
+    shortcut: str = ""
+    icon: str = ""
+    tip: str = ""
+    checkable: bool = False
+
+
+SEPARATOR = "-"
+
+COMMANDS: tuple[Command | str, ...] = (
+    Command("new", "File", "New from &template…", "Ctrl+N", "new", "Start from a project that comes with the program"),
+    Command("open", "File", "&Open…", "Ctrl+O", "open", "Open a project file"),
+    Command("open_results", "File", "Open res&ults…", "Ctrl+Shift+O", "", "Look at the folder of a finished scan"),
+    Command("recent", "File", "Open &recent"),
+    "File/-",
+    Command("save", "File", "&Save", "Ctrl+S", "save", "Save the project"),
+    Command("save_as", "File", "Save &as…", "Ctrl+Shift+S", "", "Save under another name, with the files it needs"),
+    "File/-",
+    Command("export_html", "File/Export", "Report as &HTML…", "Ctrl+E", "", "One self-contained file for a browser"),
+    Command("export_pdf", "File/Export", "Report as &PDF…", "", "", "The same report, to print"),
+    "File/Export/-",
+    Command("export_exr", "File/Export", "&Frame as EXR…", "", "", "Radiance of every light group, with the truth"),
+    Command("export_png", "File/Export", "&Image as PNG…", "", "", "As the sensor sees it"),
+    Command("export_ply", "File/Export", "&Points as PLY…", "", "", "With error and scan line as attributes"),
+    Command("export_csv", "File/Export", "Points as &CSV…", "", "", "A table for a spreadsheet"),
+    "File/Export/-",
+    Command("screenshot", "File/Export", "&Screenshot of the window…", "Ctrl+Shift+P", "picture"),
+    "File/-",
+    Command("quit", "File", "&Quit", "Ctrl+Q"),
+    Command("undo", "Edit", "&Undo", "Ctrl+Z", "undo"),
+    Command("redo", "Edit", "&Redo", "Ctrl+Shift+Z", "redo"),
+    "Edit/-",
+    Command("duplicate", "Edit", "&Duplicate", "Ctrl+D", "", "A copy of what is selected"),
+    Command("delete", "Edit", "D&elete", "Del", "", "Remove what is selected"),
+    Command("rename", "Edit", "Re&name", "F2"),
+    Command("hide", "Edit", "&Hide or show", "H", "", "Hidden objects are neither drawn nor measured"),
+    "Edit/-",
+    Command("deselect", "Edit", "Select &nothing", "Ctrl+Shift+A"),
+    Command("setup", "View", "&Set up", "F6", "", "", True),
+    Command("render_workspace", "View", "&Render", "F7", "", "", True),
+    Command("measure", "View", "&Measure", "F8", "", "", True),
+    "View/-",
+    Command("panels", "View", "&Panels"),
+    Command("log", "View", "M&essages", "Ctrl+L", "", "The log of this session"),
+    Command("arrange", "View", "Panels as they &were", "", "", "Put the panels of this workspace back in place"),
+    "View/-",
+    Command("theme_system", "View/Theme", "As the &desktop", "", "", "", True),
+    Command("theme_dark", "View/Theme", "&Dark", "", "", "", True),
+    Command("theme_light", "View/Theme", "&Light", "", "", "", True),
+    Command("full_screen", "View", "&Full screen", "F11", "", "", True),
+    Command(
+        "import_mesh", "Scene", "Import &mesh…", "Ctrl+I", "mesh", "STL, PLY, OBJ, GLB; or drop files on the window"
+    ),
+    "Scene/-",
+    Command("add", "Scene", "&Add"),
+    Command("presets", "Scene", "&Presets"),
+    Command("motion", "Scene", "M&otion"),
+    Command("render", "Render", "&Render", "F5", "render", "Render the frame with the settings of the Render panel"),
+    Command("pause", "Render", "&Pause or go on", "F9", "pause"),
+    Command("cancel", "Render", "&Cancel", "Shift+F5", "cancel", "Stop what is being computed"),
+    "Render/-",
+    Command(
+        "scan", "Render", "Run the whole &scan…", "Ctrl+F5", "", "Every step of the motion, with points and report"
+    ),
+    Command("previous_line", "Measure", "&Previous scan line", "Alt+Up"),
+    Command("next_line", "Measure", "&Next scan line", "Alt+Down"),
+    Command("worst_line", "Measure", "&Worst scan line", "Alt+W", "", "Where the error is largest"),
+    "Measure/-",
+    Command("frame_points", "Measure", "Points in &view", "Alt+P", "", "The measured points in the middle of the view"),
+    Command("help", "Help", "&Contents", "F1", "help", "The page of the panel that has the focus"),
+    Command("shortcuts", "Help", "&Shortcuts", "Ctrl+/"),
+    Command("tour", "Help", "&Guided tour"),
+    "Help/-",
+    Command("about", "Help", "&About Blazer Studio"),
+)
+SUBMENUS = ("recent", "panels", "add", "presets", "motion")
+"""Commands that are menus, filled by whoever knows what is in them."""
+
+
+class Actions:
+    """The menus of a window, and the action of every command by its key."""
+
+    def __init__(self, window: QMainWindow) -> None:
+        self.window = window
+        self.by_key: dict[str, QAction] = {}
+        self.submenus: dict[str, QMenu] = {}
+        self._menus: dict[str, QMenu] = {}
+        for entry in COMMANDS:
+            if isinstance(entry, str):
+                self._menu(entry.rpartition("/")[0]).addSeparator()
+            elif entry.key in SUBMENUS:
+                self.submenus[entry.key] = self._menu(entry.menu).addMenu(entry.text)
+            else:
+                self.by_key[entry.key] = self._action(entry)
+
+    def __getitem__(self, key: str) -> QAction:
+        return self.by_key[key]
+
+    def connect(self, key: str, handler: Callable[[], object]) -> None:
+        """Call the handler when the command is chosen."""
+        self.by_key[key].triggered.connect(lambda _checked=False: handler())
+
+    def _menu(self, path: str) -> QMenu:
+        if path not in self._menus:
+            parent, _, name = path.rpartition("/")
+            holder = self._menu(parent) if parent else self.window.menuBar()
+            self._menus[path] = holder.addMenu(f"&{name}")
+        return self._menus[path]
+
+    def _action(self, command: Command) -> QAction:
+        action = QAction(command.text, self.window)
+        action.setObjectName(command.key)
+        action.setCheckable(command.checkable)
+        if command.shortcut:
+            action.setShortcut(QKeySequence(command.shortcut))
+            action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
+        if command.icon:
+            action.setIcon(icon(command.icon))
+            action.setIconVisibleInMenu(False)
+        plain = command.text.replace("&", "")
+        tip = command.tip or plain.rstrip("…")
+        action.setStatusTip(tip)
+        action.setToolTip(f"{tip} ({command.shortcut})" if command.shortcut else tip)
+        self._menu(command.menu).addAction(action)
+        return action

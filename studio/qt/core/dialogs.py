@@ -1,0 +1,128 @@
+"""What the window asks and tells: errors with cause and cure, unsaved changes, recovery, templates."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Literal
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QMessageBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from studio.runtime.error_messages import Trouble
+
+Answer = Literal["save", "discard", "cancel"]
+
+
+def show_trouble(parent: QWidget | None, what: Trouble) -> QMessageBox:
+    """A dialog with what failed, why and what to do; the window goes on behind it."""
+    box = QMessageBox(QMessageBox.Icon.Warning, "Blazer Studio", what.title, QMessageBox.StandardButton.Ok, parent)
+    box.setObjectName("trouble")
+    box.setTextFormat(Qt.TextFormat.PlainText)
+    box.setInformativeText("\n\n".join(part for part in (what.cause, what.cure) if part))
+    if what.details:
+        box.setDetailedText(what.details)
+    box.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+    box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    box.open()
+    return box
+
+
+def ask_unsaved(parent: QWidget, name: str) -> Answer:
+    """What to do with changes that no file holds."""
+    button = QMessageBox.StandardButton
+    box = QMessageBox(
+        QMessageBox.Icon.Question,
+        "Unsaved changes",
+        f"Save the changes to “{name}”?",
+        button.Save | button.Discard | button.Cancel,
+        parent,
+    )
+    box.setObjectName("unsaved")
+    box.setInformativeText("Without saving they are lost.")
+    box.setDefaultButton(button.Save)
+    chosen = box.exec()
+    return {button.Save: "save", button.Discard: "discard"}.get(button(chosen), "cancel")  # type: ignore[return-value]
+
+
+def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> bool:
+    """Whether to open the work that a crash left behind."""
+    button = QMessageBox.StandardButton
+    box = QMessageBox(QMessageBox.Icon.Question, "Recovery", f"Open the unsaved work on “{name}”?", parent=parent)
+    box.setObjectName("recovery")
+    others = f" {count - 1} older ones stay for the next start." if count > 1 else ""
+    box.setInformativeText(f"The program did not close properly. It kept the work of {when}.{others}")
+    opened = box.addButton("Open it", QMessageBox.ButtonRole.AcceptRole)
+    box.addButton("Throw it away", QMessageBox.ButtonRole.DestructiveRole)
+    box.setDefaultButton(button.NoButton)
+    box.exec()
+    return box.clickedButton() is opened
+
+
+class TemplateDialog(QDialog):
+    """The projects that come with the program; `chosen` after it was accepted."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        from studio.project.templates import DESCRIPTIONS
+
+        super().__init__(parent)
+        self.setWindowTitle("New from template")
+        self.setObjectName("templates")
+        self.list = QListWidget()
+        self.list.setSpacing(3)
+        self.list.setWordWrap(True)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        for key, text in DESCRIPTIONS.items():
+            name = key.replace("_", " ").capitalize()
+            item = QListWidgetItem(f"{name}\n{text[0].upper()}{text[1:]}")
+            item.setData(Qt.ItemDataRole.UserRole, key)
+            self.list.addItem(item)
+        self.list.setCurrentRow(0)
+        self.list.itemDoubleClicked.connect(lambda _: self.accept())
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Open | QDialogButtonBox.StandardButton.Cancel)
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.addWidget(QLabel("Start with a copy of"))
+        layout.addWidget(self.list)
+        layout.addWidget(buttons)
+        self.resize(560, 420)
+
+    @property
+    def chosen(self) -> str:
+        item = self.list.currentItem()
+        return str(item.data(Qt.ItemDataRole.UserRole)) if item is not None else ""
+
+
+def about(parent: QWidget, version: str) -> None:
+    """Name, version and what it is made of."""
+    from importlib import metadata
+
+    parts = ("PySide6-Essentials", "pyvista", "vtk", "pyqtgraph", "embreex", "numba", "numpy", "open3d")
+    versions = []
+    for part in parts:
+        try:
+            versions.append(f"{part} {metadata.version(part)}")
+        except metadata.PackageNotFoundError:
+            continue
+    box = QMessageBox(QMessageBox.Icon.NoIcon, "About", f"Blazer Studio {version}", parent=parent)
+    box.setInformativeText(
+        "Simulates line laser scanners: what the camera sees, what is reconstructed, and how wrong it is.\n\n"
+        f"Python {sys.version.split()[0]}, " + ", ".join(versions)
+    )
+    box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    box.open()
+
+
+def suggested(folder: str, name: str) -> str:
+    """A path to begin a file dialog with."""
+    return str(Path(folder or Path.home()) / name)

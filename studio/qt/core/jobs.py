@@ -1,0 +1,144 @@
+"""Jobs for the desktop: one at a time in each lane, the newest request next, all signals on the window's thread."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import QCoreApplication, QObject, Qt, QTimer, Signal
+
+from studio.runtime.jobs import Job, State, Work
+
+RENDER = "render"
+"""The lane of final renders: there is one at a time in the whole desktop."""
+BUSY = "Something is being rendered: wait for it, or cancel it first (Shift+F5)"
+"""What a person is told who asks for another one."""
+PROGRESS_MS = 100
+SWITCH_SECONDS = 0.002
+"""How long a busy Python thread may keep the interpreter while the window waits for it (Python's own: 5 ms)."""
+
+
+class JobRunner(QObject):
+    """Starts jobs and tells about them. Every signal carries the `Job`."""
+
+    started = Signal(object)
+    progress = Signal(object)
+    """At most ten times a second, also while the job is paused."""
+    finished = Signal(object)
+    failed = Signal(object)
+    """`job.problem` says why."""
+    cancelled = Signal(object)
+    _ended = Signal(object)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._running: dict[str, Job[Any]] = {}
+        self._next: dict[str, Job[Any]] = {}
+        self._then: dict[Job[Any], Callable[[Any], None]] = {}
+        self._closed = False
+        self._timer = QTimer(self, interval=PROGRESS_MS)
+        self._timer.timeout.connect(self._tell)
+        self._ended.connect(self._end, Qt.ConnectionType.QueuedConnection)
+        sys.setswitchinterval(SWITCH_SECONDS)
+        app = QCoreApplication.instance()
+        if app is not None:
+            app.aboutToQuit.connect(self.close)
+
+    def run(
+        self,
+        lane: str,
+        name: str,
+        work: Work[Any],
+        then: Callable[[Any], None] | None = None,
+        *,
+        interrupt: bool = False,
+    ) -> Job[Any]:
+        """Start work in a lane, or have it wait for the job there; a newer request takes a waiting one's place.
+
+        then: called with the result, on this thread. interrupt: the job that runs in the lane is cancelled.
+        """
+        job: Job[Any] = Job(name, work, self._tell_end)
+        if then is not None:
+            self._then[job] = then
+        if lane in self._running:
+            waiting = self._next.pop(lane, None)
+            if waiting is not None:
+                self._then.pop(waiting, None)
+            self._next[lane] = job
+            if interrupt:
+                self._running[lane].cancel()
+        else:
+            self._start(lane, job)
+        return job
+
+    def job(self, lane: str = RENDER) -> Job[Any] | None:
+        """The one that runs in a lane."""
+        return self._running.get(lane)
+
+    @property
+    def busy(self) -> bool:
+        """Something runs or waits."""
+        return bool(self._running)
+
+    def cancel(self, lane: str = RENDER) -> None:
+        """Stop what runs in a lane, and forget what waits there."""
+        waiting = self._next.pop(lane, None)
+        if waiting is not None:
+            self._then.pop(waiting, None)
+        if lane in self._running:
+            self._running[lane].cancel()
+
+    def close(self) -> None:
+        """Cancel everything and wait for the threads; nothing starts or is told afterwards."""
+        self._closed = True
+        self._next.clear()
+        self._then.clear()
+        self._timer.stop()
+        for job in self._running.values():
+            job.cancel()
+        for job in self._running.values():
+            job.join()
+        self._running.clear()
+
+    def _start(self, lane: str, job: Job[Any]) -> None:
+        if self._closed:
+            return
+        self._running[lane] = job
+        job.start()
+        self._timer.start()
+        self.started.emit(job)
+
+    def _tell_end(self, job: Job[Any]) -> None:
+        """On the job's thread; the runner may be gone by then."""
+        with contextlib.suppress(RuntimeError):
+            self._ended.emit(job)
+
+    def _end(self, job: Job[Any]) -> None:
+        lane = next((name for name, running in self._running.items() if running is job), None)
+        if lane is None or self._closed:
+            return
+        job.join()
+        del self._running[lane]
+        waiting = self._next.pop(lane, None)
+        then = self._then.pop(job, None)
+        if not self._running and waiting is None:
+            self._timer.stop()
+        if job.state is State.DONE:
+            if then is not None:
+                then(job.result)
+            self.finished.emit(job)
+        elif job.state is State.FAILED:
+            self.failed.emit(job)
+        else:
+            self.cancelled.emit(job)
+        if waiting is not None and not self._closed:
+            if lane in self._running:  # what was told has started another
+                self._next.setdefault(lane, waiting)
+            else:
+                self._start(lane, waiting)
+
+    def _tell(self) -> None:
+        for job in list(self._running.values()):
+            self.progress.emit(job)

@@ -1,0 +1,188 @@
+"""What all panels share: the document, one selection, one hovered scan line, and the renders made so far.
+
+Panels never talk to each other: they change the session, and follow its signals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from render.base.errors import InputError
+from render.checkpoint import RenderState
+from render.frame import Frame
+from render.sensor.develop import Image
+from render.world.world import World
+from studio.project.document import Document, FieldPath
+from studio.project.project import Project
+from studio.scan.scan import Measurement
+from studio.scan.scan_results import ScanResults
+
+
+@dataclass
+class Render:
+    """One finished or refining render in the history."""
+
+    number: int
+    project: Project
+    """As it was when the render began."""
+    world: World
+    frame: Frame
+    measurements: dict[str, list[Measurement]] = field(default_factory=dict)
+    """By extraction method: one for each laser."""
+    final: bool = True
+    """False while it refines, and when it was stopped early."""
+    name: str = ""
+    """As the history shows it; empty: by its number."""
+    created: str = ""
+    """Time of day, as the history shows it."""
+    image_scale: float = 1.0
+    """`project` is at this scale."""
+    state: RenderState | None = None
+    """To go on with a render that was stopped early; None: there is nothing to go on from."""
+    source: Project | None = None
+    """The project at full scale, None: `project` is."""
+    images: list[Image] = field(default_factory=list)
+    """As developed last: one for each laser, or one without any."""
+    scan: ScanResults | None = None
+    """The scan that the frame is a step of; None: it was rendered alone."""
+
+    @property
+    def scanner_scale(self) -> float:
+        """Of the image, to the scanner's."""
+        return self.image_scale if self.scan is None else self.scan.image_scale
+
+
+class Session(QObject):
+    """The state of the desktop, in one place."""
+
+    project_changed = Signal()
+    """The document's project is another one; while a drag goes on, once a step."""
+    drag_changed = Signal(bool)
+    """A drag began or ended: panels that are slow to update wait for its end."""
+    selection_changed = Signal()
+    frame_requested = Signal()
+    """The selection is to fill the 3D view."""
+    hover_changed = Signal()
+    """`hovered` is another scan line."""
+    step_changed = Signal()
+    """`step`, the step of the motion that is looked at, is another one."""
+    renders_changed = Signal()
+    """A render joined, changed or left the history, or another one is shown."""
+    developed = Signal()
+    """The shown render has new `images`; the measurements of them follow."""
+    measured = Signal()
+    """The shown render was developed and measured again (power, exposure, method)."""
+    render_asked = Signal()
+    """A panel other than the render panel asks for a render with the present settings."""
+    problems_changed = Signal()
+    """`problems` are others."""
+    message = Signal(str, str)
+    """level ("info", "warning", "error") and text, for log and status bar."""
+    document_replaced = Signal()
+    """Another project was opened."""
+
+    def __init__(self, document: Document) -> None:
+        super().__init__()
+        self.dragging = False
+        self.selection: FieldPath = ()
+        self.hovered: int | None = None
+        self.step = 0
+        self.renders: list[Render] = []
+        self.shown: Render | None = None
+        self.problems: dict[FieldPath, str] = {}
+        """What the live preview cannot show as it is set: by the path of the field, why."""
+        self.document = document
+        document.listeners.append(self.project_changed.emit)
+
+    @property
+    def project(self) -> Project:
+        return self.document.project
+
+    def replace_document(self, document: Document) -> None:
+        """Open another project: history and selection start anew."""
+        self.document.listeners.clear()
+        self.document = document
+        document.listeners.append(self.project_changed.emit)
+        self.selection, self.hovered, self.step, self.renders, self.shown = (), None, 0, [], None
+        self.document_replaced.emit()
+        self.project_changed.emit()
+        self.selection_changed.emit()
+        self.hover_changed.emit()
+        self.step_changed.emit()
+        self.renders_changed.emit()
+
+    def select(self, path: FieldPath) -> None:
+        """Select an item of the scene by its path: ("scene", "objects", 0), ("scene", "rig", "camera"), ()."""
+        if path != self.selection:
+            self.selection = path
+            self.selection_changed.emit()
+
+    def hover(self, scan_line: int | None) -> None:
+        if scan_line != self.hovered:
+            self.hovered = scan_line
+            self.hover_changed.emit()
+
+    def look_at_step(self, step: int) -> None:
+        """Another step of the motion; beyond its ends the nearest one."""
+        step = min(max(step, 0), self.project.scene.frame_count - 1)
+        if step != self.step:
+            self.step = step
+            self.step_changed.emit()
+
+    def begin_drag(self) -> None:
+        self.dragging = True
+        self.drag_changed.emit(True)
+
+    def end_drag(self) -> None:
+        """The drag becomes one entry of the undo history."""
+        self.dragging = False
+        self.document.end_merge()
+        self.drag_changed.emit(False)
+
+    def set(self, path: FieldPath, value: Any, label: str = "", merge: str = "") -> bool:
+        """Change a value; a bad one is told in `message` and refused."""
+        try:
+            self.document.set(path, value, label, merge)
+        except InputError as error:
+            self.message.emit("error", str(error))
+            return False
+        return True
+
+    def tell_problems(self, problems: dict[FieldPath, str]) -> None:
+        if problems != self.problems:
+            self.problems = problems
+            self.problems_changed.emit()
+
+    def problem_of(self, path: FieldPath) -> str:
+        """Why an item of the scene is not as it is set; empty: it is."""
+        return "\n".join(text for field, text in self.problems.items() if path and field[: len(path)] == path)
+
+    def add_render(self, render: Render) -> None:
+        self.renders.append(render)
+        self.show(render)
+
+    def show(self, render: Render | None) -> None:
+        """Look at another render; a scan line of an image of another size is no longer the hovered one."""
+        before, self.shown = self.shown, render
+        if before is not None and (render is None or render.frame.shape != before.frame.shape):
+            self.hover(None)
+        self.renders_changed.emit()
+
+    def present(self, render: Render | None) -> Render | None:
+        """What stands for a render in the history now: a scan may be at another step; None: it is there no longer."""
+        scan = None if render is None else render.scan
+        return next(
+            (other for other in self.renders if other is render or (scan is not None and other.scan is scan)), None
+        )
+
+    def look_at_scan(self, scan: ScanResults, frame: Frame, world: World) -> None:
+        """Another step of a scan that is among the renders; what was measured of the one before goes with it."""
+        for i, other in enumerate(self.renders):
+            if other.scan is scan:
+                self.renders[i] = replace(other, frame=frame, world=world, measurements={}, images=[])
+                self.shown = self.renders[i] if self.shown is other else self.shown
+                self.renders_changed.emit()
+                return

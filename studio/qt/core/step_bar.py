@@ -1,0 +1,77 @@
+"""From step to step of a motion: buttons, a slider, play."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import QHBoxLayout, QSlider, QToolButton, QWidget
+
+from studio.qt.core.icons import icon
+from studio.qt.core.session import Session
+
+PLAY_MS = 100
+
+
+class StepBar(QWidget):
+    """Changes `session.step` and follows it; every view stands at that step."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        look = session.look_at_step
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setMaximum(0)
+        self.slider.valueChanged.connect(look)
+        self.play = self._button("play", "Play the motion", self.toggle_play)
+        self._timer = QTimer(self, interval=PLAY_MS)
+        self._timer.timeout.connect(self._next)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        for widget in (
+            self._button("first", "First step", lambda: look(0)),
+            self._button("previous", "Step back", lambda: look(session.step - 1)),
+            self.play,
+            self._button("next", "Step on", lambda: look(min(session.step + 1, self.slider.maximum()))),
+            self._button("last", "Last step", lambda: look(self.slider.maximum())),
+        ):
+            row.addWidget(widget)
+        row.addWidget(self.slider, 1)
+        session.step_changed.connect(self._follow)
+
+    def set_count(self, count: int) -> None:
+        """So many steps there are; one is nothing to play."""
+        self.slider.blockSignals(True)
+        self.slider.setMaximum(max(0, count - 1))
+        self.slider.blockSignals(False)
+        if count < 2 and self._timer.isActive():
+            self.toggle_play()
+        self._follow()
+
+    def toggle_play(self) -> None:
+        """Play to the end, from the start where it stands at the end; or stop."""
+        if self._timer.isActive():
+            self._timer.stop()
+        else:
+            if self.session.step >= self.slider.maximum():
+                self.session.look_at_step(0)
+            self._timer.start()
+        self.play.setIcon(icon("pause" if self._timer.isActive() else "play"))
+
+    def _next(self) -> None:
+        if self.session.step >= self.slider.maximum():
+            self.toggle_play()
+        else:
+            self.session.look_at_step(self.session.step + 1)
+
+    def _follow(self) -> None:
+        self.slider.blockSignals(True)
+        self.slider.setValue(self.session.step)
+        self.slider.blockSignals(False)
+
+    def _button(self, name: str, tip: str, handler: Callable[[], None]) -> QToolButton:
+        button = QToolButton()
+        button.setIcon(icon(name))
+        button.setToolTip(tip)
+        button.clicked.connect(handler)
+        return button

@@ -1,0 +1,1 @@
+"""The camera's view, and lines upon it."""

@@ -1,0 +1,399 @@
+"""What the camera sees: a live estimate while things move, then the rendered frame and each of its light groups."""
+
+from __future__ import annotations
+
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QSplitter,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from render.base.threads import Cancel
+from render.output.tone_mapping import Picture, pyramid
+from studio.project.project import Project
+from studio.qt.core import theme
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Render, Session
+from studio.qt.image.image_item import PictureView
+from studio.qt.image.line_overlay import LineOverlay
+from studio.qt.image.row_profile import RowProfile
+from studio.runtime.jobs import Progress
+from studio.scan.frame_views import at_pixel, live_picture, picture, views
+from studio.scan.redevelop import is_stale
+
+DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
+"""Of work for a live picture: while something is dragged, and when it has come to rest."""
+HOVER_HZ = 30
+LOW = 400
+"""px of height, for picture and profile together."""
+LIVE = "Live estimate"
+
+
+class CameraView(QWidget):
+    """Image, read-out and row profile. Follows the session; hovering tells the scan line."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.runner = JobRunner(self)
+        self.live = live(session)
+        self.view = PictureView()
+        self.overlay = LineOverlay(self.view.box)
+        self.profile = RowProfile(session)
+        self.choice = QComboBox()
+        self.choice.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
+        self.bright = QCheckBox("Brighten")
+        self.bright.setChecked(True)
+        self.readout = QLabel()
+        self.badge = QFrame()
+        self.badge_text = QLabel()
+        self.lines = QWidget()
+        self.render_button = QPushButton("Render")
+        self.is_live = True
+        self._judged: tuple[Render, Project, int, bool] | None = None
+        self._ground = ""
+        self._chosen = 0
+        self._last_shown: Render | None = None
+        self._size = (0, 0)
+        self._fitted = False
+        self._cursor: tuple[int, int] | None = None
+        """Column and row that are read out."""
+        self._hover = pg.SignalProxy(self.view.scene().sigMouseMoved, rateLimit=HOVER_HZ, slot=self._moved)
+        self._lay_out()
+        self._connect()
+        self._renders_changed()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.runner.close()
+        super().closeEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        # a low panel shows the picture alone rather than two strips
+        self.profile.setVisible(self.height() >= LOW)
+        self.overlay.show_names_within(self.lines.width())
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.refresh()
+
+    def changeEvent(self, event: QEvent) -> None:
+        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "badge"):
+            self._colour()
+        super().changeEvent(event)
+
+    @property
+    def stale(self) -> bool:
+        """The scene has changed since the shown render, in a way that developing cannot follow."""
+        shown, project, step = self.session.shown, self.session.project, self.session.step
+        if shown is None:
+            return False
+        before = self._judged
+        if before is None or before[0] is not shown or before[1] is not project or before[2] != step:
+            changed = shown.frame.step != step or is_stale(shown.source or shown.project, project)
+            self._judged = (shown, project, step, changed)
+            return changed
+        return before[3]
+
+    def refresh(self) -> None:
+        """Draw what is chosen."""
+        if self.is_live:
+            self._draw_live()
+        else:
+            self._draw_render()
+
+    def _lay_out(self) -> None:
+        self.choice.setToolTip("What to look at")
+        self.bright.setToolTip("Square root of the light, to see what is faint")
+        bar = QHBoxLayout()
+        bar.setContentsMargins(6, 4, 6, 4)
+        bar.addWidget(self.choice)
+        bar.addSpacing(8)
+        bar.addWidget(self.bright)
+        bar.addSpacing(8)
+        lines = self.lines
+        lines.setLayout(self.overlay.bar)
+        self.overlay.bar.setContentsMargins(0, 0, 0, 0)
+        self.overlay.bar.addStretch(1)
+        # many methods must not make the panel, and so the window, wider
+        lines.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        bar.addWidget(lines, 1)
+        for text, tip, action in (
+            ("Fit", "The whole image (F)", self.view.fit),
+            ("1:1", "One screen pixel a pixel", self.view.one_to_one),
+        ):
+            button = QToolButton()
+            button.setText(text)
+            button.setToolTip(tip)
+            button.clicked.connect(action)
+            bar.addWidget(button)
+        badge = QHBoxLayout(self.badge)
+        badge.setContentsMargins(8, 3, 4, 3)
+        self.badge_text.setMinimumWidth(1)  # a narrow panel may cut it off
+        badge.addWidget(self.badge_text, 1)
+        badge.addWidget(self.render_button)
+        self.readout.setContentsMargins(8, 2, 8, 2)
+        self.readout.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.readout.setMinimumWidth(1)
+        picture = QWidget()
+        column = QVBoxLayout(picture)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.badge)
+        column.addWidget(self.view, 1)
+        column.addWidget(self.readout)
+        split = QSplitter(Qt.Orientation.Vertical)
+        split.addWidget(picture)
+        split.addWidget(self.profile)
+        split.setStretchFactor(0, 3)
+        split.setStretchFactor(1, 1)
+        split.setSizes([300, 140])
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addLayout(bar)
+        layout.addWidget(split, 1)
+        self._colour()
+
+    def _connect(self) -> None:
+        session = self.session
+        session.renders_changed.connect(self._renders_changed)
+        session.project_changed.connect(self._project_changed)
+        session.step_changed.connect(self._step_changed)
+        session.problems_changed.connect(self._show_badge)
+        session.developed.connect(self._developed)
+        session.measured.connect(self._draw_overlay)
+        session.hover_changed.connect(self._hover_changed)
+        session.document_replaced.connect(lambda: self._read_out(None))
+        self.live.changed.connect(self._live_changed)
+        self.live.loading.connect(lambda on: self._show_badge())
+        self.choice.activated.connect(self._choose)
+        self.bright.toggled.connect(lambda on: self.refresh())
+        self.render_button.clicked.connect(session.render_asked)
+
+    def _colour(self) -> None:
+        colours = theme.colours()
+        self.view.setBackground(colours.base)
+        self._colour_badge()
+
+    def _colour_badge(self) -> None:
+        colours = theme.colours()
+        ground = theme.mixed(colours.warning, colours.window, 0.3) if self.stale else colours.raised
+        if ground != self._ground:  # a style sheet paints everything anew
+            self._ground = ground
+            self.badge.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
+
+    # what is shown
+
+    def _renders_changed(self) -> None:
+        shown = self.session.shown
+        new = shown is not self._last_shown
+        self._last_shown = shown
+        if new:
+            self._set_live(shown is None or self.stale)
+            self._read_out(None)
+        self._fill_choice()
+        self._profile_of_view()
+        self.refresh()
+
+    def _project_changed(self) -> None:
+        if self.session.shown is not None and self.stale and not self.is_live:
+            self._set_live(True)
+            self._fill_choice()
+        self._show_badge()
+
+    def _step_changed(self) -> None:
+        self.live.show_step(self.session.step)
+        self._project_changed()
+
+    def _set_live(self, on: bool) -> None:
+        self.is_live = on
+
+    def _fill_choice(self) -> None:
+        """The live estimate, and below it the ways to look at the shown render."""
+        shown = self.session.shown
+        self.choice.blockSignals(True)
+        self.choice.clear()
+        self.choice.addItem(LIVE, None)
+        if shown is not None:
+            for view in views(shown.project.scene, shown.frame):
+                self.choice.addItem(view.label, view)
+            self._chosen = min(max(self._chosen, 1), self.choice.count() - 1)
+        self.choice.setCurrentIndex(0 if self.is_live else self._chosen)
+        self.choice.blockSignals(False)
+        self._show_badge()
+
+    def _choose(self, index: int) -> None:
+        self._set_live(index == 0)
+        if index > 0:
+            self._chosen = index
+            self._profile_of_view()
+        self._show_badge()
+        self.refresh()
+
+    def _profile_of_view(self) -> None:
+        """The row profile is of the laser that is looked at."""
+        view = self.choice.itemData(self._chosen)
+        self.profile.show_laser(view.laser if view is not None and view.kind in ("image", "laser") else 0)
+
+    def _show_badge(self) -> None:
+        shown = self.session.shown
+        if shown is None and not self.live.ready:
+            text = "Preparing the live estimate; the very first time this takes half a minute."
+        elif shown is None:
+            text = "Live estimate: one ray a pixel, no noise. Render for the real image."
+        elif self.stale:
+            text = (
+                "Live estimate: the scene has changed since the render." if self.is_live else "The scene has changed."
+            )
+        elif self.is_live:
+            text = "Live estimate: one ray a pixel, no noise."
+        elif not shown.final:
+            text = "Still refining." if self.session.dragging else ""
+        else:
+            text = ""
+        if self.is_live and self.session.problems and self.live.ready:
+            text = "Live estimate, but not of the scene as it is set: the scene tree marks what cannot be."
+        self._colour_badge()
+        self.badge_text.setText(text)
+        self.render_button.setVisible(shown is None or self.stale)
+        self.badge.setVisible(bool(text))
+
+    # the live estimate
+
+    def _live_changed(self) -> None:
+        if self.is_live:
+            self._draw_live()
+
+    def _draw_live(self) -> None:
+        if not self.isVisible() or not self.live.ready:
+            return
+        look = self.live.look
+        image = look.image(seconds=DRAG_SECONDS if self.session.dragging else REST_SECONDS)
+        camera = look.scene.camera
+        drawn = live_picture(look.project, image)
+        self._place([drawn], (camera.width, camera.height))
+        curves = [look.lit_curve(i) for i in range(len(look.scene.lasers))]
+        self.overlay.show_truth(curves)
+        self.overlay.show_methods([])
+        self.overlay.show_names_within(self.lines.width())
+        self._draw_hover()
+
+    # the render
+
+    def _developed(self) -> None:
+        if not self.is_live:
+            view = self.choice.currentData()
+            if view is not None and view.kind == "image":
+                self._draw_render()
+
+    def _draw_render(self) -> None:
+        shown, view = self.session.shown, self.choice.currentData()
+        if shown is None or view is None or not self.isVisible():
+            return
+        scene, frame, images, bright = shown.project.scene, shown.frame, list(shown.images), self.bright.isChecked()
+
+        def work(progress: Progress, cancelled: Cancel) -> list[Picture] | None:
+            made = picture(view, scene, frame, images, bright)
+            return None if made is None else pyramid(made)
+
+        def then(levels: list[Picture] | None) -> None:
+            if levels is not None and not self.is_live and self.session.shown is shown:
+                self._place(levels, (levels[0].shape[1], levels[0].shape[0]))
+                self._draw_overlay()
+
+        self.runner.run("picture", "drawing", work, then)
+
+    def _place(self, levels: list[Picture], size: tuple[int, int]) -> None:
+        """Put a picture up; the part that is seen stays the same when its size in pixels changes."""
+        before = self._size
+        self.view.item.set_levels(levels, size)
+        self._size = size
+        if not self._fitted or before == (0, 0):
+            self._fitted = True
+            self.view.fit()
+        elif before != size:
+            self.view.keep_place(before, size)
+        self._read_out(self._cursor if before == size else None)
+
+    def _draw_overlay(self) -> None:
+        shown = self.session.shown
+        if shown is None or self.is_live:
+            return
+        self.overlay.show_truth(list(shown.frame.curves))
+        self.overlay.show_methods([item.line for items in shown.measurements.values() for item in items])
+        self.overlay.show_names_within(self.lines.width())
+        self._draw_hover()
+
+    # under the cursor
+
+    def _draw_hover(self) -> None:
+        axis = self.session.project.extraction.axis
+        self.overlay.show_hover(self.session.hovered, axis)
+
+    def _hover_changed(self) -> None:
+        """What is read out is on the hovered scan line, or on none."""
+        self._draw_hover()
+        if self._cursor is not None and self.session.hovered != self._scan_line(*self._cursor) and not self.is_live:
+            self._read_out(None)
+
+    def _scan_line(self, column: int, row: int) -> int:
+        shown = self.session.shown
+        project = self.session.project if shown is None else shown.project
+        return row if project.extraction.axis == "rows" else column
+
+    def _moved(self, event: tuple[QPointF]) -> None:
+        where = self.view.box.mapSceneToView(event[0])
+        column, row = round(where.x()), round(where.y())
+        width, height = self._size
+        if not (0 <= column < width and 0 <= row < height):
+            self._read_out(None)
+            return
+        self._read_out((column, row))
+        if not self.is_live and self.session.shown is not None:
+            self.session.hover(self._scan_line(column, row))
+
+    def _read_out(self, cursor: tuple[int, int] | None) -> None:
+        """The values at a pixel (column, row) of what is shown now; None: the cursor is at none."""
+        self._cursor = cursor
+        if cursor is None:
+            self.readout.clear()
+            return
+        (column, row), shown = cursor, self.session.shown
+        if self.is_live or shown is None:
+            self.readout.setText(readout_text(self._live_values(row, column)))
+        else:
+            self.readout.setText(readout_text(at_pixel(shown.project.scene, shown.frame, shown.images, row, column)))
+
+    def _live_values(self, row: int, column: int) -> list[tuple[str, str]]:
+        look = self.live.look
+        image = look.image(seconds=DRAG_SECONDS if self.session.dragging else REST_SECONDS)
+        i = min(int((row + 0.5) * image.scale), image.depth_z.shape[0] - 1)
+        j = min(int((column + 0.5) * image.scale), image.depth_z.shape[1] - 1)
+        told = [("u, v", f"{column}, {row}")]
+        item = int(image.object_id[i, j])
+        told += [
+            (laser.name, f"about {light[i, j]:.3g} W/(m² sr)")
+            for laser, light in zip(look.scene.lasers, image.laser, strict=True)
+        ]
+        if item >= 0:
+            told.append(("depth", f"{1e3 * float(image.depth_z[i, j]):.2f} mm"))
+            told.append(("object", look.scene.visible_objects[item].name))
+        return told
+
+
+def readout_text(values: list[tuple[str, str]]) -> str:
+    """In one line."""
+    return "   ".join(f"<b>{name}</b>&nbsp;{value}" for name, value in values)

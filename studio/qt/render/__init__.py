@@ -1,0 +1,1 @@
+"""Rendering, developing and motion panels."""

@@ -1,0 +1,310 @@
+"""Exposure, gain, bits, laser power and noise of a render that exists: developed and measured again, never rendered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import get_args
+
+import numpy as np
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QCloseEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QFormLayout,
+    QLabel,
+    QMenu,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from analysis.line.settings import Method
+from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
+from render.base.threads import Cancel
+from render.sensor.develop import Image
+from studio.project.document import FieldPath
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.session import Render, Session
+from studio.qt.forms.log_field import LogField
+from studio.qt.image.line_overlay import swatch
+from studio.runtime.jobs import Job, Progress
+from studio.scan.redevelop import Development, develop_again, development, measure_again
+from studio.scan.results import METHODS
+from studio.scan.stages import Measurement
+
+REST_MS = 120
+"""Without a change before the lines are measured: while something is dragged, new images come first."""
+
+
+class DevelopPanel(QWidget):
+    """Edits the sensor and the lasers' power in the project; follows every change with new images and measures."""
+
+    _images_ready = Signal(object, object, float, str)
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.runner = JobRunner(self)
+        self.develop_seconds = 0.0
+        self._told_of: Render | None = None
+        """The render that brightness and measures are of."""
+        self._to_measure: tuple[Render, Development, list[Image], tuple[Method, ...]] | None = None
+        self._rest = QTimer(self)
+        self._rest.setSingleShot(True)
+        self._rest.setInterval(REST_MS)
+        self._rest.timeout.connect(self._measure)
+        self.exposure = LogField(1e-6, 1.0, 1e3, "ms", 4)
+        self.exposure.setToolTip("Exposure time: longer is brighter, until the line saturates.")
+        self.automatic_gain = QCheckBox("full well fills the range")
+        self.gain = LogField(1e-3, 100.0, 1.0, "DN/e-", 4)
+        self.bits = QComboBox()
+        for bits in (8, 10, 12, 16):
+            self.bits.addItem(f"{bits} bit", bits)
+        self.noise = QCheckBox("shot, dark, read, pixels")
+        self.noise.setChecked(True)
+        self.noise.setToolTip("Off: the mean image, still saturated and quantised. A look only, the project keeps it.")
+        self.exposures = QComboBox()
+        for count in range(1, 9):
+            self.exposures.addItem("one" if count == 1 else f"{count}, fused", count)
+        self.exposures.setToolTip("Several are fused in electrons, each shorter than the one before by the ratio")
+        self.continuous = QCheckBox("on the smoothest chain")
+        self.continuous.setToolTip("Of all peaks of a scan line the one that continues the line, or none")
+        self.possible = QCheckBox("that the laser can have made")
+        self.possible.setToolTip("On the laser's plane, within its fan and the working volume, no wider than its sheet")
+        self.powers: list[LogField] = []
+        self.methods_button = QPushButton()
+        self.methods_button.setToolTip("Every chosen method measures the same image")
+        self.methods_menu = QMenu(self.methods_button)
+        self.methods_button.setMenu(self.methods_menu)
+        self.methods = {method: self._method_action(method) for method in get_args(Method) if method != "auto"}
+        self.told = QLabel(wordWrap=True)
+        self.told.setObjectName("muted")
+        self.table = QLabel(textFormat=Qt.TextFormat.RichText)
+        self.noted = QLabel(wordWrap=True)
+        self.noted.setObjectName("muted")
+        self._form = QFormLayout()
+        self._power_rows = QVBoxLayout()
+        self._lay_out()
+        self._connect()
+        self._follow_project()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self._rest.stop()
+        self.runner.close()
+        super().closeEvent(event)
+
+    @property
+    def busy(self) -> bool:
+        """What was asked for is not all done yet."""
+        return self.runner.busy or self._rest.isActive()
+
+    def chosen(self) -> tuple[Method, ...]:
+        """The methods to measure by; the project's own first."""
+        own = self.session.project.extraction.method
+        return (own, *(m for m, action in self.methods.items() if m != own and action.isChecked()))
+
+    def _lay_out(self) -> None:
+        form = self._form
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
+        form.addRow("Exposure", self.exposure)
+        form.addRow("Gain", self.automatic_gain)
+        form.addRow("", self.gain)
+        form.addRow("Bit depth", self.bits)
+        form.addRow("Laser power", self._power_rows)
+        form.addRow("Noise", self.noise)
+        form.addRow("Exposures", self.exposures)
+        form.addRow("Only peaks", self.continuous)
+        form.addRow("", self.possible)
+        form.addRow("Measure by", self.methods_button)
+        layout = QVBoxLayout(self)
+        layout.addLayout(form)
+        layout.addWidget(self.told)
+        layout.addWidget(self.table)
+        layout.addWidget(self.noted)
+        layout.addStretch(1)
+
+    def _method_action(self, method: Method) -> QAction:
+        action = QAction(swatch(method_colour(method)), method_name(method), self)
+        action.setCheckable(True)
+        action.setChecked(method in METHODS)
+        self.methods_menu.addAction(action)
+        return action
+
+    def _connect(self) -> None:
+        session = self.session
+        session.project_changed.connect(self._project_changed)
+        session.renders_changed.connect(self.refresh)
+        self.exposure.changed.connect(self._setter(("sensor", "exposure_time"), "exposure"))
+        self.gain.changed.connect(self._setter(("sensor", "gain"), "gain"))
+        for field in (self.exposure, self.gain):
+            field.released.connect(self._end_merge)
+        self.automatic_gain.clicked.connect(self._choose_gain)
+        self.bits.activated.connect(lambda i: session.set(("sensor", "bits"), self.bits.itemData(i), "bit depth"))
+        self.exposures.activated.connect(
+            lambda i: session.set(("extraction", "exposures"), self.exposures.itemData(i), "exposures")
+        )
+        self.continuous.clicked.connect(
+            lambda on: session.set(("extraction", "select"), "continuous" if on else "strongest", "selection")
+        )
+        self.possible.clicked.connect(lambda on: session.set(("extraction", "geometry"), on, "geometric check"))
+        self.noise.toggled.connect(self.refresh)
+        for action in self.methods.values():
+            action.toggled.connect(self._methods_changed)
+        self._images_ready.connect(self._take_images)
+        self.runner.failed.connect(self._tell_failure)
+
+    def _setter(self, path: FieldPath, label: str) -> Callable[[float, bool], None]:
+        def set_value(value: float, held: bool) -> None:
+            if not self.session.set(path, value, f"change {label}", f"develop {label}" if held else ""):
+                self._follow_project()
+
+        return set_value
+
+    def _end_merge(self) -> None:
+        self.session.document.end_merge()
+
+    def _choose_gain(self, automatic: bool) -> None:
+        sensor = self.session.project.sensor
+        self.session.set(("sensor", "gain"), None if automatic else float(f"{sensor.dn_per_electron:.4g}"), "gain")
+
+    def _methods_changed(self) -> None:
+        self._tell_methods()
+        self.refresh()
+
+    def _project_changed(self) -> None:
+        self._follow_project()
+        self.refresh()
+
+    def _follow_project(self) -> None:
+        project = self.session.project
+        sensor, lasers = project.sensor, project.scene.lasers
+        self.exposure.set_value(sensor.exposure_time)
+        self.automatic_gain.setChecked(sensor.gain is None)
+        self.gain.setEnabled(sensor.gain is not None)
+        self.gain.set_value(sensor.dn_per_electron)
+        self.bits.setCurrentIndex(self.bits.findData(sensor.bits))
+        self.exposures.setCurrentIndex(self.exposures.findData(project.extraction.exposures))
+        self.continuous.setChecked(project.extraction.select == "continuous")
+        self.possible.setChecked(project.extraction.geometry)
+        if len(self.powers) != len(lasers):
+            self._make_powers(len(lasers))
+        for field, laser in zip(self.powers, lasers, strict=True):
+            field.set_value(laser.power)
+            field.setToolTip(f"{laser.name}, {laser.wavelength_nm:g} nm")
+            colour = hex_colour(wavelength_colour(laser.wavelength_nm))
+            field.sign.setPixmap(swatch(colour).pixmap(10, 10))
+        for method, action in self.methods.items():
+            # the project's own method is always measured
+            action.setEnabled(method != project.extraction.method)
+        self._tell_methods()
+
+    def _tell_methods(self) -> None:
+        chosen = self.chosen()
+        more = f" and {len(chosen) - 1} more" if len(chosen) > 1 else ""
+        self.methods_button.setText(f"{method_name(chosen[0])}{more}")
+
+    def _make_powers(self, count: int) -> None:
+        for field in self.powers:
+            self._power_rows.removeWidget(field)
+            field.deleteLater()
+        self.powers = [LogField(1e-5, 10.0, 1e3, "mW") for _ in range(count)]
+        for i, field in enumerate(self.powers):
+            field.changed.connect(self._setter(("scene", "rig", "lasers", i, "power"), f"power of laser {i + 1}"))
+            field.released.connect(self._end_merge)
+            self._power_rows.addWidget(field)
+
+    def refresh(self) -> None:
+        """Develop and measure the shown render; what is asked for meanwhile is done once, with the latest values."""
+        render = self.session.shown
+        if render is not self._told_of:
+            self._told_of = render
+            for label in (self.told, self.table, self.noted):
+                label.clear()
+        if render is None:
+            self._rest.stop()
+            self.runner.cancel("develop")
+            self.runner.cancel("measure")
+            self.told.setText("Render the scene, then change these as often as you like.")
+            return
+        frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()
+        how = development(render.project, self.session.project, render.image_scale)
+        names = [laser.name for laser in render.project.scene.lasers]
+
+        def work(progress: Progress, cancelled: Cancel) -> list[Image]:
+            start = time.perf_counter()
+            images = develop_again(frame, how, noise=noise, cancelled=cancelled)
+            seconds = time.perf_counter() - start
+            blur = how.project.sensor.defocus_by(how.project.scene.camera.lens.model)
+            told = brightness(images, names) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
+            self._images_ready.emit(render, images, seconds, told)
+            return images
+
+        def then(images: list[Image]) -> None:
+            self._to_measure = (render, how, images, methods)
+            self._rest.start()
+
+        self._rest.stop()
+        self.runner.cancel("measure")
+        self.runner.run("develop", "developing", work, then)
+
+    def _take_images(self, render: Render, images: list[Image], seconds: float, told: str) -> None:
+        render.images = images
+        self.develop_seconds = seconds
+        if render is self.session.shown:
+            self.told.setText(told)
+            self.session.developed.emit()
+
+    def _measure(self) -> None:
+        if self._to_measure is None or self.runner.job("develop") is not None:
+            return
+        render, how, images, methods = self._to_measure
+        self._to_measure = None
+        frame, world = render.frame, render.world
+
+        def work(progress: Progress, cancelled: Cancel) -> dict[str, list[Measurement]]:
+            return measure_again(frame, world, how, images, methods, cancelled=cancelled)
+
+        def then(found: dict[str, list[Measurement]]) -> None:
+            render.measurements = found
+            if render is self.session.shown:
+                self._tell_measures(found)
+                self.session.measured.emit()
+
+        self.runner.run("measure", "measuring", work, then, interrupt=True)
+
+    def _tell_measures(self, found: dict[str, list[Measurement]]) -> None:
+        small = f" at {self._told_of.scanner_scale:.3g} x" if self._told_of and self._told_of.scanner_scale != 1 else ""
+        rows = [f"<tr><th align='left'>RMSE{small}&nbsp;</th><th>px</th><th>depth</th><th>rows</th></tr>"]
+        for method, by_laser in found.items():
+            for item in by_laser:
+                name = method_name(method) + (f", {item.laser + 1}" if len(by_laser) > 1 else "")
+                u, depth = item.errors.u.rmse, item.errors.depth_z.rmse
+                rows.append(
+                    f"<tr><td><span style='color:{method_colour(method)}'>&#9632;</span> {name}&nbsp;&nbsp;</td>"
+                    f"<td align='right'>{u:.3f}&nbsp;&nbsp;</td><td align='right'>{1e6 * depth:.1f} µm&nbsp;&nbsp;</td>"
+                    f"<td align='right'>{item.errors.completeness:.1%}</td></tr>"
+                )
+        self.table.setText(f"<table cellspacing='2'>{''.join(rows)}</table>")
+        own = next(iter(found.values()), [])
+        notes = [item.line.note for item in own if item.line.note]
+        if self.session.project.extraction.spacetime:
+            notes.append("Along time is for whole scans: Motion, Run the scan")
+        self.noted.setText("\n".join(dict.fromkeys(notes)))
+
+    def _tell_failure(self, job: Job[object]) -> None:
+        if job.problem is not None:
+            self.session.message.emit("error", job.problem.text)
+
+
+def brightness(images: list[Image], names: list[str]) -> str:
+    """The brightest number of each image, and how much of it is saturated."""
+    lines = []
+    for image, name in zip(images, names or [""], strict=True):
+        top, full = int(image.pixels.max()), float(np.mean(image.pixels >= image.saturation))
+        saturated = f", {full:.2%} of the pixels saturated" if full > 0.0 else ""
+        prefix = f"{name}: " if len(images) > 1 else ""
+        lines.append(f"{prefix}brightest {top} DN, {top / image.saturation:.0%} of full{saturated}")
+    return "\n".join(lines)

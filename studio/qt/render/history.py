@@ -1,0 +1,235 @@
+"""The renders made so far: look at one again, name it, delete it, compare two."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QItemSelectionModel, QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt
+from PySide6.QtGui import QIcon, QImage, QKeyEvent, QPixmap
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QMenu,
+    QPushButton,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from render.base.counts import AMBIENT_SAMPLES, DIRECT_ERROR
+from render.output.tone_mapping import Picture, grey
+from studio.qt.core.session import Render, Session
+from studio.qt.image.compare_view import CompareView
+from studio.scan.remarks import scale_name, scale_notes
+
+THUMBNAIL = QSize(64, 54)
+NEW_LINE = "\u2028"
+"""Qt breaks an item's text only here."""
+SAMPLED = 512
+"""Pixels a side that a thumbnail looks at."""
+
+
+def title(render: Render) -> str:
+    """As the list shows it."""
+    return render.name or f"Render {render.number}"
+
+
+def named(render: Render) -> str:
+    """Its title, with its image scale where that is not the scanner's."""
+    return title(render) + (f" ({render.scanner_scale:.3g} x)" if render.scanner_scale != 1.0 else "")
+
+
+def describe(render: Render) -> str:
+    """Size, quality and time, in one line."""
+    height, width = render.frame.shape
+    small = scale_name(render.scanner_scale)
+    parts = [f"{width} x {height}" + (f", {small}" if small else "")]
+    if render.scan is not None:
+        parts.insert(0, f"step {render.frame.step + 1} of {render.scan.count}")
+    counts = render.frame.counts
+    errors = [counts.get(DIRECT_ERROR.of(i)) for i in range(len(render.project.scene.lasers))]
+    known = [error for error in errors if error is not None]
+    if known:
+        parts.append(f"laser {max(known):.2%}")
+    if AMBIENT_SAMPLES in counts:
+        parts.append(f"ambient {counts[AMBIENT_SAMPLES]:.0f}")
+    parts.append(f"{sum(render.frame.seconds.values()):.1f} s")
+    return ", ".join(parts) + ("" if render.final else ", not finished")
+
+
+def thumbnail(render: Render) -> Picture | None:
+    """A small picture of the developed image, the brightest of each block so that the line stays; None: not yet."""
+    if not render.images:
+        return None
+    image = render.images[0]
+    pixels = image.pixels
+    stride = max(1, max(pixels.shape) // SAMPLED)
+    pixels = pixels[::stride, ::stride]
+    block = max(1, min(pixels.shape[1] // THUMBNAIL.width(), pixels.shape[0] // THUMBNAIL.height()))
+    rows, columns = pixels.shape[0] // block, pixels.shape[1] // block
+    blocks = pixels[: rows * block, : columns * block].reshape(rows, block, columns, block)
+    return grey(np.ascontiguousarray(blocks.max(axis=(1, 3))), image.black_level, image.saturation, bright=True)
+
+
+class _TwoLines(QStyledItemDelegate):
+    """The description below the name, which alone is edited."""
+
+    def initStyleOption(self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex) -> None:
+        super().initStyleOption(option, index)
+        render: Render = index.data(Qt.ItemDataRole.UserRole)
+        option.text = f"{title(render)}{NEW_LINE}{describe(render)}"
+
+
+class History(QWidget):
+    """A list of the session's renders, the latest first."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.comparison: CompareView | None = None
+        self.list = QListWidget()
+        self.list.setIconSize(THUMBNAIL)
+        self.list.setMinimumHeight(2 * THUMBNAIL.height() + 16)
+        self.list.setItemDelegate(_TwoLines(self.list))
+        self.list.setWordWrap(True)
+        self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.list.setEditTriggers(QAbstractItemView.EditTrigger.EditKeyPressed)
+        self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.list.setUniformItemSizes(True)
+        self.list.setToolTip("Click shows a render, F2 names it, Delete removes it; select two to compare them.")
+        self.list.keyPressEvent = self._key  # type: ignore[method-assign]
+        heading = QLabel("Renders")
+        heading.setStyleSheet("font-weight: 600")
+        self.compare_button = QPushButton("Compare")
+        self.compare_button.setToolTip("Side by side under a line that can be dragged, or their difference")
+        self.delete_button = QPushButton("Delete")
+        top = QHBoxLayout()
+        top.addWidget(heading, 1)
+        top.addWidget(self.compare_button)
+        top.addWidget(self.delete_button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addLayout(top)
+        layout.addWidget(self.list, 1)
+        session.renders_changed.connect(self.refresh)
+        session.developed.connect(self._new_images)
+        session.document_replaced.connect(self._forget_comparison)
+        self.list.itemClicked.connect(self._clicked)
+        self.list.itemChanged.connect(self._renamed)
+        self.list.itemSelectionChanged.connect(self._show_buttons)
+        self.list.customContextMenuRequested.connect(self._menu)
+        self.compare_button.clicked.connect(self.compare)
+        self.delete_button.clicked.connect(self.delete)
+        self.refresh()
+
+    def selected(self) -> list[Render]:
+        """In the order of the list."""
+        rows = sorted(self.list.row(item) for item in self.list.selectedItems())
+        return [self._render(row) for row in rows]
+
+    def refresh(self) -> None:
+        """Follow the session's list; selection stays where it can."""
+        shown, renders = self.session.shown, self.session.renders[::-1]
+        there = [self._render(row) for row in range(self.list.count())]
+        same = len(there) == len(renders) and all(a is b for a, b in zip(there, renders, strict=True))
+        before = [] if len(self.selected()) < 2 else self.selected()
+        self.list.blockSignals(True)
+        if not same:
+            self.list.clear()
+            for render in renders:
+                item = QListWidgetItem()
+                item.setData(Qt.ItemDataRole.UserRole, render)
+                item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
+                self.list.addItem(item)
+        for row, render in enumerate(renders):
+            item = self.list.item(row)
+            self._fill(item, render)
+            item.setSelected(any(render is other for other in before) if before else render is shown)
+            if render is shown:
+                self.list.setCurrentItem(item, QItemSelectionModel.SelectionFlag.NoUpdate)
+        self.list.blockSignals(False)
+        self._show_buttons()
+
+    def _render(self, row: int) -> Render:
+        found: Render = self.list.item(row).data(Qt.ItemDataRole.UserRole)
+        return found
+
+    def delete(self) -> None:
+        """Forget the selected renders; the latest of the others is shown."""
+        session, gone = self.session, self.selected()
+        session.renders = [render for render in session.renders if not any(render is other for other in gone)]
+        if any(session.shown is render for render in gone):
+            session.shown = session.renders[-1] if session.renders else None
+        session.renders_changed.emit()
+
+    def compare(self) -> None:
+        """Open two renders in a window of their own: the selected ones, or the shown one and the one before it."""
+        pair = self.selected()
+        if len(pair) != 2:
+            return
+        later, earlier = pair
+        if self.comparison is None:
+            self.comparison = CompareView(self)
+        self.comparison.compare(earlier, named(earlier), later, named(later))
+        self.comparison.show()
+        self.comparison.raise_()
+
+    def _forget_comparison(self) -> None:
+        if self.comparison is not None:
+            self.comparison.forget()
+
+    def _fill(self, item: QListWidgetItem, render: Render) -> None:
+        item.setText(title(render))
+        when = f", {render.created}" if render.created else ""
+        item.setToolTip("\n".join([f"{describe(render)}{when}", *scale_notes(render.scanner_scale)]))
+        picture = thumbnail(render)
+        if picture is not None:
+            height, width = picture.shape
+            image = QImage(picture.data, width, height, 4 * width, QImage.Format.Format_RGB32).copy()
+            item.setIcon(QIcon(QPixmap.fromImage(image)))
+
+    def _new_images(self) -> None:
+        self.list.blockSignals(True)
+        for row in range(self.list.count()):
+            if self._render(row) is self.session.shown:
+                self._fill(self.list.item(row), self._render(row))
+        self.list.blockSignals(False)
+
+    def _clicked(self, item: QListWidgetItem) -> None:
+        render = item.data(Qt.ItemDataRole.UserRole)
+        if len(self.list.selectedItems()) == 1 and render is not self.session.shown:
+            self.session.show(render)
+
+    def _renamed(self, item: QListWidgetItem) -> None:
+        render = item.data(Qt.ItemDataRole.UserRole)
+        name = item.text().strip()
+        if name != title(render):
+            render.name = name
+            self.session.renders_changed.emit()
+
+    def _show_buttons(self) -> None:
+        count = len(self.list.selectedItems())
+        self.compare_button.setEnabled(count == 2)
+        self.delete_button.setEnabled(count > 0)
+
+    def _key(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Delete:
+            self.delete()
+        else:
+            QListWidget.keyPressEvent(self.list, event)
+
+    def _menu(self, where: QPoint) -> None:
+        item = self.list.itemAt(where)
+        if item is None:
+            return
+        menu = QMenu(self)
+        menu.addAction("Show", lambda: self.session.show(item.data(Qt.ItemDataRole.UserRole)))
+        menu.addAction("Rename", lambda: self.list.editItem(item))
+        compare = menu.addAction("Compare", self.compare)
+        compare.setEnabled(len(self.list.selectedItems()) == 2)
+        menu.addAction("Delete", self.delete)
+        menu.exec(self.list.mapToGlobal(where))
+        menu.deleteLater()

@@ -1,0 +1,271 @@
+"""Motion: play or scrub through the steps of a scan, run it, and see its cloud grow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QStackedLayout,
+    QVBoxLayout,
+    QWidget,
+)
+
+from analysis.cloud import Cloud, cloud
+from analysis.report.model import FrameResult
+from render.base.errors import InputError
+from render.base.threads import Cancel
+from render.scene.motion import LinearStage, NoMotion, Turntable
+from studio.commands.console import FRAMES, frame_of
+from studio.editing.scene_edits import set_motion
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.qt.core.jobs import BUSY, RENDER, JobRunner
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Session
+from studio.qt.core.step_bar import StepBar
+from studio.runtime.jobs import Job, Progress
+from studio.scan.scan import ScanResult, run_scan
+from studio.scan.scan_folder import open_folder
+from studio.scan.scan_results import is_unfinished
+from studio.scan.stages import scaled
+
+SCALES = {"full size": 1.0, "half size": 0.5, "quarter size": 0.25}
+
+
+@dataclass(frozen=True)
+class Order:
+    """A scan as it was asked for, so that it can go on as it began."""
+
+    document: Document
+    """What was open."""
+    project: Project
+    """At full scale."""
+    root: Path
+    folder: Path
+    image_scale: float
+    report: bool
+
+
+class MotionPanel(QWidget):
+    """Changes `session.step`; the scan runs in the render lane, so that two never compete."""
+
+    grew = Signal(object)
+    """A `Cloud`: the points of one more step of the running scan."""
+    began = Signal(float)
+    """A scan began, at this image scale: what was shown of an earlier one goes."""
+    _measured = Signal(object, object)
+
+    def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session, self.runner = session, runner
+        self.report: Path | None = None
+        self.steps = StepBar(session)
+        self.told = QLabel()
+        self.told.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.scale = QComboBox()
+        self.scale.addItems(list(SCALES))
+        self.scale.setCurrentIndex(1)
+        self.scale.setToolTip("Size of the rendered images: half size takes about a quarter of the time")
+        self.run = QPushButton("Run the scan…")
+        self.run.setToolTip("Render and measure every step, into a folder, with points and report")
+        self.run.clicked.connect(lambda: self.ask_and_run())
+        self.go_on = QPushButton("Resume")
+        self.go_on.clicked.connect(self.resume)
+        self.go_on.hide()
+        self.stopped: Order | None = None
+        """The scan that was cancelled, or failed, before its end."""
+        self._running: tuple[Job[ScanResult], Order] | None = None
+        self.open = QPushButton("Open the report")
+        self.open.clicked.connect(self._open_report)
+        self.open.hide()
+        self._lay_out()
+        self._measured.connect(self._grow)
+        for signal in (runner.cancelled, runner.failed):
+            signal.connect(self._stop)
+        session.project_changed.connect(self.refresh)
+        session.document_replaced.connect(self._forget)
+        session.step_changed.connect(self._follow_step)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Follow the project's motion."""
+        scene = self.session.project.scene
+        moves = not isinstance(scene.motion, NoMotion)
+        self.stack.setCurrentIndex(1 if moves else 0)
+        self.steps.set_count(scene.frame_count)
+        if self.session.step >= scene.frame_count:
+            self.session.look_at_step(scene.frame_count - 1)
+        self._follow_step()
+
+    def ask_and_run(self) -> None:
+        """Ask for the folder of the results, then run the scan."""
+        start = self.session.document.path
+        base = (start.parent if start is not None else Path.home()) / f"{self.session.project.name} scan"
+        chosen = QFileDialog.getExistingDirectory(self, "Folder for the scan's results", str(base.parent))
+        if chosen:
+            self.run_into(Path(chosen))
+
+    def run_into(self, folder: Path, report: bool = True) -> Job[ScanResult] | None:
+        """Run the scan into a folder; None: something else is being rendered. What the folder holds of it is kept."""
+        session, scale = self.session, SCALES[self.scale.currentText()]
+        order = Order(session.document, session.project, session.document.root, folder, scale, report)
+        return self._start(order, resume=is_unfinished(folder, scaled(order.project, scale)))
+
+    def resume(self) -> Job[ScanResult] | None:
+        """Go on with the scan that was stopped, as it was asked for, whatever has changed in the project since."""
+        return None if self.stopped is None else self._start(self.stopped, resume=True)
+
+    def _start(self, order: Order, resume: bool) -> Job[ScanResult] | None:
+        if self.runner.job(RENDER) is not None:
+            self.session.message.emit("warning", BUSY)
+            return None
+        count, source = order.project.scene.frame_count, order.document.path
+
+        def each(frame: FrameResult) -> None:
+            for i, laser in enumerate(frame.lasers):
+                best = laser.extractions[0]
+                points = cloud(best.points, best.errors, i, frame.step, order.project.scene)
+                self._measured.emit(order, points)
+
+        def work(progress: Progress, cancelled: Cancel) -> ScanResult:
+            at, where = 0.0, ""
+
+            def tell(stage: str, done: float) -> None:
+                nonlocal at, where
+                at = max(at, share(stage, done) or 0.0)
+                if stage == FRAMES:
+                    where = f"{frame_of(done, count)}: " if done < 1.0 else ""
+                else:
+                    progress(where + stage, at)
+
+            return run_scan(
+                order.project,
+                order.root,
+                out=order.folder,
+                image_scale=order.image_scale,
+                progress=tell,
+                cancelled=cancelled,
+                each=each,
+                report=order.report,
+                resume=resume,
+                source=source,
+            )
+
+        self.stopped = None
+        for button in (self.open, self.go_on):
+            button.hide()
+        self.began.emit(order.image_scale)
+        job = self.runner.run(RENDER, "scan", work, lambda result: self._done(result, order))
+        self._running = job, order
+        return job
+
+    def _grow(self, order: Order, points: Cloud) -> None:
+        """More points, unless another project was opened meanwhile."""
+        if order.document is self.session.document:
+            self.grew.emit(points)
+
+    def _done(self, result: ScanResult, order: Order) -> None:
+        self._running = None
+        self.session.message.emit("info", f"The scan is done: {result.folder}")
+        if self.session.document is not order.document:
+            return
+        self.report = next((path for path in result.report if path.suffix == ".html"), None)
+        self.open.setVisible(self.report is not None)
+        for text in result.manifest["notes"]:
+            self.session.message.emit("warning", text)
+        self.session.message.emit("info", f"The scan is done: {result.folder}")
+        try:
+            found = open_folder(result.folder)
+        except InputError as error:
+            self.session.message.emit("error", str(error))
+        else:
+            scan_steps(self.session).show(found, order.project, order.image_scale)
+
+    def _stop(self, job: Job[ScanResult]) -> None:
+        """It was cancelled, or could not go on."""
+        if self._running is None or self._running[0] is not job:
+            return
+        order, self._running = self._running[1], None
+        if order.document is self.session.document:
+            self.stopped = order
+            self.go_on.setToolTip(f"Go on where the scan into {order.folder} was stopped")
+            self.go_on.show()
+            self.session.message.emit("info", f"The scan was stopped; Resume in Motion goes on: {order.folder}")
+
+    def _forget(self) -> None:
+        """Another project was opened: what was scanned of the one before goes."""
+        self.report = self.stopped = None
+        for button in (self.open, self.go_on):
+            button.hide()
+
+    def _open_report(self) -> None:
+        if self.report is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.report)))
+
+    def _follow_step(self) -> None:
+        scene, step = self.session.project.scene, self.session.step
+        self.told.setText(f"step {step + 1} of {scene.frame_count}: {describe(scene.motion, step)}")
+
+    def _set_motion(self, kind: type[LinearStage] | type[Turntable]) -> None:
+        try:
+            project, path = set_motion(self.session.project, kind)
+        except InputError as error:
+            self.session.message.emit("error", str(error))
+            return
+        self.session.document.apply("add motion", project)
+        self.session.select(path)
+
+    def _lay_out(self) -> None:
+        still = QWidget()
+        column, row = QVBoxLayout(still), QHBoxLayout()
+        column.setContentsMargins(8, 8, 8, 6)
+        column.addWidget(QLabel("Nothing moves: a scan is a single frame.", wordWrap=True))
+        column.addLayout(row)
+        column.addStretch(1)
+        for text, kind in (("Add a linear stage", LinearStage), ("Add a turntable", Turntable)):
+            button = QPushButton(text)
+            button.clicked.connect(lambda _checked=False, kind=kind: self._set_motion(kind))
+            row.addWidget(button)
+        row.addStretch(1)
+        moving = QWidget()
+        inside = QVBoxLayout(moving)
+        inside.setContentsMargins(8, 4, 8, 6)
+        bottom = QHBoxLayout()
+        bottom.addStretch(1)
+        for widget in (self.open, self.go_on, self.scale, self.run):
+            bottom.addWidget(widget)
+        inside.addWidget(self.steps)
+        inside.addWidget(self.told)
+        inside.addLayout(bottom)
+        inside.addStretch(1)
+        self.stack = QStackedLayout(self)
+        self.stack.addWidget(still)
+        self.stack.addWidget(moving)
+
+
+def share(stage: str, done: float) -> float | None:
+    """How much of a scan is done; None: the stage does not say."""
+    if stage == FRAMES:
+        return 0.02 + 0.93 * done
+    return 0.96 + 0.03 * done if stage in ("writing points", "report") else None
+
+
+def describe(motion: object, step: int) -> str:
+    """Where a step stands, for a person."""
+    if isinstance(motion, LinearStage):
+        x, y, z = (1e3 * step * value for value in motion.step)
+        return f"{motion.moves} moved by ({x:.2f}, {y:.2f}, {z:.2f}) mm"
+    if isinstance(motion, Turntable):
+        import math
+
+        return f"{motion.moves} turned by {math.degrees(step * motion.angle_step):.2f} deg"
+    return "at its listed pose"

@@ -1,0 +1,382 @@
+"""The final render: what will be computed and why, how well, how far it is, and the renders made so far."""
+
+from __future__ import annotations
+
+import time
+from html import escape
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from render.base.threads import Cancel
+from render.checkpoint import RenderState
+from render.frame import Frame
+from render.progressive import plan
+from render.world.world import World
+from studio.project.project import Project
+from studio.qt.core.jobs import BUSY, RENDER, JobRunner
+from studio.qt.core.session import Render, Session
+from studio.qt.render.history import History
+from studio.qt.render.render_job import can_go_on, carried, render_frames
+from studio.qt.shell.status import time_left
+from studio.runtime.jobs import Job, Progress, State
+from studio.scan.light_group_status import group_lines, unfinished
+from studio.scan.redevelop import is_stale
+from studio.scan.stages import scaled
+
+SCALES = (0.125, 0.25, 0.5, 1.0)
+LONGEST_HEAD = 20
+TRANSPORT = {
+    "auto": "as much as matters",
+    "direct": "by way of one surface",
+    "interreflection": "and reflected on",
+    "caustic": "and through glass, off mirrors",
+    "specular-chain": "and seen through glass again",
+    "subsurface": "and below surfaces",
+}
+
+
+class RenderPanel(QWidget):
+    """Starts, holds and stops the render; its frames join the session's history as they get better."""
+
+    _refined = Signal(object, object)
+
+    def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session, self.runner = session, runner
+        self._job: Job[None] | None = None
+        self._render: Render | None = None
+        self._before: Render | None = None
+        self._keep = False
+        self._warned: set[str] = set()
+        """What was told of the render under way."""
+        self._state = RenderState({})
+        self.plan = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
+        self.plan.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.laser_error = QDoubleSpinBox(decimals=2, minimum=0.01, maximum=100.0)
+        self.laser_error.setSuffix(" %")
+        self.laser_error.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
+        self.laser_error.setToolTip("Relative RMS error of the laser light over the lit pixels.")
+        self.samples = QSpinBox(minimum=1, maximum=65536)
+        self.samples.setStepType(QSpinBox.StepType.AdaptiveDecimalStepType)
+        self.samples.setToolTip(
+            "The ambient light ends here where its error is not reached. Samples of a pixel, on average: noisy places "
+            "get more; four times as many halve the noise."
+        )
+        self.ambient_error = QDoubleSpinBox(decimals=2, minimum=0.01, maximum=100.0)
+        self.ambient_error.setSuffix(" %")
+        self.ambient_error.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
+        self.ambient_error.setToolTip("Relative RMS error of the ambient light at which it ends.")
+        self.limit = QSpinBox(minimum=0, maximum=86400)
+        self.limit.setSuffix(" s")
+        self.limit.setSpecialValueText("none")
+        self.limit.setToolTip("The best frame so far is kept when the time is over.")
+        for box in (self.laser_error, self.ambient_error, self.samples, self.limit):
+            box.setKeyboardTracking(False)
+        self.transport = QComboBox()
+        for value, text in TRANSPORT.items():
+            self.transport.addItem(text, value)
+        self.transport.setToolTip("A short pilot finds out what the reflections add, unless you decide.")
+        self.scale = QComboBox()
+        self.start_button = QPushButton("Render")
+        self.start_button.setObjectName("primary")
+        self.continue_button = QPushButton("Continue")
+        self.continue_button.setToolTip("Go on with the shown render, which was stopped before it reached its errors")
+        self.pause_button = QPushButton("Pause")
+        self.keep_button = QPushButton("Keep")
+        self.keep_button.setToolTip("Stop here and keep the image as it is")
+        self.cancel_button = QPushButton("Cancel")
+        self.cancel_button.setToolTip("Stop and forget this render")
+        self.bar = QProgressBar(maximum=1000, textVisible=False)
+        self.bar.setMaximumHeight(10)
+        self.stage = QLabel()
+        self.errors = QLabel(textFormat=Qt.TextFormat.RichText)
+        self.history = History(session)
+        self._lay_out()
+        self._connect()
+        self._follow_project()
+        self._show_state()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.cancel()
+        super().closeEvent(event)
+
+    # what a person does
+
+    def go_on(self) -> None:
+        """Go on with the shown render where it was stopped."""
+        render = self.session.shown
+        if render is None or render.final or render.state is None or not self._may_start():
+            return
+        self._before, self._keep = render, True
+        self._render = render
+        self._run(render.project, self.session.document.root, render.frame.step, render.world, render.state)
+
+    def start(self, image_scale: float | None = None) -> None:
+        """Render the project as it is now; one render at a time."""
+        if not self._may_start():
+            return
+        session = self.session
+        source, root, step = session.project, session.document.root, session.step
+        if image_scale is not None and self.scale.findData(image_scale) >= 0:
+            self.scale.setCurrentIndex(self.scale.findData(image_scale))
+        image_scale = self.scale.currentData() if image_scale is None else image_scale
+        project = scaled(source, image_scale)
+        world = self._same_world(project, step)
+        self._render, self._before, self._keep = None, session.shown, False
+        number = max([render.number for render in session.renders], default=0) + 1
+        self._template = (number, project, source, image_scale)
+        self._warned = set()
+        self._run(project, root, step, world, RenderState({}))
+
+    def _may_start(self) -> bool:
+        if self.runner.job(RENDER) is not None:
+            self.session.message.emit("warning", BUSY)
+            return False
+        return True
+
+    def _run(self, project: Project, root: Path, step: int, world: World | None, state: RenderState) -> None:
+        refined, limit, self._state = self._refined, self.limit.value() or None, state
+
+        def work(progress: Progress, cancelled: Cancel) -> None:
+            render_frames(
+                project, root, step, world, progress, cancelled, refined.emit, lambda: self._keep, limit, state
+            )
+
+        self._job = self.runner.run(RENDER, "render", work)
+        self._show_state()
+        self._tell_render()
+
+    def pause(self) -> None:
+        """Hold the render, or let it go on."""
+        if self._job is None:
+            return
+        if self._job.state is State.PAUSED:
+            self._job.resume()
+        else:
+            self._job.pause()
+        self._show_state()
+
+    def keep(self) -> None:
+        """Stop here; the frame so far stays."""
+        if self._job is not None:
+            self._keep = True
+            self._job.cancel()
+            self._show_state()
+
+    def cancel(self) -> None:
+        """Stop and forget."""
+        if self._job is not None:
+            # what was there before it went on stays
+            self._keep = self._render is not None and self._render is self._before
+            self._job.cancel()
+            self._show_state()
+
+    # what follows
+
+    def _lay_out(self) -> None:
+        form = QFormLayout()
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.addRow("Light transport", self.transport)
+        form.addRow("Laser error", self.laser_error)
+        form.addRow("Ambient error", self.ambient_error)
+        form.addRow("Ambient samples", self.samples)
+        form.addRow("Time limit", self.limit)
+        form.addRow("Image", self.scale)
+        buttons = QHBoxLayout()
+        for button in (
+            self.start_button,
+            self.continue_button,
+            self.pause_button,
+            self.keep_button,
+            self.cancel_button,
+        ):
+            buttons.addWidget(button)
+        for label in (self.stage, self.errors):
+            label.setObjectName("muted")
+        self.stage.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        layout = QVBoxLayout(self)
+        layout.addLayout(form)
+        layout.addLayout(buttons)
+        layout.addWidget(self.bar)
+        layout.addWidget(self.stage)
+        layout.addWidget(self.errors)
+        layout.addWidget(self.plan)
+        layout.addWidget(self.history, 1)
+
+    def _connect(self) -> None:
+        session, runner = self.session, self.runner
+        session.project_changed.connect(self._follow_project)
+        session.document_replaced.connect(self._document_replaced)
+        session.render_asked.connect(self.start)
+        runner.progress.connect(self._tell_progress)
+        runner.finished.connect(self._ended)
+        runner.failed.connect(self._ended)
+        runner.cancelled.connect(self._ended)
+        self._refined.connect(self._take_frame)
+        self.laser_error.valueChanged.connect(
+            lambda percent: session.set(("render", "laser_error"), round(percent / 100, 8), "laser error")
+        )
+        self.ambient_error.valueChanged.connect(
+            lambda percent: session.set(("render", "ambient_error"), round(percent / 100, 8), "ambient error")
+        )
+        self.samples.valueChanged.connect(
+            lambda count: session.set(("render", "ambient_samples"), count, "ambient samples")
+        )
+        self.scale.currentIndexChanged.connect(lambda index: self._show_plan())
+        self.transport.activated.connect(
+            lambda i: session.set(("render", "transport"), self.transport.itemData(i), "laser light")
+        )
+        self.start_button.clicked.connect(lambda: self.start())
+        self.continue_button.clicked.connect(self.go_on)
+        session.renders_changed.connect(self._show_state)
+        session.renders_changed.connect(self._tell_render)
+        self.pause_button.clicked.connect(self.pause)
+        self.keep_button.clicked.connect(self.keep)
+        self.cancel_button.clicked.connect(self.cancel)
+
+    def _follow_project(self) -> None:
+        project = self.session.project
+        for box in (self.laser_error, self.ambient_error, self.samples):
+            box.blockSignals(True)
+        self.laser_error.setValue(100 * project.render.laser_error)
+        self.ambient_error.setValue(100 * project.render.ambient_error)
+        self.samples.setValue(project.render.ambient_samples)
+        self.transport.setCurrentIndex(self.transport.findData(project.render.transport))
+        for box in (self.laser_error, self.ambient_error, self.samples):
+            box.blockSignals(False)
+        camera, chosen = project.scene.camera, max(0, self.scale.currentIndex())
+        if self.scale.count() == 0:
+            chosen = len(SCALES) - 1
+        sizes = []
+        for scale in SCALES:
+            small = camera.scaled(scale)
+            sizes.append(f"{small.width} x {small.height} px" + ("" if scale == 1.0 else f" ({scale:.3g} x)"))
+        if sizes != [self.scale.itemText(i) for i in range(self.scale.count())]:
+            self.scale.clear()
+            for text, scale in zip(sizes, SCALES, strict=True):
+                self.scale.addItem(text, scale)
+            self.scale.setCurrentIndex(chosen)
+        self._show_plan()
+
+    def _show_plan(self) -> None:
+        project = self.session.project
+        scale = self.scale.currentData()
+        self.plan.setText(plan_text(plan(project.scene.scaled(scale if scale is not None else 1.0), project.render)))
+
+    def _tell_render(self) -> None:
+        """What was computed of the running render, else of the shown one, and how well it is known."""
+        render = self.session.shown if self._job is None else self._render
+        self.errors.setText("" if render is None else error_text(render))
+        self.errors.setVisible(bool(self.errors.text()))
+        if render is not None and not is_stale(render.source or render.project, self.session.project):
+            self.plan.setText(plan_text(tuple(render.frame.plan.splitlines())))
+
+    def _document_replaced(self) -> None:
+        self._render, self._before = None, None
+        self.cancel()
+
+    def _same_world(self, project: Project, step: int) -> World | None:
+        """The world of an earlier render in which every object stands where it stands now."""
+        for render in reversed(self.session.renders):
+            scene, now = render.project.scene, project.scene
+            if (scene.objects, scene.motion, render.frame.step) == (now.objects, now.motion, step):
+                return render.world
+        return None
+
+    def _take_frame(self, world: World, frame: Frame) -> None:
+        if self._job is None or (self._job.cancel_asked and not self._keep):
+            return
+        if self._render is None:
+            number, project, source, image_scale = self._template
+            self._render = Render(
+                number,
+                project,
+                world,
+                frame,
+                final=False,
+                created=time.strftime("%H:%M:%S"),
+                image_scale=image_scale,
+                source=source,
+            )
+            self.session.add_render(self._render)
+        else:
+            self._render.frame = carried(frame, self._render.frame)
+            self.session.renders_changed.emit()
+        for text in frame.warnings:
+            if text not in self._warned:
+                self._warned.add(text)
+                self.session.message.emit("warning", text)
+
+    def _tell_progress(self, job: Job[None]) -> None:
+        if job is self._job:
+            self.bar.setValue(round(1000 * job.done))
+            left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
+            self.stage.setText(f"{job.stage}   {left}")
+
+    def _ended(self, job: Job[None]) -> None:
+        if job is not self._job:
+            return
+        render, self._job = self._render, None
+        session = self.session
+        if render is not None:
+            self._state.pause()
+            early = unfinished(render.frame, render.project.scene, render.project.render)
+            render.state = self._state if early or job.state is not State.DONE else None
+        if job.state is State.DONE and render is not None:
+            render.final = render.state is None
+            session.renders_changed.emit()
+        elif render is not None and not (self._keep and job.state is State.CANCELLED):
+            session.renders = [other for other in session.renders if other is not render]
+            session.show(session.present(self._before) if session.shown is render else session.shown)
+        elif render is not None:
+            session.renders_changed.emit()
+        if job.state is State.FAILED and job.problem is not None:
+            session.message.emit("error", job.problem.text)
+        self._show_state()
+        self._tell_render()
+
+    def _show_state(self) -> None:
+        job = self._job
+        running = job is not None
+        self.start_button.setVisible(not running)
+        self.continue_button.setVisible(not running and can_go_on(self.session.shown))
+        for button in (self.pause_button, self.keep_button, self.cancel_button):
+            button.setVisible(running)
+            button.setEnabled(job is not None and not job.cancel_asked)
+        self.pause_button.setText("Go on" if job is not None and job.state is State.PAUSED else "Pause")
+        self.bar.setVisible(running)
+        self.stage.setVisible(running)
+        if not running:
+            self.bar.setValue(0)
+            self.stage.clear()
+
+
+def plan_text(lines: tuple[str, ...]) -> str:
+    """Rich text: what a line is about stands out."""
+    shown = []
+    for line in lines:
+        head, colon, rest = line.partition(":")
+        bold = f"<b>{escape(head)}</b>" if len(head) <= LONGEST_HEAD else escape(head)
+        shown.append(f"<p style='margin: 3px 0'>{bold}{colon}{escape(rest)}</p>")
+    return "".join(shown)
+
+
+def error_text(render: Render) -> str:
+    """Error so far of every light group, and what it is to become."""
+    groups = group_lines(render.frame, render.project.scene, render.project.render)
+    return "<br>".join(f"{escape(name)}: {escape(text)}" for _, name, text in groups)

@@ -1,0 +1,134 @@
+"""The export menu: asks where to, and lets a job write it."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QObject
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from render.base.threads import Cancel
+from studio.qt.core.actions import Actions
+from studio.qt.core.dialogs import show_trouble, suggested
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.session import Session
+from studio.runtime.error_messages import trouble
+from studio.runtime.jobs import Job, Progress
+from studio.runtime.preferences import PreferencesFile
+from studio.scan.redevelop import development
+from studio.scan.remarks import scale_notes
+
+KINDS = {
+    "export_html": ("Report (*.html)", ".html", "report"),
+    "export_pdf": ("Report (*.pdf)", ".pdf", "report"),
+    "export_exr": ("OpenEXR frame (*.exr)", ".exr", "frame"),
+    "export_png": ("PNG image (*.png)", ".png", "image"),
+    "export_ply": ("PLY points (*.ply)", ".ply", "points"),
+    "export_csv": ("CSV table (*.csv)", ".csv", "points"),
+}
+"""Command -> filter of the file dialog, suffix, what it is."""
+LANE = "export"
+
+
+class ExportActions(QObject):
+    """Follows the session, so that nothing can be exported that is not there."""
+
+    def __init__(
+        self, window: QWidget, session: Session, runner: JobRunner, preferences: PreferencesFile, actions: Actions
+    ) -> None:
+        super().__init__(window)
+        self.window, self.session, self.runner, self.preferences = window, session, runner, preferences
+        self.actions = actions
+        for key in KINDS:
+            actions.connect(key, partial(self.ask, key))
+        actions.connect("screenshot", self.screenshot)
+        for signal in (session.renders_changed, session.measured, session.developed):
+            signal.connect(self.refresh)
+        self._job: Job[list[Path]] | None = None
+        runner.cancelled.connect(self._tell_cancelled)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Offer what can be had."""
+        render = self.session.shown
+        for key, (_, _, what) in KINDS.items():
+            there = render is not None and (
+                what == "frame" or bool(render.images if what == "image" else render.measurements)
+            )
+            self.actions[key].setEnabled(there)
+
+    def ask(self, key: str) -> None:
+        """Ask for a file, then write it."""
+        name_filter, suffix, _ = KINDS[key]
+        render = self.session.shown
+        # the name says what the figures inside are of
+        size = f" at {render.scanner_scale:.3g} x" if render is not None and render.scanner_scale != 1.0 else ""
+        name = f"{self.session.project.name.replace('/', '-')}{size}{suffix}"
+        start = suggested(self.preferences.values.folder, name)
+        chosen, _ = QFileDialog.getSaveFileName(self.window, "Export", start, name_filter)
+        if chosen:
+            path = Path(chosen)
+            self.write(key, path if path.suffix.lower() == suffix else path.with_name(path.name + suffix))
+
+    def write(self, key: str, path: Path) -> None:
+        """Write in the background; the message says what was written."""
+        from studio.scan import export
+
+        render = self.session.shown
+        if render is None:
+            return
+        how = development(render.project, self.session.project, render.image_scale)
+        lasers = tuple(
+            laser.model_copy(update={"power": power})
+            for laser, power in zip(how.project.scene.lasers, how.laser_power, strict=True)
+        )
+        rig = how.project.scene.rig.model_copy(update={"lasers": lasers})
+        scene = how.project.scene.model_copy(update={"rig": rig})
+        what = export.Exported(
+            how.project.model_copy(update={"scene": scene}),
+            render.project,
+            self.session.document.root,
+            render.world,
+            render.frame,
+            tuple(render.images),
+            dict(render.measurements),
+            render.scanner_scale,
+        )
+        writers: dict[str, export.Writer] = {
+            "report": export.export_report,
+            "frame": export.export_frame,
+            "image": export.export_image,
+            "points": export.export_points,
+        }
+        writer = writers[KINDS[key][2]]
+
+        def work(progress: Progress, cancelled: Cancel) -> list[Path]:
+            progress(path.name, 0.3)
+            return export.export_unless(cancelled, writer, path, what)
+
+        notes = scale_notes(render.scanner_scale)
+        self._job = self.runner.run(LANE, f"export {path.name}", work, lambda written: self._tell(written, notes))
+        self.preferences.change(folder=str(path.parent))
+
+    def screenshot(self) -> None:
+        """The window as it is, as a PNG."""
+        picture = self.window.grab()  # before the dialog covers it
+        start = suggested(self.preferences.values.folder, f"{self.session.project.name}.png")
+        chosen, _ = QFileDialog.getSaveFileName(self.window, "Save the screenshot", start, "PNG image (*.png)")
+        if not chosen:
+            return
+        path = Path(chosen).with_suffix(".png")
+        if picture.save(str(path)):
+            self.session.message.emit("info", f"Wrote {path}")
+        else:
+            error = OSError(None, "the file cannot be written", str(path))
+            show_trouble(self.window, trouble(error, "save the screenshot"))
+
+    def _tell_cancelled(self, job: Job[list[Path]]) -> None:
+        if job is self._job:
+            self.session.message.emit("info", f"Cancelled: {job.name}. No file was written")
+
+    def _tell(self, written: list[Path], notes: tuple[str, ...]) -> None:
+        names = ", ".join(str(path) for path in written)
+        self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes]))

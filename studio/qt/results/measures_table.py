@@ -1,0 +1,69 @@
+"""The table of measures: a column a method, each row explained where the mouse rests."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
+
+from analysis.report.colour import method_name
+from analysis.report.units import digits
+from studio.qt.core import theme
+
+COVERED = "Within 2 sigma"
+HONEST = 88.0
+"""Percent within 2 sigma below which more than noise moves the line; the report remarks on it from there as well."""
+EXPLAINED = {
+    "Points": "Points measured.",
+    "Completeness": "Share of the scan lines on which the line can be seen that have a right measurement.",
+    "False scan lines": "Scan lines with a point although no line is to be seen there.",
+    "Bias": "Mean error: what averaging does not remove.",
+    "Sigma": "Spread of the errors about their mean, as a standard deviation.",
+    "RMSE": "Bias and sigma together: the root of the mean squared error.",
+    "Robust sigma": "The spread as it would be without outliers.",
+    "95 % within": "95 % of the errors are smaller than this.",
+    "Outliers": "Errors larger than a pixel and than five times the usual error.",
+    COVERED: "Share of the errors within twice the sigma predicted from the image's noise: 95 % where noise alone "
+    "moves the line. Less: something else moves it too, as texture and edges under the line, or too few pixels.",
+}
+
+ROW_PX = 22
+
+
+def shown(value: float) -> str:
+    """Three digits, or all of a whole number."""
+    return "-" if math.isnan(value) else f"{value:.0f}" if value == round(value) else digits(value)
+
+
+class MeasuresTable(QTableWidget):
+    """Read only; rows can be selected and copied."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ContiguousSelection)
+        self.setShowGrid(False)
+        self.setAlternatingRowColors(True)
+        self.verticalHeader().setDefaultSectionSize(ROW_PX)
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+        self.setMinimumWidth(360)
+
+    def show_measures(self, methods: list[str], rows: list[tuple[str, str, list[float]]]) -> None:
+        """rows: name, unit, and a value for each method, NaN where there is none."""
+        self.setColumnCount(len(methods))
+        self.setRowCount(len(rows))
+        self.setHorizontalHeaderLabels([method_name(method).replace(" ", "\n", 1) for method in methods])
+        for row, (name, unit, values) in enumerate(rows):
+            heading = QTableWidgetItem(f"{name} / {unit}" if unit else name)
+            heading.setToolTip(f"<p>{EXPLAINED[name]}</p>")
+            self.setVerticalHeaderItem(row, heading)
+            for column, value in enumerate(values):
+                item = QTableWidgetItem(shown(value))
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                item.setToolTip(f"<p>{EXPLAINED[name]}</p>")
+                if name == COVERED and value < HONEST:
+                    item.setForeground(QColor(theme.colours().warning))
+                self.setItem(row, column, item)
+        self.setMaximumHeight(self.horizontalHeader().sizeHint().height() + ROW_PX * len(rows) + 2 * self.frameWidth())

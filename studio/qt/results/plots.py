@@ -1,0 +1,81 @@
+"""Plots in the theme's colours, and what they have in common: quiet axes, a mark on the hovered scan line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, Qt
+
+from studio.qt.core import theme
+
+pg.setConfigOptions(antialias=False)
+
+
+def new_plot(bottom: str = "", left: str = "", left_unit: str = "") -> pg.PlotItem:
+    """An empty plot; the unit is part of the label, so that no prefix is put before it."""
+    plot = pg.PlotItem()
+    plot.setLabel("left", f"{left} / {left_unit}" if left_unit else left)
+    if bottom:
+        plot.setLabel("bottom", bottom)
+    plot.hideButtons()
+    plot.setMenuEnabled(False)
+    plot.showGrid(x=True, y=True, alpha=0.15)
+    for side in ("left", "bottom"):
+        plot.getAxis(side).enableAutoSIPrefix(False)
+    return plot
+
+
+def paint(plot: pg.PlotItem) -> None:
+    """Give a plot the theme's colours."""
+    c = theme.colours()
+    for side in ("left", "bottom"):
+        axis = plot.getAxis(side)
+        axis.setPen(pg.mkPen(c.line))
+        axis.setTextPen(pg.mkPen(c.muted))
+        axis.label.setDefaultTextColor(pg.mkColor(c.muted))
+
+
+def set_title(plot: pg.PlotItem, text: str) -> None:
+    """What a plot is of, where its place does not say; empty: no title, and no room for one."""
+    plot.setTitle(text or None, size="9pt", color=theme.colours().muted)
+
+
+def cursor(plot: pg.PlotItem, angle: float = 90.0) -> pg.InfiniteLine:
+    """A thin line across a plot, hidden until it is placed."""
+    line = pg.InfiniteLine(angle=angle, movable=False)
+    line.setZValue(20)
+    line.hide()
+    plot.addItem(line, ignoreBounds=True)
+    return line
+
+
+def dots(colour: str, size: float = 4.0) -> pg.ScatterPlotItem:
+    """Measured samples of one method."""
+    return pg.ScatterPlotItem(pen=None, brush=pg.mkBrush(colour), size=size, pxMode=True)
+
+
+def ring() -> pg.ScatterPlotItem:
+    """The mark around the hovered sample."""
+    item = pg.ScatterPlotItem(brush=None, size=11, pxMode=True)
+    item.setZValue(30)
+    return item
+
+
+def curve(colour: str, width: float = 1.2) -> pg.PlotCurveItem:
+    """A line with gaps at NaN."""
+    return pg.PlotCurveItem(pen=pg.mkPen(colour, width=width), connect="finite")
+
+
+def at(plot: pg.PlotItem, scene_position: QPointF) -> QPointF | None:
+    """Where the mouse is in the plot's own coordinates, None outside."""
+    if not plot.sceneBoundingRect().contains(scene_position):
+        return None
+    point: Any = plot.vb.mapSceneToView(scene_position)
+    return QPointF(point.x(), point.y())
+
+
+def reset_on_double_click(plot: pg.PlotItem, event: Any) -> None:
+    """Show everything again."""
+    if event.double() and event.button() == Qt.MouseButton.LeftButton:
+        plot.enableAutoRange()

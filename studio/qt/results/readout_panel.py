@@ -1,0 +1,122 @@
+"""The design read-outs of a laser, live while anything is dragged."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QComboBox, QFrame, QGridLayout, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+
+from studio.preview.readout_rows import Row, rows
+from studio.preview.readouts import readouts
+from studio.qt.core import theme
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session
+
+
+class ReadoutPanel(QWidget):
+    """One compact row for each read-out; its tool tip explains it, its colour says when it is out of range."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._session, self._live = session, live(session)
+        self.laser = 0
+        """Index of the laser that is read out."""
+        self._lasers = QComboBox()
+        self._lasers.setToolTip("The laser that the read-outs are of")
+        self._lasers.activated.connect(self._choose)
+        self._hint = QLabel("Add a laser to the rig to see what it measures.", wordWrap=True)
+        self.problem = QLabel("Not of the scene as it is set: the scene tree marks what cannot be.", wordWrap=True)
+        self.problem.setObjectName("warning")
+        self._hint.setObjectName("muted")
+        self._labels: dict[str, tuple[QLabel, QLabel, QLabel]] = {}
+        inner = QFrame()
+        self._grid = QGridLayout(inner)
+        self._grid.setContentsMargins(10, 8, 10, 8)
+        self._grid.setHorizontalSpacing(12)
+        self._grid.setVerticalSpacing(5)
+        self._grid.setColumnStretch(2, 1)
+        area = QScrollArea(widgetResizable=True)
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setWidget(inner)
+        self._area = area
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        for widget in (self._lasers, self._hint, self.problem):
+            layout.addWidget(widget)
+        layout.addWidget(area, 1)
+        for label in (self._hint, self.problem):
+            label.setContentsMargins(10, 6, 10, 0)
+        self._live.changed.connect(self._refresh)
+        session.problems_changed.connect(self._refresh)
+        session.selection_changed.connect(self._follow_selection)
+        theme.notice.changed.connect(self._paint)
+        self._rows: tuple[Row, ...] = ()
+        self._refresh()
+
+    def rows(self) -> tuple[Row, ...]:
+        """What is shown."""
+        return self._rows
+
+    def _follow_selection(self) -> None:
+        path = self._session.selection
+        if path[:3] == ("scene", "rig", "lasers") and len(path) > 3 and path[3] != self.laser:
+            self.laser = int(path[3])
+            self._refresh()
+
+    def _choose(self, index: int) -> None:
+        self.laser = index
+        self._session.select(("scene", "rig", "lasers", index))
+        self._refresh()
+
+    def _refresh(self) -> None:
+        look = self._live.look
+        names = [laser.name for laser in look.scene.lasers]
+        self.laser = min(self.laser, max(len(names) - 1, 0))
+        if names != [self._lasers.itemText(i) for i in range(self._lasers.count())]:
+            self._lasers.clear()
+            self._lasers.addItems(names)
+        self._lasers.setCurrentIndex(self.laser if names else -1)
+        self._lasers.setVisible(len(names) > 1)
+        self._hint.setVisible(not names)
+        self.problem.setVisible(bool(names and self._session.problems))
+        self._area.setVisible(bool(names))
+        shown = rows(readouts(look, self.laser)) if names and self._live.ready else ()
+        if shown != self._rows:
+            self._rows = shown
+            self._paint()
+
+    def _paint(self) -> None:
+        colours = theme.colours()
+        keys = {row.key for row in self._rows}
+        for key, labels in self._labels.items():
+            for label in labels:
+                label.setVisible(key in keys)
+        tints = {"": colours.text, "warning": colours.warning, "error": colours.error}
+        for row in self._rows:
+            name, value, note = self._labels.get(row.key) or self._add(row.key)
+            name.setText(row.label)
+            value.setText(row.value)
+            note.setText(row.note)
+            for label, style in (
+                (name, f"color: {colours.muted}"),
+                (value, f"color: {tints[row.level]}; font-weight: 600"),
+                (note, f"color: {colours.muted}"),
+            ):
+                # a style sheet costs more to set than all the numbers to compute
+                if label.styleSheet() != style:
+                    label.setStyleSheet(style)
+                label.setToolTip(f"<p>{row.help}</p>")
+
+    def _add(self, key: str) -> tuple[QLabel, QLabel, QLabel]:
+        """A line of labels at the end."""
+        name, value, note = QLabel(), QLabel(), QLabel()
+        value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        value.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        # a narrow panel may cut the ranges off, never the values
+        note.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        line = self._grid.rowCount()
+        for column, label in enumerate((name, value, note)):
+            self._grid.addWidget(label, line, column)
+        self._labels[key] = (name, value, note)
+        return name, value, note

@@ -1,0 +1,65 @@
+"""How the errors are spread: one outline for each method, centred on zero."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pyqtgraph as pg
+
+from analysis.report.colour import method_colour
+from studio.qt.core import theme
+from studio.qt.results import plots
+from studio.scan.result_series import ErrorView, Float, histogram, symmetric_limit
+
+PLOTTED = 99.5
+"""Percent of the errors within the axis."""
+
+
+class ErrorHistogram(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """Counts of points over their signed error."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.plot = plots.new_plot("Depth error / µm", "Points")
+        self.addItem(self.plot)
+        self.plot.getAxis("left").setWidth(62)
+        self.ci.layout.setContentsMargins(2, 4, 8, 2)
+        self.zero = pg.InfiniteLine(angle=90, pos=0.0)
+        self.plot.addItem(self.zero, ignoreBounds=True)
+        self.cursor = plots.cursor(self.plot)
+        self._outlines: list[Any] = []
+        self.repaint_theme()
+
+    def show_errors(self, measured: dict[str, Float], view: ErrorView, title: str = "") -> None:
+        """measured: errors in the view's unit, by method; what lies beyond the axis is counted at its ends."""
+        plots.set_title(self.plot, title)
+        for item in self._outlines:
+            self.plot.removeItem(item)
+        self._outlines = []
+        self.plot.setLabel("bottom", f"{view.title} / {view.unit}")
+        limit = max([symmetric_limit(error, PLOTTED) for error in measured.values()], default=1.0)
+        for method, error in reversed(measured.items()):  # the first method on top
+            edges, counts = histogram(error, limit)
+            colour = pg.mkColor(method_colour(method))
+            fill = pg.mkColor(colour)
+            fill.setAlpha(45)
+            outline = pg.PlotCurveItem(
+                edges, counts, stepMode="center", pen=pg.mkPen(colour, width=1.6), fillLevel=0.0, brush=fill
+            )
+            self.plot.addItem(outline)
+            self._outlines.append(outline)
+        self.plot.enableAutoRange()
+        self.plot.setXRange(-limit, limit, padding=0.02)
+
+    def mark(self, error: float | None) -> None:
+        """A line at the error of the hovered scan line."""
+        self.cursor.setVisible(error is not None)
+        if error is not None:
+            self.cursor.setPos(error)
+
+    def repaint_theme(self) -> None:
+        c = theme.colours()
+        self.setBackground(c.base)
+        plots.paint(self.plot)
+        self.zero.setPen(pg.mkPen(c.muted, width=1))
+        self.cursor.setPen(pg.mkPen(c.text, width=1))

@@ -1,0 +1,367 @@
+"""The results of the shown render: line, depth and error by scan line, profile, histogram, measures, all linked.
+
+Of a scan they are of the step that is looked at; the measures and the histogram of all its steps, where asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from html import escape
+
+import numpy as np
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent, QColor, QPixmap, QResizeEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QSplitter,
+    QStackedLayout,
+    QTabWidget,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from analysis.report.colour import TRUTH, method_colour, method_name
+from analysis.report.units import digits
+from studio.qt.core import theme
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Session
+from studio.qt.results.measures_table import MeasuresTable
+from studio.qt.results.results_histogram import ErrorHistogram
+from studio.qt.results.results_profile import ProfilePlot
+from studio.qt.results.results_rows import RowPlots
+from studio.qt.results.results_steps import StepsPlot
+from studio.qt.results.scan_bar import ScanBar
+from studio.scan.redevelop import is_developed_otherwise
+from studio.scan.remarks import frame_remarks, scale_head, scale_notes
+from studio.scan.result_series import (
+    ERROR_VIEWS,
+    ErrorView,
+    Float,
+    error_values,
+    measured_series,
+    table,
+    true_series,
+)
+from studio.scan.scan_results import COLUMNS, ScanResults
+from studio.scan.stages import Measurement
+
+NOTHING = (
+    "Nothing is measured yet. Render the frame (F5), run a scan, or open the results of one: "
+    "line, points and errors appear here."
+)
+BY_STEP_ONLY = "The scan's files hold this error in sum only; choose This step"
+AS_SCANNED = "All steps are as they were scanned; what was changed since in exposure or extraction is in This step."
+STEPS, NOTICE = 2, 3
+"""Tabs."""
+TALL = 480
+"""px of height from which there is room below the measures."""
+
+
+class ResultsPanel(QWidget):
+    """Follows `session.shown`; hovering any plot hovers the scan line everywhere, a click keeps it."""
+
+    view_changed = Signal(object)
+    """Another `ErrorView` was chosen."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.pinned: int | None = None
+        self.hidden: set[str] = set()
+        """Methods that are switched off."""
+        self.laser = QComboBox()
+        self.error = QComboBox()
+        self.error.addItems([view.title for view in ERROR_VIEWS])
+        self.error.setToolTip("Which error the plots, the histogram and the table show")
+        self.switches = QHBoxLayout()
+        self.switches.setSpacing(2)
+        self.reading = QLabel()
+        self.reading.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.reading.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.rows, self.profile, self.histogram, self.by_step = RowPlots(), ProfilePlot(), ErrorHistogram(), StepsPlot()
+        self.table = MeasuresTable()
+        self.scan_bar = ScanBar(session)
+        self.scan_steps = scan_steps(session)
+        self.head = QFrame()
+        self.head_text = QLabel()
+        self.head_text.setMinimumWidth(1)  # a narrow panel may cut it off: it is among the remarks as well
+        self.notices = _Remarks(), _Remarks()
+        """What a reader should notice: below the measures, and in a tab where there is no room below them."""
+        self._lay_out()
+        self.laser.currentIndexChanged.connect(self.refresh)
+        self.error.currentIndexChanged.connect(self.refresh)
+        self.error.currentIndexChanged.connect(lambda _: self.view_changed.emit(self.view))
+        for plot in (self.rows, self.profile):
+            plot.hovered.connect(self._hover)
+            plot.chosen.connect(self._pin)
+        self.by_step.chosen.connect(session.look_at_step)
+        self.scan_bar.scope_changed.connect(self.refresh)
+        self.scan_steps.told.connect(self._tell_head)
+        session.renders_changed.connect(self._another_render)
+        session.step_changed.connect(lambda: self.by_step.mark(session.step))
+        session.measured.connect(self.refresh)
+        session.hover_changed.connect(self._mark)
+        theme.notice.changed.connect(self._repaint)
+        self._another_render()
+        self._repaint()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.scan_steps.close()
+        super().closeEvent(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._place_remarks()
+
+    @property
+    def view(self) -> ErrorView:
+        return ERROR_VIEWS[self.error.currentIndex()]
+
+    def shown(self) -> dict[str, Measurement]:
+        """Measurements of the chosen laser by the methods that are switched on."""
+        render, laser = self.session.shown, max(0, self.laser.currentIndex())
+        if render is None:
+            return {}
+        found = {method: each[laser] for method, each in render.measurements.items() if laser < len(each)}
+        return {method: one for method, one in found.items() if method not in self.hidden}
+
+    def refresh(self) -> None:
+        """Draw everything anew."""
+        render, laser = self.session.shown, max(0, self.laser.currentIndex())
+        self._make_switches()
+        have = render is not None and laser < len(render.frame.curves)
+        self.stack.setCurrentIndex(1 if have else 0)
+        if render is None or not have:
+            return
+        scene, shown, view = render.project.scene, self.shown(), self.view
+        curve = render.frame.curves[laser]
+        truth = true_series(curve, scene, laser)
+        series = {method: measured_series(one, scene) for method, one in shown.items()}
+        errors = {method: error_values(one.errors, view) for method, one in shown.items()}
+        self.rows.show_series(curve.axis, truth, {method: (series[method], errors[method]) for method in shown}, view)
+        self.profile.show_series(truth, series)
+        if render.scan is not None and self.scan_bar.all_steps:
+            self._show_all_steps(render.scan, laser)
+            remarks = render.scan.remarks()
+            if is_developed_otherwise(render.project, self.session.project, render.image_scale):
+                remarks.insert(0, AS_SCANNED)
+        else:
+            self.histogram.show_errors(errors, view)
+            self.table.show_measures(list(shown), table(list(shown.values()), view))
+            remarks = frame_remarks(render.project, render.frame, render.measurements) if render.measurements else []
+        self._show_by_step(render.scan, laser)
+        self._tell_remarks(list(dict.fromkeys([*scale_notes(render.scanner_scale), *remarks])))
+        self._tell_head()
+        self._mark()
+
+    def _show_all_steps(self, scan: ScanResults, laser: int) -> None:
+        """Measures and histogram of a whole scan; its points are of the first method alone."""
+        view = self.view
+        methods, rows = scan.table(laser, view)
+        kept = [i for i, method in enumerate(methods) if method not in self.hidden]
+        self.table.show_measures(
+            [methods[i] for i in kept], [(name, unit, [values[i] for i in kept]) for name, unit, values in rows]
+        )
+        errors: dict[str, Float] = {}
+        if view.kind in COLUMNS and kept[:1] == [0]:
+            column = np.asarray(scan.points[COLUMNS[view.kind]] * view.scale)
+            errors[methods[0]] = column[scan.points["laser"] == laser]
+        self.histogram.show_errors(errors, view, "" if view.kind in COLUMNS else BY_STEP_ONLY)
+
+    def _show_by_step(self, scan: ScanResults | None, laser: int) -> None:
+        self.tabs.setTabVisible(STEPS, scan is not None and scan.measured)
+        if scan is not None and scan.measured:
+            view, (methods, _) = self.view, scan.table(laser, self.view)
+            bias, rmse = scan.by_step(laser, view.kind)
+            title = "RMSE, and dashed the mean error" if view.kind in COLUMNS else BY_STEP_ONLY
+            self.by_step.show_steps(methods[0] if methods else "", view.scale * bias, view.scale * rmse, view, title)
+            self.by_step.mark(self.session.step)
+
+    def _tell_remarks(self, remarks: list[str]) -> None:
+        """What a reader should notice, as the report has it."""
+        self.tabs.setTabText(NOTICE, f"Worth noticing ({len(remarks)})" if remarks else "Worth noticing")
+        for notice in self.notices:
+            notice.show_texts(remarks)
+
+    def _tell_head(self) -> None:
+        """Above all figures: why they are not the scanner's, or not of the step that was asked for."""
+        render = self.session.shown
+        told = [] if render is None else [scale_head(render.scanner_scale)]
+        if self.scan_steps.problem:
+            told.insert(0, f"Step {self.session.step + 1} cannot be shown: {self.scan_steps.problem}")
+        told = [text for text in told if text]
+        self.head_text.setText("   ".join(told))
+        self.head_text.setToolTip("".join(f"<p>{escape(text)}</p>" for text in told))
+        self.head.setVisible(bool(told))
+
+    def _another_render(self) -> None:
+        render = self.session.shown
+        names = [] if render is None else [laser.name for laser in render.project.scene.lasers]
+        if names != [self.laser.itemText(i) for i in range(self.laser.count())]:
+            self.laser.blockSignals(True)
+            self.laser.clear()
+            self.laser.addItems(names)
+            self.laser.blockSignals(False)
+        self.laser.setVisible(len(names) > 1)
+        if self.scan_bar.scan is None or render is None or render.scan is not self.scan_bar.scan:
+            self.pinned = None  # from step to step of a scan a row stays the same
+        self.scan_bar.follow()
+        self.refresh()
+
+    def _mark(self) -> None:
+        """Follow the hovered scan line."""
+        scan_line, shown, view = self.session.hovered, self.shown(), self.view
+        self.rows.mark(scan_line)
+        self.profile.mark(scan_line)
+        parts, first = [], None
+        for method, one in shown.items():
+            for i in np.flatnonzero(one.points.index == (-1 if scan_line is None else scan_line))[:1]:
+                error = float(error_values(one.errors, view)[i])
+                depth = 1e3 * float(one.points.depth_z[i])
+                said = (
+                    f"{'+' if error > 0 else ''}{digits(error)} {view.unit}"
+                    if math.isfinite(error)
+                    else "no truth here"
+                )
+                parts.append(f"<span style='color:{method_colour(method)}'>●</span> {depth:.3f} mm ({said})")
+                first = error if first is None and math.isfinite(error) else first
+        self.histogram.mark(first)
+        if scan_line is None:
+            self.reading.setText("")
+            return
+        render = self.session.shown
+        name = "Column" if render is not None and render.project.extraction.axis == "columns" else "Row"
+        self.reading.setText(f"<b>{name} {scan_line}</b>&nbsp;&nbsp; {'&nbsp;&nbsp; '.join(parts) or 'no point'}")
+
+    def _hover(self, scan_line: int | None) -> None:
+        self.session.hover(self.pinned if scan_line is None else scan_line)
+
+    def _pin(self, scan_line: int) -> None:
+        self.pinned = None if scan_line == self.pinned else scan_line
+        self.session.hover(scan_line)
+
+    def _make_switches(self) -> None:
+        """One button for each method of the render, in its colour."""
+        render = self.session.shown
+        if render is not None and not render.measurements:
+            return  # it is about to be measured: those of the render before may stay
+        wanted = [] if render is None else list(render.measurements)
+        there = [item.widget() for i in range(self.switches.count()) if (item := self.switches.itemAt(i)) is not None]
+        buttons = [button for button in there if button is not None]
+        if wanted == [button.objectName() for button in buttons]:
+            return
+        for button in buttons:
+            self.switches.removeWidget(button)
+            button.hide()
+            button.deleteLater()
+        for method in wanted:
+            switch = QToolButton()
+            switch.setObjectName(method)
+            switch.setCheckable(True)
+            switch.setChecked(method not in self.hidden)
+            switch.setText(method_name(method))
+            switch.setIcon(_dot(method_colour(method)))
+            switch.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+            switch.setToolTip("Show or hide this method")
+            switch.toggled.connect(partial(self._switch, method))
+            self.switches.addWidget(switch)
+
+    def _switch(self, method: str, on: bool) -> None:
+        self.hidden.discard(method) if on else self.hidden.add(method)
+        self.refresh()
+
+    def _place_remarks(self) -> None:
+        tall = self.height() >= TALL
+        self.notices[0].setVisible(tall)
+        self.tabs.setTabVisible(NOTICE, not tall)
+
+    def _repaint(self) -> None:
+        for plot in (self.rows, self.profile, self.histogram, self.by_step):
+            plot.repaint_theme()
+        colours = theme.colours()
+        ground = theme.mixed(colours.warning, colours.window, 0.3)
+        self.head.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
+        self.refresh()
+
+    def _lay_out(self) -> None:
+        bar = QHBoxLayout()
+        truth = QLabel(f"<span style='color:{TRUTH}'>━</span> truth")
+        for widget in (self.laser, self.error, truth):
+            bar.addWidget(widget)
+        bar.addLayout(self.switches)
+        bar.addSpacing(12)
+        bar.addWidget(self.reading, 1)
+        tabs = QTabWidget()
+        tabs.setDocumentMode(True)
+        tabs.addTab(self.profile, "Profile")
+        tabs.addTab(self.histogram, "Histogram")
+        tabs.addTab(self.by_step, "Steps")
+        tabs.addTab(self.notices[1], "Worth noticing")
+        self.tabs = tabs
+        across = QSplitter(Qt.Orientation.Horizontal)
+        measures = QWidget()
+        column = QVBoxLayout(measures)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.table, 2)
+        column.addWidget(self.notices[0], 1)
+        column.addStretch(0)
+        parts: list[tuple[QWidget, int]] = [(self.rows, 5), (tabs, 4), (measures, 3)]
+        for i, (part, stretch) in enumerate(parts):
+            across.addWidget(part)
+            across.setStretchFactor(i, stretch)
+        across.setSizes([480, 380, 360])
+        content = QWidget()
+        inside = QVBoxLayout(content)
+        inside.setContentsMargins(8, 6, 8, 8)
+        head = QVBoxLayout(self.head)
+        head.setContentsMargins(8, 3, 8, 3)
+        head.addWidget(self.head_text)
+        top = QHBoxLayout()
+        top.addWidget(self.scan_bar, 1)
+        top.addWidget(self.head, 1)
+        inside.addLayout(top)
+        inside.addLayout(bar)
+        inside.addWidget(across, 1)
+        nothing = QLabel(NOTHING, alignment=Qt.AlignmentFlag.AlignCenter, wordWrap=True)
+        nothing.setObjectName("muted")
+        self.stack = QStackedLayout(self)
+        self.stack.addWidget(nothing)
+        self.stack.addWidget(content)
+
+
+class _Remarks(QScrollArea):
+    """Sentences, one below the other."""
+
+    def __init__(self) -> None:
+        super().__init__(widgetResizable=True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
+        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.text.setContentsMargins(8, 8, 8, 8)
+        self.setWidget(self.text)
+
+    def show_texts(self, texts: list[str]) -> None:
+        listed = "".join(f"<p style='margin: 0 0 6px 0'>{escape(text)}</p>" for text in texts)
+        self.text.setText(f"<p style='margin: 0 0 6px 0'><b>Worth noticing</b></p>{listed}" if texts else "")
+
+
+def _dot(colour: str) -> QPixmap:
+    from PySide6.QtGui import QPainter
+
+    made = QPixmap(12, 12)
+    made.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(made)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(colour))
+    painter.drawEllipse(1, 1, 10, 10)
+    painter.end()
+    return made

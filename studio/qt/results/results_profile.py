@@ -1,0 +1,107 @@
+"""The profile: the line's points in the laser's plane, as a scanner would deliver them, over the true profile."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QPointF, Signal
+
+from analysis.report.colour import TRUTH, method_colour
+from studio.qt.core import theme
+from studio.qt.results import plots
+from studio.scan.result_series import Series
+
+NEAR = 30.0
+"""px; the mouse hovers a sample that is no farther than this."""
+
+
+class ProfilePlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """Distance from the laser over the place along its fan, both mm. Nearer is up."""
+
+    hovered = Signal(object)
+    chosen = Signal(int)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.plot = plots.new_plot("Along the fan / mm", "Distance from the laser", "mm")
+        self.addItem(self.plot)
+        self.plot.invertY(True)
+        self.plot.getAxis("left").setWidth(62)
+        self.ci.layout.setContentsMargins(2, 4, 8, 2)
+        self.truth = plots.curve(TRUTH)
+        self.truth.setZValue(10)
+        self.plot.addItem(self.truth)
+        self.ring = plots.ring()
+        self.plot.addItem(self.ring, ignoreBounds=True)
+        self._dots: list[Any] = []
+        self._shown: dict[str, Series] = {}
+        self.scene().sigMouseMoved.connect(self._move)
+        self.scene().sigMouseClicked.connect(self._click)
+        self.repaint_theme()
+
+    def show_series(self, truth: Series | None, measured: dict[str, Series]) -> None:
+        """measured: by method."""
+        for item in self._dots:
+            self.plot.removeItem(item)
+        self._dots, self._shown = [], measured
+        if truth is None:
+            self.truth.setData([], [])
+        else:
+            self.truth.setData(truth.across, truth.distance)
+        for method, series in reversed(measured.items()):  # the first method on top
+            item = plots.dots(method_colour(method))
+            here = np.isfinite(series.distance)
+            item.setData(series.across[here], series.distance[here])
+            self.plot.addItem(item)
+            self._dots.append(item)
+        self.plot.enableAutoRange()
+        self.mark(None)
+
+    def mark(self, scan_line: int | None) -> None:
+        """A ring around the samples of a scan line."""
+        x: list[float] = []
+        y: list[float] = []
+        for series in self._shown.values() if scan_line is not None else ():
+            here = np.flatnonzero((series.index == scan_line) & np.isfinite(series.distance))
+            x += series.across[here].tolist()
+            y += series.distance[here].tolist()
+        self.ring.setData(x, y)
+
+    def repaint_theme(self) -> None:
+        c = theme.colours()
+        self.setBackground(c.base)
+        plots.paint(self.plot)
+        self.ring.setPen(pg.mkPen(c.text, width=1.5))
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self.hovered.emit(None)
+
+    def nearest(self, position: QPointF) -> int | None:
+        """The scan line of the sample nearest to a place of the widget, None where none is near."""
+        point = plots.at(self.plot, position)
+        if point is None:
+            return None
+        width, height = self.plot.vb.viewPixelSize()
+        best, found = NEAR**2, None
+        for series in self._shown.values():
+            squared = ((series.across - point.x()) / width) ** 2 + ((series.distance - point.y()) / height) ** 2
+            if len(squared) and np.isfinite(squared).any():
+                i = int(np.nanargmin(squared))
+                if squared[i] < best:
+                    best, found = float(squared[i]), int(series.index[i])
+        return found
+
+    def _move(self, position: QPointF) -> None:
+        scan_line = self.nearest(position)
+        if scan_line is not None:
+            self.hovered.emit(scan_line)
+
+    def _click(self, event: Any) -> None:
+        scan_line = self.nearest(event.scenePos())
+        if event.double():
+            self.plot.enableAutoRange()
+        elif scan_line is not None:
+            self.chosen.emit(scan_line)

@@ -1,0 +1,131 @@
+"""The three panels of the founding paper: line position, depth, and error of the depth, by scan line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QEvent, QPointF, Signal
+
+from analysis.report.colour import TRUTH, method_colour
+from studio.qt.core import theme
+from studio.qt.results import plots
+from studio.scan.result_series import ErrorView, Float, Series, symmetric_limit
+
+PLOTTED = 99.5
+"""Percent of the errors within the axis."""
+
+
+class RowPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """Stacked plots with one scan-line axis. `hovered` tells the scan line under the mouse, None when it leaves."""
+
+    hovered = Signal(object)
+    chosen = Signal(int)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.position = plots.new_plot("", "Position", "px")
+        self.depth = plots.new_plot("", "Depth", "mm")
+        self.error = plots.new_plot("Row", "Error", "µm")
+        self.plots = (self.position, self.depth, self.error)
+        for row, plot in enumerate(self.plots):
+            self.addItem(plot, row=row, col=0)
+            plot.getAxis("left").setWidth(62)
+            if plot is not self.error:
+                plot.setXLink(self.error)
+                plot.getAxis("bottom").setStyle(showValues=False)
+        self.ci.layout.setSpacing(2)
+        self.ci.layout.setContentsMargins(2, 4, 8, 2)
+        self.cursors = [plots.cursor(plot) for plot in self.plots]
+        self.zero = pg.InfiniteLine(angle=0, pos=0.0)
+        self.error.addItem(self.zero, ignoreBounds=True)
+        self.rings = [plots.ring() for _ in self.plots]
+        for plot, ring in zip(self.plots, self.rings, strict=True):
+            plot.addItem(ring, ignoreBounds=True)
+        self._drawn: list[tuple[pg.PlotItem, Any]] = []
+        self._shown: dict[str, tuple[Series, Float]] = {}
+        self.scene().sigMouseMoved.connect(self._move)
+        self.scene().sigMouseClicked.connect(self._click)
+        self.repaint_theme()
+
+    def show_series(
+        self, axis: str, truth: Series | None, measured: dict[str, tuple[Series, Float]], view: ErrorView
+    ) -> None:
+        """measured: by method, with its errors in the view's unit."""
+        for plot, item in self._drawn:
+            plot.removeItem(item)
+        self._drawn = []
+        self._shown = measured
+        self.error.setLabel("bottom", "Row" if axis == "rows" else "Column")
+        self.position.setLabel("left", f"{'u' if axis == 'rows' else 'v'} / px")
+        self.error.setLabel("left", f"Error / {view.unit}")
+        for method, (series, error) in reversed(measured.items()):  # the first method on top
+            for plot, values in ((self.position, series.position), (self.depth, series.depth), (self.error, error)):
+                here = np.isfinite(values)
+                self._add(plot, plots.dots(method_colour(method))).setData(series.index[here], values[here])
+        if truth is not None:  # thin, over the dots, so that both can be seen
+            for plot, values in ((self.position, truth.position), (self.depth, truth.depth)):
+                self._add(plot, plots.curve(TRUTH)).setData(truth.index, values)
+        errors = [error for _, error in measured.values()]
+        limit = max([symmetric_limit(error, PLOTTED) for error in errors], default=1.0)
+        for plot in self.plots:
+            plot.enableAutoRange()
+        self.error.setYRange(-limit, limit, padding=0.02)
+        self.mark(None)
+
+    def mark(self, scan_line: int | None) -> None:
+        """Put the cursor on a scan line, and a ring around its samples."""
+        for line in self.cursors:
+            line.setVisible(scan_line is not None)
+            if scan_line is not None:
+                line.setPos(scan_line)
+        for k, ring in enumerate(self.rings):
+            x: list[float] = []
+            y: list[float] = []
+            for series, error in self._shown.values():
+                here = np.flatnonzero(series.index == scan_line) if scan_line is not None else np.zeros(0, dtype=int)
+                values = (series.position, series.depth, error)[k][here]
+                x += series.index[here][np.isfinite(values)].tolist()
+                y += values[np.isfinite(values)].tolist()
+            ring.setData(x, y)
+
+    def repaint_theme(self) -> None:
+        c = theme.colours()
+        self.setBackground(c.base)
+        for plot in self.plots:
+            plots.paint(plot)
+        for line in self.cursors:
+            line.setPen(pg.mkPen(c.text, width=1))
+        for ring in self.rings:
+            ring.setPen(pg.mkPen(c.text, width=1.5))
+        self.zero.setPen(pg.mkPen(c.muted, width=1))
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self.hovered.emit(None)
+
+    def _add(self, plot: pg.PlotItem, item: Any) -> Any:
+        plot.addItem(item)
+        self._drawn.append((plot, item))
+        return item
+
+    def _scan_line(self, position: QPointF) -> int | None:
+        for plot in self.plots:
+            point = plots.at(plot, position)
+            if point is not None:
+                return round(point.x())
+        return None
+
+    def _move(self, position: QPointF) -> None:
+        scan_line = self._scan_line(position)
+        if scan_line is not None:
+            self.hovered.emit(scan_line)
+
+    def _click(self, event: Any) -> None:
+        scan_line = self._scan_line(event.scenePos())
+        if event.double():
+            for plot in self.plots:
+                plot.enableAutoRange()
+        elif scan_line is not None:
+            self.chosen.emit(scan_line)

@@ -1,0 +1,68 @@
+"""The error over the steps of a scan: where along the way it measures worse."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Signal
+
+from analysis.report.colour import method_colour
+from studio.qt.core import theme
+from studio.qt.results import plots
+from studio.scan.result_series import ErrorView, Float
+
+
+class StepsPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """RMSE of each step, and about zero its mean error. A click looks at a step."""
+
+    chosen = Signal(int)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.plot = plots.new_plot("Step", "Error")
+        self.addItem(self.plot)
+        self.plot.getAxis("left").setWidth(62)
+        self.ci.layout.setContentsMargins(2, 4, 8, 2)
+        self.zero = pg.InfiniteLine(angle=0, pos=0.0)
+        self.plot.addItem(self.zero, ignoreBounds=True)
+        self.cursor = plots.cursor(self.plot)
+        self.rmse = pg.PlotDataItem(connect="finite", symbolSize=5, symbolPen=None)
+        self.bias = pg.PlotDataItem(connect="finite")
+        for item in (self.bias, self.rmse):
+            self.plot.addItem(item)
+        self.count = 0
+        self.scene().sigMouseClicked.connect(self._click)
+        self.repaint_theme()
+
+    def show_steps(self, method: str, bias: Float, rmse: Float, view: ErrorView, title: str = "") -> None:
+        """(steps,) in the view's unit, of the scan's own method."""
+        self.count = len(rmse)
+        plots.set_title(self.plot, title)
+        self.plot.setLabel("left", f"{view.title} / {view.unit}")
+        steps, colour = np.arange(1, self.count + 1), method_colour(method)
+        self.rmse.setPen(pg.mkPen(colour, width=1.6))
+        self.rmse.setData(steps, rmse, symbol="o" if self.count <= 200 else None, symbolBrush=pg.mkBrush(colour))
+        self.bias.setPen(pg.mkPen(colour, width=1.2, style=pg.QtCore.Qt.PenStyle.DashLine))
+        self.bias.setData(steps, bias)
+        self.plot.enableAutoRange()
+
+    def mark(self, step: int) -> None:
+        """A line at the step that is looked at."""
+        self.cursor.setVisible(self.count > 0)
+        self.cursor.setPos(step + 1)
+
+    def repaint_theme(self) -> None:
+        c = theme.colours()
+        self.setBackground(c.base)
+        plots.paint(self.plot)
+        self.zero.setPen(pg.mkPen(c.muted, width=1))
+        self.cursor.setPen(pg.mkPen(c.text, width=1))
+
+    def _click(self, event: Any) -> None:
+        point = plots.at(self.plot, event.scenePos())
+        if event.double():
+            self.plot.enableAutoRange()
+        elif point is not None and self.count:
+            self.chosen.emit(min(max(round(point.x()) - 1, 0), self.count - 1))

@@ -1,0 +1,70 @@
+"""What is looked at of a scan: which of its steps, and whether the measures are of that step or of all."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QWidget
+
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Session
+from studio.qt.core.step_bar import StepBar
+from studio.scan.scan_results import ScanResults
+
+
+class ScanBar(QWidget):
+    """Hidden while what is shown is no scan."""
+
+    scope_changed = Signal(bool)
+    """True: measures, histogram and cloud are of all steps."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.scan: ScanResults | None = None
+        self.steps = StepBar(session)
+        self.steps.setMinimumWidth(260)
+        self.told = QLabel()
+        self.scope = QComboBox()
+        self.scope.addItems(["All steps", "This step"])
+        self.scope.setToolTip("What the measures, the histogram and the points in the 3D view are of")
+        self.scope.currentIndexChanged.connect(lambda index: self.scope_changed.emit(index == 0))
+        self.report = QToolButton()
+        self.report.setText("Report")
+        self.report.clicked.connect(self._open_report)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addWidget(self.scope)
+        row.addWidget(self.steps, 1)
+        row.addWidget(self.told)
+        row.addWidget(self.report)
+        self.told.setAlignment(Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight)
+        self.steps_of = scan_steps(session)
+        session.step_changed.connect(self._tell)
+        self.follow()
+
+    @property
+    def all_steps(self) -> bool:
+        """The measures are of all steps of a scan."""
+        return self.scan is not None and self.scan.measured and self.scope.currentIndex() == 0
+
+    def follow(self) -> None:
+        """The shown render is another one."""
+        render = self.session.shown
+        self.scan = None if render is None else render.scan
+        self.setVisible(self.scan is not None)
+        if self.scan is not None:
+            self.steps.set_count(self.scan.count)
+            self.scope.setVisible(self.scan.measured)
+            self.report.setVisible(self.scan.report is not None)
+            self.report.setToolTip(f"Open the report in {self.scan.found.folder}")
+        self._tell()
+
+    def _tell(self) -> None:
+        if self.scan is not None:
+            step = min(self.session.step, self.scan.count - 1)
+            self.told.setText(f"step {step + 1} of {self.scan.count}")
+
+    def _open_report(self) -> None:
+        if self.scan is not None and self.scan.report is not None:
+            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.scan.report)))

@@ -1,0 +1,158 @@
+"""What can be done to the scene and its selection, for tree, menus and shortcuts alike: one undoable edit each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QMenu, QWidget
+
+from render.base.errors import InputError
+from render.scene.lights import PointLight, RectangleLight
+from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
+from render.scene.scene import SceneObject
+from render.scene.shape import Box, Cylinder, Plane, Sphere, StepBlock, VGroove, WeldTee
+from studio.editing import scene_edits
+from studio.editing.forms import kind_label
+from studio.editing.presets import Preset, presets_for, with_preset
+from studio.project.document import FieldPath, value_at
+from studio.project.project import Project
+from studio.qt.core.session import Session
+from studio.qt.scene.mesh_importer import choose_meshes
+from studio.qt.scene.scene_icons import scene_icon
+
+PRIMITIVES = (Plane, Box, Sphere, Cylinder, StepBlock, VGroove, WeldTee)
+MOTIONS = (NoMotion, LinearStage, Turntable, PoseList)
+Edit = Callable[[Project], scene_edits.Result]
+
+
+def apply(session: Session, label: str, edit: Edit) -> None:
+    """Make an edit current and select what it made; a refusal is told and changes nothing."""
+    try:
+        project, path = edit(session.project)
+    except InputError as error:
+        session.message.emit("error", str(error))
+        return
+    session.document.apply(label, project)
+    session.select(path)
+
+
+def can_change(session: Session) -> bool:
+    """The selection can be removed, copied, renamed and moved."""
+    return scene_edits.in_list(session.selection) and _exists(session)
+
+
+def remove(session: Session) -> None:
+    """Remove the selection; its neighbour is selected."""
+    path = session.selection
+    if can_change(session):
+        name = value_at(session.project, path).name
+        apply(session, f"delete {name}", lambda project: scene_edits.remove(project, path))
+
+
+def duplicate(session: Session) -> None:
+    path = session.selection
+    if can_change(session):
+        name = value_at(session.project, path).name
+        apply(session, f"duplicate {name}", lambda project: scene_edits.duplicate(project, path))
+
+
+def toggle_visible(session: Session, path: FieldPath | None = None) -> None:
+    """Hide or show an object, the selected one unless another is given."""
+    path = session.selection if path is None else path
+    if not scene_edits.in_list(path):
+        return
+    item = value_at(session.project, path)
+    if isinstance(item, SceneObject):
+        label = f"{'hide' if item.visible else 'show'} {item.name}"
+        session.document.apply(label, scene_edits.set_visible(session.project, path, not item.visible))
+
+
+def move(session: Session, by: int) -> None:
+    """The selection up or down in its list."""
+    path = session.selection
+    if can_change(session):
+        apply(session, "move in the list", lambda project: scene_edits.move(project, path, int(path[-1]) + by))
+
+
+def move_to(session: Session, path: FieldPath, index: int) -> None:
+    """An item to another place in its list."""
+    if scene_edits.in_list(path):
+        apply(session, "move in the list", lambda project: scene_edits.move(project, path, index))
+
+
+def fill_add_menu(menu: QMenu, session: Session, parent: QWidget, what: str = "") -> None:
+    """Entries that add things: everything, or only "lasers", "objects" or "lights"."""
+    if what in ("", "lasers"):
+        _entry(menu, "Line laser", "lasers", lambda: apply(session, "add laser", scene_edits.add_laser))
+    if what in ("", "objects"):
+        _separate(menu)
+        for kind in PRIMITIVES:
+            name = kind_label(kind)
+
+            def add(kind: scene_edits.Kind = kind, name: str = name) -> None:
+                apply(session, f"add {name.lower()}", lambda project: scene_edits.add_primitive(project, kind))
+
+            _entry(menu, name, kind.model_fields["kind"].default, add)
+        _entry(menu, "Mesh file…", "file", lambda: choose_meshes(session, parent))
+    if what in ("", "lights"):
+        _separate(menu)
+        for light, name, icon in ((PointLight, "Point light", "lights"), (RectangleLight, "Panel light", "rectangle")):
+
+            def add_light(light: type = light, name: str = name) -> None:
+                apply(session, f"add {name.lower()}", lambda project: scene_edits.add_light(project, light))
+
+            _entry(menu, name, icon, add_light)
+
+
+def fill_motion_menu(menu: QMenu, session: Session) -> None:
+    """Entries that choose the kind of motion."""
+    now = type(session.project.scene.motion)
+    for kind in MOTIONS:
+        name = kind_label(kind)
+
+        def choose(kind: type = kind, name: str = name) -> None:
+            apply(session, f"motion: {name.lower()}", lambda project: scene_edits.set_motion(project, kind))
+
+        action = _entry(menu, name, "", choose)
+        action.setCheckable(True)
+        action.setChecked(kind is now)
+
+
+def fill_presets_menu(menu: QMenu, session: Session) -> None:
+    """Presets for the selection, or one entry that says that there are none."""
+    menu.setToolTipsVisible(True)
+    path = session.selection
+    found = presets_for(session.project, path) if _exists(session) else ()
+    for preset in found:
+
+        def use(preset: Preset = preset) -> None:
+            apply(session, f"preset {preset.name}", lambda project: (with_preset(project, path, preset), path))
+            session.message.emit("info", f"{preset.name}. {preset.source}")
+
+        # rich text, so that a tool tip breaks its lines
+        _entry(menu, preset.name, "", use).setToolTip(f"<p>{preset.source}</p>")
+    if not found:
+        menu.addAction("Select the camera, the sensor, a laser or an object").setEnabled(False)
+
+
+def _exists(session: Session) -> bool:
+    try:
+        value_at(session.project, session.selection)
+    except KeyError:
+        return False
+    return True
+
+
+def _entry(menu: QMenu, text: str, icon: str, handler: Callable[[], None]) -> QAction:
+    action = QAction(text, menu)
+    if icon:
+        action.setIcon(scene_icon(icon))
+    action.triggered.connect(lambda _checked=False: handler())
+    menu.addAction(action)
+    return action
+
+
+def _separate(menu: QMenu) -> None:
+    if not menu.isEmpty():
+        menu.addSeparator()

@@ -1,0 +1,1 @@
+"""The window itself: application, panels, workspaces, files, help."""

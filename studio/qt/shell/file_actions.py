@@ -1,0 +1,274 @@
+"""Projects as files: new, open, recent, save, unsaved changes, autosave and recovery."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QMessageBox, QWidget
+
+from render.base.errors import InputError
+from studio.project.autosave import Autosave, find, sweep
+from studio.project.document import Document, replaced
+from studio.project.project import Project, project_file
+from studio.project.project_files import carry, missing_files
+from studio.project.templates import template_folder
+from studio.qt.core.dialogs import TemplateDialog, ask_recovery, ask_unsaved, show_trouble, suggested
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Session
+from studio.runtime.error_messages import trouble
+from studio.runtime.preferences import PreferencesFile, recovery_folder
+from studio.scan.scan_folder import ScanFolder, open_folder
+from studio.scan.scan_results import holds_scan, image_scale_of, is_scan_of, source_of
+
+MAX_NAME = 200
+FILTER = "Blazer project (*.json)"
+AFTER_A_CHANGE = 2.0
+"""Seconds of rest after an edit until it is kept."""
+AT_LEAST_EVERY = 20.0
+"""Seconds, while edits never rest."""
+
+
+def template(key: str, autosave: Autosave) -> Document:
+    """A new document from a project that comes with the program; it has no file yet, its meshes are in a draft."""
+    source = template_folder(key)
+    project = Project.load(source / "project.json")
+    try:
+        root = autosave.draft()
+        carry(project.scene, source, root)
+    except InputError:  # nothing can be imported into it then, but it can be looked at and saved elsewhere
+        root = source
+    return Document(project, None, root)
+
+
+def _scanned(found: ScanFolder) -> Document:
+    """The project of a scan: the file it was made from, or, where that has changed since, what the scan kept of it.
+
+    InputError: meshes or textures are missing.
+    """
+    source = source_of(found)
+    project = found.project if source is None else Project.load(source)
+    gone = missing_files(project.scene, found.root)
+    if gone:
+        cure = "put the project's folder back to where it was when it was scanned"
+        raise InputError("a file of the scanned project is missing", where=str(gone[0][1]), cure=cure)
+    if source is not None:
+        return Document(project, source)
+    scale = image_scale_of(found)
+    # its camera is the scan's: the name says so, wherever it is shown or saved
+    name = project.name if scale == 1.0 else f"{project.name} at {scale:.3g} x"
+    return Document(project.model_copy(update={"name": name[:MAX_NAME]}), None, found.root)
+
+
+class FileActions(QObject):
+    """Every change of the session's document as a whole goes through here, and asks before work is lost."""
+
+    results_opened = Signal()
+    """Those of a scan: they are shown as soon as they are read."""
+
+    def __init__(
+        self, window: QWidget, session: Session, preferences: PreferencesFile, autosave: Autosave | None = None
+    ) -> None:
+        super().__init__(window)
+        self.window, self.session, self.preferences = window, session, preferences
+        self.autosave = autosave or Autosave(recovery_folder())
+        self._pristine = session.project
+        """As it came from a template or a file: closing it unchanged needs no question."""
+        self._rest = QTimer(self, singleShot=True, interval=round(1000 * AFTER_A_CHANGE))
+        self._rest.timeout.connect(self.keep)
+        self._regular = QTimer(self, interval=round(1000 * AT_LEAST_EVERY))
+        self._regular.timeout.connect(self.keep)
+        self._regular.start()
+        session.project_changed.connect(self._rest.start)
+
+    @property
+    def unsaved(self) -> bool:
+        """There is work that closing would lose; an untouched template is none."""
+        return self.session.document.dirty and self.session.project != self._pristine
+
+    def new(self) -> bool:
+        dialog = TemplateDialog(self.window)
+        if dialog.exec() != QDialog.DialogCode.Accepted or not dialog.chosen or not self.may_close():
+            return False
+        self.replace(template(dialog.chosen, self.autosave))
+        return True
+
+    def open_dialog(self) -> bool:
+        name, _ = QFileDialog.getOpenFileName(self.window, "Open a project", self._folder(), FILTER)
+        return bool(name) and self.open(Path(name))
+
+    def open(self, path: Path, ask: bool = True) -> bool:
+        """Open a project file, a folder with one, or the results of a scan; what is open stays when it cannot be."""
+        scan = holds_scan(path)
+        if scan is not None:
+            return self.open_results(scan, ask)
+        if ask and not self.may_close():
+            return False
+        try:
+            file = project_file(path)
+            document = Document(Project.load(file), file)
+            gone = missing_files(document.project.scene, document.root)
+        except (InputError, OSError, MemoryError) as error:
+            self.preferences.forget_recent(path)
+            self._tell(error, f"open {path.name}")
+            return False
+        if gone and not self._open_without(document, gone):
+            return False
+        self.replace(document)
+        self.preferences.add_recent(file)
+        return True
+
+    def open_results_dialog(self) -> bool:
+        name = QFileDialog.getExistingDirectory(self.window, "Open the results of a scan", self._folder())
+        return bool(name) and self.open_results(Path(name))
+
+    def open_results(self, folder: Path, ask: bool = True) -> bool:
+        """Look at a finished scan, with its own project where the open one is another."""
+        session = self.session
+        try:
+            found = open_folder(folder)
+            scale = image_scale_of(found)
+            document = session.document if is_scan_of(found, session.project) else _scanned(found)
+        except (InputError, OSError, MemoryError) as error:
+            self.preferences.forget_recent(folder)
+            self._tell(error, f"open {folder.name}")
+            return False
+        if document is not session.document:
+            if ask and not self.may_close():
+                return False
+            self.replace(document)
+        if is_scan_of(found, document.project):
+            scan_steps(session).show(found, document.project, scale)
+        else:
+            scan_steps(session).show(found)
+        self.preferences.add_recent(folder)
+        self.results_opened.emit()
+        return True
+
+    def replace(self, document: Document) -> None:
+        """Make another document the session's."""
+        self._pristine = document.project
+        self.autosave.forget()
+        self.session.replace_document(document)
+        self.session.message.emit("info", f"Opened {document.project.name}")
+
+    def save(self) -> bool:
+        path = self.session.document.path
+        return self._save(path) if path is not None else self.save_as()
+
+    def save_as(self) -> bool:
+        name = f"{self.session.project.name.replace('/', '-')}.json"
+        start = str(self.session.document.path or suggested(self._folder(), name))
+        chosen, _ = QFileDialog.getSaveFileName(self.window, "Save the project", start, FILTER)
+        if not chosen:
+            return False
+        path = Path(chosen)
+        return self._save(path if path.suffix else path.with_suffix(".json"))
+
+    def may_close(self) -> bool:
+        """Whether the document may be given up; asks when there is unsaved work."""
+        if not self.unsaved:
+            return True
+        answer = ask_unsaved(self.window, self.session.project.name)
+        return answer == "discard" or (answer == "save" and self.save())
+
+    def give_up(self) -> None:
+        """What is unsaved is not wanted."""
+        self._pristine = self.session.project
+
+    def keep(self) -> None:
+        """Autosave, but not in the middle of a drag."""
+        if self.session.dragging or not self.unsaved:
+            return
+        try:
+            self.autosave.keep(self.session.document)
+        except InputError as error:
+            self.session.message.emit("warning", f"Autosave: {error}")
+            self._regular.stop()
+
+    def recover(self) -> bool:
+        """After a crash: offer what it left behind. True: it was opened."""
+        sweep(self.autosave.folder)
+        left = find(self.autosave.folder)
+        if not left:
+            return False
+        if not ask_recovery(self.window, left[0].project.name, left[0].when, len(left)):
+            left[0].discard()
+            return False
+        document = left[0].document()
+        if left[0].is_draft:
+            document.root = self.autosave.draft()
+            carry(document.project.scene, left[0].root, document.root)
+        self.replace(document)
+        self._pristine = document.project.model_copy(update={"name": ""})  # equal to nothing: it is unsaved work
+        self.keep()
+        left[0].discard()
+        self.session.message.emit("info", f"Recovered the work of {left[0].when}; save it to keep it")
+        return True
+
+    def fill_recent(self, menu: QMenu) -> None:
+        """The recent projects, latest first."""
+        menu.clear()
+        for number, text in enumerate(self.preferences.values.recent, 1):
+            path = Path(text)
+            action = menu.addAction(f"&{number % 10} {path.parent.name}/{path.name}")
+            action.setToolTip(text)
+            action.triggered.connect(lambda _checked=False, path=path: self.open(path))
+        if not self.preferences.values.recent:
+            menu.addAction("none yet").setEnabled(False)
+            return
+        menu.addSeparator()
+        menu.addAction("Clear this list").triggered.connect(lambda: self.preferences.change(recent=()))
+
+    def close(self) -> None:
+        """The window closes in order."""
+        self._rest.stop()
+        self._regular.stop()
+        self.autosave.close()
+
+    def _save(self, path: Path) -> bool:
+        document = self.session.document
+        try:
+            carry(document.project.scene, document.root, path.absolute().parent)
+            document.save(path.absolute())
+        except (InputError, OSError, MemoryError) as error:
+            self._tell(error, f"save {path.name}")
+            return False
+        self.autosave.forget()
+        self._pristine = document.project
+        self.preferences.add_recent(path)
+        self.session.message.emit("info", f"Saved {path}")
+        return True
+
+    def _open_without(self, document: Document, gone: list[tuple[int, Path]]) -> bool:
+        """Files are missing: open with their objects hidden, or not at all."""
+        names = [document.project.scene.objects[i].name for i, _ in gone]
+        button = QMessageBox.StandardButton
+        box = QMessageBox(
+            QMessageBox.Icon.Warning, "Missing files", "Files of this project are missing", parent=self.window
+        )
+        box.setObjectName("missing")
+        listed = "\n".join(f"{name}: {file}" for name, (_, file) in zip(names[:8], gone, strict=False))
+        box.setInformativeText(
+            f"{listed}\n\nPut them back and open the project again; or open it with these objects hidden. "
+            "The project file stays as it is until you save."
+        )
+        hide = box.addButton("Open with them hidden", QMessageBox.ButtonRole.AcceptRole)
+        box.addButton(button.Cancel)
+        box.exec()
+        if box.clickedButton() is not hide:
+            return False
+        project = document.project
+        for i in {i for i, _ in gone}:
+            project = replaced(project, ("scene", "objects", i, "visible"), False)
+        document.apply("hide what is missing", project)
+        return True
+
+    def _tell(self, error: BaseException, doing: str) -> None:
+        what = trouble(error, doing)
+        self.session.message.emit("error", str(what))
+        show_trouble(self.window, what)
+
+    def _folder(self) -> str:
+        path = self.session.document.path
+        return str(path.parent) if path is not None else self.preferences.values.folder

@@ -1,0 +1,64 @@
+"""The cheat sheet: every shortcut on one page, read from the same table as the menus."""
+
+from __future__ import annotations
+
+import html
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeySequence
+from PySide6.QtWidgets import QDialog, QLabel, QVBoxLayout, QWidget
+
+from studio.qt.core import theme
+from studio.qt.core.actions import COMMANDS, Command
+
+MOUSE = (
+    ("Drag", "turn the 3D view"),
+    ("Shift+drag, middle drag", "shift it"),
+    ("Wheel", "nearer or farther; in pictures and plots: zoom"),
+    ("Click", "select; in a plot: keep the scan line"),
+    ("Double-click", "frame what is selected; in a plot: show everything"),
+    ("Hover", "the same scan line in every view"),
+    ("Drag on a number", "change it"),
+)
+COLUMNS = (("File", "Render"), ("Edit", "Scene", "Help"), ("View", "Measure"), ("Mouse",))
+
+
+class CheatSheet(QDialog):
+    """Closes with any key or click."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Shortcuts")
+        self.setObjectName("cheat-sheet")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        label = QLabel(page())
+        label.setTextFormat(Qt.TextFormat.RichText)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(24, 16, 24, 20)
+        layout.addWidget(label)
+
+
+def page() -> str:
+    """The sheet as rich text."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for command in COMMANDS:
+        if isinstance(command, Command) and command.shortcut:
+            keys = QKeySequence(command.shortcut).toString(QKeySequence.SequenceFormat.NativeText)
+            text = command.text.replace("&", "").rstrip("…")
+            groups.setdefault(command.menu.split("/")[0], []).append((keys, text))
+    groups["Mouse"] = list(MOUSE)
+    cells = "".join(
+        f"<td style='padding-right: 28px'>{''.join(_group(name, groups[name]) for name in column)}</td>"
+        for column in COLUMNS
+    )
+    return f"<table><tr>{cells}</tr></table>"
+
+
+def _group(name: str, rows: list[tuple[str, str]]) -> str:
+    c = theme.colours()
+    lines = "".join(
+        f"<tr><td style='padding-right: 14px; color: {c.accent}'><b>{html.escape(keys)}</b></td>"
+        f"<td>{html.escape(text)}</td></tr>"
+        for keys, text in rows
+    )
+    return f"<p style='color: {c.muted}; margin-bottom: 2px'><b>{name}</b></p><table cellspacing='3'>{lines}</table>"

@@ -1,0 +1,163 @@
+"""The status bar: what is being computed, how far, time left, pause and cancel; and the last message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from html import escape
+from typing import Any
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QMouseEvent, QMoveEvent, QResizeEvent
+from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QToolButton, QWidget
+
+from studio.qt.core.icons import icon
+from studio.qt.core.jobs import RENDER, JobRunner
+from studio.qt.core.session import Session
+from studio.runtime.jobs import Job, State
+
+SHORT = 0.4
+"""Seconds; work that ends sooner is not worth a progress bar."""
+WIDEST, MARGIN = 720, 6
+"""px, of a message that stands above the bar."""
+MESSAGE_SECONDS = {"info": 8, "warning": 20, "error": 60}
+
+
+class StatusBar(QStatusBar):
+    """Shows one job at a time, the final render before all others."""
+
+    log_asked = Signal()
+
+    def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session, self.runner = session, runner
+        self.job: Job[Any] | None = None
+        self.setSizeGripEnabled(False)
+        self.work = QLabel()
+        self.bar = QProgressBar(maximum=1000)
+        self.bar.setFixedWidth(160)
+        self.bar.setMaximumHeight(14)
+        self.bar.setTextVisible(False)
+        self.left = QLabel()
+        self.left.setObjectName("muted")
+        self.pause = self._button("pause", "Pause", self.toggle_pause)
+        self.cancel = self._button("cancel", "Cancel (Shift+F5)", self.cancel_work)
+        self.text = _Message()
+        self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.text.clicked.connect(self.log_asked)
+        self.text.resized.connect(self._place_whole)
+        self.whole = _Message(parent)
+        self.whole.setWordWrap(True)
+        self.whole.setProperty("note", True)
+        self.whole.hide()
+        self.whole.clicked.connect(self.log_asked)
+        self.whole.clicked.connect(self.whole.hide)
+        self.plan = QLabel()
+        self.plan.setObjectName("muted")
+        for widget in (self.work, self.bar, self.left, self.pause, self.cancel):
+            self.addWidget(widget)
+        self.addWidget(self.text, 1)
+        self.addPermanentWidget(self.plan)
+        self._fade = QTimer(self, singleShot=True)
+        self._fade.timeout.connect(lambda: self._say("", "message"))
+        self._show_work(False)
+        session.message.connect(self.show_text)
+        runner.progress.connect(self.follow)
+        for signal in (runner.finished, runner.failed, runner.cancelled):
+            signal.connect(self._end)
+
+    def follow(self, job: Job[Any]) -> None:
+        """A job's progress, unless a more important one is shown."""
+        if job.ended or (job.seconds < SHORT and job is not self.job):
+            return
+        if self.job is not None and self.job is not job and (not self.job.ended) and job is not self.runner.job(RENDER):
+            return
+        self.job = job
+        paused = job.state is State.PAUSED
+        self.work.setText(f"{job.name}: {job.stage}" if job.stage and job.stage != job.name else job.name)
+        self.bar.setValue(round(1000 * job.done))
+        self.left.setText("stopping" if job.cancel_asked else "paused" if paused else time_left(job.seconds_left))
+        self.pause.setIcon(icon("play" if paused else "pause"))
+        self.pause.setToolTip("Go on" if paused else "Pause")
+        self._show_work(True)
+
+    def toggle_pause(self) -> None:
+        """Hold the job that is shown, or let it go on."""
+        if self.job is not None:
+            self.job.resume() if self.job.state is State.PAUSED else self.job.pause()
+            self.follow(self.job)
+
+    def cancel_work(self) -> None:
+        """Stop the job that is shown; what it has given so far stays."""
+        if self.job is not None:
+            self.job.cancel()
+            self.follow(self.job)
+
+    def _end(self, job: Job[Any]) -> None:
+        if job is self.job:
+            self.job = None
+            self._show_work(False)
+
+    def _show_work(self, visible: bool) -> None:
+        for widget in (self.work, self.bar, self.left, self.pause, self.cancel):
+            widget.setVisible(visible)
+
+    def show_text(self, level: str, text: str) -> None:
+        """A message, for a while; a click on it opens the log."""
+        self._say(text, level if level in ("warning", "error") else "message")
+        self._fade.start(1000 * MESSAGE_SECONDS.get(level, 8))
+
+    def _say(self, text: str, name: str) -> None:
+        line = text.splitlines()[0] if text else ""
+        for label in (self.text, self.whole):
+            label.setObjectName(name)
+            label.style().unpolish(label)
+            label.style().polish(label)
+        self.whole.setText(line)
+        self.text.setToolTip(f"<p>{escape(text)}</p>" if text else "")
+        self._place_whole()
+
+    def moveEvent(self, event: QMoveEvent) -> None:
+        super().moveEvent(event)
+        self._place_whole()
+
+    def _place_whole(self) -> None:
+        """A message that is longer than the bar has room for stands above it, wrapped: the panels keep their sizes."""
+        whole = self.whole
+        seen = self.text.fontMetrics().elidedText(whole.text(), Qt.TextElideMode.ElideRight, self.text.width())
+        cut = seen != whole.text() and self.isVisible()
+        self.text.setText(seen)
+        if cut:
+            width = min(WIDEST, self.width() - 2 * MARGIN)
+            whole.resize(width, whole.heightForWidth(width))
+            whole.move(self.x() + MARGIN, self.y() - whole.height() - MARGIN)
+            whole.raise_()
+        whole.setVisible(cut)
+
+    def _button(self, name: str, tip: str, handler: Callable[[], None]) -> QToolButton:
+        button = QToolButton()
+        button.setIcon(icon(name))
+        button.setToolTip(tip)
+        button.clicked.connect(handler)
+        return button
+
+
+class _Message(QLabel):
+    clicked = Signal()
+    resized = Signal()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self.resized.emit()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        self.clicked.emit()
+
+
+def time_left(seconds: float | None) -> str:
+    """ "0:12 left"."""
+    if seconds is None:
+        return ""
+    whole = max(1, round(seconds))
+    minutes, rest = divmod(whole, 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d} left" if hours else f"{minutes}:{rest:02d} left"

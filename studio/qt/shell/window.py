@@ -1,0 +1,380 @@
+"""The main window: panels in docks, three workspaces, menus, toolbar and status bar over one session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QScrollArea, QSizePolicy, QToolBar, QToolButton, QWidget
+
+from studio.project.autosave import Autosave
+from studio.project.mesh_import import is_mesh
+from studio.qt.core import theme
+from studio.qt.core.actions import Actions
+from studio.qt.core.dialogs import about, show_trouble
+from studio.qt.core.drops import accept_copy, dragged_files
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session
+from studio.qt.results.export_actions import ExportActions
+from studio.qt.results.measure_actions import MeasureActions
+from studio.qt.scene import scene_actions
+from studio.qt.scene.mesh_importer import choose_meshes, import_meshes
+from studio.qt.shell.file_actions import FileActions
+from studio.qt.shell.help import Help, panel_with_focus
+from studio.qt.shell.memory import return_what_is_free
+from studio.qt.shell.panels import PANELS, Making, make_panels
+from studio.qt.shell.shortcuts import CheatSheet
+from studio.qt.shell.status import StatusBar
+from studio.qt.shell.tour import Step, Tour
+from studio.qt.shell.workspaces import WORKSPACES, arrange, remembered, restore, sealed, share_out, unsealed, workspace
+from studio.qt.viewport.error_cloud import ErrorCloud
+from studio.runtime.error_messages import trouble
+from studio.runtime.jobs import Job
+from studio.runtime.preferences import PreferencesFile
+
+TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
+TALL = ("render", "develop")
+"""Panels that scroll."""
+TRIM_MS = 1000
+"""From opening another project until the memory of the former one is given back."""
+SMALL = 0.25
+"""Image scale of the first look."""
+SWITCH = {"setup": "setup", "render": "render_workspace", "measure": "measure"}
+"""Workspace -> command."""
+
+
+class MainWindow(QMainWindow):
+    """Panels know only the session; this window knows the panels."""
+
+    def __init__(
+        self,
+        session: Session,
+        preferences: PreferencesFile | None = None,
+        autosave: Autosave | None = None,
+        making: Making = lambda title: None,
+    ) -> None:
+        """preferences, autosave: None for those of this person; making hears the title of each panel being made."""
+        super().__init__()
+        self.session = session
+        self.preferences = preferences or PreferencesFile()
+        self.workspace = ""
+        self.setObjectName("main")
+        self.setAcceptDrops(True)
+        self.setDockOptions(QMainWindow.DockOption.AllowTabbedDocks | QMainWindow.DockOption.AllowNestedDocks)
+        self.resize(1440, 900)
+        self.commands = Actions(self)
+        self.runner = JobRunner(self)
+        self.panels = make_panels(session, self.runner, making)
+        self.docks = self._make_docks()
+        self.status = StatusBar(session, self.runner, self)
+        self.setStatusBar(self.status)
+        self.files = FileActions(self, session, self.preferences, autosave)
+        self.exports = ExportActions(self, session, self.runner, self.preferences, self.commands)
+        self.measuring = MeasureActions(self, session, self.commands)
+        self.help = Help(self)
+        self.tour: Tour | None = None
+        self.cloud = self._make_cloud()
+        self._make_toolbar()
+        self._connect()
+        self._restore()
+        self._tell_document()
+
+    def switch_to(self, key: str) -> None:
+        """Another workspace; the panels stand as they were left there."""
+        if self.workspace:
+            self._remember_arrangement()
+        wanted = workspace(key)
+        self.workspace = wanted.key
+        # before the panels come: all together they may need more room than the window has, and it would grow
+        self.panels["viewport"].setVisible(wanted.viewport)
+        if not self._restore_panels():
+            self.rearrange()
+            QTimer.singleShot(0, self, self._fit_panels)
+        self.commands[SWITCH[wanted.key]].setChecked(True)
+        self.cloud.pin(wanted.key == "measure")
+        self.preferences.change(workspace=wanted.key)
+
+    def rearrange(self) -> None:
+        """The panels of this workspace back where they belong."""
+        arrange(self, self.docks, workspace(self.workspace))
+
+    def show_panel(self, key: str) -> None:
+        """Bring a panel to the front, wherever it is."""
+        self.docks[key].show()
+        self.docks[key].raise_()
+
+    def render_small(self) -> None:
+        """A quick render of what is open, for a first look."""
+        if self.session.renders or self.runner.busy:
+            return
+        panel, session = self.panels["render"], self.session
+
+        def enough() -> None:
+            shown = session.shown
+            if shown is None or shown.image_scale != SMALL or shown.final:
+                session.measured.disconnect(enough)
+            elif shown.frame.ambient is not None:
+                session.measured.disconnect(enough)
+                panel.keep()  # type: ignore[attr-defined]
+
+        session.measured.connect(enough)
+        panel.start(SMALL)  # type: ignore[attr-defined]
+
+    def choose_theme(self, choice: theme.Choice) -> None:
+        theme.apply(choice)
+        self.preferences.change(theme=choice)
+        self.commands[f"theme_{choice}"].setChecked(True)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if not event.spontaneous():
+            QTimer.singleShot(0, self, self._fit_panels)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        if not self.files.may_close():
+            event.ignore()
+            return
+        self._remember_arrangement()
+        self.preferences.change(geometry=sealed(self.saveGeometry()))
+        if self.tour is not None:
+            self.tour.end()
+        self.runner.close()
+        live(self.session).close()
+        for panel in self.panels.values():
+            panel.close()
+        self.files.close()
+        event.accept()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        paths = dragged_files(event)
+        if any(is_mesh(path) or path.suffix.lower() == ".json" or path.is_dir() for path in paths):
+            accept_copy(event)
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        paths = dragged_files(event)
+        accept_copy(event)
+        # after the drop has ended: a dialog inside it would hold up the program that the file comes from
+        QTimer.singleShot(0, self, lambda: self.take(paths))
+
+    def take(self, paths: list[Path]) -> None:
+        """Files dropped on the window: meshes join the scene, a project is opened."""
+        meshes = [path for path in paths if is_mesh(path)]
+        if meshes:
+            import_meshes(self.session, meshes, self)
+        for path in paths:
+            if path not in meshes:
+                self.files.open(path)
+
+    def _make_docks(self) -> dict[str, QDockWidget]:
+        self.setCentralWidget(self.panels["viewport"])
+        docks = {}
+        for panel in PANELS:
+            if panel.key == "viewport":
+                continue
+            dock = QDockWidget(panel.title, self)
+            dock.setObjectName(panel.key)
+            dock.setWidget(_scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
+            # added here once; from now on Qt moves docks only by restoring a state
+            self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
+            dock.hide()
+            self.commands.submenus["panels"].addAction(dock.toggleViewAction())
+            docks[panel.key] = dock
+        return docks
+
+    def _make_toolbar(self) -> None:
+        bar = QToolBar("Main", self)
+        bar.setObjectName("toolbar")
+        bar.setMovable(False)
+        group = QActionGroup(self)
+        for key in TOOLBAR:
+            bar.addSeparator() if not key else bar.addAction(self.commands[key])
+        bar.addWidget(_spring())
+        for each in WORKSPACES:
+            action = self.commands[SWITCH[each.key]]
+            group.addAction(action)
+            action.setToolTip(f"{each.tip} ({action.shortcut().toString()})")
+            button = QToolButton()
+            button.setObjectName("workspace")
+            button.setDefaultAction(action)
+            button.setText(each.title)
+            bar.addWidget(button)
+        bar.addWidget(_spring())
+        bar.addAction(self.commands["help"])
+        self.addToolBar(bar)
+        themes = QActionGroup(self)
+        for choice in theme.CHOICES:
+            themes.addAction(self.commands[f"theme_{choice}"])
+        self.commands[f"theme_{self.preferences.values.theme}"].setChecked(True)
+
+    def _make_cloud(self) -> ErrorCloud:
+        """The points in the 3D view: of the shown render as the results show them, or of a running scan."""
+        made = ErrorCloud(self.session, self.panels["viewport"].view)  # type: ignore[attr-defined]
+        results, motion = self.panels["results"], self.panels["motion"]
+        results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
+        results.scan_bar.scope_changed.connect(made.show_all_steps)  # type: ignore[attr-defined]
+        motion.began.connect(made.begin_scan)  # type: ignore[attr-defined]
+        motion.grew.connect(made.grow)  # type: ignore[attr-defined]
+        return made
+
+    def start_tour(self) -> None:
+        """Show the way around, from the start."""
+        if self.tour is None:
+            self.tour = Tour(self, self._place_tour)
+            self.tour.ended.connect(self._end_tour)
+
+    def _place_tour(self, step: Step) -> QWidget | None:
+        if step.workspace != self.workspace:
+            self.switch_to(step.workspace)
+        if step.panel in self.docks:
+            self.show_panel(step.panel)
+            return self.docks[step.panel]
+        return self.panels.get(step.panel)
+
+    def _end_tour(self) -> None:
+        self.tour = None
+        self.preferences.change(toured=True)
+
+    def _connect(self) -> None:
+        files, session, runner = self.files, self.session, self.runner
+        handlers: dict[str, Callable[[], object]] = {
+            "new": files.new,
+            "open": files.open_dialog,
+            "open_results": files.open_results_dialog,
+            "save": files.save,
+            "save_as": files.save_as,
+            "quit": self.close,
+            "undo": lambda: session.document.undo(),
+            "redo": lambda: session.document.redo(),
+            "duplicate": lambda: scene_actions.duplicate(session),
+            "delete": lambda: scene_actions.remove(session),
+            "rename": self._rename,
+            "hide": lambda: scene_actions.toggle_visible(session),
+            "deselect": lambda: session.select(()),
+            "import_mesh": lambda: choose_meshes(session, self),
+            "arrange": self.rearrange,
+            "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
+            "render": session.render_asked.emit,
+            "pause": self.status.toggle_pause,
+            "cancel": self.status.cancel_work,
+            "scan": self._scan,
+            "frame_points": self.cloud.frame,
+            "log": lambda: self.show_panel("log"),
+            "help": lambda: self.help.open_page(panel_with_focus(self.panels)),
+            "shortcuts": lambda: CheatSheet(self).open(),
+            "tour": self.start_tour,
+            "about": lambda: about(self, version()),
+        }
+        for key, handler in handlers.items():
+            self.commands.connect(key, handler)
+        for key, command in SWITCH.items():
+            self.commands.connect(command, partial(self.switch_to, key))
+        for choice in theme.CHOICES:
+            self.commands.connect(f"theme_{choice}", partial(self.choose_theme, choice))
+        menus = self.commands.submenus
+        filled: dict[str, Callable[[QMenu], None]] = {
+            "recent": files.fill_recent,
+            "add": lambda menu: scene_actions.fill_add_menu(menu, session, self),
+            "presets": lambda menu: scene_actions.fill_presets_menu(menu, session),
+            "motion": lambda menu: scene_actions.fill_motion_menu(menu, session),
+        }
+        for key, fill in filled.items():
+            menus[key].aboutToShow.connect(lambda menu=menus[key], fill=fill: (menu.clear(), fill(menu)))
+        QShortcut(Qt.Key.Key_Escape, self).activated.connect(self._escape)
+        self.status.log_asked.connect(lambda: self.show_panel("log"))
+        files.results_opened.connect(lambda: self.switch_to("measure"))
+        session.project_changed.connect(self._tell_document)
+        session.document_replaced.connect(self._tell_document)
+        session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))
+        session.selection_changed.connect(self._tell_selection)
+        session.step_changed.connect(lambda: live(session).show_step(session.step))
+        session.render_asked.connect(lambda: self.show_panel("render"))
+        runner.failed.connect(self._tell_failure)
+        self._tell_selection()
+
+    def _escape(self) -> None:
+        if self.tour is not None:
+            self.tour.end()
+        elif self.status.job is not None:
+            # it leaves fields, menus and drags: once too often must not cost an hour of work
+            keys = self.commands["cancel"].shortcut().toString()
+            self.session.message.emit("info", f"Esc does not stop the {self.status.job.name}; {keys} does")
+
+    def _rename(self) -> None:
+        self.show_panel("scene")
+        self.panels["scene"].rename_selection()  # type: ignore[attr-defined]
+
+    def _scan(self) -> None:
+        self.show_panel("motion")
+        self.panels["motion"].ask_and_run()  # type: ignore[attr-defined]
+
+    def _tell_selection(self) -> None:
+        for key in ("duplicate", "delete", "rename", "hide"):
+            self.commands[key].setEnabled(scene_actions.can_change(self.session))
+
+    def _tell_failure(self, job: Job[object]) -> None:
+        if job.problem is not None and job.problem.exception is not None:
+            what = trouble(job.problem.exception, f"finish: {job.name}")
+            self.session.message.emit("error", f"{what}\n{what.details}".strip())
+            show_trouble(self, what)
+
+    def _restore(self) -> None:
+        values = self.preferences.values
+        # the panels first: of what is restored into a window that is hidden and maximized, Qt keeps a second copy, and
+        # lays it out again after another state has freed the docks' places in it
+        self.switch_to(values.workspace)
+        geometry = unsealed(values.geometry)
+        if geometry is not None:
+            self.restoreGeometry(geometry)
+
+    def _restore_panels(self) -> bool:
+        return restore(self, self.preferences.values.arrangements.get(self.workspace, ""))
+
+    def _fit_panels(self) -> None:
+        """Once more, in the size that the window has come to."""
+        if not self._restore_panels():
+            share_out(self, self.docks, workspace(self.workspace))
+
+    def _remember_arrangement(self) -> None:
+        kept = {**self.preferences.values.arrangements, self.workspace: remembered(self)}
+        self.preferences.change(arrangements=kept)
+
+    def _tell_document(self) -> None:
+        """Title, undo and redo follow the document."""
+        document = self.session.document
+        name = document.path.name if document.path is not None else "not saved yet"
+        self.setWindowTitle(f"{document.project.name}[*] ({name}) - Blazer Studio")
+        self.setWindowModified(self.files.unsaved)
+        for key, label in (("undo", document.undo_label), ("redo", document.redo_label)):
+            self.commands[key].setEnabled(label is not None)
+            self.commands[key].setText(f"&{key.capitalize()} {label or ''}".rstrip())
+
+
+def version() -> str:
+    """Of the program, as it is installed."""
+    from importlib import metadata
+
+    try:
+        return metadata.version("blazer-studio")
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _scrolled(panel: QWidget) -> QScrollArea:
+    """So that a low screen shows a part of a panel, and the window does not outgrow the screen."""
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setFrameShape(QScrollArea.Shape.NoFrame)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setMinimumWidth(panel.minimumSizeHint().width())
+    area.setWidget(panel)
+    return area
+
+
+def _spring() -> QWidget:
+    spring = QWidget()
+    spring.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+    return spring

@@ -1,0 +1,259 @@
+"""The measured points in the 3D view, coloured by their signed error; pointing at one marks its scan line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent
+from PySide6.QtWidgets import QWidget
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
+
+from analysis.cloud import Cloud, at_step, cloud
+from studio.preview.diverging_colours import diverging
+from studio.qt.core import theme
+from studio.qt.core.session import Session
+from studio.qt.viewport.view3d import View3D
+from studio.scan.point_sample import PointSample
+from studio.scan.redevelop import is_stale
+from studio.scan.remarks import best
+from studio.scan.result_series import ERROR_VIEWS, ErrorView, symmetric_limit
+
+Float = NDArray[np.float64]
+POINT_PX, MARK_PX, NEAR_PX = 3.5, 9.0, 9.0
+OFFSET = -80.0
+"""Of the depth buffer, so that a point a little below the surface is seen."""
+
+
+class ErrorCloud(QObject):
+    """Follows the shown render, or a running scan. Shown while it fits the scene, and always on `pinned`."""
+
+    def __init__(self, session: Session, view: View3D) -> None:
+        super().__init__(view)
+        self.session, self.view = session, view
+        self.error_view: ErrorView = ERROR_VIEWS[0]
+        self.pinned = False
+        self.all_steps = True
+        """Of a scan, the points of all its steps; else those of the step that is looked at."""
+        self.points: Float = np.zeros((0, 3))
+        self.errors: Float = np.zeros(0)
+        self.rows: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
+        self.steps: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
+        self.limit = 1.0
+        self.image_scale = 1.0
+        """At which the points were measured, to the scanner's image."""
+        self._clouds: list[Cloud] = []
+        self._of_scan = False
+        self._sample, self._scan_scale = PointSample(), 1.0
+        self._data, self._actor = _point_actor(POINT_PX)
+        self._marks, self._mark_actor = _point_actor(MARK_PX)
+        for actor in (self._actor, self._mark_actor):
+            view.renderer.AddActor(actor)
+        self.bar = ColourBar(view)
+        view.hovered.connect(self._hover)
+        session.renders_changed.connect(self.refresh)
+        session.measured.connect(self.refresh)
+        session.project_changed.connect(self._show_or_hide)
+        session.hover_changed.connect(self._mark)
+        session.step_changed.connect(self._follow_step)
+        session.document_replaced.connect(self.clear)
+        self.refresh()
+
+    @property
+    def visible(self) -> bool:
+        return bool(self._actor.GetVisibility())
+
+    def pin(self, pinned: bool) -> None:
+        """Show the points even where the scene has changed since."""
+        self.pinned = pinned
+        self._show_or_hide()
+
+    def choose(self, view: ErrorView) -> None:
+        """Another kind of error."""
+        self.error_view = view
+        self._draw()
+
+    def show_all_steps(self, all_steps: bool) -> None:
+        """Of a scan, the points of all its steps, or of one."""
+        self.all_steps = all_steps
+        self.refresh()
+
+    def clear(self) -> None:
+        """Nothing is shown, until something is measured."""
+        self._clouds, self._of_scan = [], False
+        self._draw()
+
+    def begin_scan(self, image_scale: float) -> None:
+        """Points of a running scan are to come; those of an earlier one go."""
+        self._sample, self._scan_scale = PointSample(), image_scale
+        self.clear()
+
+    def grow(self, columns: Cloud) -> None:
+        """More points of a running scan."""
+        self._sample.add(columns)
+        self._clouds = [self._sample.points]
+        self._of_scan, self.image_scale = True, self._scan_scale
+        self._draw()
+
+    def frame(self) -> None:
+        """Bring the points into the middle of the view; a few far outliers must not make the others a speck."""
+        if len(self.points):
+            low, high = np.percentile(self.points, (1.0, 99.0), axis=0)
+            self.view.look_from(self.view.eye.framed(low, high, self.view.pixels))
+
+    def refresh(self) -> None:
+        """The points of the shown render, by the project's own method; of a scan those of all its steps, or of one."""
+        render = self.session.shown
+        if render is not None and render.scan is not None and render.scan.measured and self.all_steps:
+            self._clouds = [render.scan.points]
+            self._pixel_errors = [np.full(len(self._clouds[0]["x"]), np.nan)]
+        elif render is not None and render.measurements:
+            found, scene = best(render.measurements, self.session.project), render.project.scene
+            self._clouds = [cloud(one.points, one.errors, one.laser, one.step, scene) for one in found]
+            self._pixel_errors = [one.errors.position[one.points.valid] for one in found]
+        else:
+            if not self._of_scan:
+                self.clear()
+            return
+        self._of_scan, self.image_scale = False, render.scanner_scale
+        self._draw()
+
+    def _draw(self) -> None:
+        clouds = self._clouds
+        if clouds:
+            first = np.concatenate([np.stack([one["x"], one["y"], one["z"]], axis=1) for one in clouds])
+            # on the part, wherever it stands now
+            self.points = at_step(first, self.session.project.scene, self.session.step)
+            self.steps = np.concatenate([one["step"] for one in clouds])
+            self.rows = np.concatenate([one["row"] for one in clouds])
+            self.errors = np.concatenate([self._errors_of(i, one) for i, one in enumerate(clouds)])
+        else:
+            self.points, self.errors = np.zeros((0, 3)), np.zeros(0)
+            self.rows = self.steps = np.zeros(0, dtype=np.int32)
+        self.limit = symmetric_limit(self.errors)
+        _give(self._data, self.points, diverging(self.errors, self.limit))
+        self.bar.show_range(self.error_view, self.limit, self.image_scale)
+        self._mark()
+        self._show_or_hide()
+
+    def _errors_of(self, i: int, one: Cloud) -> Float:
+        view = self.error_view
+        if view.kind == "position":
+            return np.asarray(self._pixel_errors[i] if not self._of_scan else np.full(len(one["x"]), np.nan))
+        return np.asarray(one["error_depth" if view.kind == "depth" else "error_distance"] * view.scale)
+
+    def _mark(self) -> None:
+        render, hovered = self.session.shown, self.session.hovered
+        here = self.rows == hovered if hovered is not None else np.zeros(len(self.rows), bool)
+        if render is not None and render.scan is not None and not self._of_scan:
+            here &= self.steps == render.frame.step
+        text = QColor(theme.colours().accent)
+        colour = np.tile(np.array([[text.red(), text.green(), text.blue()]], np.uint8), (int(here.sum()), 1))
+        _give(self._marks, self.points[here], colour)
+        self.view.redraw()
+
+    def _show_or_hide(self) -> None:
+        shown = len(self.points) > 0 and (self.pinned or self._of_scan or not self._stale())
+        self._actor.SetVisibility(shown)
+        self._mark_actor.SetVisibility(shown)
+        self.bar.setVisible(shown)
+        self.view.redraw()
+
+    def _follow_step(self) -> None:
+        motion = self.session.project.scene.motion
+        if motion.kind != "none" and motion.moves == "objects":
+            self._draw()
+        else:
+            self._mark()
+
+    def _stale(self) -> bool:
+        render = self.session.shown
+        return render is not None and is_stale(render.source or render.project, self.session.project)
+
+    def _hover(self, x: float, y: float) -> None:
+        """The scan line of the point under the mouse, if there is one."""
+        if not self.visible:
+            return
+        apart = self.view.eye.project(self.points, self.view.pixels) - np.array([x, y])
+        squared = np.einsum("ij,ij->i", apart, apart)
+        if np.isfinite(squared).any():
+            nearest = int(np.nanargmin(squared))
+            if squared[nearest] < NEAR_PX**2:
+                self.session.hover(int(self.rows[nearest]))
+
+
+class ColourBar(QWidget):
+    """Lies in the lower right corner of the view; the mouse goes through it."""
+
+    def __init__(self, view: QWidget) -> None:
+        super().__init__(view)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.title, self.unit, self.limit, self.note = "", "", 1.0, ""
+        self.resize(QSize(128, 208))
+        view.installEventFilter(self)
+        self._place()
+
+    def show_range(self, view: ErrorView, limit: float, image_scale: float = 1.0) -> None:
+        self.title, self.unit, self.limit = view.title, view.unit, limit
+        self.note = f"at {image_scale:.3g} x size" if image_scale != 1.0 else ""
+        self.update()
+
+    def eventFilter(self, watched: QObject, event: object) -> bool:
+        if event.type() == event.Type.Resize:  # type: ignore[attr-defined]
+            self._place()
+        return False
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        c = theme.colours()
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        back = QColor(c.window)
+        back.setAlpha(215)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(back)
+        painter.drawRoundedRect(QRectF(self.rect()), 6, 6)
+        bar = QRect(14, 34, 14, self.height() - 70)
+        gradient = QLinearGradient(QPointF(bar.topLeft()), QPointF(bar.bottomLeft()))
+        for i, (red, green, blue) in enumerate(diverging(np.linspace(1.0, -1.0, 21), 1.0).tolist()):
+            gradient.setColorAt(i / 20, QColor(red, green, blue))
+        painter.fillRect(bar, gradient)
+        painter.setPen(QColor(c.text))
+        painter.drawText(QRect(12, 6, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.title)
+        painter.setPen(QColor(c.warning))
+        painter.drawText(QRect(12, self.height() - 24, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.note)
+        painter.setPen(QColor(c.text))
+        for share, text in ((0.0, f"+{self.limit:g}"), (0.5, "0"), (1.0, f"\u2212{self.limit:g}")):
+            y = bar.top() + round(share * bar.height())
+            painter.drawLine(bar.right() + 2, y, bar.right() + 6, y)
+            box = QRect(bar.right() + 10, y - 10, self.width() - bar.right() - 12, 20)
+            painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, f"{text} {self.unit}")
+
+    def _place(self) -> None:
+        if (view := self.parentWidget()) is not None:
+            self.move(view.width() - self.width() - 12, view.height() - self.height() - 12)
+
+
+def _point_actor(size: float) -> tuple[pv.PolyData, vtkActor]:
+    data = pv.PolyData()
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(data)
+    mapper.SetColorModeToDirectScalars()
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    mapper.SetRelativeCoincidentTopologyPointOffsetParameter(OFFSET)
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    actor.PickableOff()
+    actor.UseBoundsOff()  # an outlier at the horizon must not set the clipping planes
+    look = actor.GetProperty()
+    look.SetPointSize(size)
+    look.SetLighting(False)
+    return data, actor
+
+
+def _give(data: pv.PolyData, points: Float, colours: NDArray[np.uint8]) -> None:
+    made = pv.PolyData(points.astype(np.float32)) if len(points) else pv.PolyData()
+    if len(points):
+        made.point_data.SetScalars(pv.convert_array(np.ascontiguousarray(colours), name="error"))
+    data.ShallowCopy(made)
+    data.Modified()

@@ -1,0 +1,66 @@
+"""What a person should know before believing a scan, gathered frame by frame; the gravest comes first."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from analysis.report.summary import little_found, scale_note
+from render.frame import Frame
+from studio.preview.inspection import view_warnings
+from studio.project.project import Project
+
+
+class Cautions:
+    """Of one scan; `look` at every frame, then ask for the `notes`."""
+
+    def __init__(self, project: Project, image_scale: float = 1.0, laser_power: Sequence[float] | None = None) -> None:
+        """project: as it is rendered, at `image_scale`; laser_power: W of each laser, in place of the scene's."""
+        self.project, self.image_scale, self.laser_power = project, image_scale, laser_power
+        self._frames = 0
+        self._unseen = [0] * len(project.scene.lasers)
+        self._doubts: dict[str, str] = {}
+        self._caught: list[warnings.WarningMessage] = []
+        self._heard: dict[str, None] = {}
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Python's own warnings in here, of mesh readers and the like, become notes."""
+        with warnings.catch_warnings(record=True) as self._caught:
+            warnings.simplefilter("always", UserWarning)
+            yield
+        self._hear()
+
+    def look(self, frame: Frame, scene_warnings: Iterable[str]) -> None:
+        """At one frame, as rendered, with what `render.world.material_checks.scene_warnings` has to say of it."""
+        self._hear()
+        views = view_warnings(self.project, frame, self.laser_power) if self._frames == 0 else []
+        for text in (*views, *scene_warnings):  # in words as at first, though figures change from step to step
+            self._doubts.setdefault(text.split(",", 1)[0], text)
+        for i, curve in enumerate(frame.curves):
+            self._unseen[i] += len(curve.index) == 0
+        self._frames += 1
+
+    def notes(self, rows: Sequence[Mapping[str, Any]] = ()) -> list[str]:
+        """One sentence or two each; rows: the results, as `studio.scan.summary.summarise` gives them."""
+        lasers = [laser.name for laser in self.project.scene.lasers]
+        found = []
+        for name in lasers:
+            own = next((row for row in rows if row["laser"] == name), None)
+            if own is not None:
+                found.append(little_found(own["completeness"], own["points"], name if len(lasers) > 1 else ""))
+        found.append(scale_note(self.image_scale))
+        for name, unseen in zip(lasers, self._unseen, strict=True):
+            if unseen > 0 and self._frames > 1:
+                found.append(f"{name}: in {unseen} of {self._frames} frames no part of the line is both lit and seen")
+        self._hear()
+        return list(dict.fromkeys(filter(None, (*found, *self._doubts.values(), *self._heard))))
+
+    def _hear(self) -> None:
+        """Take up what was caught, each once, though every frame repeats it."""
+        for one in self._caught:
+            if issubclass(one.category, UserWarning):
+                self._heard.setdefault(str(one.message))
+        self._caught.clear()

@@ -1,0 +1,200 @@
+"""Compiles every kernel, or loads it from its cache, by asking of tiny scenes what the program asks of large ones.
+
+That takes most of a minute where the cache is empty, a second where it is not. It happens once in the life of the
+program, step by step on a thread of its own: whoever waits can be cancelled at once, which a compiler cannot.
+"""
+
+from __future__ import annotations
+
+import gc
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, wait
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from render.base.errors import Cancelled
+from render.base.pose import Pose
+from render.base.threads import Cancel
+from render.camera.camera import Camera, Lens
+from render.laser.laser import LineLaser
+from render.material.material import Conductor, Emitter, Glass, Material, Subsurface
+from render.scene.lights import Environment, PointLight, RectangleLight
+from render.scene.scene import Rig, Scene, SceneObject
+from render.scene.settings import RenderSettings
+from render.scene.shape import Box, Plane
+from render.sensor.sensor import Sensor, SpectralCurve
+from studio.project.project import Project
+from studio.project.templates import template_folder
+
+if TYPE_CHECKING:
+    from render.frame import Frame
+    from render.sensor.develop import Image
+    from render.world.world import World
+    from studio.scan.stages import Clock, StageProgress
+
+PREPARING = "preparing kernels (compiled on the first run)"
+TEMPLATE, IMAGE_SCALE = "plane", 0.05
+LOOK_SECONDS = 0.02
+"""Between two looks whether somebody who waits was cancelled."""
+COLLECTED = (20_000, 20, 20)
+"""Thresholds of the search for garbage meanwhile."""
+CAMERA = Camera(width=64, height=48, fx=100.0, fy=100.0, cx=31.5, cy=23.5)
+LASER = LineLaser(T_rig_laser=Pose(translation=(0.1, 0.0, 0.0), rotation=(0.0, -0.2, 0.0)))
+PLATE = SceneObject(name="plate", shape=Plane(), T_world_object=Pose(translation=(0.0, 0.0, 0.5)))
+WAX = Subsurface(mean_free_path=0.01, scattering_albedo=0.5)
+SENSOR = Sensor(efficiency=(SpectralCurve(wavelength_nm=(400.0, 700.0), value=(0.5, 0.5)),))
+
+
+_ends: dict[str, Future[None]] = {}
+_lock = threading.Lock()
+
+
+def begin(steps: Iterable[str]) -> None:
+    """Start on some of STEPS, after those that were started before."""
+    for name in steps:
+        with _lock:
+            if name not in _ends:
+                _ends[name] = Future()
+                before = list(_ends.values())[:-1]
+                # no daemon: the program may not end while a compiler works in it
+                threading.Thread(target=_run, args=(name, before), name=f"warm-up {name}").start()
+
+
+def warm_up(steps: Iterable[str], progress: StageProgress, cancelled: Cancel) -> None:
+    """Wait until the kernels of some of STEPS are there. Raises Cancelled, and whatever is found to be broken."""
+    names = tuple(steps)
+    begin(names)
+    for i, name in enumerate(names):
+        while not _ends[name].done():
+            if cancelled():
+                raise Cancelled
+            progress(PREPARING, i / len(names))
+            wait((_ends[name],), LOOK_SECONDS)
+        _ends[name].result()
+
+
+def needed(project: Project) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The steps whose kernels the line of a project needs, and those of what is drawn and measured after it."""
+    pinhole = project.scene.camera.lens.model == "pinhole"
+    return ("draw",) if pinhole else ("draw", "lens"), ("scan", "light")
+
+
+def _run(name: str, before: list[Future[None]]) -> None:
+    wait(before)
+    thresholds = gc.get_threshold()
+    # a compiler leaves much garbage, and looking for it as often as usual takes a tenth of its time
+    gc.set_threshold(*COLLECTED)
+    try:
+        STEPS[name](_program_ends)
+        _ends[name].set_result(None)
+    except BaseException as error:
+        _ends[name].set_exception(error)
+    finally:
+        gc.set_threshold(*thresholds)
+
+
+def _program_ends() -> bool:
+    """Nobody is left to wait."""
+    return not threading.main_thread().is_alive()
+
+
+def look(cancelled: Cancel) -> None:
+    """All that panels ask of a look."""
+    from studio.preview import rig_drawing
+    from studio.preview.preview import Preview
+    from studio.preview.readouts import readouts
+
+    scene = Scene(rig=Rig(camera=CAMERA, lasers=(LASER,)), objects=(PLATE,))
+    made = Preview(1).look(Project(scene=scene, sensor=SENSOR), Path())
+    readouts(made, 0)
+    made.image(1.0)
+    rig_drawing.frustum(scene)
+
+
+def draw(cancelled: Cancel) -> None:
+    """The line on the tilted plane at 122 x 102 px, in memory, with its pictures."""
+    _drawn(cancelled)
+
+
+def scan(cancelled: Cancel) -> None:
+    """The same, measured by every method. Raises whatever is broken."""
+    from studio.scan.results import measure_frame
+
+    project, frame, world, images, clock = _drawn(cancelled)
+    found = measure_frame(project, frame, world, images, clock, None, keep=False)
+    if not found.lasers[0].extractions[0].points.valid.any():
+        raise RuntimeError("the warm-up scan found no point: the installation is damaged")
+
+
+def _drawn(cancelled: Cancel) -> tuple[Project, Frame, World, list[Image], Clock]:
+    from render.world.world import build_world
+    from studio.scan.stages import Clock, develop_step, render_step, scaled
+
+    folder = template_folder(TEMPLATE)
+    project = scaled(Project.load(folder / "project.json"), IMAGE_SCALE)
+    line = project.scene.model_copy(update={"lights": (), "environment": Environment()})
+    direct = project.render.model_copy(update={"transport": "direct", "truth_images": False})
+    project = project.model_copy(update={"scene": line, "render": direct})
+    clock = Clock(progress=lambda stage, done: None, cancelled=cancelled)
+    world = build_world(project.scene, folder, 0)
+    frame = render_step(project, world, 0, clock, None)
+    images = develop_step(project, frame, clock, None)
+    _show(project.scene, frame, images)
+    return project, frame, world, images, clock
+
+
+def light(cancelled: Cancel) -> None:
+    """Every kind of light: of lamps and shining objects, reflected, through glass, below surfaces."""
+    _render(CAMERA, cancelled, "subsurface")
+    _render(CAMERA, cancelled, "subsurface", Glass(), Conductor(), WAX, Emitter())
+
+
+def lens(cancelled: Cancel) -> None:
+    """The line by way of a lens that blurs, on plain and on shiny surfaces."""
+    blurred = CAMERA.model_copy(update={"lens": Lens(model="thin-lens", focus_distance=0.4)})
+    _render(blurred, cancelled, "direct")
+    _render(blurred, cancelled, "direct", Conductor())
+
+
+def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Material) -> None:
+    """A plate, and blocks of some materials before it, under all sorts of lamps, by few paths."""
+    from render.render import render_world
+    from render.world.world import build_world
+    from studio.scan.exposure import expose
+
+    blocks = []
+    for i, material in enumerate(materials):
+        shape, pose = Box(size_x=0.04, size_y=0.04, size_z=0.02), Pose(translation=(0.05 * i - 0.05, 0.0, 0.45))
+        blocks.append(SceneObject(name=material.kind, shape=shape, material=material, T_world_object=pose))
+    lamps = PointLight(), RectangleLight(T_world_light=Pose(translation=(0.0, -0.3, 0.0)))
+    scene = Scene(
+        rig=Rig(camera=camera, lasers=(LASER,)),
+        objects=(PLATE, *blocks),
+        lights=lamps,
+        environment=Environment(radiance=(1.0, 1.0, 1.0)),
+    )
+    few = {"transport": transport, "light_paths": 1, "ambient_samples": 2, "laser_error": 0.1}
+    settings = RenderSettings().model_copy(update=few)
+    frame = render_world(build_world(scene, Path()), scene, settings=settings, cancelled=cancelled)
+    _show(scene, frame, [expose(Project(scene=scene, sensor=SENSOR), frame, [1.0], 0)])
+
+
+def _show(scene: Scene, frame: Frame, images: list[Image]) -> None:
+    """Every picture of a frame."""
+    from render.output.tone_mapping import pyramid
+    from studio.scan.frame_views import picture, views
+
+    for view in views(scene, frame):
+        made = picture(view, scene, frame, images, True)
+        if made is not None:
+            pyramid(made)
+
+
+STEPS: dict[str, Callable[[Cancel], None]] = {
+    "look": look,
+    "draw": draw,
+    "lens": lens,
+    "scan": scan,
+    "light": light,
+}

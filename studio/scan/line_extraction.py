@@ -1,0 +1,82 @@
+"""The line in an image whose sensor and rig are known: exposures fused, peaks checked against the geometry."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import NDArray
+
+from analysis.line.detection.noise import NoiseModel
+from analysis.line.extract import extract
+from analysis.line.result import Line
+from analysis.line.selection.geometry import WorkingVolume
+from analysis.line.series.hdr import fuse
+from analysis.line.settings import ExtractionSettings, Method
+from render.sensor.develop import Image
+from studio.project.project import Project
+
+
+def noise_model(image: Image) -> NoiseModel:
+    """How the image's numbers become electrons."""
+    return NoiseModel(
+        gain=image.gain, black_level=image.black_level, read_noise=image.read_noise, saturation=image.saturation
+    )
+
+
+def working_volume(project: Project, laser: int, settings: ExtractionSettings | None = None) -> WorkingVolume | None:
+    """Where the project's rig measures with one laser; None where no geometric check is asked for."""
+    chosen = project.extraction if settings is None else settings
+    if not chosen.geometry:
+        return None
+    return WorkingVolume(
+        project.scene.camera,
+        project.scene.lasers[laser],
+        project.scene.T_camera_laser(laser),
+        nearest=chosen.nearest or 0.0,
+        farthest=math.inf if chosen.farthest is None else chosen.farthest,
+    )
+
+
+def extract_line(
+    project: Project, image: Image, laser: int, threads: int | None = None, method: Method | None = None
+) -> Line:
+    """The line of one laser in its image, by the project's method or another; `note` tells what was done beyond that.
+
+    InputError: as `extract` and `fuse`.
+    """
+    settings, noise = project.extraction, noise_model(image)
+    if method == "likelihood" != settings.method:
+        settings = settings.model_copy(update={"smoothing": 0.0})  # it needs independent pixels
+    if image.pattern is not None and settings.pattern is None:
+        settings = settings.model_copy(update={"pattern": image.pattern})
+    pixels: NDArray[Any] = image.pixels
+    variance = None
+    if image.shorter:
+        series = (image, *image.shorter)
+        fused = fuse([one.pixels for one in series], [one.exposure_time for one in series], noise)
+        pixels, variance, noise = fused.electrons, fused.variance, fused.noise
+    volume = working_volume(project, laser, settings)
+    line = extract(
+        pixels, method=method, settings=settings, noise=noise, variance=variance, volume=volume, threads=threads
+    )
+    return replace(line, note=tell(line, settings, [one.exposure_time for one in (image, *image.shorter)]))
+
+
+def tell(line: Line, settings: ExtractionSettings, times: list[float]) -> str:
+    """What was done beyond the method itself, for a person."""
+    told = [line.note] if line.note else []
+    if len(times) > 1:
+        told.append(f"{len(times)} exposures fused, " + ", ".join(f"{1e3 * time:.3g}" for time in times) + " ms")
+    if line.candidates is not None:
+        told.append({"continuous": "the smoothest chain of peaks"}.get(settings.select, f"the {settings.select} peak"))
+        if settings.geometry:
+            near, far = settings.nearest or 0.0, settings.farthest
+            end = "" if far is None else f" to {far * 1e3:g} mm"
+            told.append(
+                "only peaks on the laser's plane and within its fan" + f", {near * 1e3:g} mm{end} away"
+                if near or far
+                else "only peaks on the laser's plane and within its fan"
+            )
+    return "; ".join(told)

@@ -1,0 +1,128 @@
+"""The measuring half of a scan: frames come and go, points go to disk, and a few numbers a frame stay."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from analysis.cloud import SpooledCloud, cloud, write_csv, write_ply
+from analysis.line.settings import Method
+from analysis.report.model import FrameResult
+from analysis.report.record import ScanRecord
+from render.frame import Frame
+from render.sensor.develop import Image
+from render.world.world import World
+from studio.project.project import Project
+from studio.scan.results import compared_methods, measure_frame, now, report_input
+from studio.scan.spacetime_window import Passing, Sweep, Taken
+from studio.scan.stages import Clock
+
+IMAGES_KEPT = 16
+"""Of a long scan only so many frames wait for the report with their images, evenly spread."""
+MOST_NOTES = 12
+
+
+class Measuring:
+    """Measures the frames of a scan in their order, each as soon as it can be."""
+
+    def __init__(
+        self,
+        project: Project,
+        folder: Path,
+        clock: Clock,
+        threads: int | None,
+        count: int,
+        each: Callable[[FrameResult], None] = lambda frame: None,
+    ) -> None:
+        """folder: what does not stay in memory is in unnamed files there; count: of frames to come; each: hears of
+        every frame once it is measured.
+
+        InputError: lines are to be measured along time, and nothing moves.
+        """
+        self.record = ScanRecord(project.scene, folder)
+        self._project, self._clock, self._threads, self._each = project, clock, threads, each
+        self._sweep = Sweep(project)
+        self._points = SpooledCloud(folder)
+        self._notes: list[Counter[str]] = [Counter() for _ in project.scene.lasers]
+        self._compared: tuple[Method, ...] | None = None
+        self._shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
+
+    def add(self, frame: Frame, world: World, images: list[Image]) -> None:
+        """The next frame with an image for each laser."""
+        self._take(self._sweep.add(frame, world, images))
+
+    def finish(self) -> None:
+        """No more frames come."""
+        self._take(self._sweep.finish())
+
+    def _take(self, ready: Iterable[tuple[Taken, Passing | None]]) -> None:
+        for one, passing in ready:
+            result = measure_frame(
+                self._project,
+                one.frame,
+                one.world,
+                one.images,
+                self._clock,
+                self._threads,
+                keep=len(self.record.steps) in self._shown,
+                passing=passing,
+                compared=self._compared,
+            )
+            if self._compared is None:
+                self._compared = compared_methods(result)
+            for i, laser in enumerate(result.lasers):
+                best = laser.extractions[0]
+                self._points.add(cloud(best.points, best.errors, i, result.step, self._project.scene))
+                self._notes[i][best.line.note] += 1
+                _bound(self._notes[i])
+            self.record.add(result)
+            self._each(result)
+
+    def notes(self) -> list[str]:
+        """What was done to find each laser's line beyond its method, and in how many frames."""
+        told, frames = [], len(self.record.steps)
+        for laser, notes in zip(self._project.scene.lasers, self._notes, strict=True):
+            for note, times in notes.items():
+                if note:
+                    where = f" in {times} of {frames} frames" if times < frames else ""
+                    told.append(f"Line of {laser.name}{where}: {note}.")
+        return told[:MOST_NOTES]
+
+    def write_points(self, out: Path) -> list[Path]:
+        """points.ply and points.csv of all frames and lasers, by the project's method, at the first step's pose."""
+        with self._clock.stage("writing points"):
+            write_ply(out / "points.ply", self._points)
+            write_csv(out / "points.csv", self._points)
+        return [out / "points.ply", out / "points.csv"]
+
+    def write_reports(
+        self, out: Path, world: World, *, notes: Sequence[str], created: str | None = None, image_scale: float = 1.0
+    ) -> list[Path]:
+        """report.html and report.pdf; `world` is that of step 0."""
+        from analysis.report.write import write_report
+
+        data = report_input(
+            self._project,
+            world,
+            self.record,
+            self._clock.seconds,
+            notes=[*notes, *self.notes()],
+            created=created or now(),
+            image_scale=image_scale,
+        )
+        with self._clock.stage("report"):
+            return list(write_report(out, data))
+
+    def close(self) -> None:
+        """Let go of what is on disk."""
+        self.record.close()
+        self._points.close()
+
+
+def _bound(notes: Counter[str]) -> None:
+    """Keep the first notes only, so that figures in them cannot make a long scan grow."""
+    if len(notes) > MOST_NOTES + 1:
+        notes.popitem()

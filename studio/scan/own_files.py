@@ -1,0 +1,106 @@
+"""Which files this program wrote, told by their content: only those are replaced or removed unasked."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+
+from analysis.cloud import UNITS
+from render.base.errors import InputError
+
+HEAD = 64 * 1024
+"""Bytes at the beginning of a file that tell what it is."""
+EXR_MAGIC = b"\x76\x2f\x31\x01"
+EXR_LAYERS = re.compile(rb"laser\.[^\0]*\.direct\.Y\0|object_id\.Y\0|ambient\.B\0.{16}ambient\.G\0|sigma_time\0", re.S)
+JSON_FORMAT = re.compile(rb'\{\s*"format": "blazer-(frame|scan)"')
+LINE_COLUMNS = ("scan_line", "rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "flag")
+RIDGE_COLUMNS = (
+    "line",
+    "u",
+    "v",
+    "sigma",
+    "normal_u",
+    "normal_v",
+    "width",
+    "amplitude",
+    "background",
+    "significance",
+    "flag",
+)
+POINT_COLUMNS = tuple(f"{name}_{unit}" if unit else name for name, unit in UNITS.items())
+TABLES = tuple(",".join(columns).encode() for columns in (LINE_COLUMNS, RIDGE_COLUMNS, POINT_COLUMNS))
+
+
+def is_own(path: Path) -> bool:
+    """An earlier run of this program wrote the file, as far as its content tells; False: another kind, or unreadable.
+
+    A PNG belongs to the frame beside it, a PDF to the HTML.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".png":
+        return any(is_own(path.with_suffix(other)) for other in (".exr", ".json"))
+    if suffix == ".pdf":
+        return is_own(path.with_suffix(".html"))
+    head = _head(path)
+    if suffix == ".csv":
+        return head.split(b"\n", 1)[0].strip() in TABLES
+    if suffix == ".ply":
+        return head.startswith(b"ply\nformat binary_little_endian 1.0\ncomment metre, pixel; world frame\n")
+    if suffix == ".exr":
+        return head.startswith(EXR_MAGIC) and EXR_LAYERS.search(head) is not None
+    if suffix == ".html":
+        return b'<meta name="generator" content="Blazer Studio">' in head
+    if suffix == ".json":
+        return JSON_FORMAT.match(head) is not None
+    return path.name.endswith(".state.npz") and path.is_file()
+
+
+def check_replaceable(paths: Iterable[Path], reads: Iterable[Path] = ()) -> None:
+    """InputError: writing to `paths` would replace a file that this program did not write, or one that it `reads`.
+
+    A folder in the way is told in the same words, before anything is computed.
+    """
+    paths = list(paths)
+    check_not_read(paths, reads)
+    for path in paths:
+        if os.path.lexists(path) and not is_own(path):
+            raise InputError(
+                "a result would replace a file that this program did not write",
+                where=str(path),
+                cure="choose another folder for results, or move the file away",
+            )
+
+
+def check_not_read(paths: Iterable[Path], reads: Iterable[Path]) -> None:
+    """InputError: one of `paths` is one of the files that are read, if by another name."""
+    sources = {identity: file for file in reads if (identity := _identity(file)) is not None}
+    for path in paths:
+        if (identity := _identity(path)) in sources:
+            raise InputError(
+                "a result would replace a file that is read",
+                where=str(path),
+                found=str(sources[identity]),
+                cure="choose another folder for results",
+            )
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """The same for all names of one file."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return None
+    return status.st_dev, status.st_ino
+
+
+def _head(path: Path) -> bytes:
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):  # a pipe would block
+            return b""
+        with open(path, "rb") as file:
+            return file.read(HEAD)
+    except (OSError, ValueError):
+        return b""

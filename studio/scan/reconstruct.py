@@ -1,0 +1,102 @@
+"""Points without rendering, from the frames of an earlier scan."""
+
+from __future__ import annotations
+
+import math
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from render.base.errors import InputError
+from render.output.frame_files import read_frame
+from render.world.material_checks import scene_warnings
+from render.world.world import build_world
+from studio.project.project import Project
+from studio.scan import scan_folder
+from studio.scan.cautions import Cautions
+from studio.scan.measuring import Measuring
+from studio.scan.redevelop import development
+from studio.scan.remarks import result_remarks
+from studio.scan.results import now
+from studio.scan.stages import Clock, develop_step, step_world
+from studio.scan.summary import summarise
+
+
+def reconstruct_folder(
+    found: scan_folder.ScanFolder,
+    project: Project,
+    root: Path,
+    out: Path,
+    clock: Clock,
+    *,
+    report: bool,
+    threads: int | None = None,
+) -> dict[str, Any]:
+    """Develop, extract and triangulate the frames of a scan anew; `project` may have another sensor or extraction.
+
+    Writes points and, where asked for, the report into `out`. InputError: frames missing or damaged, `project` differs
+    in what the frames fix, or as `scan_folder.measuring`.
+    """
+    scan_folder.check_measures(found, project)
+    with scan_folder.measuring(found, root, out):
+        return _measured(found, project, root, out, clock, report=report, threads=threads)
+
+
+def _measured(
+    found: scan_folder.ScanFolder,
+    asked: Project,
+    root: Path,
+    out: Path,
+    clock: Clock,
+    *,
+    report: bool,
+    threads: int | None,
+) -> dict[str, Any]:
+    how = development(found.project, asked)
+    project = how.project
+    image_scale = found.manifest.get("image_scale", 1.0)
+    if not isinstance(image_scale, float | int) or not 0.0 < image_scale < math.inf:
+        where = f"{found.folder / scan_folder.MANIFEST}: image_scale"
+        raise InputError("the image scale is none", where=where, found=image_scale, allowed="a positive number")
+    cautions = Cautions(project, image_scale, how.laser_power)
+    with clock.stage("loading meshes"), cautions.listening():
+        first = world = build_world(project.scene, root, 0)
+    with closing(Measuring(project, out, clock, threads, len(found.frames))) as measuring:
+        for n in clock.frames(len(found.frames)):
+            path = found.frames[n]
+            with clock.stage("reading frames"):
+                scan_folder.check_frame(found, path)
+                frame = read_frame(path)
+            if not 0 <= frame.step < project.scene.frame_count:
+                allowed = f"0 to {project.scene.frame_count - 1}"
+                raise InputError(
+                    "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
+                )
+            world = step_world(project, root, frame.step, None if frame.step == 0 else world)
+            cautions.look(frame, scene_warnings(world, project.scene, frame.step))
+            measuring.add(frame, world, develop_step(project, frame, clock, threads, how.laser_power))
+        measuring.finish()
+        if not measuring.record.steps or not project.scene.lasers:
+            raise InputError("the scan holds no laser image", where=str(found.folder))
+        with scan_folder.replacing(found, out) as measured:
+            files = measuring.write_points(out)
+            figures = summarise(measuring.record)
+            notes = cautions.notes(figures)
+            measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
+            measured["remarks"] = result_remarks(measuring.record)
+            if (asked.sensor, asked.extraction) != (found.project.sensor, found.project.extraction):
+                measured["measured_with"] = asked.model_dump(mode="json", include={"sensor", "extraction"})
+            if report:
+                created = str(found.manifest.get("created", now()))
+                reports = measuring.write_reports(out, first, notes=notes, created=created, image_scale=image_scale)
+                measured["report"] = [path.name for path in reports]
+                files += reports
+    return {
+        "name": asked.name,
+        "files": [str(path) for path in files],
+        "image_scale": image_scale,
+        "results": measured["results"],
+        "notes": notes,
+        "extraction": measured["extraction"],
+        "seconds": clock.seconds,
+    }

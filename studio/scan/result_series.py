@@ -1,0 +1,143 @@
+"""The arrays behind the result views, in the units they are shown in: px, mm, um. Qt-free."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.error import Errors
+from analysis.measures import Measures
+from render.base.pose import invert, transform_points
+from render.frame import LaserCurve
+from render.scene.scene import Scene
+from studio.scan.stages import Measurement
+
+Float = NDArray[np.float64]
+ErrorKind = Literal["depth", "surface", "position"]
+
+GAP = 4.0
+"""Neighbouring crossings of the true line farther apart than this many px are not joined."""
+MOST_BINS = 81
+
+
+@dataclass(frozen=True)
+class Series:
+    """(n,) a sample of the line: where it is on the image and in the laser's plane. NaN breaks a curve."""
+
+    index: Float
+    """Scan line."""
+    position: Float
+    """px along the scan line."""
+    depth: Float
+    """mm, `depth_z`."""
+    across: Float
+    """mm along the fan, in the laser's frame."""
+    distance: Float
+    """mm from the laser along its axis."""
+
+
+@dataclass(frozen=True)
+class ErrorView:
+    """One way to look at the error."""
+
+    kind: ErrorKind
+    title: str
+    unit: str
+    scale: float
+    """Stored value times this is shown."""
+
+
+ERROR_VIEWS = (
+    ErrorView("depth", "Depth error", "µm", 1e6),
+    ErrorView("surface", "Distance to surface", "µm", 1e6),
+    ErrorView("position", "Line position error", "px", 1.0),
+)
+
+
+MEASURED = (
+    ("Bias", "bias"),
+    ("Sigma", "sigma"),
+    ("RMSE", "rmse"),
+    ("Robust sigma", "robust_sigma"),
+    ("95 % within", "p95"),
+)
+"""Rows of the table of measures in the view's unit, and what each is called elsewhere."""
+
+
+def true_series(curve: LaserCurve, scene: Scene, laser: int) -> Series:
+    """The exact line, broken where it is interrupted."""
+    made = _series(curve.index.astype(np.float64), curve.position, curve.depth_z, curve.point, scene, laser)
+    jump = (np.abs(np.diff(curve.index)) > 1) | (np.abs(np.diff(curve.position)) > GAP)
+    at = np.flatnonzero(jump) + 1
+    return Series(
+        *(
+            np.insert(values, at, np.nan)
+            for values in (made.index, made.position, made.depth, made.across, made.distance)
+        )
+    )
+
+
+def measured_series(measurement: Measurement, scene: Scene) -> Series:
+    """The points of a measurement, in their order; NaN where a peak gave no point."""
+    points = measurement.points
+    along = points.pixel[:, 0 if points.axis == "rows" else 1]
+    index = points.index.astype(np.float64)
+    return _series(index, along, points.depth_z, points.camera, scene, measurement.laser)
+
+
+def error_values(errors: Errors, view: ErrorView) -> Float:
+    """(m,) measured minus true, in the view's unit."""
+    values = {"depth": errors.depth, "surface": errors.distance, "position": errors.position}[view.kind]
+    return np.asarray(values * view.scale)
+
+
+def measures(errors: Errors, kind: ErrorKind) -> Measures:
+    """The measures of a kind of error, stored units."""
+    return {"depth": errors.depth_z, "surface": errors.surface, "position": errors.u}[kind]
+
+
+def symmetric_limit(error: Float, share: float = 98.0) -> float:
+    """A round limit for an axis or colour bar centred on zero that holds so many percent of the errors."""
+    size = np.abs(error[np.isfinite(error)])
+    top = float(np.percentile(size, share)) if len(size) else 0.0
+    if not top > 0.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(top))
+    return float(
+        next(step * power for step in (1.0, 1.5, 2.0, 3.0, 5.0, 7.0, 10.0) if step * power >= top * (1 - 1e-9))
+    )
+
+
+def histogram(error: Float, limit: float) -> tuple[Float, Float]:
+    """Edges (n + 1,) within +-limit and counts (n,); what lies beyond is in the outermost bins.
+
+    The number of bins, odd so that zero has one, grows with the cube root of the count (Rice's rule, with room).
+    """
+    finite = np.clip(error[np.isfinite(error)], -limit, limit)
+    bins = min(2 * math.ceil(2.5 * max(len(finite), 8) ** (1 / 3)) + 1, MOST_BINS)
+    counts, edges = np.histogram(finite, bins=bins, range=(-limit, limit))
+    return edges, counts.astype(np.float64)
+
+
+def table(found: list[Measurement], view: ErrorView) -> list[tuple[str, str, list[float]]]:
+    """Rows of the table of measures: name, unit, a value for each measurement (NaN: there is none)."""
+    rows: list[tuple[str, str, list[float]]] = [
+        ("Points", "", [float(one.points.valid.sum()) for one in found]),
+        ("Completeness", "%", [100.0 * one.errors.completeness for one in found]),
+        ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
+    ]
+    of = [measures(one.errors, view.kind) for one in found]
+    for name, attribute in MEASURED:
+        rows.append((name, view.unit, [view.scale * getattr(one, attribute) for one in of]))
+    rows.append(("Outliers", "%", [100.0 * one.outlier_rate for one in of]))
+    rows.append(("Within 2 sigma", "%", [100.0 * one.coverage for one in of]))
+    return rows
+
+
+def _series(index: Float, position: Float, depth: Float, points: Float, scene: Scene, laser: int) -> Series:
+    in_laser = transform_points(invert(scene.T_camera_laser(laser)), points)
+    return Series(index, position, 1e3 * depth, 1e3 * in_laser[:, 1], 1e3 * in_laser[:, 2])

@@ -1,0 +1,124 @@
+"""From frames to results: every laser measured by every method, and what a report is made of."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from importlib import metadata
+
+from analysis.line.settings import Method
+from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
+from analysis.report.record import ScanRecord
+from render.base.model import Model
+from render.frame import Frame
+from render.sensor.develop import Image
+from render.world.world import World
+from studio.project.project import Project
+from studio.scan.spacetime_window import Passing
+from studio.scan.stages import Clock, Measurement, measure_step
+
+METHODS: tuple[Method, ...] = ("likelihood", "gaussian", "centre_of_mass")
+LIBRARIES = ("blazer-studio", "embreex", "numba", "numpy", "opencv-contrib-python-headless", "open3d", "OpenEXR")
+
+
+def measure_frame(
+    project: Project,
+    frame: Frame,
+    world: World,
+    images: list[Image],
+    clock: Clock,
+    threads: int | None,
+    *,
+    keep: bool,
+    passing: Passing | None = None,
+    compared: tuple[Method, ...] | None = None,
+) -> FrameResult:
+    """One frame by the project's method and, to compare with, by the others. `keep` the images for the report.
+
+    passing: the frames around it, for the project's method alone. compared: the other methods, which are those of the
+    scan's first frame in all its frames, where "auto" may pick another in each; None: this is the first.
+    """
+    before = dict(clock.seconds)
+    own = measure_step(project, frame, world, images, clock, threads, passing=passing)
+    by_method: list[list[Measurement]] = [own]
+    with clock.stage("other methods, to compare with"):
+        aside = Clock(lambda stage, done: None, clock.cancelled)
+        for method in _others(own) if compared is None else compared:
+            by_method.append(measure_step(project, frame, world, images, aside, threads, method))
+    lasers = []
+    for i, image in enumerate(images):
+        extractions = tuple(Extraction(found[i].line, found[i].points, found[i].errors) for found in by_method)
+        lasers.append(LaserResult(frame.curves[i], extractions, image.pixels if keep else None))
+    spent = {name: seconds - before.get(name, 0.0) for name, seconds in clock.seconds.items()}
+    seconds = {**frame.seconds, **{name: value for name, value in spent.items() if value > 0.0}}
+    return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=seconds, counts=frame.counts)
+
+
+def _others(own: list[Measurement]) -> tuple[Method, ...]:
+    """Those to compare with; never what "auto" picked for the first laser."""
+    return tuple(method for method in METHODS if not own or method != own[0].line.method)
+
+
+def compared_methods(frame: FrameResult) -> tuple[Method, ...]:
+    """Those that the project's own was compared with."""
+    methods = {extraction.line.method: None for laser in frame.lasers for extraction in laser.extractions[1:]}
+    return tuple(method for method in METHODS if method in methods)
+
+
+def report_input(
+    project: Project,
+    world: World,
+    record: ScanRecord,
+    seconds: Mapping[str, float],
+    *,
+    notes: Sequence[str],
+    created: str,
+    image_scale: float = 1.0,
+) -> ReportInput:
+    """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage."""
+    return ReportInput(
+        title=project.name,
+        scene=project.scene,
+        record=record,
+        vertices=world.vertices,
+        triangles=world.triangles,
+        object_id=world.object_id,
+        sensor=project.sensor,
+        display_max=float(2**project.sensor.bits - 1),
+        settings={"Line extraction": settings_table(project.extraction), "Rendering": settings_table(project.render)},
+        seconds={name: value for name, value in seconds.items() if name not in record.seconds},
+        seed=project.seed,
+        versions=versions(),
+        notes=tuple(notes),
+        created=created,
+        image_scale=image_scale,
+    )
+
+
+def settings_table(settings: Model) -> dict[str, str]:
+    """Label -> value with its unit, as the fields of a model describe themselves."""
+    rows = {}
+    for name, info in type(settings).model_fields.items():
+        extra = info.json_schema_extra
+        unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+        value = getattr(settings, name)
+        if isinstance(value, bool):
+            value = "yes" if value else "no"
+        rows[info.title or name] = "automatic" if value is None else f"{value} {unit}".strip()
+    return rows
+
+
+def versions() -> dict[str, str]:
+    """Python and the libraries that decide the numbers."""
+    found = {"Python": platform.python_version()}
+    for name in LIBRARIES:
+        with suppress(metadata.PackageNotFoundError):
+            found[name] = metadata.version(name)
+    return found
+
+
+def now() -> str:
+    """Date and time with its zone, to the second."""
+    return datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")

@@ -1,0 +1,187 @@
+"""The stages of a scan: render, develop, extract, triangulate, compare; each timed and told to whoever watches."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from analysis.error import Errors, compare
+from analysis.line.result import Line
+from analysis.line.settings import Method
+from analysis.triangulate import Points, triangulate
+from render.base.errors import Cancelled
+from render.checkpoint import RenderState
+from render.frame import Frame
+from render.render import render_world
+from render.scan_plan import ScanPlan
+from render.scene.motion import NoMotion
+from render.sensor.develop import Image
+from render.world.world import World, build_world
+from studio.commands.console import FRAMES
+from studio.project.project import Project
+from studio.scan.exposure import expose
+from studio.scan.line_extraction import extract_line
+from studio.scan.spacetime_window import Passing, along_time
+
+StageProgress = Callable[[str, float], None]
+Cancel = Callable[[], bool]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What one laser's image of one frame gave, by one method."""
+
+    step: int
+    laser: int
+    image: Image
+    line: Line
+    points: Points
+    errors: Errors
+
+
+@dataclass
+class Clock:
+    """Wall time by stage, and progress of the stages."""
+
+    progress: StageProgress
+    cancelled: Cancel
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[Callable[[float], None]]:
+        """Time a stage under its name. Cancelled: the user asked to stop before it began."""
+        if self.cancelled():
+            raise Cancelled
+        self.progress(name, 0.0)
+        start = time.perf_counter()
+        yield lambda done: self.progress(name, min(done, 0.999))
+        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+        self.progress(name, 1.0)
+
+    def frames(self, count: int) -> Iterator[int]:
+        """0..count - 1, told as the progress of FRAMES where there are several."""
+        for i in range(count):
+            if count > 1:
+                self.progress(FRAMES, i / count)
+            yield i
+        if count > 1:
+            self.progress(FRAMES, 1.0)
+
+
+def scaled(project: Project, image_scale: float) -> Project:
+    """The same project with `image_scale` times the pixels a side, exposed so that the image is about as bright.
+
+    The pixels grow as the image shrinks, and with them the light of each; the exposure time takes that back.
+    """
+    if image_scale == 1.0:
+        return project
+    scene = project.scene.scaled(image_scale)
+    sensor = project.sensor.model_copy(update={"exposure_time": project.sensor.exposure_time * image_scale**2})
+    return project.model_copy(update={"scene": scene, "sensor": sensor})
+
+
+def validated(project: Project, where: str) -> Project:
+    """The project, of whose numbers some were worked out. InputError: one is beyond its limits."""
+    return Project.from_data(project.model_dump(mode="json"), where)
+
+
+def step_world(project: Project, root: Path, step: int, before: World | None) -> World:
+    """The placed triangles of a step; the ones before where the objects stand still."""
+    motion = project.scene.motion
+    objects_move = not isinstance(motion, NoMotion) and motion.moves == "objects"
+    return before if before is not None and not objects_move else build_world(project.scene, root, step)
+
+
+def render_step(
+    project: Project,
+    world: World,
+    step: int,
+    clock: Clock,
+    threads: int | None,
+    *,
+    cancelled: Cancel | None = None,
+    seconds: float | None = None,
+    state: RenderState | None = None,
+    refined: Callable[[Frame], None] = lambda frame: None,
+    scan: ScanPlan | None = None,
+) -> Frame:
+    """Radiance and truth of one step; cancelled: in place of the clock's; the rest as in `render_world`."""
+    frame = render_world(
+        world,
+        project.scene,
+        settings=project.render,
+        step=step,
+        axis=project.extraction.axis,
+        seed=project.seed,
+        threads=threads,
+        progress=clock.progress,
+        cancelled=clock.cancelled if cancelled is None else cancelled,
+        seconds=seconds,
+        state=state,
+        refined=refined,
+        scan=scan,
+    )
+    for name, spent in frame.seconds.items():
+        clock.seconds[name] = clock.seconds.get(name, 0.0) + spent
+    return frame
+
+
+def develop_step(
+    project: Project, frame: Frame, clock: Clock, threads: int | None, laser_power: Sequence[float] | None = None
+) -> list[Image]:
+    """One image for each laser: they fire one after the other, so that no line hides another.
+
+    laser_power: W of each, in place of the scene's, which the frame was rendered with.
+    """
+    scene, images = project.scene, []
+    powers = [laser.power for laser in scene.lasers] if laser_power is None else laser_power
+    frame.check()  # it may come from a file
+    with clock.stage("sensor"):
+        for i in range(len(scene.lasers)):
+            power = [value if i == k else 0.0 for k, value in enumerate(powers)]
+            images.append(expose(project, frame, power, i, threads=threads))
+    return images
+
+
+def measure_step(
+    project: Project,
+    frame: Frame,
+    world: World,
+    images: list[Image],
+    clock: Clock,
+    threads: int | None,
+    method: Method | None = None,
+    passing: Passing | None = None,
+) -> list[Measurement]:
+    """Line, points and errors of every laser's image, by the project's method or another.
+
+    passing: the frames around this one, where the line is to be measured along time.
+    """
+    found = []
+    for i, image in enumerate(images):
+        with clock.stage("line extraction"):
+            line = extract_line(project, image, i, threads, method)
+            if passing is not None:
+                line = along_time(project, line, passing, i, threads)
+        with clock.stage("triangulation"):
+            points = triangulate_line(project, line, i, frame.step)
+        with clock.stage("comparison with the truth"):
+            pose = project.scene.T_world_camera(frame.step)
+            errors = compare(points, line, frame.curves[i], world.vertices, world.triangles, pose)
+        found.append(Measurement(frame.step, i, image, line, points, errors))
+    return found
+
+
+def triangulate_line(project: Project, line: Line, laser: int, step: int) -> Points:
+    """Points of one laser's line at a step."""
+    scene = project.scene
+    return triangulate(
+        line,
+        scene.camera,
+        scene.laser_plane(laser),
+        T_rig_camera=scene.camera.T_rig_camera.matrix,
+        T_world_camera=scene.T_world_camera(step),
+    )

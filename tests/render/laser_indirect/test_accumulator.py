@@ -1,0 +1,113 @@
+"""What passes bring: added up, guarded against what is no number, and clamped only where that is asked for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from render.camera.camera import Camera
+from render.laser_indirect.accumulator import LATER, Gathered
+from render.laser_indirect.connection_buffer import count_joints, no_joints
+from render.laser_indirect.guiding import BINS, NOWHERE, no_guide
+from render.laser_indirect.integrator import empty_take
+from render.laser_indirect.photon_emission import even_fan
+
+CAMERA = Camera(width=4, height=2, fx=4.0, fy=4.0, cx=1.5, cy=0.5)
+
+
+def nothing(pixels=8, size=100, most=8):
+    arrays = np.zeros((0, BINS)), np.zeros(pixels), np.zeros(pixels, np.float32)
+    return Gathered(
+        0,
+        even_fan(0.0, 1.0),
+        size,
+        4 if size > 100 else 1 << 20,
+        0.0,
+        NOWHERE,
+        np.zeros(pixels),
+        no_guide(CAMERA),
+        *arrays,
+    )
+
+
+def passes(*images):
+    takes = []
+    for image in images:
+        take = empty_take(len(image))
+        take.image[:], take.touched[:] = image, True
+        takes.append(take)
+    return takes
+
+
+def test_what_is_no_number_is_left_out_and_counted():
+    joints, take = no_joints(6), empty_take(8)
+    joints.worth[:] = (1.0, math.nan, math.inf, -1.0, 2.0, 4.0)
+    joints.pixel[:], joints.kind[:], joints.part[:] = np.arange(6), 0, 0
+    count_joints(joints, np.array([False] * 5 + [True]), 6, 0.5, take)
+    assert take.image.tolist() == [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    assert take.dropped[0] == 3.0 and np.isfinite(take.found).all() and np.isfinite(take.sums).all()
+    so_far = nothing()
+    so_far.add([take, empty_take(8)], np.zeros((2, 0, BINS)))
+    assert so_far.dropped == 3.0 and np.isfinite(so_far.radiance((2, 4))).all()
+
+
+def test_the_error_is_that_of_the_mean_of_the_passes():
+    rng = np.random.default_rng(4)
+    images = rng.gamma(3.0, 1.0, (16, 8))
+    so_far = nothing()
+    so_far.add(passes(*images), np.zeros((16, 0, BINS)))
+    mean, variance = images.mean(axis=0), images.var(axis=0, ddof=1) / 16
+    assert so_far.radiance((2, 4)).ravel() == pytest.approx(mean, rel=1e-6)
+    assert so_far.error == pytest.approx(math.sqrt(variance.sum() / (np.sum(mean**2) - variance.sum())), rel=1e-9)
+
+
+def test_later_waves_weigh_more_and_the_error_is_the_scatter_of_what_they_add_up_to():
+    rng = np.random.default_rng(8)
+    renders, errors = [], []
+    for _ in range(300):
+        so_far = nothing()
+        for _ in range(4):
+            # the larger a pass, the less noisy
+            images = 5.0 + rng.standard_normal((4, 8)) / math.sqrt(so_far.growth)
+            so_far.add(passes(*images), np.zeros((4, 0, BINS)))
+        assert (so_far.passes, so_far.growth, so_far.paths) == (32, 8, 4 * 8 * 100 << 2)
+        renders.append(so_far.radiance((2, 4)).ravel())
+        errors.append(so_far.error * 5.0)
+    scatter = np.std(renders, axis=0, ddof=1)
+    sizes = np.array([1.0, 1.0, 2.0, 4.0])
+    weights = sizes**LATER
+    expected = math.sqrt(np.sum(weights**2 / sizes) / 4) / weights.sum()
+    # the standard error of 2400 values' scatter is 1.4 %
+    assert np.sqrt(np.mean(scatter**2)) == pytest.approx(expected, rel=0.06)
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(expected, rel=0.06)
+
+
+def test_waves_grow_up_to_a_limit():
+    so_far, sizes = nothing(size=1 << 13, most=4), []
+    for _ in range(6):
+        sizes.append(so_far.growth)
+        so_far.add(passes(np.ones(8), np.ones(8)), np.zeros((2, 0, BINS)))
+    assert sizes == [1, 1, 2, 4, 4, 4]
+
+
+def test_the_clamp_takes_what_it_says_and_nothing_is_clamped_unasked():
+    images = np.ones((2, 8))
+    images[1, 3] = 100.0
+    free, cut = nothing(), nothing()
+    free.add(passes(*images), np.zeros((2, 0, BINS)))
+    cut.add(passes(*images), np.zeros((2, 0, BINS)), clamp=10.0)
+    assert free.clamped == free.cut == 0.0
+    assert cut.clamped == 1.0 and cut.cut == 90.0
+    assert free.total.sum() - cut.total.sum() == 90.0
+
+
+def test_arrays_hold_all_of_it():
+    so_far = nothing()
+    so_far.add(passes(np.arange(8.0), np.ones(8)), np.zeros((2, 0, BINS)), clamp=5.0)
+    again = Gathered.of_arrays(so_far.arrays())
+    for name, array in so_far.arrays().items():
+        assert np.array_equal(again.arrays()[name], array)
+    assert (again.passes, again.error, again.clamped, again.cut) == (2, so_far.error, 2.0, so_far.cut)
+    assert (again.waves, again.paths, again.spread, again.share) == (1, 800, so_far.spread, so_far.share)

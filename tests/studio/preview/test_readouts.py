@@ -1,0 +1,164 @@
+"""The design read-outs agree with closed forms, with what a render shows, and with the published limits."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from render.base.pose import Pose
+from render.camera.camera import Camera
+from studio.preview.estimates import blur_px, centre_bound_px, depth_of_field, read_variance, speckle_px
+from studio.preview.inspection import inspect
+from studio.preview.preview import Preview
+from studio.preview.readout_rows import NOTHING, Row, rows
+from studio.preview.readouts import Readouts, readouts
+from studio.project.document import replaced
+from studio.project.project import Project
+
+PROJECTS = Path(__file__).parents[3] / "assets/projects"
+CAMERA, LASER = ("scene", "rig", "camera"), ("scene", "rig", "lasers", 0)
+
+
+def sample(name: str) -> Project:
+    return Project.load(PROJECTS / name / "project.json")
+
+
+def read(project: Project, name: str) -> Readouts:
+    return readouts(Preview(1).look(project, PROJECTS / name), 0)
+
+
+def row(project: Project, name: str, key: str) -> Row:
+    return next(found for found in rows(read(project, name)) if found.key == key)
+
+
+@pytest.mark.parametrize("name", ["plane", "weld_seam"])
+def test_they_agree_with_the_rendered_inspection(name: str) -> None:
+    project = sample(name)
+    dark = replaced(project, ("scene", "lights"), ())
+    dark = replaced(dark, ("scene", "environment", "radiance"), (0.0, 0.0, 0.0))
+    quick, slow = read(dark, name), inspect(dark, PROJECTS / name).lasers[0]
+    assert quick.baseline == slow.baseline
+    assert quick.triangulation_angle is not None and quick.depth_per_px is not None
+    assert quick.triangulation_angle.middle == pytest.approx(slow.triangulation_angle, rel=1e-9)
+    assert quick.depth_per_px.middle == pytest.approx(slow.depth_per_px, rel=1e-6)
+    assert quick.scan_lines_hit == slow.scan_lines_hit
+    assert (quick.working_nearest, quick.working_farthest) == (slow.working_nearest, slow.working_farthest)
+    # the inspection renders the light; median over rows of the brightest pixel
+    assert quick.peak_electrons is not None
+    assert quick.peak_electrons.middle == pytest.approx(slow.peak_electrons, rel=0.05)
+
+
+def test_the_lines_width_is_that_of_the_rendered_rows() -> None:
+    # rendered: total over peak of a row, which holds the pixel's own box; median over sub-pixel phases
+    project = replaced(sample("plane"), (*LASER, "sheet", "full_angle"), 4e-3)
+    quick, slow = read(project, "plane"), inspect(project, PROJECTS / "plane").lasers[0]
+    assert quick.width_px is not None and slow.width_px is not None and quick.width_px.middle > 3.0
+    assert quick.width_px.middle == pytest.approx(slow.width_px, rel=0.01)
+
+
+def test_depth_per_pixel_is_z_squared_over_baseline_and_focal_length() -> None:
+    # parallel axes: z = B f / (u - cx) in the sheet x = B + z tan(a)
+    project = sample("plane")
+    r = read(project, "plane")
+    assert r.distance is not None and r.depth_per_px is not None
+    camera = project.scene.camera
+    expected = r.distance.middle**2 / (0.2 * camera.fx)
+    assert r.depth_per_px.middle == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("read_noise", "amplitude", "sigma", "bound"),
+    [(2, 1000, 1.5, 0.0263), (5, 1000, 1.5, 0.0276), (10, 300, 1.5, 0.0691), (5, 10000, 1.0, 0.0066),
+     (2, 100, 3, 0.1406), (10, 100, 0.8, 0.1312), (2, 10000, 0.6, 0.0055)],
+)  # fmt: skip
+def test_the_centre_bound_is_the_joint_cramer_rao_bound(
+    read_noise: float, amplitude: float, sigma: float, bound: float
+) -> None:
+    """Against the inverse Fisher matrix over A, c, s, b of the pixel-integrated model, background 10 e-."""
+    quick = centre_bound_px(np.array([amplitude]), np.array([sigma]), np.array([10.0]), read_noise**2)[0]
+    exact = joint_bound(amplitude, sigma, 10.0, read_noise**2)
+    assert exact == pytest.approx(bound, rel=0.02)
+    assert 0.975 < quick / exact < 1.005
+
+
+def joint_bound(amplitude: float, sigma: float, background: float, variance: float) -> float:
+    from scipy.special import ndtr
+
+    x = np.arange(-40, 41)
+    bounds = []
+    for phase in np.linspace(-0.5, 0.5, 16, endpoint=False):
+
+        def mean(p: np.ndarray) -> np.ndarray:
+            a, c, s, b = p
+            area = ndtr((x + 0.5 - c) / s) - ndtr((x - 0.5 - c) / s)
+            return a * s * math.sqrt(2 * math.pi) * area + b
+
+        p = np.array([amplitude, phase, sigma, background])
+        step = 1e-6 * np.array([amplitude, 1.0, 1.0, 1.0])
+        J = np.stack([(mean(p + e) - mean(p - e)) / (2 * e.sum()) for e in np.diag(step)], axis=1)
+        fisher = J.T @ (J / (mean(p) + variance)[:, None])
+        bounds.append(np.linalg.inv(fisher)[1, 1])
+    return math.sqrt(float(np.mean(bounds)))
+
+
+def test_quantisation_counts_as_read_noise() -> None:
+    sensor = sample("plane").sensor
+    coarse = sensor.model_copy(update={"bits": 8, "gain": None})
+    step = 1.0 / coarse.dn_per_electron
+    assert read_variance(coarse) == pytest.approx(sensor.read_noise**2 + step**2 / 12)
+
+
+def test_speckle_follows_the_published_figures() -> None:
+    # f/1.4 focused at 0.87 m, 450 nm, 3.45 um pixels: 0.066, 0.096 and 0.136 px at 0.7, 1.5 and 3 px
+    camera = Camera.from_physical(2448, 2048, 3.45e-6, 0.012, f_number=1.4, focus_distance=0.87)
+    found = speckle_px(camera, 450.0, np.array([0.7, 1.5, 3.0]))
+    np.testing.assert_allclose(found, (0.066, 0.096, 0.136), atol=6e-4)
+
+
+def test_blur_is_nought_in_focus_and_the_limits_of_sharpness_have_one_pixel() -> None:
+    camera = Camera.from_physical(2448, 2048, 3.45e-6, 0.012, f_number=5.6, focus_distance=0.8)
+    near, far = depth_of_field(camera)
+    points = np.array([[0.1, -0.05, depth] for depth in (near, 0.8, far)])
+    np.testing.assert_allclose(blur_px(camera, points), (1.0, 0.0, 1.0), atol=1e-9)
+    assert near < 0.8 < far
+    # the textbook's hyperfocal distance f^2 / (N c), beyond which focusing keeps infinity sharp
+    hyperfocal = 0.012**2 / (5.6 * 3.45e-6) + 0.012
+    beyond = Camera.from_physical(2448, 2048, 3.45e-6, 0.012, f_number=5.6, focus_distance=1.001 * hyperfocal)
+    before = Camera.from_physical(2448, 2048, 3.45e-6, 0.012, f_number=5.6, focus_distance=0.999 * hyperfocal)
+    assert math.isinf(depth_of_field(beyond)[1]) and math.isfinite(depth_of_field(before)[1])
+
+
+def test_four_times_the_exposure_halves_the_photon_noise_and_saturates() -> None:
+    project = sample("plane")
+    time = project.sensor.exposure_time
+    short = read(replaced(project, ("sensor", "exposure_time"), time), "plane")
+    long = read(replaced(project, ("sensor", "exposure_time"), 4 * time), "plane")
+    assert short.photon_sigma is not None and long.photon_sigma is not None
+    assert long.photon_sigma == pytest.approx(short.photon_sigma / 2, rel=0.02)
+    assert short.saturated == 0.0 and long.saturated == 1.0
+    assert short.speckle_sigma == long.speckle_sigma
+
+
+def test_nothing_lit_leaves_what_the_rig_alone_decides() -> None:
+    project = replaced(sample("plane"), ("scene", "objects"), ())
+    r = read(project, "plane")
+    assert r.depth_per_px is None and r.depth_sigma is None and r.scan_lines_hit == 0 and r.occluded is None
+    assert r.working_nearest is not None and r.working_depth_per_px is not None
+    assert r.working_depth_per_px[1] == pytest.approx(100 * r.working_depth_per_px[0], rel=1e-3)
+    assert {found.value for found in rows(r) if found.key in ("angle", "depth", "peak", "sigma")} == {NOTHING}
+
+
+def test_rows_warn_where_a_value_leaves_its_sensible_range() -> None:
+    project = replaced(sample("plane"), (*CAMERA, "lens", "focus_distance"), 0.8663)
+    assert {found.key: found.level for found in rows(read(project, "plane")) if found.level} == {}
+    bright = replaced(project, (*LASER, "power"), 1.0)
+    assert row(bright, "plane", "saturated").level == "error"
+    wide = replaced(project, (*LASER, "sheet", "full_angle"), 1e-2)
+    assert row(wide, "plane", "width").level == "warning"
+    far = replaced(project, (*CAMERA, "lens", "focus_distance"), None)
+    assert row(far, "plane", "blur").level == "error"
+    away = replaced(project, (*LASER, "T_rig_laser"), Pose(translation=(0.2, 0, 0), rotation=(0, 0.9, 0)))
+    assert row(away, "plane", "working").level == "error"

@@ -1,0 +1,227 @@
+"""The camera view: live estimate, rendered frame, light groups, read-out, row profile."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPointF, Qt
+
+from analysis.line.result import Flag
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Render
+from studio.qt.image.camera_view import CameraView
+from studio.qt.image.row_profile import REASONS, fitted_profile
+from studio.qt.render.develop_panel import DevelopPanel
+from tests.studio.qt.small_session import small_project, small_render, small_session
+
+
+@pytest.fixture
+def made(qtbot):
+    """Camera view and develop panel over one session with a render, developed and measured."""
+    session = small_session(rendered=True)
+    view, develop = CameraView(session), DevelopPanel(session)
+    qtbot.addWidget(view)
+    qtbot.addWidget(develop)
+    view.resize(800, 700)
+    view.show()
+    qtbot.waitExposed(view)
+    with qtbot.waitSignal(session.measured, timeout=20000):
+        develop.refresh()
+    qtbot.waitUntil(lambda: not view.runner.busy)
+    yield view
+    view.close()
+    develop.close()
+    live(session).close()
+
+
+@pytest.fixture
+def unrendered(qtbot):
+    session = small_session()
+    view = CameraView(session)
+    qtbot.addWidget(view)
+    view.resize(800, 700)
+    view.show()
+    qtbot.waitExposed(view)
+    qtbot.waitUntil(lambda: len(live(session).look.placed) > 0)
+    yield view
+    view.close()
+    live(session).close()
+
+
+def move_to(qtbot, view, column, row):
+    """The mouse goes to a pixel."""
+    where = view.view.box.mapViewToScene(QPointF(column, row))
+    qtbot.mouseMove(view.view.viewport(), view.view.mapFromScene(where) - view.view.viewport().rect().topLeft())
+
+
+def choose(view, label):
+    index = view.choice.findText(label)
+    assert index >= 0
+    view.choice.setCurrentIndex(index)
+    view.choice.activated.emit(index)
+
+
+def grabbed(view):
+    image = view.view.grab().toImage()
+    pixels = np.frombuffer(image.bits(), np.uint8).reshape(image.height(), image.bytesPerLine() // 4, 4)
+    return pixels[:, : image.width(), :3].astype(int)
+
+
+def test_without_a_render_the_view_is_a_live_estimate(qtbot, unrendered):
+    assert unrendered.is_live and unrendered.badge.isVisible() and unrendered.render_button.isVisible()
+    assert "estimate" in unrendered.badge_text.text()
+    assert len(unrendered.overlay.truth.xData) > 50
+    assert np.ptp(grabbed(unrendered)) > 100
+
+
+def test_the_button_of_the_badge_asks_for_a_render(qtbot, unrendered):
+    with qtbot.waitSignal(unrendered.session.render_asked):
+        qtbot.mouseClick(unrendered.render_button, Qt.MouseButton.LeftButton)
+
+
+def test_the_live_line_follows_a_dragged_laser(qtbot, unrendered):
+    session = unrendered.session
+    before = np.array(unrendered.overlay.truth.xData)
+    pose = session.project.scene.lasers[0].T_rig_laser
+    session.begin_drag()
+    for i in range(1, 4):
+        x, y, z = pose.translation
+        moved = pose.model_copy(update={"translation": (x + 0.002 * i, y, z)})
+        session.set(("scene", "rig", "lasers", 0, "T_rig_laser"), moved, "move", "drag")
+        qtbot.waitUntil(lambda: live(session).look.project is session.project)
+    session.end_drag()
+    after = np.array(unrendered.overlay.truth.xData)
+    assert np.nanmean(after) != pytest.approx(np.nanmean(before), abs=0.2)
+
+
+def test_a_render_takes_the_place_of_the_estimate(qtbot, unrendered):
+    session = unrendered.session
+    world, frame = small_render()
+    session.add_render(Render(1, small_project(), world, frame))
+    assert not unrendered.is_live and not unrendered.badge.isVisible()
+    choose(unrendered, "Light of laser")
+    qtbot.waitUntil(lambda: not unrendered.runner.busy)
+    assert unrendered.view.item.size == (306, 256)
+
+
+def test_a_changed_scene_makes_the_render_stale_and_goes_live(qtbot, made):
+    session = made.session
+    session.set(("scene", "objects", 0, "scale"), 1.01)
+    assert made.stale and made.is_live and made.badge.isVisible() and made.render_button.isVisible()
+    assert "changed" in made.badge_text.text()
+    choose(made, "Image")
+    assert not made.is_live and made.badge.isVisible()
+    session.document.undo()
+    assert not made.stale and not made.badge.isVisible()
+
+
+def test_exposure_does_not_make_it_stale(qtbot, made):
+    made.session.set(("sensor", "exposure_time"), 0.1)
+    assert not made.stale and not made.is_live
+
+
+def test_each_light_group_is_seen_on_its_own(qtbot, made):
+    labels = [made.choice.itemText(i) for i in range(made.choice.count())]
+    assert labels[:3] == ["Live estimate", "Image", "Light of laser"] and "Depth" in labels
+    seen = []
+    for label in labels[1:]:
+        choose(made, label)
+        qtbot.waitUntil(lambda: not made.runner.busy)
+        seen.append(grabbed(made))
+    for i in range(len(seen)):
+        for j in range(i):
+            assert np.abs(seen[i] - seen[j]).mean() > 0.05
+
+
+def test_the_cursor_reads_the_pixel_and_tells_the_scan_line(qtbot, made):
+    session = made.session
+    curve = session.shown.frame.curves[0]
+    k = len(curve.index) // 2
+    row, column = int(curve.index[k]), round(float(curve.position[k]))
+    box = made.view.box
+    box.setRange(xRange=(column - 20, column + 20), yRange=(row - 20, row + 20), padding=0)
+    move_to(qtbot, made, column + 0.1, row + 0.1)
+    qtbot.waitUntil(lambda: session.hovered == row)
+    text = made.readout.text()
+    assert f"{column}, {row}" in text and "mm" in text and "DN" in text
+    assert session.project.scene.visible_objects[int(curve.object_id[k])].name in text
+    assert made.profile.row.value() == row
+    assert made.overlay.hover.isVisible() and made.overlay.hover.value() == row
+
+
+def test_the_wheel_zooms_to_single_pixels(qtbot, made):
+    made.view.fit()
+    before = made.view.zoom
+    for _ in range(30):
+        made.view.box.scaleBy((0.8, 0.8))
+    assert made.view.zoom > 100 * before
+    # a grid of pixels: the picture has both the pixels' colours and lines between them
+    assert made.overlay.truth.opts["symbol"] == "+"
+    made.view.fit()
+    assert made.overlay.truth.opts["symbol"] is None
+
+
+def test_the_profile_shows_the_pixels_of_the_row_and_meets_them(qtbot, made):
+    session = made.session
+    curve = session.shown.frame.curves[0]
+    row = int(curve.index[len(curve.index) // 2])
+    session.hover(row)
+    edges, values = made.profile.pixels.getData()
+    assert len(edges) == len(values) + 1 and edges[0] == -0.5
+    image = session.shown.images[0]
+    assert np.array_equal(values, image.pixels[row])
+    line = session.shown.measurements["likelihood"][0].line
+    u, width = line.u[row, 0], line.width[row, 0]
+    x = np.arange(np.ceil(u - 2 * width), np.floor(u + 2 * width) + 1)
+    (fit,) = fitted_profile(line, row, image, x, True)
+    electrons = (values[x.astype(int)] - image.black_level) / image.gain
+    noise = np.sqrt(np.maximum(electrons, 1) + image.read_noise**2 + 1 / (12 * image.gain**2)) * image.gain
+    assert np.all(np.abs(fit - values[x.astype(int)]) < 5 * noise)
+    assert "true" in made.profile.text.text() and "px" in made.profile.text.text()
+
+
+def test_a_row_without_a_position_says_why(qtbot, made):
+    line = made.session.shown.measurements["likelihood"][0].line
+    empty = np.flatnonzero(~line.valid[:, 0])
+    assert len(empty) > 0
+    made.session.hover(int(empty[0]))
+    assert REASONS[Flag(int(line.flag[empty[0], 0]))] in made.profile.text.text()
+
+
+def test_lines_of_each_method_are_switched_on_their_own(qtbot, made):
+    overlay = made.overlay
+    assert overlay.methods["likelihood"].isVisible() and not overlay.methods["gaussian"].isVisible()
+    qtbot.mouseClick(
+        overlay.method_boxes["gaussian"],
+        Qt.MouseButton.LeftButton,
+        pos=overlay.method_boxes["gaussian"].rect().center(),
+    )
+    assert overlay.methods["gaussian"].isVisible()
+    curve = made.session.shown.frame.curves[0]
+    assert len(overlay.methods["gaussian"].xData) > 0.9 * len(np.unique(curve.index))
+
+
+def test_keeping_the_place_when_the_size_changes(qtbot, made):
+    view = made.view
+    view.box.setRange(xRange=(99.5, 199.5), yRange=(99.5, 149.5), padding=0)
+    before = view.box.viewRect()
+    view.keep_place((306, 256), (612, 512))
+    after = view.box.viewRect()
+    assert after.left() + 0.5 == pytest.approx(2 * (before.left() + 0.5), abs=0.5)
+    assert after.width() == pytest.approx(2 * before.width(), rel=1e-6)
+
+
+def test_what_is_fitted_stays_fitted_until_a_person_zooms(qtbot, made):
+    def seen():
+        shown, whole = made.view.box.viewRect(), made.view.item.boundingRect()
+        return sorted((shown.width() / whole.width(), shown.height() / whole.height()))
+
+    made.view.fit()
+    for size in ((500, 900), (900, 500), (800, 700)):
+        made.resize(*size)
+        qtbot.waitUntil(lambda width=size[0]: abs(made.view.width() - width) < 10)
+        assert 1.0 < seen()[0] < 1.03, "one side fills the view, the other has room"
+    made.view.box.scaleBy((0.5, 0.5))
+    made.resize(500, 900)
+    qtbot.waitUntil(lambda: made.view.width() < 510)
+    assert seen()[0] < 0.9, "what is zoomed to stays"

@@ -1,0 +1,159 @@
+"""The develop panel: sensor and power change the shown render at once, never rendering; measures follow."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from studio.qt.render.develop_panel import DevelopPanel
+from tests.studio.qt.small_session import small_session
+
+
+@pytest.fixture
+def panel(qtbot):
+    made = DevelopPanel(small_session(rendered=True))
+    qtbot.addWidget(made)
+    made.resize(340, 480)
+    made.show()
+    qtbot.waitExposed(made)
+    settle(qtbot, made)
+    yield made
+    made.close()
+
+
+def settle(qtbot, panel):
+    """All that was asked for is done."""
+    panel.refresh()
+    qtbot.waitUntil(lambda: not panel.busy)
+
+
+def type_into(qtbot, box, text):
+    box.setFocus()
+    box.selectAll()
+    qtbot.keyClicks(box, text)
+    qtbot.keyClick(box, Qt.Key.Key_Return)
+
+
+def electrons(panel):
+    image = panel.session.shown.images[0]
+    return float(np.sum((image.pixels - image.black_level) / image.gain))
+
+
+def test_a_shown_render_is_developed_and_measured_by_every_method(panel):
+    render = panel.session.shown
+    assert set(render.measurements) == {"likelihood", "gaussian", "centre_of_mass"}
+    assert render.images[0].pixels.shape == render.frame.shape
+    assert "µm" in panel.table.text() and "DN" in panel.told.text()
+
+
+def test_typing_half_the_exposure_halves_the_electrons_without_rendering(qtbot, panel):
+    session = panel.session
+    qtbot.mouseClick(panel.noise, Qt.MouseButton.LeftButton, pos=QPoint(8, panel.noise.height() // 2))
+    assert not panel.noise.isChecked()
+    settle(qtbot, panel)
+    frame, before = session.shown.frame, electrons(panel)
+    exposure = session.project.sensor.exposure_time
+    with qtbot.waitSignal(session.measured, timeout=20000):
+        type_into(qtbot, panel.exposure.box, f"{0.5e3 * exposure:.4f}")
+    assert session.project.sensor.exposure_time == pytest.approx(exposure / 2, rel=1e-3)
+    # quantisation: half a step in 12 bits on every pixel at most
+    assert electrons(panel) == pytest.approx(before / 2, rel=0.05)
+    assert session.shown.frame is frame
+    session.document.undo()
+    assert panel.exposure.box.value() == pytest.approx(1e3 * exposure, abs=1e-3)
+
+
+def test_dragging_the_slider_is_one_step_of_the_history(qtbot, panel):
+    document = panel.session.document
+    slider = panel.exposure.slider
+    slider.setSliderDown(True)
+    for value in range(400, 460, 5):
+        slider.setValue(value)
+    slider.setSliderDown(False)
+    assert len(document._undo) == 1 and document.undo_label == "change exposure"
+    settle(qtbot, panel)
+
+
+def test_the_laser_power_scales_its_own_light(qtbot, panel):
+    session = panel.session
+    power = session.project.scene.lasers[0].power
+    peak = int(session.shown.images[0].pixels.max())
+    with qtbot.waitSignal(session.measured, timeout=20000):
+        type_into(qtbot, panel.powers[0].box, f"{1e3 * power / 4:.3f}")
+    assert int(session.shown.images[0].pixels.max()) < 0.5 * peak
+    assert session.project.scene.lasers[0].power == pytest.approx(power / 4, rel=1e-3)
+
+
+def test_bits_and_gain_are_edits_of_the_sensor(qtbot, panel):
+    session = panel.session
+    panel.bits.setFocus()
+    panel.bits.setCurrentIndex(0)
+    panel.bits.activated.emit(0)
+    settle(qtbot, panel)
+    assert session.shown.images[0].pixels.dtype == np.uint8
+    assert not panel.gain.isEnabled()
+    qtbot.mouseClick(panel.automatic_gain, Qt.MouseButton.LeftButton, pos=QPoint(8, panel.automatic_gain.height() // 2))
+    assert session.project.sensor.gain is not None and panel.gain.isEnabled()
+    type_into(qtbot, panel.gain.box, "0.01")
+    settle(qtbot, panel)
+    assert session.shown.images[0].gain == pytest.approx(0.01)
+
+
+def test_an_unchecked_method_is_not_measured(qtbot, panel):
+    with qtbot.waitSignal(panel.session.measured, timeout=20000):
+        panel.methods["centre_of_mass"].trigger()
+    assert set(panel.session.shown.measurements) == {"likelihood", "gaussian"}
+    assert not panel.methods["likelihood"].isEnabled() and "1 more" in panel.methods_button.text()
+
+
+def test_an_impossible_value_is_refused_and_the_field_goes_back(qtbot, panel):
+    session = panel.session
+    before = session.project.sensor.exposure_time
+    with qtbot.waitSignal(session.message) as told:
+        type_into(qtbot, panel.exposure.box, "0")
+    assert told.args[0] == "error"
+    assert session.project.sensor.exposure_time == before
+    assert panel.exposure.box.value() == pytest.approx(1e3 * before, abs=1e-3)
+
+
+def test_many_changes_in_a_row_end_with_the_last_one(qtbot, panel):
+    session, count = panel.session, []
+    session.developed.connect(lambda: count.append(session.shown.images[0]))
+    for i in range(30):
+        session.set(("sensor", "exposure_time"), 1e-3 * (1 + i))
+    qtbot.waitUntil(lambda: not panel.busy)
+    assert len(count) <= 5
+    from studio.scan.redevelop import develop_again, development
+
+    how = development(session.shown.project, session.project)
+    assert np.array_equal(count[-1].pixels, develop_again(session.shown.frame, how)[0].pixels)
+
+
+def test_without_a_render_it_says_what_to_do(qtbot):
+    made = DevelopPanel(small_session())
+    qtbot.addWidget(made)
+    assert "Render" in made.told.text() or made.told.text() == ""
+    made.refresh()
+    assert "Render" in made.told.text()
+    made.close()
+
+
+def test_exposures_and_the_choice_of_peaks_are_the_projects_and_told(qtbot, panel):
+    session = panel.session
+    panel.exposures.setCurrentIndex(2)
+    panel.exposures.activated.emit(2)
+    for box in (panel.continuous, panel.possible):
+        qtbot.mouseClick(box, Qt.MouseButton.LeftButton, pos=QPoint(8, box.height() // 2))
+    extraction = session.project.extraction
+    assert (extraction.exposures, extraction.select, extraction.geometry) == (3, "continuous", True)
+    settle(qtbot, panel)
+    image = session.shown.images[0]
+    assert [one.exposure_time for one in (image, *image.shorter)] == pytest.approx(
+        [session.project.sensor.exposure_time / 4**k for k in range(3)]
+    )
+    line = session.shown.measurements["likelihood"][0].line
+    assert line.candidates is not None and line.valid.mean() > 0.5
+    assert "3 exposures fused" in panel.noted.text() and "fan" in panel.noted.text()
+    session.document.undo()
+    assert not panel.possible.isChecked()

@@ -1,0 +1,172 @@
+"""No figure of another project, render or row stays on the screen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from PySide6.QtCore import QPointF
+from pytestqt.qtbot import QtBot
+
+from studio.preview.readout_rows import Row
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.project.templates import template_folder
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Render, Session
+from studio.qt.image.camera_view import CameraView
+from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.render.history import History
+from studio.qt.render.render_panel import RenderPanel
+from studio.qt.results.readout_panel import ReadoutPanel
+from studio.qt.results.results_panel import ResultsPanel
+from studio.scan.stages import scaled
+from tests.studio.qt.small_session import small_project, small_render, small_session
+
+
+def another_document() -> Document:
+    folder = template_folder("plane")
+    return Document(scaled(Project.load(folder / "project.json"), 0.125), root=folder)
+
+
+def another_render(number: int = 2) -> Render:
+    world, frame = small_render()
+    counts = {name: 2 * value for name, value in frame.counts.items()}
+    return Render(number, small_project(), world, replace(frame, counts=counts))
+
+
+@pytest.fixture
+def camera(qtbot: QtBot):
+    session = small_session(rendered=True)
+    view, develop = CameraView(session), DevelopPanel(session)
+    for widget in (view, develop):
+        qtbot.addWidget(widget)
+    view.resize(800, 700)
+    view.show()
+    qtbot.waitExposed(view)
+    with qtbot.waitSignal(session.measured, timeout=20_000):
+        develop.refresh()
+    qtbot.waitUntil(lambda: not view.runner.busy)
+    view._moved((view.view.box.mapViewToScene(QPointF(60, 40)),))
+    assert "60, 40" in view.readout.text()
+    yield view
+    view.close()
+    develop.close()
+    live(session).close()
+
+
+class TestReadOut:
+    def test_another_project_takes_it_away(self, camera: CameraView) -> None:
+        camera.session.replace_document(another_document())
+        assert camera.readout.text() == ""
+
+    def test_another_render_takes_it_away(self, camera: CameraView) -> None:
+        camera.session.add_render(another_render())
+        assert camera.readout.text() == ""
+
+    def test_another_row_takes_it_away(self, camera: CameraView) -> None:
+        camera.session.hover(40)
+        assert camera.readout.text()
+        camera.session.hover(41)
+        assert camera.readout.text() == ""
+
+    def test_another_exposure_is_read_anew(self, camera: CameraView, qtbot: QtBot) -> None:
+        before, session = camera.readout.text(), camera.session
+        with qtbot.waitSignal(session.developed, timeout=20_000):
+            session.set(("sensor", "exposure_time"), 20 * session.project.sensor.exposure_time)
+        qtbot.waitUntil(lambda: not camera.runner.busy and camera.readout.text() != before)
+        assert "60, 40" in camera.readout.text()
+
+
+def test_the_hovered_row_goes_with_its_project_and_with_another_size(qtbot: QtBot) -> None:
+    session = small_session(rendered=True)
+    session.hover(40)
+    session.add_render(another_render())
+    assert session.hovered == 40, "the rows are the same"
+    other = another_render(3)
+    session.add_render(replace(other, frame=replace(other.frame, laser_direct=(other.frame.laser_direct[0][::2],))))
+    assert session.hovered is None
+    session.hover(7)
+    with qtbot.waitSignals([session.hover_changed, session.step_changed]):
+        session.replace_document(another_document())
+    assert session.hovered is None
+
+
+def test_the_errors_of_the_render_panel_are_of_what_is_shown(qtbot: QtBot) -> None:
+    session = small_session(rendered=True)
+    panel = RenderPanel(session, JobRunner())
+    qtbot.addWidget(panel)
+    panel.show()
+    first = session.shown
+    session.add_render(another_render())
+    second = panel.errors.text()
+    session.show(first)
+    assert panel.errors.text() and panel.errors.text() != second
+    session.show(session.renders[1])
+    assert panel.errors.text() == second
+    session.replace_document(another_document())
+    assert panel.errors.text() == "" and not panel.errors.isVisible()
+    live(session).close()
+
+
+def test_measures_beside_the_exposure_are_of_what_is_shown(qtbot: QtBot) -> None:
+    session = small_session(rendered=True)
+    panel = DevelopPanel(session)
+    qtbot.addWidget(panel)
+    with qtbot.waitSignal(session.measured, timeout=20_000):
+        panel.refresh()
+    assert panel.table.text() and panel.told.text()
+    session.add_render(another_render())
+    assert panel.table.text() == "" and panel.told.text() == ""
+    qtbot.waitUntil(lambda: not panel.busy)
+    assert panel.table.text()
+    panel.close()
+
+
+def test_design_figures_that_a_project_does_not_have_are_hidden(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+    from studio.qt.results import readout_panel
+
+    session = small_session()
+    panel = ReadoutPanel(session)
+    qtbot.addWidget(panel)
+    panel.show()
+    qtbot.waitUntil(lambda: live(session).ready and len(panel.rows()) > 2)
+    row: Row = panel.rows()[0]
+    monkeypatch.setattr(readout_panel, "rows", lambda *_: (row,))
+    panel._refresh()
+    assert [key for key, labels in panel._labels.items() if labels[1].isVisible()] == [row.key]
+    live(session).close()
+
+
+def test_two_renders_of_another_project_are_compared_no_longer(qtbot: QtBot) -> None:
+    session = small_session(rendered=True)
+    panel = History(session)
+    qtbot.addWidget(panel)
+    small = replace(another_render(), image_scale=0.5)
+    session.add_render(small)
+    panel.list.selectAll()
+    panel.compare()
+    view = panel.comparison
+    assert view is not None and view.isVisible() and "0.5 x" in view.right.text()
+    qtbot.waitUntil(lambda: not view.runner.busy)
+    session.replace_document(another_document())
+    assert not view.isVisible() and view.comparison is None
+
+
+def test_results_explain_what_lies_within_two_sigma(qtbot: QtBot) -> None:
+    session: Session = small_session(rendered=True)
+    panel, develop = ResultsPanel(session), DevelopPanel(session)
+    for widget in (panel, develop):
+        qtbot.addWidget(widget)
+    with qtbot.waitSignal(session.measured, timeout=20_000):
+        develop.refresh()
+    rows = {panel.table.verticalHeaderItem(i).text(): i for i in range(panel.table.rowCount())}
+    heading = panel.table.verticalHeaderItem(rows["Within 2 sigma / %"])
+    assert "95 %" in heading.toolTip() and "noise" in heading.toolTip()
+    assert session.shown is not None
+    said = panel.notices[1].text.text()
+    low = session.shown.measurements["likelihood"][0].errors.u.coverage < 0.88
+    assert ("predicted sigma" in said) == low
+    panel.close()
+    develop.close()

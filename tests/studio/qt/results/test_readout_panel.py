@@ -1,0 +1,74 @@
+"""The design panel: it follows the look, says what is out of range in colour, and explains itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import QComboBox, QLabel
+from pytestqt.qtbot import QtBot
+
+from render.base.pose import Pose
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.qt.core import theme
+from studio.qt.core.session import Session
+from studio.qt.results.readout_panel import ReadoutPanel
+
+SAMPLE = Path(__file__).parents[4] / "assets/projects/plane/project.json"
+LASERS = ("scene", "rig", "lasers")
+
+
+def panel_on(qtbot: QtBot) -> ReadoutPanel:
+    theme.apply("light")
+    panel = ReadoutPanel(Session(Document(Project.load(SAMPLE), SAMPLE)))
+    qtbot.addWidget(panel)
+    panel.show()
+    qtbot.waitUntil(lambda: bool(panel.rows()) and panel.rows()[1].value != "-")
+    return panel
+
+
+def label_of(panel: ReadoutPanel, text: str) -> QLabel:
+    return next(label for label in panel.findChildren(QLabel) if label.text() == text)
+
+
+def value_of(panel: ReadoutPanel, key: str) -> str:
+    return next(row.value for row in panel.rows() if row.key == key)
+
+
+def test_a_value_out_of_range_takes_the_colour_of_a_warning(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    session = panel._session
+    session.set((*LASERS, 0, "power"), 2.0)
+    qtbot.waitUntil(lambda: value_of(panel, "saturated") == "100%")
+    assert theme.colours().error in label_of(panel, "100%").styleSheet()
+    assert "full well" in label_of(panel, "Saturated").toolTip()
+    theme.apply("dark")
+    assert theme.DARK.error in label_of(panel, "100%").styleSheet()
+    session.document.undo()
+    qtbot.waitUntil(lambda: value_of(panel, "saturated") == "0%")
+    assert theme.colours().text in label_of(panel, value_of(panel, "peak")).styleSheet()
+
+
+def test_with_two_lasers_the_selected_one_is_read_out(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    session = panel._session
+    choice = panel.findChild(QComboBox)
+    assert choice is not None and not choice.isVisible()
+    first = session.project.scene.lasers[0]
+    other = first.model_copy(
+        update={"name": "second", "T_rig_laser": Pose(translation=(-0.35, 0, 0), rotation=(0, 0.4, 0))}
+    )
+    session.set(LASERS, (first, other))
+    qtbot.waitUntil(choice.isVisible)
+    assert value_of(panel, "baseline") == "200 mm"
+    session.select((*LASERS, 1))
+    assert value_of(panel, "baseline") == "350 mm" and choice.currentText() == "second"
+    session.set(LASERS, (first,))
+    qtbot.waitUntil(lambda: value_of(panel, "baseline") == "200 mm")
+
+
+def test_without_a_laser_it_says_what_to_do(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    panel._session.set(LASERS, ())
+    qtbot.waitUntil(lambda: panel.rows() == ())
+    assert label_of(panel, "Add a laser to the rig to see what it measures.").isVisible()

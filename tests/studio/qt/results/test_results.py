@@ -1,0 +1,219 @@
+"""The result views are one: what is pointed at in one of them is marked in all."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from pytestqt.qtbot import QtBot
+
+from render.world.world import build_world
+from studio.project.project import Project
+from studio.qt.core.session import Render
+from studio.qt.results.results_panel import ResultsPanel
+from studio.qt.shell.window import MainWindow
+from studio.qt.viewport.error_cloud import ErrorCloud
+from studio.scan.stages import Clock, develop_step, measure_step, render_step
+
+METHODS = ("likelihood", "gaussian", "centre_of_mass")
+
+
+@pytest.fixture(scope="module")
+def render(tmp_path_factory: pytest.TempPathFactory) -> Render:
+    """The step block in 244 x 204 px, measured by three methods."""
+    from studio.project.templates import template_folder
+    from studio.scan.stages import scaled
+
+    folder = template_folder("step_block")
+    project = scaled(Project.load(folder / "project.json"), 0.1)
+    settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05})
+    project = project.model_copy(update={"render": settings})
+    clock = Clock(lambda *_: None, lambda: False)
+    world = build_world(project.scene, folder, 0)
+    frame = render_step(project, world, 0, clock, None)
+    images = develop_step(project, frame, clock, None)
+    found = {method: measure_step(project, frame, world, images, clock, None, method) for method in METHODS}
+    return Render(1, project, world, frame, measurements=found, images=images)
+
+
+@pytest.fixture
+def results(window: MainWindow, render: Render, qtbot: QtBot) -> ResultsPanel:
+    window.switch_to("measure")
+    window.session.add_render(render)
+    panel = window.panels["results"]
+    assert isinstance(panel, ResultsPanel)
+    qtbot.waitUntil(lambda: panel.rows.isVisible() and panel.rows.width() > 100)
+    return panel
+
+
+def scan_line_in(window: MainWindow) -> int:
+    """One with a point and a true crossing."""
+    render = window.session.shown
+    assert render is not None
+    one = render.measurements["likelihood"][0]
+    here = np.flatnonzero(np.isfinite(one.errors.depth))
+    return int(one.points.index[here[len(here) // 3]])
+
+
+def test_pointing_at_a_row_marks_it_everywhere(window: MainWindow, results: ResultsPanel, qtbot: QtBot) -> None:
+    row = scan_line_in(window)
+    plot = results.rows.depth
+    low, high = plot.vb.viewRange()[1]
+    at = plot.vb.mapViewToScene(QPointF(row, (low + high) / 2))
+    qtbot.mouseMove(results.rows.viewport(), results.rows.mapFromScene(at))
+    qtbot.waitUntil(lambda: window.session.hovered is not None)
+    hovered = window.session.hovered
+    assert hovered is not None and abs(hovered - row) <= 1
+    assert all(line.isVisible() and line.value() == hovered for line in results.rows.cursors)
+    assert len(results.profile.ring.data) > 0
+    assert results.histogram.cursor.isVisible()
+    assert f"Row {hovered}" in results.reading.text()
+    assert np.all(window.cloud.rows[window.cloud.rows == hovered] == hovered) and window.cloud._marks.n_points > 0
+
+
+def test_a_click_keeps_the_row_when_the_mouse_leaves(window: MainWindow, results: ResultsPanel, qtbot: QtBot) -> None:
+    row = scan_line_in(window)
+    at = results.rows.error.vb.mapViewToScene(QPointF(row, 0.0))
+    place = results.rows.mapFromScene(at)
+    qtbot.mouseMove(results.rows.viewport(), place)
+    qtbot.mouseClick(results.rows.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    pinned = results.pinned
+    assert pinned is not None and abs(pinned - row) <= 1
+    results.rows.hovered.emit(3)
+    assert window.session.hovered == 3
+    results.rows.hovered.emit(None)
+    assert window.session.hovered == pinned
+
+
+def test_pointing_at_the_profile_finds_the_nearest_sample(
+    window: MainWindow, results: ResultsPanel, qtbot: QtBot
+) -> None:
+    from studio.scan.result_series import measured_series
+
+    render = window.session.shown
+    assert render is not None
+    series = measured_series(render.measurements["likelihood"][0], render.project.scene)
+    i = int(np.flatnonzero(np.isfinite(series.distance))[20])
+    at = results.profile.plot.vb.mapViewToScene(QPointF(series.across[i], series.distance[i]))
+    found = results.profile.nearest(at)
+    assert found is not None and abs(found - series.index[i]) <= 1
+
+
+def test_pointing_at_a_point_in_3d_marks_its_row(window: MainWindow, results: ResultsPanel, qtbot: QtBot) -> None:
+    cloud: ErrorCloud = window.cloud
+    assert cloud.visible and len(cloud.points) > 50
+    cloud.frame()
+    i = len(cloud.points) // 2
+    x, y = cloud.view.eye.project(cloud.points[i : i + 1], cloud.view.pixels)[0]
+    qtbot.mouseMove(cloud.view, QPoint(5, 5))
+    qtbot.mouseMove(cloud.view, QPoint(round(x), round(y)))
+    qtbot.waitUntil(lambda: window.session.hovered is not None)
+    hovered = window.session.hovered
+    assert hovered is not None
+    apart = cloud.view.eye.project(cloud.points[cloud.rows == hovered], cloud.view.pixels) - (x, y)
+    assert np.linalg.norm(apart, axis=1).min() < 3.0
+
+
+def test_the_menu_walks_along_the_line_and_to_the_worst(
+    window: MainWindow, results: ResultsPanel, qtbot: QtBot
+) -> None:
+    session = window.session
+    qtbot.keyClick(window, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)
+    first = session.hovered
+    qtbot.keyClick(window, Qt.Key.Key_Down, Qt.KeyboardModifier.AltModifier)
+    assert first is not None and session.hovered == first + 1
+    qtbot.keyClick(window, Qt.Key.Key_W, Qt.KeyboardModifier.AltModifier)
+    assert session.shown is not None
+    errors = session.shown.measurements["likelihood"][0].errors.depth
+    worst = np.nanmax(np.abs(errors))
+    row = session.shown.measurements["likelihood"][0].points.index == session.hovered
+    assert np.nanmax(np.abs(errors[row])) == worst
+
+
+def test_methods_can_be_switched_off(window: MainWindow, results: ResultsPanel, qtbot: QtBot) -> None:
+    assert list(results.shown()) == list(METHODS) and results.table.columnCount() == 3
+    button = results.findChild(type(results.switches.itemAt(1).widget()), "gaussian")
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert "gaussian" not in results.shown() and results.table.columnCount() == 2
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert list(results.shown()) == list(METHODS)
+
+
+def test_the_table_says_what_the_measures_say(window: MainWindow, results: ResultsPanel) -> None:
+    render = window.session.shown
+    assert render is not None
+    rows = {results.table.verticalHeaderItem(i).text(): i for i in range(results.table.rowCount())}
+    rmse = render.measurements["likelihood"][0].errors.depth_z.rmse
+    assert float(results.table.item(rows["RMSE / µm"], 0).text()) == pytest.approx(1e6 * rmse, rel=5e-3)
+    results.error.setCurrentIndex(2)
+    assert float(results.table.item(rows["RMSE / µm"], 0).text()) == pytest.approx(
+        render.measurements["likelihood"][0].errors.u.rmse, rel=5e-3
+    )
+    assert window.cloud.error_view.kind == "position"
+    results.error.setCurrentIndex(0)
+
+
+def test_points_hide_when_the_scene_has_changed_but_not_while_measuring(
+    window: MainWindow, results: ResultsPanel, qtbot: QtBot
+) -> None:
+    window.session.set(("scene", "objects", 0, "scale"), 1.5)
+    assert window.cloud.visible, "the measure workspace keeps what was measured"
+    window.switch_to("setup")
+    assert not window.cloud.visible
+    window.session.document.undo()
+
+
+def test_without_a_render_the_panel_says_what_to_do(window: MainWindow) -> None:
+    panel = window.panels["results"]
+    assert isinstance(panel, ResultsPanel)
+    assert panel.stack.currentIndex() == 0
+    assert not window.commands["export_html"].isEnabled()
+
+
+class TestMotion:
+    @pytest.fixture
+    def moving(self, window: MainWindow, tmp_path: Path) -> MainWindow:
+        from render.scene.motion import LinearStage
+        from studio.project.document import replaced
+
+        motion = LinearStage(step=(0.0, 0.002, 0.0), steps=3)
+        window.session.document.apply("move", replaced(window.session.project, ("scene", "motion"), motion))
+        window.show_panel("motion")
+        return window
+
+    def test_the_slider_moves_what_every_view_shows(self, moving: MainWindow, qtbot: QtBot) -> None:
+        from studio.qt.core.live_preview import live
+        from studio.qt.render.motion_panel import MotionPanel
+
+        panel = moving.panels["motion"]
+        assert isinstance(panel, MotionPanel) and panel.steps.slider.maximum() == 2
+        panel.steps.slider.setValue(2)
+        assert moving.session.step == 2
+        qtbot.waitUntil(lambda: live(moving.session).look.step == 2)
+        assert "step 3 of 3" in panel.told.text() and "4.00" in panel.told.text()
+
+    def test_playing_goes_to_the_end_and_stops(self, moving: MainWindow, qtbot: QtBot) -> None:
+        panel = moving.panels["motion"]
+        panel.steps._timer.setInterval(1)  # type: ignore[attr-defined]
+        qtbot.mouseClick(panel.steps.play, Qt.MouseButton.LeftButton)  # type: ignore[attr-defined]
+        qtbot.waitUntil(lambda: moving.session.step == 2 and not panel.steps._timer.isActive())  # type: ignore[attr-defined]
+
+    def test_undoing_the_motion_leads_back_to_a_step_that_is_there(self, moving: MainWindow) -> None:
+        moving.session.look_at_step(2)
+        moving.session.document.undo()
+        assert moving.session.step == 0
+
+    def test_a_scan_grows_its_cloud_step_by_step(self, moving: MainWindow, qtbot: QtBot, tmp_path: Path) -> None:
+        panel = moving.panels["motion"]
+        sizes: list[int] = []
+        panel.grew.connect(lambda _: sizes.append(len(moving.cloud.points)))  # type: ignore[attr-defined]
+        panel.scale.setCurrentText("full size")  # type: ignore[attr-defined]
+        with qtbot.waitSignal(moving.runner.finished, timeout=60_000):
+            assert panel.run_into(tmp_path / "scan", report=False) is not None  # type: ignore[attr-defined]
+        assert len(sizes) == 3 and sizes[0] < sizes[1] < sizes[2]
+        ys = moving.cloud.points[:, 1]
+        assert math.isclose(np.ptp(ys), np.ptp(ys[: sizes[0]]) + 0.004, abs_tol=0.002)
+        assert (tmp_path / "scan" / "points.ply").is_file()

@@ -1,0 +1,153 @@
+"""The inspector's choices: another kind, a file, a preset, an entry added to a list."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QToolButton
+from pytestqt.qtbot import QtBot
+
+from render.laser.laser import Waist
+from render.material.material import Texture
+from render.scene.shape import MeshFile
+from studio.qt.core.session import Session
+from studio.qt.scene import mesh_importer
+from studio.qt.scene.inspector import Inspector
+from tests.studio.qt.scene.inspector_hands import CAMERA, LASER, field, inspector_window, sample_session, type_into
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Session:
+    return sample_session(tmp_path)
+
+
+@pytest.fixture
+def inspector(session: Session, qtbot: QtBot) -> Iterator[Inspector]:
+    with inspector_window(session, qtbot) as panel:
+        yield panel
+
+
+def tools(inspector: Inspector) -> list[QToolButton]:
+    return [tool for tool in inspector.form.findChildren(QToolButton) if tool.isVisible()]
+
+
+def click_tool(qtbot: QtBot, inspector: Inspector, tip: str) -> None:
+    """The first one with this tip."""
+    qtbot.waitUntil(lambda: any(tool.toolTip() == tip for tool in tools(inspector)))
+    qtbot.mouseClick(next(tool for tool in tools(inspector) if tool.toolTip() == tip), Qt.MouseButton.LeftButton)
+
+
+class TestKinds:
+    def choose(self, qtbot: QtBot, inspector: Inspector, path: Any, label: str) -> None:
+        chooser = inspector.form.kinds[path]
+        index = chooser.findText(label)
+        chooser.setFocus()
+        # as the list does when an entry is clicked
+        chooser.setCurrentIndex(index)
+        chooser.activated.emit(index)
+
+    def test_a_sheet_becomes_focused(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+        self.choose(qtbot, inspector, (*LASER, "sheet"), "Focused")
+        assert session.project.scene.lasers[0].sheet == Waist()
+        assert field(inspector, *LASER, "sheet", "radius").suffix == "um"
+        session.document.undo()
+        assert field(inspector, *LASER, "sheet", "full_angle").text() == "1.15"
+
+    def test_poses_are_added_and_removed(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+        path = ("scene", "motion")
+        session.select(path)
+        self.choose(qtbot, inspector, path, "List of poses")
+        type_into(qtbot, field(inspector, *path, "poses", 0, axis=0), "10")
+        click_tool(qtbot, inspector, "Add a pose like the last one")
+        type_into(qtbot, field(inspector, *path, "poses", 1, axis=0), "25")
+        assert [pose.translation[0] for pose in session.project.scene.motion.poses] == [0.010, 0.025]
+        click_tool(qtbot, inspector, "Remove this pose")
+        assert [pose.translation[0] for pose in session.project.scene.motion.poses] == [0.025]
+        qtbot.waitUntil(lambda: any("Add a pose" in tool.toolTip() for tool in tools(inspector)))
+        assert not [tool for tool in tools(inspector) if tool.toolTip() == "Remove this pose"]  # one must stay
+        session.document.undo()
+        assert session.project.scene.frame_count == 2
+
+    def test_motion_shape_and_filter(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+        session.select(("scene", "motion"))
+        self.choose(qtbot, inspector, ("scene", "motion"), "Turntable")
+        assert session.project.scene.motion.kind == "turntable"
+        session.select(("scene", "objects", 1))
+        self.choose(qtbot, inspector, ("scene", "objects", 1, "shape"), "Sphere")
+        assert session.project.scene.objects[1].shape.kind == "sphere"
+        session.select(("sensor",))
+        self.choose(qtbot, inspector, ("sensor", "band_pass"), "Band pass")
+        assert session.project.sensor.band_pass is not None
+        assert field(inspector, "sensor", "band_pass", "centre_nm").text() == "450"
+
+    def test_a_mesh_file_is_chosen_copied_and_used(
+        self, qtbot: QtBot, session: Session, inspector: Inspector, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        outside = tmp_path.parent / f"{tmp_path.name}-outside" / "part.stl"
+        outside.parent.mkdir()
+        trimesh.creation.box((100, 50, 20)).export(outside)
+        monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: outside)
+        monkeypatch.setattr(mesh_importer, "may_copy", lambda *_: True)
+        session.select(("scene", "objects", 1))
+        self.choose(qtbot, inspector, ("scene", "objects", 1, "shape"), "Mesh file")
+        qtbot.waitUntil(lambda: isinstance(session.project.scene.objects[1].shape, MeshFile))
+        shape = session.project.scene.objects[1].shape
+        assert (shape.path, shape.unit) == ("meshes/part.stl", "mm")
+        qtbot.waitUntil(lambda: not mesh_importer.importing())
+
+    def test_a_file_dialog_that_is_cancelled_changes_nothing(
+        self, qtbot: QtBot, session: Session, inspector: Inspector, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        before = session.project
+        monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: None)
+        session.select(("scene", "objects", 1))
+        for part, label in (("shape", "Mesh file"), ("material", None)):
+            path = ("scene", "objects", 1, part)
+            if label is None:
+                path, label = (*path, "albedo"), "Image"
+            self.choose(qtbot, inspector, path, label)
+            assert session.project is before
+            assert inspector.form.kinds[path].currentText() != label
+
+    def test_an_image_becomes_the_albedo(
+        self, qtbot: QtBot, session: Session, inspector: Inspector, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        (tmp_path / "wood.png").write_bytes(b"png")
+        monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: tmp_path / "wood.png")
+        session.select(("scene", "objects", 1))
+        self.choose(qtbot, inspector, ("scene", "objects", 1, "material", "albedo"), "Image")
+        assert session.project.scene.objects[1].material.albedo == Texture(path="wood.png")
+
+
+class TestMenus:
+    def test_a_list_offers_to_add_to_it(self, session: Session, inspector: Inspector) -> None:
+        session.select(("scene", "lights"))
+        entries = {action.text(): action for action in inspector.add.menu().actions()}
+        assert inspector.add.isVisible() and list(entries) == ["Point light", "Panel light"]
+        entries["Point light"].trigger()
+        assert session.selection == ("scene", "lights", 1)
+        assert inspector.title.text() == "lamp"
+
+    def test_a_preset_is_one_edit_and_tells_its_source(
+        self, qtbot: QtBot, session: Session, inspector: Inspector
+    ) -> None:
+        before, told = session.project, []
+        session.message.connect(lambda level, text: told.append(text))
+        action = next(entry for entry in inspector.presets.menu().actions() if "660" in entry.text())
+        assert "Typical" in action.toolTip()
+        action.trigger()
+        assert session.project.scene.lasers[0].wavelength_nm == 660.0
+        assert field(inspector, *LASER, "wavelength_nm").text() == "660"
+        assert "Typical" in told[-1]
+        session.document.undo()
+        assert session.project == before
+
+    def test_only_items_with_presets_have_the_menu(self, session: Session, inspector: Inspector) -> None:
+        items = (LASER, CAMERA, ("sensor",), ("scene", "objects", 0), ("scene", "motion"), ())
+        shown = {path: (session.select(path), inspector.presets.isVisible())[1] for path in items}
+        assert list(shown.values()) == [True, True, True, True, False, False]

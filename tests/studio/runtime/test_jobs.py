@@ -1,0 +1,199 @@
+"""Jobs: states, progress, pause, cancel, and what a failure tells a person."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from render.base.errors import Cancelled, InputError
+from render.base.threads import Cancel, map_chunks
+from studio.project.project import Project
+from studio.runtime.jobs import Job, Progress, State
+
+
+def until(condition: Callable[[], bool], seconds: float = 180.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        threading.Event().wait(0.001)
+
+
+def until_it_stands(value: Callable[[], object]) -> None:
+    """Until a value stays as it is: what was under way has ended."""
+
+    def stands() -> bool:
+        before = value()
+        threading.Event().wait(0.05)
+        return value() == before
+
+    until(stands)
+
+
+def spin(progress: Progress, cancelled: Cancel) -> int:
+    """Counts until it is told to stop."""
+    count = 0
+    while not cancelled():
+        count += 1
+        progress("counting", 0.5)
+    raise Cancelled
+
+
+def started(work: Callable[[Progress, Cancel], object]) -> Job[object]:
+    job = Job("count", work)
+    job.start()
+    until(lambda: job.state is State.RUNNING)
+    return job
+
+
+def test_a_job_is_queued_then_done_with_its_result() -> None:
+    ended: list[State] = []
+    job = Job("add", lambda progress, cancelled: 1 + 1, on_end=lambda job: ended.append(job.state))
+    assert job.state is State.QUEUED and not job.ended
+    job.start()
+    assert job.join(180)
+    assert (job.state, job.result, job.done, ended) == (State.DONE, 2, 1.0, [State.DONE])
+
+
+def test_a_job_starts_only_once() -> None:
+    job = Job("add", lambda progress, cancelled: 2)
+    job.start()
+    job.join()
+    with pytest.raises(RuntimeError):
+        job.start()
+
+
+def test_cancel_stops_running_work() -> None:
+    job = started(spin)
+    job.cancel()
+    assert job.join(180)
+    assert job.state is State.CANCELLED and job.problem is None
+
+
+def test_a_job_cancelled_before_its_start_never_works() -> None:
+    worked = []
+    job = Job("never", lambda progress, cancelled: worked.append(1))
+    job.cancel()
+    job.start()
+    job.join()
+    assert job.state is State.CANCELLED and worked == []
+
+
+def test_a_paused_job_stands_still_and_its_clock_too() -> None:
+    count = [0]
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        while not cancelled():
+            count[0] += 1
+        raise Cancelled
+
+    job = started(work)
+    until(lambda: count[0] > 100)
+    job.pause()
+    assert job.state is State.PAUSED
+    until_it_stands(lambda: (count[0], job.seconds))
+    stood = count[0]
+    job.resume()
+    until(lambda: count[0] > stood)
+    assert job.state is State.RUNNING
+    job.cancel()
+    assert job.join(180)
+
+
+def test_a_paused_job_can_be_cancelled() -> None:
+    job = started(spin)
+    job.pause()
+    job.cancel()
+    assert job.join(180) and job.state is State.CANCELLED
+
+
+def test_pause_holds_a_pool_of_threads_as_well() -> None:
+    calls = []
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        map_chunks(lambda start, stop: calls.append(start), 10_000_000, 1000, 2, cancelled)
+
+    job = started(work)
+    until(lambda: len(calls) > 10)
+    job.pause()
+    until_it_stands(lambda: len(calls))
+    assert len(calls) < 10_000
+    job.cancel()
+    assert job.join(180) and job.state is State.CANCELLED
+
+
+def test_time_left_follows_the_progress() -> None:
+    half = threading.Event()
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        progress("first half", 0.5)
+        half.wait(180)
+
+    job = started(work)
+    until(lambda: job.seconds_left is not None)
+    left, spent = job.seconds_left, job.seconds
+    assert left is not None and left == pytest.approx(spent, rel=0.05)
+    half.set()
+    job.join()
+    assert job.seconds_left is None
+
+
+def test_bad_input_is_told_in_its_own_words() -> None:
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        raise InputError("the mesh is missing", where="part.stl", cure="choose the file again")
+
+    job = Job("render", work)
+    job.start()
+    job.join()
+    assert job.state is State.FAILED and job.problem is not None
+    assert job.problem.text == "part.stl: the mesh is missing; choose the file again"
+    assert job.problem.details == ""
+
+
+def test_too_little_memory_is_told_with_its_cure() -> None:
+    job = Job("render", lambda progress, cancelled: np.empty(1 << 60, np.uint8))
+    job.start()
+    job.join()
+    assert job.state is State.FAILED and job.problem is not None
+    assert "memory" in job.problem.text and "smaller image" in job.problem.text
+    assert "Traceback" not in job.problem.text and "Traceback" in job.problem.details
+
+
+def test_an_internal_error_keeps_its_traceback_for_the_log() -> None:
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        raise KeyError("lamp")
+
+    job = Job("render", work)
+    job.start()
+    job.join()
+    assert job.problem is not None
+    assert "internal error" in job.problem.text and "KeyError" in job.problem.text
+    assert "Traceback" not in job.problem.text and "test_jobs" in job.problem.details
+
+
+def test_a_render_in_a_job_is_cancelled_in_the_middle_of_a_pass() -> None:
+    from render.progressive import refine
+    from render.world.world import build_world
+    from studio.project.templates import template_folder
+
+    folder: Path = template_folder("sphere")
+    project = Project.load(folder / "project.json")
+    world = build_world(project.scene, folder)
+    frames = []
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        settings = project.render.model_copy(update={"ambient_samples": 4096, "ambient_error": 2e-4})
+        for frame in refine(world, project.scene, settings=settings, progress=progress, cancelled=cancelled):
+            frames.append(frame)
+
+    job = started(work)
+    until(lambda: len(frames) >= 4, 60)
+    job.cancel()
+    seen = len(frames)
+    assert job.join(180)
+    # a pass of thousands of samples would take minutes; how soon it ends is measured in bench_desktop.py
+    assert job.state is State.CANCELLED and len(frames) <= seen + 1 and frames[-1].ambient is not None

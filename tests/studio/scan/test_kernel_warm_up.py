@@ -1,0 +1,136 @@
+"""After the warm-up nothing is compiled: what renders, measures and draws is there, whatever the scene is made of."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from render.base.errors import Cancelled
+from studio.project.project import Project
+from studio.project.templates import DESCRIPTIONS, template_folder
+from studio.scan import kernel_warm_up
+
+ROOT = Path(__file__).resolve().parents[3]
+CHILD = """
+import importlib, json, pkgutil, sys
+from pathlib import Path
+from numba.core.dispatcher import Dispatcher
+import analysis, render
+from studio.project import Project
+from studio.stages import scaled
+from studio.warm_up import needed, warm_up
+
+def quietly(stage, done): pass
+
+def never(): return False
+
+def kernels():
+    # every kernel of both rooms, by name: signatures that are there
+    found = {}
+    for room in (render, analysis):
+        for module in pkgutil.walk_packages(room.__path__, room.__name__ + "."):
+            for name, value in vars(importlib.import_module(module.name)).items():
+                if isinstance(value, Dispatcher):
+                    found[f"{value.py_func.__module__}.{value.py_func.__qualname__}"] = value
+    return found
+
+def read():
+    return {name: set(map(str, kernel.signatures)) for name, kernel in kernels().items()}
+
+from render.material import Subsurface
+from studio.scan import run_scan
+late = {}
+for folder in map(Path, sys.argv[2:]):
+    project = scaled(Project.load(folder / "project.json"), 0.03)
+    if folder.name == "sphere":
+        # what no template has: wax, and a lens that blurs
+        scene, camera = project.scene, project.scene.camera
+        camera = camera.model_copy(update={"lens": camera.lens.model_copy(update={"model": "thin-lens"})})
+        objects = tuple(
+            item.model_copy(update={"material": Subsurface()}) if item.shape.kind == "sphere" else item
+            for item in scene.objects
+        )
+        scene = scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": camera}), "objects": objects})
+        project = project.model_copy(update={"scene": scene})
+    warm_up(sum(needed(project), ()), quietly, never)
+    before = read()
+    run_scan(project, folder, out=Path(sys.argv[1], folder.name), steps=1, report=False, seconds=0.5)
+    late[folder.name] = sorted(name for name, there in read().items() if there - before.get(name, set()))
+print(json.dumps({"late": late, "kernels": len(read())}))
+"""
+
+
+def test_nothing_is_compiled_or_loaded_after_the_warm_up(tmp_path):
+    """No kernel of render and analysis, whatever its name, meets types in a scan that the warm-up has not shown it."""
+    names = ("scan", "weld_seam", "shiny_weld_seam", "glass_ball", "sphere")
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, str(tmp_path), *(str(template_folder(name)) for name in names)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    told = json.loads(done.stdout.splitlines()[-1])
+    assert told["kernels"] > 150
+    assert told["late"] == {name: [] for name in names}
+
+
+def test_a_lens_that_blurs_is_prepared_where_there_is_one():
+    for name in DESCRIPTIONS:
+        assert kernel_warm_up.needed(Project.load(template_folder(name) / "project.json"))[0] == ("draw",)
+    project = Project.load(template_folder("plane") / "project.json")
+    camera = project.scene.camera
+    camera = camera.model_copy(update={"lens": camera.lens.model_copy(update={"model": "thin-lens"})})
+    scene = project.scene.model_copy(update={"rig": project.scene.rig.model_copy(update={"camera": camera})})
+    for_line, for_all = kernel_warm_up.needed(project.model_copy(update={"scene": scene}))
+    assert for_line == ("draw", "lens") and {*for_line, *for_all, "look"} == set(kernel_warm_up.STEPS)
+
+
+@pytest.fixture
+def slow_step(monkeypatch):
+    """A step that takes until it is let go, and how often it has run."""
+    go, runs = threading.Event(), []
+
+    def step(cancelled):
+        runs.append(1)
+        go.wait(180.0)
+
+    monkeypatch.setitem(kernel_warm_up.STEPS, "slow", step)
+    yield go, runs
+    go.set()
+    kernel_warm_up._ends.pop("slow", None)
+
+
+def test_who_waits_is_told_and_cancelled_at_once_and_a_step_runs_once(slow_step):
+    go, runs = slow_step
+    told, asked = [], []
+
+    def cancelled():
+        asked.append(1)
+        return len(asked) > 3
+
+    with pytest.raises(Cancelled):
+        kernel_warm_up.warm_up(("slow",), lambda stage, done: told.append(stage), cancelled)
+    assert len(asked) == 4 and not kernel_warm_up._ends["slow"].done()
+    assert set(told) == {kernel_warm_up.PREPARING} and "compiled" in kernel_warm_up.PREPARING
+    go.set()
+    kernel_warm_up.warm_up(("slow",), lambda stage, done: None, lambda: False)
+    kernel_warm_up.warm_up(("slow",), lambda stage, done: pytest.fail("it is done"), lambda: False)
+    assert len(runs) == 1
+
+
+def test_what_is_broken_is_told_to_all_who_wait(monkeypatch):
+    def broken(cancelled):
+        raise RuntimeError("the installation is damaged")
+
+    monkeypatch.setitem(kernel_warm_up.STEPS, "broken", broken)
+    for _ in range(2):
+        with pytest.raises(RuntimeError, match="damaged"):
+            kernel_warm_up.warm_up(("broken",), lambda stage, done: None, lambda: False)
+    kernel_warm_up._ends.pop("broken", None)

@@ -1,0 +1,44 @@
+"""What is said of figures beside them: at which scale they were measured, and what the report says of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.report.record import record_of
+from analysis.report.summary import remarks
+from analysis.report.total import total
+from render.base.errors import InputError
+from render.world.world import build_world
+from studio.project.project import Project
+from studio.project.templates import template_folder
+from studio.scan.remarks import best, frame_remarks, frame_result, scale_head, scale_notes
+from studio.scan.stages import Clock, develop_step, measure_step, render_step, scaled
+
+
+def test_figures_at_another_scale_are_said_not_to_be_the_scanners() -> None:
+    assert scale_notes(1.0) == () and scale_head(1.0) == ""
+    (note,) = scale_notes(0.25)
+    assert "image scale 0.25" in note and "not the scanner's" in note and "4 times as large" in note
+    assert note.startswith(scale_head(0.25))
+    assert "as large" not in scale_notes(2.0)[0]
+
+
+def test_the_remarks_are_those_of_the_report() -> None:
+    folder = template_folder("step_block")
+    project = scaled(Project.load(folder / "project.json"), 0.1)
+    world = build_world(project.scene, folder, 0)
+    clock = Clock(lambda *_: None, lambda: False)
+    frame = render_step(project, world, 0, clock, None)
+    images = develop_step(project, frame, clock, None)
+    found = {"gaussian": measure_step(project, frame, world, images, clock, None, "gaussian")}
+    result = frame_result(project, frame, found, images)
+    assert np.array_equal(result.lasers[0].image, images[0].pixels)
+    said = remarks(total(record_of(project.scene, [result]).chosen()))
+    assert said and frame_remarks(project, frame, found) == [*frame.warnings, *said]
+    assert any("predicted sigma" in text for text in said), "the share within 2 sigma is explained"
+
+
+def test_without_a_measurement_there_is_nothing_to_remark() -> None:
+    with pytest.raises(InputError, match="nothing is measured"):
+        best({}, scaled(Project.load(template_folder("plane") / "project.json"), 0.1))
