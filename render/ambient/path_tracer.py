@@ -14,11 +14,12 @@ from render.ambient.path_state import Shadows, Wave, add_clear, launch
 from render.ambient.random_walk import wander
 from render.base.errors import Cancelled
 from render.base.threads import Cancel
-from render.laser_indirect.random_walk import MOST_STEPS
+from render.camera.view import View
+from render.material.medium import MOST_STEPS
 from render.sampling.low_discrepancy import pair_table
 from render.scene.scene import Scene
 from render.world.embree import RayScene
-from render.world.triangles import Surface, View, has_gloss, has_medium
+from render.world.triangles import Surface, has_gloss, has_medium
 from render.world.world import World
 
 Float = NDArray[np.float64]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.ambient.path_state import Wave
-from render.laser_indirect.random_walk import MOST_STEPS, turn
 from render.material.bsdf import ANISOTROPY, EXTINCTION, SCATTERED
+from render.material.medium import MOST_STEPS, turn
 from render.sampling.random import uniform
 
 Float = NDArray[np.float64]

@@ -19,7 +19,7 @@ from pydantic import Field, field_validator, model_validator
 from render.base.model import Model, UnitInterval, quantity
 from render.base.pose import Pose
 from render.camera.distortion import distort_points, fold_radii, undistort_points
-from render.world.triangles import View
+from render.camera.view import View
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.camera.distortion import distort, fold_radius_at, undistort
-from render.world.triangles import View
+from render.camera.view import View
 
 Float = NDArray[np.float64]
 

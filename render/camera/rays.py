@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from render.camera.distortion import tilt_matrix, undistort
 from render.camera.lens import chief_ray, lens_direction, lens_point, lens_position
+from render.camera.view import View
 from render.sampling.low_discrepancy import ROWS
 from render.sampling.random import bits, uniform
-from render.world.triangles import View
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]

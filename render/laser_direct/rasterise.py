@@ -17,10 +17,11 @@ from render.base.threads import map_chunks
 from render.camera.camera import Camera
 from render.camera.distortion import distort, tilt_matrix
 from render.camera.lens import chief_ray
+from render.camera.projection import project_point
+from render.camera.view import View
 from render.laser.irradiance import SHEET_SIGMAS, sheet_sigma
 from render.laser.laser import LineLaser
-from render.truth.laser_curve import project_point
-from render.world.triangles import Surface, View
+from render.world.triangles import Surface
 from render.world.world import World
 
 Float = NDArray[np.float64]

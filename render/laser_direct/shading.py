@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from render.camera.distortion import distort, tilt_matrix
 from render.camera.lens import lens_direction, lens_position
+from render.camera.view import View
 from render.laser.irradiance import fan_density, sheet_sigma
 from render.laser.sheet_integral import about_over, about_over_aperture, mean_over, sheet_slope
 from render.material.bsdf import evaluate, is_diffuse
 from render.world.surface_interaction import detailed, light_side
-from render.world.triangles import Surface, View, lookup, slot_reflectance, to_local
+from render.world.triangles import Surface, lookup, slot_reflectance, to_local
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]

@@ -19,6 +19,7 @@ from render.base.threads import Cancel
 from render.camera.camera import Camera
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_position
+from render.camera.view import View
 from render.laser.laser import LineLaser
 from render.laser_indirect.connection_buffer import Joints, Lit, Take, count_joints, no_joints
 from render.laser_indirect.connections import (
@@ -51,11 +52,12 @@ from render.laser_indirect.path_vertex import (
 )
 from render.laser_indirect.photon_emission import Fan, Paths, emit
 from render.laser_indirect.photon_merging import SHRINK, Photons, merge, photons
-from render.laser_indirect.random_walk import MOST_STEPS, scatter_inside
+from render.laser_indirect.random_walk import scatter_inside
 from render.laser_indirect.ris import join_light
 from render.material.material import reflectance_weights
+from render.material.medium import MOST_STEPS
 from render.sampling.random import uniform, wrapped
-from render.world.triangles import Surface, View
+from render.world.triangles import Surface
 from render.world.world import World
 
 Float = NDArray[np.float64]

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import lens_point, lens_position, lens_project
+from render.camera.view import View
 from render.laser.irradiance import irradiance
 from render.laser_indirect.connection_buffer import BLOCK, JOINS, Joints, Take, cast
 from render.laser_indirect.path_vertex import (
@@ -43,7 +44,6 @@ from render.laser_indirect.path_vertex import (
 )
 from render.laser_indirect.photon_emission import Fan, emitted_density
 from render.sampling.random import uniform
-from render.world.triangles import View
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]

@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from render.laser_indirect.path_vertex import DVC, DVCM, MEDIUM, NUMBER
 from render.material.bsdf import ANISOTROPY, EXTINCTION, SCATTERED
+from render.material.medium import MOST_STEPS, turn
 from render.sampling.random import uniform
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 
-MOST_STEPS = 4096
-"""Scatterings between two meetings with the boundary; a path that needs more is ended: e^-41 of them at 0.99 albedo."""
 WALK = 1000
 """First of the random dimensions that walks use."""
 
@@ -73,15 +72,3 @@ def scatter_inside(
         walking[left] = r
         left += 1
     return left
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def turn(d: Float, x: float, y: float, z: float) -> None:
-    """Give the unit vector d (3,) the direction (x, y, z) that it has in a frame about d (Duff et al. 2017)."""
-    n0, n1, n2 = d[0], d[1], d[2]
-    sign = 1.0 if n2 >= 0.0 else -1.0
-    a = -1.0 / (sign + n2)
-    b = n0 * n1 * a
-    d[0] = x * (1.0 + sign * n0 * n0 * a) + y * b + z * n0
-    d[1] = x * sign * b + y * (sign + n1 * n1 * a) + z * n1
-    d[2] = -x * sign * n0 - y * n1 + z * n2

@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from render.base.pose import invert, transform_points
 from render.base.threads import map_chunks
 from render.camera.camera import Camera
-from render.camera.distortion import distort, fold_radius_at, tilt_matrix
+from render.camera.distortion import tilt_matrix
+from render.camera.projection import NEAR, project_point
+from render.camera.view import View
 from render.frame import Axis, LaserCurve
 from render.laser.irradiance import irradiance_at
 from render.laser.laser import LineLaser
 from render.world.embree import CHUNK, RayScene
-from render.world.triangles import View
 from render.world.world import World
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int32]
 
-NEAR = 1e-9
 PIECE_PX = 8.0
 """With distortion a segment is solved in pieces of this length, in which v is taken to be monotonic."""
 
@@ -117,20 +117,6 @@ def clip_to_fan(segments: Float, T_laser_world: Float, tan_half_fan: float) -> F
                 high = min(high, values[0] / (values[0] - values[1]))
         spans[k, 0], spans[k, 1] = low, high
     return spans
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def project_point(p: Float, view: View, tilt: Float, distorted: bool) -> tuple[float, float]:
-    """Camera-frame point -> (u, v), NaN where it has no image; `tilt` is that of the view's distortion."""
-    if p[2] <= NEAR:
-        return np.nan, np.nan
-    x, y = p[0] / p[2], p[1] / p[2]
-    if distorted:
-        if np.hypot(x, y) >= fold_radius_at(x, y, view.folds):
-            return np.nan, np.nan
-        x, y, _, _, _, _ = distort(x, y, view.distortion, tilt)
-    intrinsics = view.intrinsics
-    return intrinsics[0] * x + intrinsics[4] * y + intrinsics[2], intrinsics[1] * y + intrinsics[3]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

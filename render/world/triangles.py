@@ -56,22 +56,6 @@ def emission(row: Float, cosine: float, rgb: Float) -> None:
         rgb[band] = row[EMITTED + band] if cosine > 0.0 else 0.0
 
 
-class View(NamedTuple):
-    """A camera in the world."""
-
-    width: int
-    intrinsics: Float
-    """fx, fy, cx, cy, skew."""
-    distortion: Float
-    """(14,)."""
-    folds: Float
-    """(720,) `render.camera.distortion.fold_radii`."""
-    T_world_camera: Float
-    lens: Float
-    """(4,) aperture's radius m (0: a pinhole), 1 / focus distance, slopes of the plane of focus (`render.camera.lens`).
-    """
-
-
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, rgb: Float) -> None:
     """Albedo at the point p of triangle t -> rgb (3,): the object's constant colour or its texture."""

@@ -153,7 +153,10 @@ def speckle_px(camera: Camera, wavelength_nm: float, sigma: Float) -> Float:
 
 
 def blur_px(camera: Camera, points: Float) -> Float:
-    """(n,) diameter, px, of the blur disc of (n, 3) points, camera frame: D fx |w - 1/z|, w as in `render.camera.lens`."""
+    """(n,) diameter, px, of the blur disc of (n, 3) points, camera frame: D fx |w - 1/z|.
+
+    w is that of `render.camera.lens`.
+    """
     plane = camera.focus_plane
     return np.asarray(_blur_scale(camera) * np.abs(points @ plane[:3] + plane[3]) / points[:, 2])
 
