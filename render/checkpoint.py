@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from render.base.errors import InputError
 from render.base.files import atomic_write, check_regular
 from render.base.kernel_cache import source_key
-from render.laser_indirect.accumulator import Gathered
+from render.laser_indirect.accumulator import Accumulator
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from render.world.world import World
@@ -36,7 +36,7 @@ EVERY = 30.0
 class Part(Protocol):
     """What can be kept: the sums of a light group."""
 
-    whole: bool
+    consistent: bool
     """False while it changes."""
 
     def arrays(self) -> Arrays: ...
@@ -50,7 +50,7 @@ class RenderState:
     """Of what it is a render."""
     path: Path | None = None
     """The file that follows; None: in memory only."""
-    lasers: dict[int, Gathered] = field(default_factory=dict)
+    lasers: dict[int, Accumulator] = field(default_factory=dict)
     """Reflected light of each laser."""
     ambient: Arrays | None = None
     """As read from a file, for `render.ambient.integrator` to go on from."""
@@ -58,7 +58,7 @@ class RenderState:
     """The ambient light under way."""
     written: float = field(default_factory=time.monotonic)
 
-    def keep_laser(self, index: int, gathered: Gathered) -> None:
+    def keep_laser(self, index: int, gathered: Accumulator) -> None:
         self.lasers[index] = gathered
         self._write_if_due()
 
@@ -68,15 +68,15 @@ class RenderState:
 
     def pause(self) -> None:
         """What is under way becomes what to go on from."""
-        if self.film is not None and self.film.whole:
+        if self.film is not None and self.film.consistent:
             self.ambient = self.film.arrays()
         self.film = None
-        self.lasers = {i: gathered for i, gathered in self.lasers.items() if gathered.whole}
+        self.lasers = {i: gathered for i, gathered in self.lasers.items() if gathered.consistent}
 
     def write(self) -> bool:
         """Bring the file up to date; False: there is nothing worth a file. InputError: it cannot be written."""
-        parts = {f"laser {i}": gathered.arrays() for i, gathered in self.lasers.items() if gathered.whole}
-        if self.film is not None and self.film.whole:
+        parts = {f"laser {i}": gathered.arrays() for i, gathered in self.lasers.items() if gathered.consistent}
+        if self.film is not None and self.film.consistent:
             parts["ambient"] = self.film.arrays()
         elif self.ambient is not None:
             parts["ambient"] = self.ambient
@@ -144,7 +144,7 @@ def read_state(state: RenderState) -> RenderState:
         )
     try:
         lasers = {
-            int(name.split()[1]): Gathered.of_arrays(arrays) for name, arrays in found.items() if name != "ambient"
+            int(name.split()[1]): Accumulator.of_arrays(arrays) for name, arrays in found.items() if name != "ambient"
         }
     except (KeyError, ValueError, IndexError, TypeError):
         told = "arrays that are missing or of another shape"

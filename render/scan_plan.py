@@ -13,7 +13,7 @@ import numpy as np
 from render.ambient.transport_plan import AmbientPlan, ambient_plan_of, has_ambient, onward_share
 from render.base.threads import Cancel, Progress
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.transport_plan import RUNGS, Plan, direct_plan, pilot_shares, plan_of
+from render.laser_indirect.transport_plan import TRANSPORT_STEPS, Plan, direct_plan, pilot_shares, plan_of
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from render.world.world import World
@@ -85,7 +85,9 @@ def plan_scan(
             found = onward_share(here, scene, settings.max_bounces, step=step, seed=seed, cancelled=cancelled)
             onward.append(found)
         progress((i + 1.0) / len(steps))
-    largest = {rung.share: max((one[rung.share] for one in shares), key=_at_most) for rung in RUNGS}
+    largest = {
+        transport.share: max((one[transport.share] for one in shares), key=_at_most) for transport in TRANSPORT_STEPS
+    }
     light = plan_of(largest, scene, settings)
     said = (
         f"the same for all {scene.frame_count} frames: pilots on the steps {', '.join(map(str, steps))}, of which the "

@@ -166,7 +166,7 @@ def ambient_image(
 class Film:
     """Sums of the samples of both halves, and how many there are of each in every tile."""
 
-    whole = True
+    consistent = True
     """No tile is ever half done."""
 
     def __init__(self, width: int, height: int) -> None:

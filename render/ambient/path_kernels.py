@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from render.ambient.light_sampling import POINT, SHINING, Lights, chance, light_in_view, pick, shining_point
 from render.ambient.path_state import EACH_SURFACE, FIRST_SURFACE, Shadows, Wave, deposit
-from render.material.bsdf import ROW, SUBSURFACE, evaluate, is_boundary, is_diffuse, is_smooth, pdf, sample
+from render.material.bsdf import ROW, SUBSURFACE, evaluate, is_boundary, is_diffuse, is_specular_row, pdf, sample
 from render.sampling.low_discrepancy import pair
 from render.world.surface_interaction import interaction
 from render.world.triangles import Surface, scattering, to_world
@@ -195,7 +195,7 @@ def _shade_kernel(glossy: bool) -> Any:
             pick_number, stay_number = 0.0, 0.0
             if rows.shape[0] > 1 or depth + 1 >= ROULETTE_AFTER:
                 pick_number, stay_number = pair(table, seed, index, s, base + 3)
-            if rows.shape[0] > 0 and (diffuse or not is_smooth(row)):
+            if rows.shape[0] > 0 and (diffuse or not is_specular_row(row)):
                 k, chosen = pick(rows, p0, p1, p2, pick_number)
                 if k >= 0:
                     r1, r2 = pair(table, seed, index, s, base + 1)

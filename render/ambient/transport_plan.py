@@ -13,7 +13,7 @@ from render.ambient.integrator import AmbientImage, Arrays, Film, ambient_images
 from render.ambient.path_tracer import camera_paths
 from render.base.counts import AMBIENT_CLAMPED, AMBIENT_CUT, AMBIENT_DROPPED, AMBIENT_ERROR, AMBIENT_SAMPLES, Counts
 from render.base.threads import Cancel, Progress
-from render.material.bsdf import DIELECTRIC, SMOOTH
+from render.material.bsdf import DIELECTRIC, SPECULAR_ROUGHNESS
 from render.material.material import Emitter
 from render.sampling.random import wrapped
 from render.scene.lights import PointLight
@@ -198,7 +198,7 @@ def _clamp_line(settings: RenderSettings) -> tuple[str, ...]:
 def _blind_lines(world: World, scene: Scene) -> tuple[str, ...]:
     """What no path from the camera can find, or is not followed."""
     rows, lines = world.surface.rows, []
-    polished = np.any((rows[:, 0] == DIELECTRIC) & (np.maximum(rows[:, 1], rows[:, 2]) < SMOOTH))
+    polished = np.any((rows[:, 0] == DIELECTRIC) & (np.maximum(rows[:, 1], rows[:, 2]) < SPECULAR_ROUGHNESS))
     if polished and any(isinstance(light, PointLight) for light in scene.lights):
         lines.append("left out: light of point lamps by way of polished glass - no path from the camera meets a point")
     return tuple(lines)

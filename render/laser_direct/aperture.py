@@ -66,16 +66,16 @@ def gather_aperture(
         if predicted <= 0.0:
             continue
         whole = mean_over_aperture(plane[0], plane[1] * 0.5, plane[2] * 0.5, reach)
-        sampled = apart = 0.0
+        pdf_lobes = apart = 0.0
         middle = first / n / predicted
         for cell in range(n):
             r = i * n + cell
             u, v = (cell % cells + 0.5) * size - 0.5, (cell // cells + 0.5) * size - 0.5
             q = plane[0] + plane[1] * u + plane[2] * v + plane[3] * lens[r, 0] + plane[4] * lens[r, 1]
             g = mean_over(q, plane[1] * half, plane[2] * half)
-            sampled += g
+            pdf_lobes += g
             apart += ((values[r, 0] if lit[r] else 0.0) - middle * g) ** 2
-        left = total / n - middle * sampled / n
+        left = total / n - middle * pdf_lobes / n
         corrected = left + middle * whole
         spread = max(second / n - (first / n) ** 2, apart / n - left * left, 0.0) * n / (n - 1)
         # between independent samples, 1/2, and an edge through jittered cells of pixel and aperture, 5/8; as measured

@@ -1,6 +1,6 @@
-"""One pass: a batch of paths from the laser and from the camera, each surface of the ones joined to the others.
+"""One pass of bidirectional path tracing: paths from the laser and from the camera, connected at every vertex.
 
-A wavefront: all rays of a chunk are traced, their vertices joined, and scattered, until none is left.
+A wavefront: all rays of a chunk are traced, their vertices connected, and scattered, until none is left.
 """
 
 from __future__ import annotations
@@ -21,39 +21,34 @@ from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_position
 from render.camera.view import View
 from render.laser.laser import LineLaser
-from render.laser_indirect.connection_buffer import Joints, Lit, Take, count_joints, no_joints
+from render.laser_indirect.connection_buffer import Connections, PassBuffer, empty_connections, splat_unoccluded
 from render.laser_indirect.connections import (
-    begin_camera,
-    begin_light,
-    hint_at,
-    join_camera,
-    join_laser,
-    joinable,
+    CameraSampling,
+    LaserSampling,
+    connect_to_camera,
+    connect_to_laser,
+    connectable,
+    init_camera_mis,
+    init_light_mis,
+    mark_reachable,
     path_lens_point,
 )
-from render.laser_indirect.guiding import Guide, any_clear, draw_paths
+from render.laser_indirect.guiding import Guide, any_specular, draw_camera_paths
 from render.laser_indirect.path_vertex import (
-    BENT,
-    CLEAR,
-    DVC,
-    DVCM,
-    LONE,
-    MEDIUM,
+    CAUSTIC,
     MOST_BOUNCES,
-    NUMBER,
-    PART,
-    PIXEL,
-    POWER,
-    STATE,
-    UNJOINED,
+    PATH,
+    SPECULAR_CHAIN,
     VERTEX,
-    interact,
+    PassContext,
+    Records,
+    intersect,
     scatter,
 )
-from render.laser_indirect.photon_emission import Fan, Paths, emit
-from render.laser_indirect.photon_merging import SHRINK, Photons, merge, photons
-from render.laser_indirect.random_walk import scatter_inside
-from render.laser_indirect.ris import join_light
+from render.laser_indirect.photon_emission import FanDistribution, Photons, emit
+from render.laser_indirect.photon_merging import RADIUS_EXPONENT, PhotonMap, merge, photon_map
+from render.laser_indirect.random_walk import random_walk_step
+from render.laser_indirect.ris import LightVertices, connect_by_ris
 from render.material.material import reflectance_weights
 from render.material.medium import MOST_STEPS
 from render.sampling.random import uniform, wrapped
@@ -62,33 +57,49 @@ from render.world.world import World
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int32]
+Bool = NDArray[np.bool_]
+Vertices = tuple[int, Records, Records]
+"""Depth, and the connectable vertices and paths of a chunk there."""
 
 CHUNK_PATHS = 1 << 13
 """Short enough to be cancelled within a tenth of a second."""
 CANDIDATES, LATER_CANDIDATES = 8, 2
-"""Light vertices weighed against each other at the first surface that the camera sees, and at those after it."""
+"""Light vertices of the first surface weighed against each other, at the camera's first surface and those after it."""
 CAMERA_SEED = 0x5DEECE66D
 KINDS = 5
 
 
 @dataclass(frozen=True)
-class LightPass:
+class Sampling:
+    """How often a pass tries what; decided by earlier passes only, so that each pass is unbiased."""
+
+    light_paths: int
+    fan: FanDistribution
+    camera_paths: Float
+    """(pixels,) expected."""
+    active: Int
+    """The pixels that may have a camera path, in order."""
+    guide: Guide
+
+
+@dataclass(frozen=True)
+class BdptPass:
     """What all passes of a render have in common; `run` makes one."""
 
     world: World
     surface: Surface
     view: View
     height: int
-    beam: Float
+    laser: LineLaser
     weights: Float
+    """(3,) of the RGB reflectance at the laser's wavelength."""
     T_world_laser: Float
-    T_laser_world: Float
-    reach: float
+    reference_distance: float
     """Middle distance of the part from the laser, m."""
     seed: int
     kinds: int
     """Of light that is wanted, besides plain interreflection."""
-    clear: bool
+    specular: bool
     """Some material is a mirror or clear glass."""
 
     @classmethod
@@ -99,255 +110,204 @@ class LightPass:
         laser: LineLaser,
         T_world_camera: Float,
         T_world_laser: Float,
-        reach: float,
+        reference_distance: float,
         seed: int,
         kinds: int,
-    ) -> LightPass:
+    ) -> BdptPass:
         surface = world.surface_at((laser.wavelength_nm,) * 3)
         return cls(
-            world,
-            surface,
-            camera.view(T_world_camera),
-            camera.height,
-            laser.packed(),
-            np.array(reflectance_weights(laser.wavelength_nm)),
-            T_world_laser,
-            invert(T_world_laser),
-            reach,
-            seed,
-            kinds,
-            bool(kinds & BENT) and any_clear(surface),
+            world=world,
+            surface=surface,
+            view=camera.view(T_world_camera),
+            height=camera.height,
+            laser=laser,
+            weights=np.array(reflectance_weights(laser.wavelength_nm)),
+            T_world_laser=T_world_laser,
+            reference_distance=reference_distance,
+            seed=seed,
+            kinds=kinds,
+            specular=bool(kinds & CAUSTIC) and any_specular(surface),
         )
 
     def run(
         self,
         number: int,
-        paths: int,
-        fan: Fan,
-        samples: Float,
-        looked_at: Int,
-        guide: Guide,
-        take: Take,
-        cancelled: Cancel | None,
-        hints: NDArray[np.bool_] | None = None,
+        sampling: Sampling,
+        buffer: PassBuffer,
+        cancelled: Cancel | None = None,
+        reachable_pixels: Bool | None = None,
     ) -> None:
-        """Pass `number`: light paths, and camera paths, samples (pixels,) to be expected. Raises Cancelled.
+        """Pass `number`, into `buffer`. Raises Cancelled.
 
-        looked_at: the pixels that may have a camera path, in order.
+        reachable_pixels (pixels,): where the camera sees mirrors or glass, to mark what camera paths may reach there.
         """
         seed = wrapped(self.seed * 1_000_003 + number)
-        pixels, starts = draw_paths(samples, looked_at, seed ^ CAMERA_SEED)
-        found: list[tuple[int, Float, Float]] = []
-        for first in range(0, paths, CHUNK_PATHS):
-            joined = len(pixels) > 0 or hints is not None
-            count = min(CHUNK_PATHS, paths - first)
-            found += self.light(seed, first, count, paths, fan, samples, take, joined, cancelled)
-        for _, vertex, state in found if hints is not None else ():
+        pixels, starts = draw_camera_paths(sampling.camera_paths, sampling.active, seed ^ CAMERA_SEED)
+        keep = len(pixels) > 0 or reachable_pixels is not None
+        found: list[Vertices] = []
+        for first in range(0, sampling.light_paths, CHUNK_PATHS):
+            count = min(CHUNK_PATHS, sampling.light_paths - first)
+            found += self.trace_light_paths(seed, first, count, sampling, buffer, keep, cancelled)
+        for _, vertices, paths in found if reachable_pixels is not None else ():
             _stop(cancelled)
-            hint_at(vertex, state, self.view, self.height, hints, paths, take)
+            mark_reachable(vertices, paths, self._camera(sampling), reachable_pixels, buffer)
         if not len(pixels):
             return
         _stop(cancelled)
-        merged = self.photons(found, number, paths) if self.clear and self.kinds & UNJOINED else None
-        near = _lit([part for part in found if part[0] == 0], True, paths)
-        later = _lit([part for part in found if part[0] > 0], False, paths)
+        photons = self.photon_map(found, number, sampling) if self.specular and self.kinds & SPECULAR_CHAIN else None
+        light_vertices = (
+            _light_vertices(
+                [part for part in found if part[0] == 0], True, sampling, (CANDIDATES, LATER_CANDIDATES), 16
+            ),
+            _light_vertices([part for part in found if part[0] > 0], False, sampling, (1, 1), 20),
+        )
         chunks = np.searchsorted(starts, np.arange(0, starts[-1] + CHUNK_PATHS, CHUNK_PATHS))
         for a, b in pairwise(np.minimum(chunks, len(pixels))):
-            self.eye(
-                seed ^ CAMERA_SEED,
-                pixels[a:b],
-                samples,
-                starts[a : b + 1],
-                near,
-                later,
-                merged,
-                paths,
-                fan,
-                guide,
-                take,
-                cancelled,
-            )
+            some = pixels[a:b], starts[a : b + 1]
+            self.trace_camera_paths(seed ^ CAMERA_SEED, *some, sampling, light_vertices, photons, buffer, cancelled)
 
-    def light(
+    def trace_light_paths(
         self,
         seed: int,
         first: int,
         count: int,
-        paths: int,
-        fan: Fan,
-        samples: Float,
-        take: Take,
-        wanted: bool,
+        sampling: Sampling,
+        buffer: PassBuffer,
+        keep: bool,
         cancelled: Cancel | None = None,
-    ) -> list[tuple[int, Float, Float]]:
-        """Trace light paths, join them to the camera; if wanted their joinable vertices and states, by depth.
+    ) -> list[Vertices]:
+        """Trace light paths first .. first + count, splat them to the camera; if `keep`, what can be connected to.
 
         Raises Cancelled.
         """
-        rays, rows = self.world.rays, self.surface.rows
-        start = np.array([uniform(seed, 0, dimension, 99) for dimension in range(5)])
+        context, laser, camera = self._context(seed), self._laser(sampling), self._camera(sampling)
+        shift = np.array([uniform(seed, 0, dimension, 99) for dimension in range(5)])
         long = np.empty((2, count), np.int64)
-        emitted = Paths(np.empty((count, 3)), np.empty((count, 3)), np.empty(count), long[0], long[1])
-        emit(first, paths, start, fan, self.reach, self.beam, self.T_world_laser, emitted)
+        emitted = Photons(np.empty((count, 3)), np.empty((count, 3)), np.empty(count), long[0], long[1])
+        emit(
+            first,
+            sampling.light_paths,
+            shift,
+            self.reference_distance,
+            laser.beam,
+            laser.fan,
+            self.T_world_laser,
+            emitted,
+        )
         origin, direction = emitted.origin, emitted.direction
-        state = np.zeros((count, STATE))
-        state[:, POWER], state[:, LONE], state[:, NUMBER] = emitted.power, 1.0, emitted.number
-        state[:, PART] = emitted.part
-        joints = no_joints(count)
-        kept = []
+        paths = _begun(count)
+        paths["throughput"], paths["index"], paths["fan_bin"] = emitted.power, emitted.path_index, emitted.fan_bin
+        connections = empty_connections(count)
+        kept: list[Vertices] = []
         for depth in range(MOST_BOUNCES):
             _stop(cancelled)
-            vertex, state = self.meet(seed, depth, origin, direction, state)
-            if not len(vertex):
+            vertices, paths = self.intersect(context, depth, origin, direction, paths)
+            if not len(vertices):
                 break
             if depth == 0:
-                begin_light(vertex, state, self.T_laser_world, self.beam, fan)
+                init_light_mis(vertices, paths, laser)
             else:
-                joined = join_camera(
-                    vertex,
-                    state,
-                    rows,
-                    self.view,
-                    self.height,
-                    samples,
-                    paths,
-                    seed,
-                    depth,
-                    rays.centre,
-                    rays.surface_offset,
-                    joints,
-                )
-                self.count(joints, joined, 1.0 / paths, take)
-            if wanted:
-                kept.append((depth, *joinable(vertex, state, rows)))
-            n = scatter(
-                vertex,
-                state,
-                rows,
-                seed,
-                depth,
-                start[2:],
-                True,
-                self.kinds,
-                rays.surface_offset,
-                origin,
-                direction,
-            )
-            origin, direction, state = origin[:n], direction[:n], state[:n]
+                connected = connect_to_camera(vertices, paths, context, camera, depth, connections)
+                self.splat(connections, connected, 1.0 / sampling.light_paths, buffer)
+            if keep:
+                kept.append((depth, *connectable(vertices, paths, context.rows)))
+            n = scatter(vertices, paths, context, depth, shift[2:], True, origin, direction)
+            origin, direction, paths = origin[:n], direction[:n], paths[:n]
         return kept
 
-    def eye(
+    def trace_camera_paths(
         self,
         seed: int,
         pixels: Int,
-        samples: Float,
         starts: Int,
-        near: Lit,
-        later: Lit,
-        merged: Photons | None,
-        paths: int,
-        fan: Fan,
-        guide: Guide,
-        take: Take,
+        sampling: Sampling,
+        light_vertices: tuple[LightVertices, ...],
+        photons: PhotonMap | None,
+        buffer: PassBuffer,
         cancelled: Cancel | None,
     ) -> None:
-        """Trace camera paths of pixels numbered from `starts`; join them to the laser and to light vertices.
+        """Trace camera paths of pixels numbered from `starts`; connect them to the laser and to light vertices.
 
         Raises Cancelled.
         """
-        rays, rows = self.world.rays, self.surface.rows
+        context, laser, camera = self._context(seed), self._laser(sampling), self._camera(sampling)
         count = int(starts[-1] - starts[0])
-        origin, direction, state = np.empty((count, 3)), np.empty((count, 3)), np.zeros((count, STATE))
-        pixel_rays(self.view, pixels, samples, starts, seed, origin, direction, state)
-        joints = no_joints(count)
+        origin, direction, paths = np.empty((count, 3)), np.empty((count, 3)), _begun(count)
+        pixel_rays(camera, pixels, starts, seed, origin, direction, paths)
+        connections = empty_connections(count)
         unused = np.zeros(3)
         for depth in range(MOST_BOUNCES):
             _stop(cancelled)
-            vertex, state = self.meet(seed, depth, origin, direction, state)
-            if not len(vertex):
+            vertices, paths = self.intersect(context, depth, origin, direction, paths)
+            if not len(vertices):
                 break
             if depth == 0:
-                begin_camera(vertex, state, self.view, samples, paths, seed)
+                init_camera_mis(vertices, paths, camera, seed)
             else:
-                joined = join_laser(
-                    vertex,
-                    state,
-                    rows,
-                    self.T_laser_world,
-                    self.beam,
-                    fan,
-                    rays.centre,
-                    rays.surface_offset,
-                    joints,
-                )
-                self.count(joints, joined, 1.0, take)
-            if merged is not None:
-                merge(vertex, state, rows, merged, take)
-            few = CANDIDATES if depth == 0 else LATER_CANDIDATES
-            for stream, lit, candidates in ((16, near, few), (20, later, 1)):
-                joined = join_light(
-                    vertex,
-                    state,
-                    lit,
-                    rows,
-                    candidates,
-                    guide,
-                    take.learnt,
-                    seed,
-                    depth,
-                    stream,
-                    rays.centre,
-                    rays.surface_offset,
-                    joints,
-                )
-                self.count(joints, joined, 1.0, take)
-            n = scatter(
-                vertex, state, rows, seed, depth, unused, False, self.kinds, rays.surface_offset, origin, direction
-            )
-            origin, direction, state = origin[:n], direction[:n], state[:n]
+                self.splat(connections, connect_to_laser(vertices, paths, context, laser, connections), 1.0, buffer)
+            if photons is not None:
+                merge(vertices, paths, context.rows, photons, buffer)
+            for light in light_vertices:
+                connected = connect_by_ris(vertices, paths, light, sampling.guide, depth, context, buffer, connections)
+                self.splat(connections, connected, 1.0, buffer)
+            n = scatter(vertices, paths, context, depth, unused, False, origin, direction)
+            origin, direction, paths = origin[:n], direction[:n], paths[:n]
 
-    def meet(self, seed: int, depth: int, origin: Float, direction: Float, state: Float) -> tuple[Float, Float]:
-        """The next vertex of each path that has one, and its state."""
-        vertex = np.empty((len(origin), VERTEX))
+    def intersect(
+        self, context: PassContext, depth: int, origin: Float, direction: Float, paths: Records
+    ) -> tuple[Records, Records]:
+        """The next vertex of each path that has one, and these paths."""
+        vertices = np.empty(len(origin), VERTEX)
         if not len(origin):
-            return vertex, state
-        rays, rows = self.world.rays, self.surface.rows
+            return vertices, paths
+        rays = self.world.rays
         start, towards = (origin - rays.centre).astype(np.float32), direction.astype(np.float32)
         # a chunk's first rays lie side by side in the image, or in the sheet
         triangle, distance = rays.intersect(start, towards, coherent=depth == 0)
-        walking = np.flatnonzero(state[:, MEDIUM]).astype(np.int32)
+        walking = np.flatnonzero(paths["medium"] >= 0).astype(np.int32)
         distance = distance[walking]
         for step in range(MOST_STEPS):
-            left = scatter_inside(walking, distance, state, rows, seed, depth, step, origin, direction, triangle)
+            left = random_walk_step(walking, distance, paths, context, depth, step, origin, direction, triangle)
             if not left:
                 break
             walking = walking[:left]
             triangle[walking], distance = rays.intersect(
                 (origin[walking] - rays.centre).astype(np.float32), direction[walking].astype(np.float32)
             )
-        n = interact(self.surface, self.weights, seed, depth, origin, direction, triangle, state, vertex)
-        return vertex[:n], state[:n]
+        n = intersect(self.surface, self.weights, context, depth, origin, direction, triangle, paths, vertices)
+        return vertices[:n], paths[:n]
 
-    def count(self, joints: Joints, joined: int, scale: float, take: Take) -> None:
-        """Add the joints that nothing blocks."""
-        if joined:
-            blocked = self.world.rays.occluded(joints.origin[:joined], joints.direction[:joined], joints.far[:joined])
-            count_joints(joints, blocked, joined, scale, take)
+    def splat(self, connections: Connections, connected: int, scale: float, buffer: PassBuffer) -> None:
+        """Splat the connections that nothing occludes."""
+        if connected:
+            rays = connections.origin[:connected], connections.direction[:connected], connections.distance[:connected]
+            splat_unoccluded(connections, self.world.rays.occluded(*rays), connected, scale, buffer)
 
-    def photons(self, parts: list[tuple[int, Float, Float]], number: int, paths: int) -> Photons:
+    def photon_map(self, parts: list[Vertices], number: int, sampling: Sampling) -> PhotonMap:
         """The light vertices that only merging can use; the radius is a pixel's, less with each pass."""
-        vertex = np.concatenate([part[1] for part in parts])
-        state = np.concatenate([part[2] for part in parts])
-        distance = np.linalg.norm(vertex[:, :3] - self.view.T_world_camera[:3, 3], axis=1)
-        pixel = float(np.median(distance)) / max(self.view.intrinsics[:2]) if len(vertex) else 1.0
-        return photons(vertex, state, pixel * (1.0 + number) ** -SHRINK, paths)
+        vertices = np.concatenate([part[1] for part in parts])
+        paths = np.concatenate([part[2] for part in parts])
+        distance = np.linalg.norm(vertices["p"] - self.view.T_world_camera[:3, 3], axis=1)
+        pixel = float(np.median(distance)) / max(self.view.intrinsics[:2]) if len(vertices) else 1.0
+        return photon_map(vertices, paths, pixel * (1.0 + number) ** -RADIUS_EXPONENT, sampling.light_paths)
+
+    def _context(self, seed: int) -> PassContext:
+        rays = self.world.rays
+        return PassContext(self.surface.rows, seed, self.kinds, rays.centre, rays.surface_offset)
+
+    def _camera(self, sampling: Sampling) -> CameraSampling:
+        return CameraSampling(self.view, self.height, sampling.camera_paths, sampling.light_paths)
+
+    def _laser(self, sampling: Sampling) -> LaserSampling:
+        return LaserSampling(invert(self.T_world_laser), self.laser.packed(), sampling.fan)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def pixel_rays(
-    view: View, pixels: Int, samples: Float, first: Int, seed: int, origin: Float, direction: Float, state: Float
+    sampling: CameraSampling, pixels: Int, first: Int, seed: int, origin: Float, direction: Float, paths: Records
 ) -> None:
     """Camera paths for (n,) pixels, numbered from `first` (n + 1,), spread over each pixel's area."""
+    view = sampling.camera
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
     r = 0
@@ -355,9 +315,9 @@ def pixel_rays(
         pixel = pixels[n]
         column, row = pixel % view.width, pixel // view.width
         u0, v0 = uniform(seed, pixel, 0, 90), uniform(seed, pixel, 0, 91)
-        count = first[n + 1] - first[n]
+        count, expected = first[n + 1] - first[n], sampling.camera_paths[pixel]
         # where every pass has one, their number need not be known beforehand
-        power = 1.0 / count if samples[pixel] >= 1.0 else 1.0 / samples[pixel]
+        throughput = 1.0 / count if expected >= 1.0 else 1.0 / expected
         for sample in range(count):
             u = column - 0.5 + (u0 + sample * 0.7548776662466927) % 1.0
             v = row - 0.5 + (v0 + sample * 0.5698402909980532) % 1.0
@@ -367,17 +327,25 @@ def pixel_rays(
             d0, d1, d2 = lens_direction(view, x, y, a, b)
             length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2) if ok else math.inf
             direction[r, 0], direction[r, 1], direction[r, 2] = d0 / length, d1 / length, d2 / length
-            state[r, POWER], state[r, DVCM], state[r, DVC] = power, 0.0, 0.0
-            state[r, LONE], state[r, CLEAR] = 1.0, 0.0
-            state[r, NUMBER], state[r, PIXEL] = first[n] + sample, pixel
+            path = paths[r]
+            path.throughput, path.index, path.pixel = throughput, first[n] + sample, pixel
             r += 1
 
 
-def _lit(parts: list[tuple[int, Float, Float]], ordered: bool, paths: int) -> Lit:
+def _begun(count: int) -> Records:
+    """Paths that have met nothing yet."""
+    paths = np.zeros(count, PATH)
+    paths["all_specular"], paths["medium"] = True, -1
+    return paths
+
+
+def _light_vertices(
+    parts: list[Vertices], ordered: bool, sampling: Sampling, candidates: tuple[int, int], dimension: int
+) -> LightVertices:
     """Light vertices of all chunks."""
-    vertex = np.concatenate([np.zeros((0, VERTEX)), *(part[1] for part in parts)])
-    state = np.concatenate([np.zeros((0, STATE)), *(part[2] for part in parts)])
-    return Lit(vertex, state, ordered, paths)
+    vertices = np.concatenate([np.zeros(0, VERTEX), *(part[1] for part in parts)])
+    paths = np.concatenate([np.zeros(0, PATH), *(part[2] for part in parts)])
+    return LightVertices(vertices, paths, ordered, sampling.light_paths, candidates, dimension)
 
 
 def _stop(cancelled: Cancel | None) -> None:

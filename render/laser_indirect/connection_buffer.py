@@ -1,4 +1,4 @@
-"""Joints between paths, the shadow rays that decide whether they count, and what they add to."""
+"""Connections between path vertices, the shadow rays that test them, and the buffers of a pass that they splat to."""
 
 from __future__ import annotations
 
@@ -9,66 +9,61 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.laser_indirect.path_vertex import PassContext, Record, cosine_to
+
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
+Bool = NDArray[np.bool_]
 
-JOINS = 32.0
-"""What one resampled joint among many candidates counts for, in joints to a single random vertex."""
+RIS_SAMPLE_WEIGHT = 32.0
+"""Samples that a connection chosen by RIS counts for in the balance heuristic, per camera path.
 
-
+Any positive constant is unbiased, as the weights of all techniques still sum to 1; it only says how far a connection is
+trusted beside one to the laser or to the camera. A connection chosen from M candidates has about the variance of M to
+single random vertices; 32 is the most candidates there may be.
+"""
 BLOCK = 64
 """Pixels that are looked at or skipped together where passes are added up."""
 
 
-class Joints(NamedTuple):
-    """(n,) pixel and worth of joints; (n, 3) origins (scene-centred), directions and (n,) length of shadow rays."""
+class Connections(NamedTuple):
+    """(n,) connections: pixel, contribution; (n, 3) shadow rays from scene-centred origins, and (n,) their length."""
 
     pixel: Int
     kind: Int
-    part: Int
-    """Of the fan that the light left by; -1: not known."""
-    helped: NDArray[np.bool_]
-    """Camera paths make this path as well."""
-    worth: Float
+    fan_bin: Int
+    """Bin of the fan that the light path left the laser by; -1: not known."""
+    reachable_from_camera: Bool
+    """Techniques that start at the camera can make this path as well."""
+    contribution: Float
     origin: Float32
     direction: Float32
-    far: Float32
+    distance: Float32
 
 
-class Take(NamedTuple):
-    """What a pass adds to."""
+class PassBuffer(NamedTuple):
+    """What one pass accumulates."""
 
     image: Float
     """(pixels,) radiance."""
-    helped: Float32
-    """(pixels,) of it, what camera paths could help with."""
+    camera_radiance: Float32
+    """(pixels,) of it, what techniques that start at the camera can make as well."""
     sums: Float
     """(KINDS,) by kind of light (`render.laser_indirect.path_vertex`)."""
-    found: Float
-    """(PARTS,) squared worth of what came from each part of the fan."""
-    learnt: Float
-    """As in `join_light`."""
+    fan_moments: Float
+    """(FAN_BINS,) sum of the squared contributions of light from each bin of the fan."""
+    wave_moments: Float
+    """(rows of the guide, BINS) sum of the squared target weights that `connect_by_ris` met."""
     dropped: Float
-    """(1,) joints whose worth was no number, infinite or negative."""
-    touched: NDArray[np.bool_]
-    """(pixels / BLOCK,) where there may be something in `image` or `helped`."""
+    """(1,) contributions that were NaN, infinite or negative, and were left out."""
+    touched: Bool
+    """(pixels / BLOCK,) where there may be something in `image` or `camera_radiance`."""
 
 
-class Lit(NamedTuple):
-    """Light vertices to be joined to: the rows of `render.laser_indirect.path_vertex`."""
-
-    vertex: Float
-    state: Float
-    ordered: bool
-    """They follow each other along the fan: the first surface's."""
-    paths: int
-    """Traced in all."""
-
-
-def no_joints(n: int) -> Joints:
+def empty_connections(n: int) -> Connections:
     """Room for n."""
-    return Joints(
+    return Connections(
         np.empty(n, np.int32),
         np.empty(n, np.int32),
         np.empty(n, np.int32),
@@ -81,39 +76,39 @@ def no_joints(n: int) -> Joints:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def cast(
-    joints: Joints,
+def set_shadow_ray(
+    connections: Connections,
     j: int,
-    v: Float,
+    v: Record,
     d0: float,
     d1: float,
     d2: float,
-    out: float,
-    far: float,
-    centre: Float,
-    offset: float,
+    distance: float,
+    context: PassContext,
 ) -> None:
-    """Aim the shadow ray of joint j from vertex v along d; out: cosine with the geometric normal."""
-    side = offset if out > 0.0 else -offset
+    """Shadow ray of connection j from vertex v along the unit direction d."""
+    side = context.ray_epsilon if cosine_to(v, d0, d1, d2) > 0.0 else -context.ray_epsilon
     for axis in range(3):
-        joints.origin[j, axis] = v[axis] - centre[axis] + side * v[3 + axis]
-    joints.direction[j, 0], joints.direction[j, 1], joints.direction[j, 2] = d0, d1, d2
-    joints.far[j] = far
+        connections.origin[j, axis] = v.p[axis] - context.centre[axis] + side * v.n[axis]
+    connections.direction[j, 0], connections.direction[j, 1], connections.direction[j, 2] = d0, d1, d2
+    connections.distance[j] = distance
 
 
 @numba.njit(nogil=True, cache=True)
-def count_joints(joints: Joints, blocked: NDArray[np.bool_], count: int, scale: float, take: Take) -> None:
-    """Add the clear joints to the image, to the sum of their kind of light, and to what their part of the fan found."""
+def splat_unoccluded(connections: Connections, occluded: Bool, count: int, scale: float, buffer: PassBuffer) -> None:
+    """Splat the connections that nothing occludes: to the image, the sum of their kind of light, the fan's moments."""
     for j in range(count):
-        if not blocked[j]:
-            worth = joints.worth[j] * scale
-            if not 0.0 <= worth < math.inf:
-                take.dropped[0] += 1.0
-                continue
-            take.image[joints.pixel[j]] += worth
-            take.touched[joints.pixel[j] // BLOCK] = True
-            take.sums[joints.kind[j]] += worth
-            if joints.helped[j]:
-                take.helped[joints.pixel[j]] += worth
-            if joints.part[j] >= 0:
-                take.found[joints.part[j]] += worth * worth
+        if occluded[j]:
+            continue
+        contribution = connections.contribution[j] * scale
+        if not 0.0 <= contribution < math.inf:
+            buffer.dropped[0] += 1.0
+            continue
+        pixel = connections.pixel[j]
+        buffer.image[pixel] += contribution
+        buffer.touched[pixel // BLOCK] = True
+        buffer.sums[connections.kind[j]] += contribution
+        if connections.reachable_from_camera[j]:
+            buffer.camera_radiance[pixel] += contribution
+        if connections.fan_bin[j] >= 0:
+            buffer.fan_moments[connections.fan_bin[j]] += contribution * contribution

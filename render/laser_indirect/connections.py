@@ -1,21 +1,22 @@
-"""Joining paths: a light path's vertex to the camera, a camera path's vertex to the laser or to light vertices.
+"""Connecting paths: a light vertex to the camera, a camera vertex to the laser; `ris` connects the two to each other.
 
-A path over k surfaces can be made in k + 1 ways, by where the joint lies. Each way's contribution is weighted by its
-density, times how often it is tried, over the sum of all ways' (balance heuristic, Veach 1997, eq. 9.8; in the
-recursive form of Georgiev et al. 2012). The ways are tried
+A path over k surfaces can be made by k + 1 techniques, one for each of its edges that a connection can lie on. Each
+technique's contribution has its MIS weight by the balance heuristic (Veach 1997, eq. 9.8), in the recursive form of
+Georgiev et al. 2012 (dVCM, dVC), with the sample counts
 
-    light_paths               times for the joint at the camera,
-    samples[pixel] JOINS      times for a joint between two surfaces,
-    samples[pixel]            times for the joint at the laser,
+    light_paths                               for the connection to the camera (light tracing),
+    camera_paths[pixel] RIS_SAMPLE_WEIGHT     for one between two surfaces,
+    camera_paths[pixel]                       for the one to the laser.
 
-samples being the camera paths to be expected, a fraction where not every pass has one; a pixel without is left to light
-tracing, with weight 1. Light that met one surface only is left
-to `render.laser_direct.integrator`. All joints go into `Joints`; a shadow ray each decides whether they count.
+camera_paths is the expected number of a pixel's camera paths in a pass, a fraction where not every pass has one; a
+pixel without any is left to light tracing, with weight 1. Light that met one surface only belongs to
+`render.laser_direct.integrator`. Every connection goes into `Connections` and counts if its shadow ray is free.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -25,218 +26,226 @@ from render.camera.distortion import tilt_matrix
 from render.camera.lens import lens_point, lens_position, lens_project
 from render.camera.view import View
 from render.laser.irradiance import irradiance
-from render.laser_indirect.connection_buffer import BLOCK, JOINS, Joints, Take, cast
+from render.laser_indirect.connection_buffer import BLOCK, RIS_SAMPLE_WEIGHT, Connections, PassBuffer, set_shadow_ray
 from render.laser_indirect.path_vertex import (
-    BACK,
-    DVC,
-    DVCM,
-    KIND,
-    NUMBER,
-    PART,
-    PIXEL,
-    POWER,
-    REFLECTANCE,
-    adjoint,
-    chance,
-    local,
-    mirror_at,
-    scattered,
+    PassContext,
+    Record,
+    Records,
+    bsdf_pdf,
+    cosine_to,
+    eval_bsdf,
+    is_specular,
+    shading_normal_factor,
+    to_shading,
 )
-from render.laser_indirect.photon_emission import Fan, emitted_density
+from render.laser_indirect.photon_emission import FanDistribution, emitted_density
 from render.sampling.random import uniform
 
 Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
+Bool = NDArray[np.bool_]
+
+
+class CameraSampling(NamedTuple):
+    """How often a pass tries what leads to the camera."""
+
+    camera: View
+    height: int
+    camera_paths: Float
+    """(pixels,) expected camera paths of a pass."""
+    light_paths: int
+
+
+class LaserSampling(NamedTuple):
+    """The laser's light, and how a pass draws photons of it."""
+
+    T_laser_world: Float
+    beam: Float
+    """`LineLaser.packed`."""
+    fan: FanDistribution
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def join_camera(
-    vertex: Float,
-    state: Float,
-    rows: Float,
-    view: View,
-    height: int,
-    samples: Float,
-    light_paths: int,
-    seed: int,
+def connect_to_camera(
+    vertices: Records,
+    paths: Records,
+    context: PassContext,
+    sampling: CameraSampling,
     depth: int,
-    centre: Float,
-    offset: float,
-    joints: Joints,
+    connections: Connections,
 ) -> int:
-    """Join light vertices (n, .) to the camera -> joints, to be divided by the light paths. Returns their number."""
+    """Connect light vertices (n,) to the camera -> connections, to be divided by the light paths; their number."""
+    view, rows = sampling.camera, context.rows
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
     a = b = 0.0
     n = 0
-    for r in range(vertex.shape[0]):
-        v = vertex[r]
-        if mirror_at(v, rows):
+    for r in range(vertices.shape[0]):
+        v, path = vertices[r], paths[r]
+        if is_specular(v, rows):
             continue
         if view.lens[0] > 0.0:
-            number = int(state[r, NUMBER])
-            a, b = lens_point(view.lens[0], uniform(seed, number, depth, 8), uniform(seed, number, depth, 9))
-        pixel, area = pixel_of(view, tilt, distorted, height, v, a, b)
+            r1, r2 = uniform(context.seed, path.index, depth, 8), uniform(context.seed, path.index, depth, 9)
+            a, b = lens_point(view.lens[0], r1, r2)
+        pixel, area = pixel_of(view, tilt, distorted, sampling.height, v, a, b)
         if pixel < 0:
             continue
-        c0, c1, c2 = lens_position(view, a, b)
-        e0, e1, e2 = c0 - v[0], c1 - v[1], c2 - v[2]
-        far = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
-        e0, e1, e2 = e0 / far, e1 / far, e2 / far
-        out = v[3] * e0 + v[4] * e1 + v[5] * e2
-        i0, i1, i2 = local(v, e0, e1, e2)
+        e0, e1, e2, distance = towards(v, *lens_position(view, a, b))
+        out = cosine_to(v, e0, e1, e2)
+        i0, i1, i2 = to_shading(v, e0, e1, e2)
         if out * i2 <= 0.0:
             continue
-        o0, o1, o2 = v[BACK], v[BACK + 1], v[BACK + 2]
-        f = scattered(v, rows, o0, o1, o2, i0, i1, i2)
+        o0, o1, o2 = v.wo[0], v.wo[1], v.wo[2]
+        f = eval_bsdf(v, rows, o0, o1, o2, i0, i1, i2)
         if f <= 0.0:
             continue
-        density = area * abs(out)
-        weight = 1.0
-        joints.helped[n] = state[r, DVCM] > 0.0 or state[r, DVC] > 0.0
-        if samples[pixel] > 0.0 and joints.helped[n]:
-            reverse = chance(v, rows, i0, i1, i2, o0, o1, o2)
-            others = density * (state[r, DVCM] + reverse * state[r, DVC])
-            weight = 1.0 / (1.0 + JOINS * samples[pixel] / light_paths * others)
-        joints.pixel[n], joints.kind[n], joints.part[n] = pixel, int(state[r, KIND]), int(state[r, PART])
-        joints.worth[n] = state[r, POWER] * f * density * weight * adjoint(v)
-        cast(joints, n, v, e0, e1, e2, out, far, centre, offset)
+        camera_pdf = area * abs(out)
+        mis_weight = 1.0
+        reachable = path.dvcm > 0.0 or path.dvc > 0.0
+        if sampling.camera_paths[pixel] > 0.0 and reachable:
+            reverse_pdf = bsdf_pdf(v, rows, i0, i1, i2, o0, o1, o2)
+            others = camera_pdf * (path.dvcm + reverse_pdf * path.dvc)
+            mis_weight = 1.0 / (1.0 + RIS_SAMPLE_WEIGHT * sampling.camera_paths[pixel] / sampling.light_paths * others)
+        connections.pixel[n], connections.kind[n], connections.fan_bin[n] = pixel, path.kind, path.fan_bin
+        connections.reachable_from_camera[n] = reachable
+        connections.contribution[n] = path.throughput * f * camera_pdf * mis_weight * shading_normal_factor(v)
+        set_shadow_ray(connections, n, v, e0, e1, e2, distance, context)
         n += 1
     return n
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def hint_at(
-    vertex: Float, state: Float, view: View, height: int, clear: NDArray[np.bool_], light_paths: int, take: Take
-) -> None:
-    """Add to `take.helped` what light vertices would look like behind clear glass, were it not to bend light.
-
-    clear (pixels,): where the camera looks at glass or a mirror. Only says where camera paths are worth while.
-    """
-    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
-    distorted = bool(np.any(view.distortion))
-    for r in range(vertex.shape[0]):
-        v = vertex[r]
-        pixel, area = pixel_of(view, tilt, distorted, height, v, 0.0, 0.0)
-        if pixel < 0:
+def connect_to_laser(
+    vertices: Records, paths: Records, context: PassContext, laser: LaserSampling, connections: Connections
+) -> int:
+    """Connect camera vertices (n,) to the laser -> connections. Returns their number."""
+    m, rows = laser.T_laser_world, context.rows
+    l0 = -(m[0, 0] * m[0, 3] + m[1, 0] * m[1, 3] + m[2, 0] * m[2, 3])
+    l1 = -(m[0, 1] * m[0, 3] + m[1, 1] * m[1, 3] + m[2, 1] * m[2, 3])
+    l2 = -(m[0, 2] * m[0, 3] + m[1, 2] * m[1, 3] + m[2, 2] * m[2, 3])
+    n = 0
+    for r in range(vertices.shape[0]):
+        v, path = vertices[r], paths[r]
+        light, photon_pdf = laser_irradiance(v, laser)
+        if light <= 0.0:
             continue
-        if clear[pixel]:
-            take.touched[pixel // BLOCK] = True
-            take.helped[pixel] += state[r, POWER] * v[REFLECTANCE] * area / (math.pi * light_paths)
+        if is_specular(v, rows):
+            continue
+        e0, e1, e2, distance = towards(v, l0, l1, l2)
+        out = cosine_to(v, e0, e1, e2)
+        i0, i1, i2 = to_shading(v, e0, e1, e2)
+        if out * i2 <= 0.0:
+            continue
+        o0, o1, o2 = v.wo[0], v.wo[1], v.wo[2]
+        f = eval_bsdf(v, rows, i0, i1, i2, o0, o1, o2)
+        if f <= 0.0:
+            continue
+        others = photon_pdf * (path.dvcm + bsdf_pdf(v, rows, i0, i1, i2, o0, o1, o2) * path.dvc)
+        mis_divisor = 1.0 + RIS_SAMPLE_WEIGHT * others
+        connections.pixel[n], connections.kind[n], connections.fan_bin[n] = path.pixel, path.kind, -1
+        connections.reachable_from_camera[n] = True
+        connections.contribution[n] = path.throughput * f * light * abs(i2 / out) / mis_divisor
+        set_shadow_ray(connections, n, v, e0, e1, e2, distance, context)
+        n += 1
+    return n
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def pixel_of(view: View, tilt: Float, distorted: bool, height: int, v: Float, a: float, b: float) -> tuple[int, float]:
+def init_light_mis(vertices: Records, paths: Records, laser: LaserSampling) -> None:
+    """The partial MIS sums of light paths at the first surface that they meet."""
+    for r in range(vertices.shape[0]):
+        _, photon_pdf = laser_irradiance(vertices[r], laser)
+        path = paths[r]
+        path.dvcm = 1.0 / (RIS_SAMPLE_WEIGHT * photon_pdf) if photon_pdf > 0.0 else 0.0
+        path.dvc = 0.0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def init_camera_mis(vertices: Records, paths: Records, sampling: CameraSampling, seed: int) -> None:
+    """The partial MIS sums of camera paths at the first surface that they meet."""
+    view = sampling.camera
+    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
+    distorted = bool(np.any(view.distortion))
+    for r in range(vertices.shape[0]):
+        v, path = vertices[r], paths[r]
+        a, b = path_lens_point(view, seed, path.index)
+        _, _, area = lens_project(view, tilt, distorted, v.p[0], v.p[1], v.p[2], a, b)
+        c0, c1, c2 = lens_position(view, a, b)
+        e0, e1, e2 = c0 - v.p[0], c1 - v.p[1], c2 - v.p[2]
+        camera_pdf = area * abs(cosine_to(v, e0, e1, e2)) / math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
+        tries = RIS_SAMPLE_WEIGHT * sampling.camera_paths[path.pixel]
+        path.dvcm = sampling.light_paths / (tries * camera_pdf) if camera_pdf > 0.0 else 0.0
+        path.dvc = 0.0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def mark_reachable(
+    vertices: Records, paths: Records, sampling: CameraSampling, specular: Bool, buffer: PassBuffer
+) -> None:
+    """Add to `buffer.camera_radiance` roughly what light vertices look like behind clear glass, as if it bent nothing.
+
+    specular (pixels,): where the camera sees a mirror or clear glass. It only says where camera paths are worthwhile.
+    """
+    view = sampling.camera
+    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
+    distorted = bool(np.any(view.distortion))
+    for r in range(vertices.shape[0]):
+        v = vertices[r]
+        pixel, area = pixel_of(view, tilt, distorted, sampling.height, v, 0.0, 0.0)
+        if pixel < 0:
+            continue
+        if specular[pixel]:
+            buffer.touched[pixel // BLOCK] = True
+            buffer.camera_radiance[pixel] += (
+                paths[r].throughput * v.reflectance * area / (math.pi * sampling.light_paths)
+            )
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def connectable(vertices: Records, paths: Records, rows: Float) -> tuple[Records, Records]:
+    """Copies of the vertices (n,) and paths that connections can be made of: all but the specular ones."""
+    kept_vertices, kept_paths = np.empty_like(vertices), np.empty_like(paths)
+    n = 0
+    for r in range(vertices.shape[0]):
+        if not is_specular(vertices[r], rows):
+            kept_vertices[n], kept_paths[n] = vertices[r], paths[r]
+            n += 1
+    return kept_vertices[:n], kept_paths[:n]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def towards(v: Record, c0: float, c1: float, c2: float) -> tuple[float, float, float, float]:
+    """Unit direction from a vertex to the point c, and its distance, m."""
+    e0, e1, e2 = c0 - v.p[0], c1 - v.p[1], c2 - v.p[2]
+    distance = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
+    return e0 / distance, e1 / distance, e2 / distance, distance
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def pixel_of(view: View, tilt: Float, distorted: bool, height: int, v: Record, a: float, b: float) -> tuple[int, float]:
     """The pixel that sees a vertex through lens point (a, b), -1 if none, and `lens_project`'s area."""
-    x, y, area = lens_project(view, tilt, distorted, v[0], v[1], v[2], a, b)
+    x, y, area = lens_project(view, tilt, distorted, v.p[0], v.p[1], v.p[2], a, b)
     if not (area > 0.0 and -0.5 <= x < view.width - 0.5 and -0.5 <= y < height - 0.5):
         return -1, 0.0
     return int(math.floor(y + 0.5)) * view.width + int(math.floor(x + 0.5)), area
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def laser_light(v: Float, T_laser_world: Float, beam: Float, fan: Fan) -> tuple[float, float]:
-    """Irradiance (W/m^2, on the geometric normal) at a vertex by the laser, and the photons a path and m^2 there."""
-    m = T_laser_world
-    x = m[0, 0] * v[0] + m[0, 1] * v[1] + m[0, 2] * v[2] + m[0, 3]
-    y = m[1, 0] * v[0] + m[1, 1] * v[1] + m[1, 2] * v[2] + m[1, 3]
-    z = m[2, 0] * v[0] + m[2, 1] * v[1] + m[2, 2] * v[2] + m[2, 3]
-    nx = m[0, 0] * v[3] + m[0, 1] * v[4] + m[0, 2] * v[5]
-    ny = m[1, 0] * v[3] + m[1, 1] * v[4] + m[1, 2] * v[5]
-    nz = m[2, 0] * v[3] + m[2, 1] * v[4] + m[2, 2] * v[5]
-    value = irradiance(x, y, z, nx, ny, nz, beam)
-    return value, value / beam[0] * emitted_density(y / z, fan, beam) if value > 0.0 else 0.0
+def laser_irradiance(v: Record, laser: LaserSampling) -> tuple[float, float]:
+    """Irradiance (W/m^2, on the geometric normal) of a vertex by the laser, and the pdf (1/m^2) of photons there."""
+    m = laser.T_laser_world
+    x = m[0, 0] * v.p[0] + m[0, 1] * v.p[1] + m[0, 2] * v.p[2] + m[0, 3]
+    y = m[1, 0] * v.p[0] + m[1, 1] * v.p[1] + m[1, 2] * v.p[2] + m[1, 3]
+    z = m[2, 0] * v.p[0] + m[2, 1] * v.p[1] + m[2, 2] * v.p[2] + m[2, 3]
+    nx = m[0, 0] * v.n[0] + m[0, 1] * v.n[1] + m[0, 2] * v.n[2]
+    ny = m[1, 0] * v.n[0] + m[1, 1] * v.n[1] + m[1, 2] * v.n[2]
+    nz = m[2, 0] * v.n[0] + m[2, 1] * v.n[1] + m[2, 2] * v.n[2]
+    value = irradiance(x, y, z, nx, ny, nz, laser.beam)
+    return value, value / laser.beam[0] * emitted_density(y / z, laser.fan, laser.beam) if value > 0.0 else 0.0
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def begin_light(vertex: Float, state: Float, T_laser_world: Float, beam: Float, fan: Fan) -> None:
-    """The weights' partial sums at the first surface that light meets."""
-    for r in range(vertex.shape[0]):
-        _, density = laser_light(vertex[r], T_laser_world, beam, fan)
-        state[r, DVCM] = 1.0 / (JOINS * density) if density > 0.0 else 0.0
-        state[r, DVC] = 0.0
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def begin_camera(vertex: Float, state: Float, view: View, samples: Float, light_paths: int, seed: int) -> None:
-    """The weights' partial sums at the first surface that the camera sees."""
-    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
-    distorted = bool(np.any(view.distortion))
-    for r in range(vertex.shape[0]):
-        v = vertex[r]
-        a, b = path_lens_point(view, seed, int(state[r, NUMBER]))
-        _, _, area = lens_project(view, tilt, distorted, v[0], v[1], v[2], a, b)
-        c0, c1, c2 = lens_position(view, a, b)
-        e0, e1, e2 = c0 - v[0], c1 - v[1], c2 - v[2]
-        density = area * abs(v[3] * e0 + v[4] * e1 + v[5] * e2) / math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
-        state[r, DVCM] = light_paths / (JOINS * samples[int(state[r, PIXEL])] * density) if density > 0.0 else 0.0
-        state[r, DVC] = 0.0
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def path_lens_point(view: View, seed: int, number: int) -> tuple[float, float]:
-    """(a, b) on the aperture through which camera path `number` goes."""
+def path_lens_point(view: View, seed: int, index: int) -> tuple[float, float]:
+    """(a, b) on the aperture through which camera path `index` goes."""
     if view.lens[0] == 0.0:
         return 0.0, 0.0
-    return lens_point(view.lens[0], uniform(seed, number, 0, 94), uniform(seed, number, 0, 95))
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def join_laser(
-    vertex: Float,
-    state: Float,
-    rows: Float,
-    T_laser_world: Float,
-    beam: Float,
-    fan: Fan,
-    centre: Float,
-    offset: float,
-    joints: Joints,
-) -> int:
-    """Join camera vertices (n, .) to the laser -> joints. Returns their number."""
-    m = T_laser_world
-    l0 = -(m[0, 0] * m[0, 3] + m[1, 0] * m[1, 3] + m[2, 0] * m[2, 3])
-    l1 = -(m[0, 1] * m[0, 3] + m[1, 1] * m[1, 3] + m[2, 1] * m[2, 3])
-    l2 = -(m[0, 2] * m[0, 3] + m[1, 2] * m[1, 3] + m[2, 2] * m[2, 3])
-    n = 0
-    for r in range(vertex.shape[0]):
-        v = vertex[r]
-        light, density = laser_light(v, m, beam, fan)
-        if light <= 0.0:
-            continue
-        if mirror_at(v, rows):
-            continue
-        e0, e1, e2 = l0 - v[0], l1 - v[1], l2 - v[2]
-        far = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
-        e0, e1, e2 = e0 / far, e1 / far, e2 / far
-        out = v[3] * e0 + v[4] * e1 + v[5] * e2
-        i0, i1, i2 = local(v, e0, e1, e2)
-        if out * i2 <= 0.0:
-            continue
-        o0, o1, o2 = v[BACK], v[BACK + 1], v[BACK + 2]
-        f = scattered(v, rows, i0, i1, i2, o0, o1, o2)
-        if f <= 0.0:
-            continue
-        others = density * (state[r, DVCM] + chance(v, rows, i0, i1, i2, o0, o1, o2) * state[r, DVC])
-        joints.pixel[n], joints.kind[n], joints.part[n] = int(state[r, PIXEL]), int(state[r, KIND]), -1
-        joints.helped[n] = True
-        joints.worth[n] = state[r, POWER] * f * light * abs(i2 / out) / (1.0 + JOINS * others)
-        cast(joints, n, v, e0, e1, e2, out, far, centre, offset)
-        n += 1
-    return n
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def joinable(vertex: Float, state: Float, rows: Float) -> tuple[Float, Float]:
-    """Copies of the vertices (n, .) and states of which joints can be made: all but mirrors and clear glass."""
-    kept, kept_state = np.empty(vertex.shape), np.empty(state.shape)
-    n = 0
-    for r in range(vertex.shape[0]):
-        if not mirror_at(vertex[r], rows):
-            for c in range(vertex.shape[1]):
-                kept[n, c] = vertex[r, c]
-            for c in range(state.shape[1]):
-                kept_state[n, c] = state[r, c]
-            n += 1
-    return kept[:n], kept_state[:n]
+    return lens_point(view.lens[0], uniform(seed, index, 0, 94), uniform(seed, index, 0, 95))

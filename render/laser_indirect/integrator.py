@@ -19,23 +19,22 @@ from render.base.errors import Cancelled
 from render.base.threads import Cancel, Progress, map_chunks, thread_count
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser
-from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, Gathered, gather_takes
-from render.laser_indirect.bdpt_pass import KINDS, LightPass
-from render.laser_indirect.connection_buffer import BLOCK, Take
+from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, Accumulator, sum_passes
+from render.laser_indirect.bdpt_pass import KINDS, BdptPass, Sampling
+from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
     BINS,
-    NOWHERE,
-    Guide,
-    clear_pixels,
+    NO_PIXELS,
+    active_pixels,
+    allocate_camera_paths,
     first_guide,
-    learn,
-    look_behind,
     no_guide,
-    pixels_looked_at,
-    share_samples,
+    reserve_for_specular,
+    specular_pixels,
+    update_guide,
 )
-from render.laser_indirect.path_vertex import BENT, SUNK, UNJOINED
-from render.laser_indirect.photon_emission import PARTS, Fan, aimed_fan, even_fan, fan_span
+from render.laser_indirect.path_vertex import CAUSTIC, SPECULAR_CHAIN, SUBSURFACE_LIGHT
+from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
 from render.world.world import World
 
 Float = NDArray[np.float64]
@@ -48,7 +47,7 @@ LOOK_PATHS = 1 << 11
 PILOT_PATHS = 1 << 13
 WAVE = 4
 """Passes at a time, whatever the number of threads."""
-ALL_KINDS = BENT | SUNK | UNJOINED
+ALL_KINDS = CAUSTIC | SUBSURFACE_LIGHT | SPECULAR_CHAIN
 
 
 @dataclass(frozen=True)
@@ -73,13 +72,13 @@ class IndirectImage:
 class Shares:
     """Radiance summed over the image, with its standard error, of each kind of indirect light."""
 
-    plain: tuple[float, float]
+    interreflection: tuple[float, float]
     """Over two or more surfaces, none of them a mirror, clear glass or a medium."""
-    bent: tuple[float, float]
+    caustic: tuple[float, float]
     """Through clear glass or off mirrors, on one side of some joint."""
-    unjoined: tuple[float, float]
+    specular_chain: tuple[float, float]
     """Through clear glass or off mirrors on both sides of a single rough surface."""
-    sunk: tuple[float, float]
+    subsurface: tuple[float, float]
     """Through a medium."""
 
 
@@ -108,8 +107,8 @@ def indirect_images(
     progress: Progress | None = None,
     enough: Cancel | None = None,
     keeps: Cancel | None = None,
-    before: Gathered | None = None,
-    keep: Callable[[Gathered], None] | None = None,
+    resume_from: Accumulator | None = None,
+    keep: Callable[[Accumulator], None] | None = None,
 ) -> Iterator[IndirectImage]:
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
@@ -120,40 +119,40 @@ def indirect_images(
     what to go on from after every wave of passes; it stays whole when this raises Cancelled, where keeps() says so
     after one more image.
     """
-    low, high, reach = fan_span(world, laser, T_world_laser)
+    low, high, reach = visible_fan_range(world, laser, T_world_laser)
     shape = (camera.height, camera.width)
     if high <= low:
         yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0)
         return
-    task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, kinds)
-    takes = [empty_take(camera.width * camera.height) for _ in range(WAVE)]
+    task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, kinds)
+    buffers = [empty_buffer(camera.width * camera.height) for _ in range(WAVE)]
 
-    def wave(first: int, paths: int, fan: Fan, samples: Float, guide: Guide, hints: Bool | None = None) -> None:
-        looked_at = pixels_looked_at(samples)
-
+    def wave(first: int, sampling: Sampling, reachable_pixels: Bool | None = None) -> None:
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
-                task.run(first + number, paths, fan, samples, looked_at, guide, takes[number], cancelled, hints)
+                task.run(first + number, sampling, buffers[number], cancelled, reachable_pixels)
 
         map_chunks(work, WAVE, 1, min(WAVE, thread_count(threads)), cancelled)
 
-    if before is None:
+    if resume_from is None:
         # two looks only say where laser and camera should look: the first, by light, where it arrives at all (what is
         # behind glass only the camera finds), the second, from there, which light matters
-        fan = even_fan(low, high)
-        clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else NOWHERE
-        hints = clear if task.clear else None
-        wave(0, LOOK_PATHS, fan, first_samples(clear, camera, 8 * LOOK_PATHS), no_guide(camera), hints)
-        before = first_knowledge(takes, fan, camera, kinds, clear)
-        learnt = learn_with(takes, before)
-        wave(WAVE, LOOK_PATHS, before.fan, before.samples, before.guide, hints)
-        second_knowledge(before, takes, learnt, camera)
-    so_far = before
-    learnt = learn_with(takes, so_far)
+        fan = uniform_fan(low, high)
+        specular = specular_pixels(world, task.surface, camera, T_world_camera) if task.specular else NO_PIXELS
+        reachable_pixels = specular if task.specular else None
+        camera_paths = first_camera_paths(specular, camera, 8 * LOOK_PATHS)
+        first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
+        wave(0, first_look, reachable_pixels)
+        resume_from = initialise_guiding(buffers, fan, camera, kinds, specular)
+        wave_moments = attach_wave_moments(buffers, resume_from)
+        wave(WAVE, sampling_of(resume_from, LOOK_PATHS), reachable_pixels)
+        refine_guiding(resume_from, buffers, wave_moments, camera)
+    so_far = resume_from
+    wave_moments = attach_wave_moments(buffers, so_far)
 
     def image() -> IndirectImage:
         counts = so_far.paths, round(so_far.dropped), round(so_far.clamped)
-        cut = so_far.cut / so_far.weight / so_far.total.size
+        cut = so_far.clamped_radiance / so_far.weight / so_far.total.size
         return IndirectImage(so_far.radiance(shape), so_far.error, *counts, cut)
 
     def unfinished() -> bool:
@@ -163,12 +162,12 @@ def indirect_images(
     while unfinished():
         try:
             first = WAVE * (2 + so_far.waves)
-            wave(first, so_far.next_paths, so_far.fan, so_far.samples, so_far.guide)
+            wave(first, sampling_of(so_far, so_far.next_paths))
         except Cancelled:
             if so_far.passes and keeps is not None and keeps():
                 yield image()
             raise
-        so_far.add(takes, learnt, clamp, threads)
+        so_far.add(buffers, wave_moments, clamp, threads)
         if keep is not None:
             keep(so_far)
         if progress is not None:
@@ -183,52 +182,62 @@ def indirect_images(
     yield image()
 
 
-def first_knowledge(takes: list[Take], fan: Fan, camera: Camera, kinds: int, clear: Bool) -> Gathered:
+def initialise_guiding(
+    buffers: list[PassBuffer], fan: FanDistribution, camera: Camera, kinds: int, specular: Bool
+) -> Accumulator:
     """Nothing gathered yet, but where a first look (cleared) says that light is to be found."""
     pixels = camera.width * camera.height
-    fan = aimed_fan(fan, np.sum([take.found for take in takes], axis=0))
-    share, helped = looked(takes)
-    samples = share_samples(helped, camera.width, LOOK_PATHS * share, arrived(helped), 1.0)
-    look_behind(samples, clear, LOOK_PATHS)
-    guide = first_guide(samples, camera)
-    knowledge = np.zeros((len(guide.cumulative), BINS))
+    fan = guided_fan(fan, np.sum([buffer.fan_moments for buffer in buffers], axis=0))
+    share, camera_radiance = camera_reachable_share(buffers)
+    camera_paths = allocate_camera_paths(
+        camera_radiance, camera.width, LOOK_PATHS * share, arrived_paths(camera_radiance), 1.0
+    )
+    reserve_for_specular(camera_paths, specular, LOOK_PATHS)
+    guide = first_guide(camera_paths, camera)
+    guide_moments = np.zeros((len(guide.cumulative), BINS))
     size = min(max(1 << (pixels >> 8).bit_length() - 1, LEAST_PASS), MOST_PASS)
     sums = np.zeros(pixels), np.zeros(pixels, np.float32)
-    return Gathered(kinds, fan, size, 1, share, clear, samples, guide, knowledge, *sums)
+    return Accumulator(kinds, fan, size, 1, share, specular, camera_paths, guide, guide_moments, *sums)
 
 
-def second_knowledge(first: Gathered, takes: list[Take], learnt: Float, camera: Camera) -> None:
+def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: Float, camera: Camera) -> None:
     """Add what a second look (cleared) has found, and set the size of the passes to come."""
-    first.guide = learn(first.guide, learnt, first.knowledge)
-    first.share, helped = looked(takes)
-    if len(first.clear):
+    first.guide = update_guide(first.guide, wave_moments, first.guide_moments)
+    first.camera_share, camera_radiance = camera_reachable_share(buffers)
+    if len(first.specular):
         # where something may be behind glass is not forgotten when the first passes find nothing there
-        first.helped[:] = helped
+        first.camera_radiance[:] = camera_radiance
     # a wide glow is best known by passes with a path for each of its pixels
-    first.most = max((MOST_CAMERA_PASS // 2 if first.share > 0.5 else MOST_PASS) // first.size, 1)
-    share_samples(helped, camera.width, first.wanted, first.samples, float(WAVE))
-    look_behind(first.samples, first.clear, first.wanted)
+    first.growth_limit = max((MOST_CAMERA_PASS // 2 if first.camera_share > 0.5 else MOST_PASS) // first.size, 1)
+    allocate_camera_paths(camera_radiance, camera.width, first.next_camera_paths, first.camera_paths, float(WAVE))
+    reserve_for_specular(first.camera_paths, first.specular, first.next_camera_paths)
 
 
-def arrived(helped: Float32) -> Float:
+def arrived_paths(camera_radiance: Float32) -> Float:
     """(pixels,) roughly how many light paths of a first look came to each."""
-    return helped.astype(np.float64) * (WAVE * LOOK_PATHS / max(float(helped.sum()), 1e-300))
+    return camera_radiance.astype(np.float64) * (WAVE * LOOK_PATHS / max(float(camera_radiance.sum()), 1e-300))
 
 
-def looked(takes: list[Take]) -> tuple[float, Float32]:
+def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
     """What camera paths could help with: its share of the light, and (pixels,) of takes, which are cleared."""
-    helped = np.zeros_like(takes[0].helped)
-    light, by_camera, *_ = gather_takes(takes, np.zeros(len(helped)), helped)
-    for take in takes:
-        take.dropped[:] = 0.0
-    return min(by_camera / light, 1.0) if light > 0.0 else 1.0, helped
+    camera_radiance = np.zeros_like(buffers[0].camera_radiance)
+    light, by_camera, *_ = sum_passes(buffers, np.zeros(len(camera_radiance)), camera_radiance)
+    for buffer in buffers:
+        buffer.dropped[:] = 0.0
+    return min(by_camera / light, 1.0) if light > 0.0 else 1.0, camera_radiance
 
 
-def learn_with(takes: list[Take], so_far: Gathered) -> Float:
+def sampling_of(so_far: Accumulator, light_paths: int) -> Sampling:
+    """How the next passes sample, by what the passes so far have found."""
+    active = active_pixels(so_far.camera_paths)
+    return Sampling(light_paths, so_far.fan, so_far.camera_paths, active, so_far.guide)
+
+
+def attach_wave_moments(buffers: list[PassBuffer], so_far: Accumulator) -> Float:
     """Give each take (in place) its part of the array that is returned, to learn in."""
-    learnt = np.zeros((WAVE, *so_far.knowledge.shape))
-    takes[:] = [take._replace(learnt=learnt[i]) for i, take in enumerate(takes)]
-    return learnt
+    wave_moments = np.zeros((WAVE, *so_far.guide_moments.shape))
+    buffers[:] = [buffer._replace(wave_moments=wave_moments[i]) for i, buffer in enumerate(buffers)]
+    return wave_moments
 
 
 def indirect_shares(
@@ -243,40 +252,43 @@ def indirect_shares(
     cancelled: Cancel | None = None,
 ) -> Shares:
     """A pilot of a few short passes: what each kind of indirect light brings. Raises Cancelled."""
-    low, high, reach = fan_span(world, laser, T_world_laser)
+    low, high, reach = visible_fan_range(world, laser, T_world_laser)
     if high <= low:
         return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
-    task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, ALL_KINDS)
-    clear = clear_pixels(world, task.surface, camera, T_world_camera) if task.clear else NOWHERE
-    fan, guide, sums = even_fan(low, high), no_guide(camera), []
-    take = empty_take(camera.width * camera.height)
-    samples = first_samples(clear, camera, PILOT_PATHS)
-    if task.clear:
+    task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, ALL_KINDS)
+    specular = specular_pixels(world, task.surface, camera, T_world_camera) if task.specular else NO_PIXELS
+    fan, guide, sums = uniform_fan(low, high), no_guide(camera), []
+    buffer = empty_buffer(camera.width * camera.height)
+    camera_paths = first_camera_paths(specular, camera, PILOT_PATHS)
+    if task.specular:
         # what is seen through glass may be small, and is worth a look of its own
-        task.run(passes, LOOK_PATHS, fan, samples, pixels_looked_at(samples), guide, take, cancelled, clear)
-        _, helped = looked([take])
-        samples = share_samples(helped, camera.width, PILOT_PATHS, arrived(helped), 1.0)
-        look_behind(samples, clear, PILOT_PATHS)
-    looked_at = pixels_looked_at(samples)
+        first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
+        task.run(passes, first_look, buffer, cancelled, specular)
+        _, camera_radiance = camera_reachable_share([buffer])
+        camera_paths = allocate_camera_paths(
+            camera_radiance, camera.width, PILOT_PATHS, arrived_paths(camera_radiance), 1.0
+        )
+        reserve_for_specular(camera_paths, specular, PILOT_PATHS)
+    sampling = Sampling(PILOT_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
     for number in range(passes):
-        take = empty_take(camera.width * camera.height)
-        task.run(number, PILOT_PATHS, fan, samples, looked_at, guide, take, cancelled)
-        plain, bent, sunk, both, unjoined = take.sums
-        sums.append((plain, bent, unjoined, sunk + both))
+        buffer = empty_buffer(camera.width * camera.height)
+        task.run(number, sampling, buffer, cancelled)
+        diffuse, caustic, subsurface, both, specular_chain = buffer.sums
+        sums.append((diffuse, caustic, specular_chain, subsurface + both))
     mean, error = np.mean(sums, axis=0), np.std(sums, axis=0, ddof=1) / math.sqrt(passes)
     return Shares(*((float(m), float(e)) for m, e in zip(mean, error, strict=True)))
 
 
-def empty_take(pixels: int) -> Take:
+def empty_buffer(pixels: int) -> PassBuffer:
     """Nothing yet, and no guide to learn for; of the images the system finds room only where light arrives."""
-    zeros = np.zeros(KINDS), np.zeros(PARTS), np.zeros((0, BINS))
+    zeros = np.zeros(KINDS), np.zeros(FAN_BINS), np.zeros((0, BINS))
     touched = np.zeros(-(-pixels // BLOCK), np.bool_)
-    return Take(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)
+    return PassBuffer(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)
 
 
-def first_samples(clear: Bool, camera: Camera, count: int) -> Float:
+def first_camera_paths(specular: Bool, camera: Camera, count: int) -> Float:
     """(pixels,) camera paths of a first look: at most `count`, on what the camera sees of mirrors and clear glass."""
-    samples = np.zeros(camera.width * camera.height)
-    if len(clear):
-        samples[clear] = min(1.0, count / max(int(clear.sum()), 1))
-    return samples
+    camera_paths = np.zeros(camera.width * camera.height)
+    if len(specular):
+        camera_paths[specular] = min(1.0, count / max(int(specular.sum()), 1))
+    return camera_paths

@@ -30,11 +30,11 @@ SEQUENCE = _recurrence(5)
 """Additive recurrence in five dimensions (Roberts 2018, R5): two at the laser, three for the first bounce."""
 
 
-PARTS, EVERYWHERE = 128, 0.25
+FAN_BINS, UNIFORM_FRACTION = 128, 0.25
 """Of the fan, each with its own density of photons; the share of them that is spread evenly."""
 
 
-class Fan(NamedTuple):
+class FanDistribution(NamedTuple):
     """Which photons are sent out."""
 
     low: float
@@ -44,14 +44,14 @@ class Fan(NamedTuple):
     """(PARTS + 1,) distribution over equal parts of what lies between, from 0 to 1."""
 
 
-class Paths(NamedTuple):
-    """Paths on their way: (n, 3) origin and direction (world), (n,) power, number of the path, part of the fan."""
+class Photons(NamedTuple):
+    """Photons on their way: (n, 3) origin and direction (world), (n,) power, number of the path, bin of the fan."""
 
     origin: Float
     direction: Float
     power: Float
-    number: Long
-    part: Long
+    path_index: Long
+    fan_bin: Long
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -102,63 +102,71 @@ def fan_quantile(share: float, beam: Float) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def emit(
-    first: int, total: int, start: Float, fan: Fan, reach: float, beam: Float, T_world_laser: Float, paths: Paths
+    first: int,
+    total: int,
+    shift: Float,
+    reference_distance: float,
+    beam: Float,
+    fan: FanDistribution,
+    T_world_laser: Float,
+    photons: Photons,
 ) -> None:
-    """Fill paths with photons number `first` .. of `total`, in the fan's order; `start` (5,) is the pass's.
+    """Fill `photons` with numbers first, first + 1, ... of `total`, in the fan's order; shift (5,) is the pass's.
 
-    A focused sheet bends; its photons fly straight towards where the sheet is at distance `reach`, about the part's.
+    A focused sheet bends; its photons fly straight towards where the sheet is at the reference distance, the part's.
     """
     m = T_world_laser
     emitter, _ = sheet_sigma(0.0, beam)
-    sigma, _ = sheet_sigma(reach, beam)
-    part = 0
-    for i in range(len(paths.number)):
-        number = first + i
-        place = (number + start[0]) / total
-        while part < PARTS - 1 and fan.cumulative[part + 1] <= place:
-            part += 1
-        chance = fan.cumulative[part + 1] - fan.cumulative[part]
-        along = fan.low + (fan.high - fan.low) * (part + (place - fan.cumulative[part]) / chance) / PARTS
-        across = (start[1] + number * SEQUENCE[1]) % 1.0
+    sigma, _ = sheet_sigma(reference_distance, beam)
+    fan_bin = 0
+    for i in range(len(photons.path_index)):
+        index = first + i
+        place = (index + shift[0]) / total
+        while fan_bin < FAN_BINS - 1 and fan.cumulative[fan_bin + 1] <= place:
+            fan_bin += 1
+        probability = fan.cumulative[fan_bin + 1] - fan.cumulative[fan_bin]
+        within = (place - fan.cumulative[fan_bin]) / probability
+        along = fan.low + (fan.high - fan.low) * (fan_bin + within) / FAN_BINS
+        across = (shift[1] + index * SEQUENCE[1]) % 1.0
         y = fan_quantile(min(max(along, 1e-15), 1.0 - 1e-15), beam)
         q = normal_quantile(min(max(across, 1e-12), 1.0 - 1e-12))
         x0 = q * emitter
-        dx, dy, dz = q * (sigma - emitter) / reach, y, 1.0
+        dx, dy, dz = q * (sigma - emitter) / reference_distance, y, 1.0
         length = math.sqrt(dx * dx + dy * dy + dz * dz)
         for axis in range(3):
-            paths.origin[i, axis] = m[axis, 3] + m[axis, 0] * x0
-            paths.direction[i, axis] = (m[axis, 0] * dx + m[axis, 1] * dy + m[axis, 2] * dz) / length
-        paths.power[i] = beam[0] * (fan.high - fan.low) / (PARTS * chance)
-        paths.number[i], paths.part[i] = number, part
+            photons.origin[i, axis] = m[axis, 3] + m[axis, 0] * x0
+            photons.direction[i, axis] = (m[axis, 0] * dx + m[axis, 1] * dy + m[axis, 2] * dz) / length
+        photons.power[i] = beam[0] * (fan.high - fan.low) / (FAN_BINS * probability)
+        photons.path_index[i], photons.fan_bin[i] = index, fan_bin
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def emitted_density(y: float, fan: Fan, beam: Float) -> float:
+def emitted_density(y: float, fan: FanDistribution, beam: Float) -> float:
     """How much denser photons leave towards Y than the laser's light does, over its whole power; 0: none do."""
-    place = (fan_integral(y, beam) - fan.low) / (fan.high - fan.low) * PARTS
-    if place < 0.0 or place > PARTS:
+    place = (fan_integral(y, beam) - fan.low) / (fan.high - fan.low) * FAN_BINS
+    if place < 0.0 or place > FAN_BINS:
         return 0.0
-    part = min(int(place), PARTS - 1)
-    return PARTS * (fan.cumulative[part + 1] - fan.cumulative[part]) / (fan.high - fan.low)
+    part = min(int(place), FAN_BINS - 1)
+    return FAN_BINS * (fan.cumulative[part + 1] - fan.cumulative[part]) / (fan.high - fan.low)
 
 
-def even_fan(low: float, high: float) -> Fan:
+def uniform_fan(low: float, high: float) -> FanDistribution:
     """Photons as the laser's light, between two shares of its power."""
-    return Fan(low, high, np.linspace(0.0, 1.0, PARTS + 1))
+    return FanDistribution(low, high, np.linspace(0.0, 1.0, FAN_BINS + 1))
 
 
-def aimed_fan(fan: Fan, found: Float) -> Fan:
+def guided_fan(fan: FanDistribution, found: Float) -> FanDistribution:
     """Photons where paths brought most: found (PARTS,), their squared worth; a part goes everywhere all the same."""
     density = np.sqrt(found)
     density = 0.5 * density + 0.25 * (np.roll(density, 1) + np.roll(density, -1))
     if not density.sum() > 0.0:
         return fan
-    density = (1.0 - EVERYWHERE) * density / density.sum() + EVERYWHERE / PARTS
+    density = (1.0 - UNIFORM_FRACTION) * density / density.sum() + UNIFORM_FRACTION / FAN_BINS
     cumulative = np.concatenate([[0.0], np.cumsum(density)])
     return fan._replace(cumulative=cumulative / cumulative[-1])
 
 
-def fan_span(world: World, laser: LineLaser, T_world_laser: Float) -> tuple[float, float, float]:
+def visible_fan_range(world: World, laser: LineLaser, T_world_laser: Float) -> tuple[float, float, float]:
     """Shares of the power (low, high) between which the sheet can hit anything, and the part's middle distance, m."""
     local = transform_points(invert(T_world_laser), world.vertices)
     z = local[:, 2]

@@ -1,9 +1,9 @@
-"""Photon merging, for light that no joint can bring: through clear glass or off mirrors before and after a surface.
+"""Photon merging, for what no connection can bring: light through clear glass or off mirrors on both sides.
 
-The light arrives at its one rough surface between by a direction that only chance can give, and leaves by another, so a
-camera path that ends within a small radius of where a light path ended is taken to be joined to it (progressive
+The light arrives at its one rough surface between by a direction that only scattering can give, and leaves by another,
+so a camera path that ends within a small radius of where a light path ended is taken to be connected to it (progressive
 photon mapping, Hachisuka and Jensen 2009; one radius a pass, Knaus and Zwicker 2011). It blurs by that radius, about a
-pixel at first, ever less with the passes; all other light is joined without.
+pixel at first, ever less with the passes; all other light is connected without bias.
 """
 
 from __future__ import annotations
@@ -15,93 +15,90 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.laser_indirect.connection_buffer import BLOCK, Take
-from render.laser_indirect.path_vertex import (
-    BACK,
-    CLEAR,
-    LONE,
-    NORMAL,
-    PART,
-    PIXEL,
-    POWER,
-    UNJOINED,
-    mirror_at,
-    scattered,
-)
+from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
+from render.laser_indirect.path_vertex import SPECULAR_CHAIN, Record, Records, eval_bsdf, is_specular
 
 Float = NDArray[np.float64]
 Long = NDArray[np.int64]
 
-SHRINK = 1.0 / 6.0
+RADIUS_EXPONENT = 1.0 / 6.0
 """The radius falls as n^-(1/6) with the passes (Knaus and Zwicker 2011, alpha = 2/3)."""
+LEAST_COSINE = 0.7
+"""Between the normals of a photon and of the surface it is merged on: none is taken from around a corner."""
 
 
-class Photons(NamedTuple):
-    """(n, .) vertices in the order of their cells; (n,) power, part of the fan, cell; the cells' origin and size, m."""
+class PhotonMap(NamedTuple):
+    """(n,) photons in the order of their cells: vertices, power, bin of the fan; the cells' origin and size, m."""
 
-    vertex: Float
+    vertices: Records
     power: Float
-    part: Long
+    fan_bin: Long
     cell: Long
     corner: Float
     size: float
-    paths: int
+    light_paths: int
 
 
-def photons(vertex: Float, state: Float, radius: float, paths: int) -> Photons:
+def photon_map(vertices: Records, paths: Records, radius: float, light_paths: int) -> PhotonMap:
     """Sort light vertices that only merging can use into cells of twice the radius."""
-    lone = (state[:, LONE] > 0.0) & (state[:, CLEAR] > 0.0)
-    vertex, power, part = vertex[lone], state[lone, POWER], state[lone, PART].astype(np.int64)
-    corner = vertex[:, :3].min(axis=0) - 2.0 * radius if len(vertex) else np.zeros(3)
+    alone = paths["all_specular"] & paths["after_specular"]
+    vertices, paths = vertices[alone], paths[alone]
+    points = vertices["p"]
+    corner = points.min(axis=0) - 2.0 * radius if len(vertices) else np.zeros(3)
     size = 2.0 * radius
-    place = np.floor((vertex[:, :3] - corner) / size).astype(np.int64)
+    place = np.floor((points - corner) / size).astype(np.int64)
     cell = (place[:, 0] << 42) | (place[:, 1] << 21) | place[:, 2]
     order = np.argsort(cell, kind="stable")
-    return Photons(vertex[order], power[order], part[order], cell[order], corner, size, paths)
+    power, fan_bin = paths["throughput"][order], paths["fan_bin"][order].astype(np.int64)
+    return PhotonMap(vertices[order], power, fan_bin, cell[order], corner, size, light_paths)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def merge(vertex: Float, state: Float, rows: Float, light: Photons, take: Take) -> None:
-    """Add what the photons about each camera vertex bring."""
-    radius = 0.5 * light.size
-    share = 1.0 / (math.pi * radius * radius * light.paths)
-    count = light.cell.shape[0]
-    for r in range(vertex.shape[0]):
-        if state[r, LONE] == 0.0 or state[r, CLEAR] == 0.0:
+def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, buffer: PassBuffer) -> None:
+    """Splat what the photons about each camera vertex bring."""
+    radius = 0.5 * photons.size
+    kernel = 1.0 / (math.pi * radius * radius * photons.light_paths)
+    for r in range(vertices.shape[0]):
+        v, path = vertices[r], paths[r]
+        if not path.all_specular or not path.after_specular:
             continue
-        v = vertex[r]
-        if mirror_at(v, rows):
+        if is_specular(v, rows):
             continue
-        # the two cells along each axis that the sphere can reach
-        a = [int(math.floor((v[axis] - light.corner[axis]) / light.size - 0.5)) for axis in range(3)]
-        total = 0.0
-        for corner in range(8):
-            x, y, z = a[0] + (corner & 1), a[1] + ((corner >> 1) & 1), a[2] + (corner >> 2)
-            if x < 0 or y < 0 or z < 0 or x >= 1 << 20 or y >= 1 << 20 or z >= 1 << 20:
-                continue
-            key = (np.int64(x) << 42) | (np.int64(y) << 21) | np.int64(z)
-            j = np.searchsorted(light.cell, key)
-            while j < count and light.cell[j] == key:
-                w = light.vertex[j]
-                d0, d1, d2 = w[0] - v[0], w[1] - v[1], w[2] - v[2]
-                if d0 * d0 + d1 * d1 + d2 * d2 < radius * radius:
-                    alike = v[NORMAL] * w[NORMAL] + v[NORMAL + 1] * w[NORMAL + 1] + v[NORMAL + 2] * w[NORMAL + 2]
-                    if alike > 0.7:
-                        f = scattered(v, rows, w[BACK], w[BACK + 1], w[BACK + 2], v[BACK], v[BACK + 1], v[BACK + 2])
-                        value = light.power[j] * f
-                        if not 0.0 <= value < math.inf:
-                            take.dropped[0] += 1.0
-                            j += 1
-                            continue
-                        total += value
-                        take.found[light.part[j]] += (state[r, POWER] * value * share) ** 2
-                j += 1
-        worth = state[r, POWER] * total * share
-        if not 0.0 <= worth < math.inf:
-            take.dropped[0] += 1.0
-        elif worth > 0.0:
-            pixel = int(state[r, PIXEL])
-            take.image[pixel] += worth
-            take.helped[pixel] += worth
-            take.touched[pixel // BLOCK] = True
-            take.sums[UNJOINED] += worth
+        contribution = path.throughput * gather_photons(v, path, rows, photons, kernel, buffer) * kernel
+        if not 0.0 <= contribution < math.inf:
+            buffer.dropped[0] += 1.0
+        elif contribution > 0.0:
+            buffer.image[path.pixel] += contribution
+            buffer.camera_radiance[path.pixel] += contribution
+            buffer.touched[path.pixel // BLOCK] = True
+            buffer.sums[SPECULAR_CHAIN] += contribution
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def gather_photons(
+    v: Record, path: Record, rows: Float, photons: PhotonMap, kernel: float, buffer: PassBuffer
+) -> float:
+    """Sum of power times BSDF of the photons within the radius of v; their moments go to the fan's bins."""
+    radius, total = 0.5 * photons.size, 0.0
+    # the two cells along each axis that the sphere can reach
+    a = [int(math.floor((v.p[axis] - photons.corner[axis]) / photons.size - 0.5)) for axis in range(3)]
+    for corner in range(8):
+        x, y, z = a[0] + (corner & 1), a[1] + ((corner >> 1) & 1), a[2] + (corner >> 2)
+        if x < 0 or y < 0 or z < 0 or x >= 1 << 20 or y >= 1 << 20 or z >= 1 << 20:
+            continue
+        key = (np.int64(x) << 42) | (np.int64(y) << 21) | np.int64(z)
+        j = np.searchsorted(photons.cell, key)
+        while j < photons.cell.shape[0] and photons.cell[j] == key:
+            w = photons.vertices[j]
+            d0, d1, d2 = w.p[0] - v.p[0], w.p[1] - v.p[1], w.p[2] - v.p[2]
+            near = d0 * d0 + d1 * d1 + d2 * d2 < radius * radius
+            if near and v.n[0] * w.n[0] + v.n[1] * w.n[1] + v.n[2] * w.n[2] > LEAST_COSINE:
+                f = eval_bsdf(v, rows, w.wo[0], w.wo[1], w.wo[2], v.wo[0], v.wo[1], v.wo[2])
+                value = photons.power[j] * f
+                if 0.0 <= value < math.inf:
+                    total += value
+                    buffer.fan_moments[photons.fan_bin[j]] += (path.throughput * value * kernel) ** 2
+                else:
+                    buffer.dropped[0] += 1.0
+            j += 1
+    return total

@@ -24,7 +24,7 @@ from render.base.threads import Cancel, Progress
 from render.camera.focus import lens_lines
 from render.checkpoint import RenderState
 from render.laser_indirect.integrator import indirect_images, indirect_shares
-from render.laser_indirect.path_vertex import BENT, PLAIN, SUNK, UNJOINED
+from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.sampling.random import wrapped
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
@@ -32,35 +32,40 @@ from render.world.world import World
 
 Float32 = NDArray[np.float32]
 Shares = dict[str, tuple[float, float]]
-"""By `Rung.share`: light of that kind over the direct light in the image, and its standard error."""
+"""By `TransportStep.share`: light of that kind over the direct light in the image, and its standard error."""
 
 DIRECT = "direct: light of each laser that meets one surface, exact across the sheet, sampled across edges and shadows"
 
 
 @dataclass(frozen=True)
-class Rung:
+class TransportStep:
     """One step of the ladder of light transport, each dearer than the one before."""
 
     name: str
     light: str
     kind: int
-    """Bits of `render.laser_indirect.path_vertex`; PLAIN: nothing but rough surfaces."""
+    """Bits of `render.laser_indirect.path_vertex`; INTERREFLECTION: nothing but rough surfaces."""
     share: str
     """Of `render.laser_indirect.integrator.Shares`."""
 
 
-RUNGS = (
-    Rung("interreflection", "laser light over two or more rough surfaces", PLAIN, "plain"),
-    Rung(
-        "caustic", "laser light through clear glass or off mirrors, joined from the laser or the camera", BENT, "bent"
+TRANSPORT_STEPS = (
+    TransportStep("interreflection", "laser light over two or more rough surfaces", INTERREFLECTION, "interreflection"),
+    TransportStep(
+        "caustic",
+        "laser light through clear glass or off mirrors, joined from the laser or the camera",
+        CAUSTIC,
+        "caustic",
     ),
-    Rung(
+    TransportStep(
         "specular-chain",
         "laser light through clear glass or off mirrors both before and after its one rough surface, by photon merging",
-        BENT | UNJOINED,
-        "unjoined",
+        CAUSTIC | SPECULAR_CHAIN,
+        "specular_chain",
     ),
-    Rung("subsurface", "laser light that wandered below a surface, by random walk", SUNK, "sunk"),
+    TransportStep(
+        "subsurface", "laser light that wandered below a surface, by random walk", SUBSURFACE_LIGHT, "subsurface"
+    ),
 )
 INDIRECT = "light of the lasers that meets two or more surfaces"
 
@@ -94,7 +99,7 @@ def choose_plan(
     seed: int = 0,
     cancelled: Cancel | None = None,
 ) -> Plan:
-    """Decide on the lasers' indirect light; a pilot of a few thousand paths measures what each rung would add.
+    """Decide on the lasers' indirect light; a pilot of a few thousand paths measures what each transport step would add.
 
     direct: (h, w) direct radiance of each laser.
     """
@@ -112,32 +117,34 @@ def direct_plan(scene: Scene) -> Plan:
 
 def plan_of(shares: Shares, scene: Scene, settings: RenderSettings) -> Plan:
     """The plan that follows from what a pilot measured."""
-    names = [rung.name for rung in RUNGS]
+    names = [transport.name for transport in TRANSPORT_STEPS]
     wanted = names.index(settings.transport) if settings.transport in names else -1
-    worth = {}
-    for i, rung in enumerate(RUNGS):
-        share, error = shares[rung.share]
+    computed = {}
+    for i, transport in enumerate(TRANSPORT_STEPS):
+        share, error = shares[transport.share]
         # what may well be more than negligible is computed
-        worth[rung.name] = i <= wanted or (wanted < 0 and share + 2.0 * error > settings.negligible)
-    chosen = [rung for rung in RUNGS if worth[rung.name]]
-    kinds = functools.reduce(operator.or_, (rung.kind for rung in chosen), PLAIN) if chosen else None
+        computed[transport.name] = i <= wanted or (wanted < 0 and share + 2.0 * error > settings.negligible)
+    chosen = [transport for transport in TRANSPORT_STEPS if computed[transport.name]]
+    kinds = (
+        functools.reduce(operator.or_, (transport.kind for transport in chosen), INTERREFLECTION) if chosen else None
+    )
     lines = [DIRECT]
-    for i, rung in enumerate(RUNGS):
-        share, error = shares[rung.share]
+    for i, transport in enumerate(TRANSPORT_STEPS):
+        share, error = shares[transport.share]
         if share == error == 0.0 and i > max(wanted, 0):
             # nothing in the scene makes such light, or none that the pilot met
             continue
         measured = f"a pilot puts it at {share:.2%} +- {error:.2%} of the direct light in the image"
         if math.isinf(share):
             measured = "there is no direct light in the image to compare it with"
-        if worth[rung.name]:
+        if computed[transport.name]:
             asked = "asked for; " if wanted >= 0 else ""
-            lines.append(f"{rung.name}: {rung.light} - {asked}{measured}")
-        elif kinds is not None and rung.kind & kinds == rung.kind:
-            lines.append(f"{rung.name}: {rung.light} - comes with {chosen[-1].name}; {measured}")
+            lines.append(f"{transport.name}: {transport.light} - {asked}{measured}")
+        elif kinds is not None and transport.kind & kinds == transport.kind:
+            lines.append(f"{transport.name}: {transport.light} - comes with {chosen[-1].name}; {measured}")
         else:
             why = "not asked for" if wanted >= 0 else f"below the negligible {settings.negligible:.2%}"
-            lines.append(f"left out: {rung.light} ({rung.name}) - {measured}, {why}")
+            lines.append(f"left out: {transport.light} ({transport.name}) - {measured}, {why}")
     clamped = clamp_line(settings) if kinds is not None else ()
     return Plan(kinds, (*lines, *clamped, *lens_lines(scene.camera)))
 
@@ -174,7 +181,7 @@ def indirect_light(
             scene.T_world_laser(i, step),
             target=settings.indirect_error,
             most_paths=settings.light_paths,
-            kinds=plan.kinds or PLAIN,
+            kinds=plan.kinds or INTERREFLECTION,
             clamp=settings.laser_clamp,
             seed=wrapped(seed + i),
             threads=threads,
@@ -182,7 +189,7 @@ def indirect_light(
             progress=None if progress is None else partial(_share, progress, i, count),
             keeps=keeps,
             enough=enough(count - i),
-            before=None if state is None else state.lasers.get(i),
+            resume_from=None if state is None else state.lasers.get(i),
             keep=None if state is None else partial(state.keep_laser, i),
         ):
             images[i] = image.radiance
@@ -226,11 +233,11 @@ def pilot_shares(
         pilot_seed = wrapped(seed + 7919 * (i + 1))
         found.append(indirect_shares(world, scene.camera, laser, *poses, seed=pilot_seed, cancelled=cancelled))
     shares = {}
-    for rung in RUNGS:
-        parts = [getattr(one, rung.share) for one in found]
+    for transport in TRANSPORT_STEPS:
+        parts = [getattr(one, transport.share) for one in found]
         flux, error = sum(part[0] for part in parts), math.sqrt(sum(part[1] ** 2 for part in parts))
         if known > 0.0:
-            shares[rung.share] = (flux / known, error / known)
+            shares[transport.share] = (flux / known, error / known)
         else:
-            shares[rung.share] = (math.inf, 0.0) if flux > 0.0 else (0.0, 0.0)
+            shares[transport.share] = (math.inf, 0.0) if flux > 0.0 else (0.0, 0.0)
     return shares

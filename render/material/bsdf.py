@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 LAMBERTIAN, CONDUCTOR, DIELECTRIC, COATED, SUBSURFACE, EMITTER = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 ANISOTROPY, EXTINCTION, SCATTERED, EMITTED = 11, 12, 15, 18
 ROW = 21
-SMOOTH = 1e-4
+SPECULAR_ROUGHNESS = 1e-4
 """Below this roughness a boundary is a mirror: its density is a delta function."""
 
 
@@ -47,15 +47,15 @@ def is_boundary(row: Array) -> bool:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def is_smooth(row: Array) -> bool:
+def is_specular_row(row: Array) -> bool:
     """The material scatters into single directions only."""
-    return mirrors(row[0], row[1], row[2])
+    return is_specular_kind(row[0], row[1], row[2])
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def mirrors(kind: float, ax: float, ay: float) -> bool:
+def is_specular_kind(kind: float, ax: float, ay: float) -> bool:
     """A boundary or metal of this roughness scatters into single directions only."""
-    return kind in (CONDUCTOR, DIELECTRIC) and max(ax, ay) < SMOOTH
+    return kind in (CONDUCTOR, DIELECTRIC) and max(ax, ay) < SPECULAR_ROUGHNESS
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -71,17 +71,17 @@ def evaluate(
     row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, f: Array
 ) -> None:
     """f(o, i) in 1/sr, without the cosine -> f (3,) for each band; 0 for the delta parts."""
-    facets, cosine, base = lobes(row[0], row[1], row[2], row[3], ox, oy, oz, ix, iy, iz)
+    facets, cosine, base = eval_lobes(row[0], row[1], row[2], row[3], ox, oy, oz, ix, iy, iz)
     for band in range(f.shape[0]):
-        f[band] = in_band(row[0], facets, cosine, base, rgb[band], row[4 + band], row[7 + band], row[10])
+        f[band] = eval_band(row[0], facets, cosine, base, rgb[band], row[4 + band], row[7 + band], row[10])
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def lobes(
+def eval_lobes(
     kind: float, ax: float, ay: float, eta: float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
 ) -> tuple[float, float, float]:
     """What of f(o, i) is alike in all bands: facets, 1/sr, their cosine with o, and the diffuse base, 1/sr."""
-    if oz == 0.0 or iz == 0.0 or mirrors(kind, ax, ay):
+    if oz == 0.0 or iz == 0.0 or is_specular_kind(kind, ax, ay):
         return 0.0, 0.0, 0.0
     if kind in (DIELECTRIC, SUBSURFACE):
         return rough_dielectric(eta, ax, ay, ox, oy, oz, ix, iy, iz), 0.0, 0.0
@@ -106,10 +106,10 @@ def lobes(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def in_band(
+def eval_band(
     kind: float, facets: float, cosine: float, base: float, reflectance: float, n: float, k: float, internal: float
 ) -> float:
-    """f(o, i) of `lobes` in one band, 1/sr."""
+    """f(o, i) of `eval_lobes` in one band, 1/sr."""
     if kind == CONDUCTOR:
         return reflectance * facets * conductor(cosine, n, k) if facets > 0.0 else 0.0
     if kind == COATED:
@@ -164,11 +164,11 @@ def facet_between(
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def pdf(row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
     """Density of `sample` for i given o, 1/sr; 0 for the delta parts."""
-    return sampled(row[0], row[1], row[2], row[3], (rgb[0] + rgb[1] + rgb[2]) / 3.0, ox, oy, oz, ix, iy, iz)
+    return pdf_lobes(row[0], row[1], row[2], row[3], (rgb[0] + rgb[1] + rgb[2]) / 3.0, ox, oy, oz, ix, iy, iz)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def sampled(
+def pdf_lobes(
     kind: float,
     ax: float,
     ay: float,
@@ -182,7 +182,7 @@ def sampled(
     iz: float,
 ) -> float:
     """Density of `sample`, reflectance the mean over its bands."""
-    if oz == 0.0 or iz == 0.0 or mirrors(kind, ax, ay):
+    if oz == 0.0 or iz == 0.0 or is_specular_kind(kind, ax, ay):
         return 0.0
     if kind in (DIELECTRIC, SUBSURFACE):
         eta, oz, iz, hx, hy, hz = facet_between(index, ox, oy, oz, ix, iy, iz)
@@ -232,7 +232,7 @@ def sample(
         return 0.0
     side = 1.0 if oz > 0.0 else -1.0
     ax, ay = row[1], row[2]
-    smooth = is_smooth(row)
+    smooth = is_specular_row(row)
     if is_boundary(row):
         eta = row[3] if oz > 0.0 else 1.0 / row[3]
         z = abs(oz)

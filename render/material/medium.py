@@ -12,6 +12,15 @@ MOST_STEPS = 4096
 """Scatterings between two meetings with the boundary; a path that needs more is ended: e^-41 of them at 0.99 albedo."""
 
 
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def henyey_greenstein(g: float, u: float) -> float:
+    """Cosine of a scattering angle, drawn by u in [0, 1) (Henyey and Greenstein 1941; PBRT 4th ed., eq. 11.24)."""
+    if abs(g) < 1e-3:
+        return 1.0 - 2.0 * u
+    part = (1.0 - g * g) / (1.0 - g + 2.0 * g * u)
+    return (1.0 + g * g - part * part) / (2.0 * g)
+
+
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def turn(d: Float, x: float, y: float, z: float) -> None:
     """Give the unit vector d (3,) the direction (x, y, z) that it has in a frame about d (Duff et al. 2017)."""

@@ -57,6 +57,27 @@ def emission(row: Float, cosine: float, rgb: Float) -> None:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def plane_of(surface: Surface, t: int) -> tuple[float, float, float, float, float, float]:
+    """A corner of triangle t and its unit normal, that of the winding."""
+    vertices, triangles = surface.vertices, surface.triangles
+    ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
+    ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
+    ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
+    n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+    length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+    return a0, a1, a2, n0 / length, n1 / length, n2 / length
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def off_surface(
+    p0: float, p1: float, p2: float, n0: float, n1: float, n2: float, side: float
+) -> tuple[float, float, float]:
+    """The point p moved by `side`, m, along the normal n: where a ray begins that must not meet its own surface."""
+    return p0 + side * n0, p1 + side * n1, p2 + side * n2
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, rgb: Float) -> None:
     """Albedo at the point p of triangle t -> rgb (3,): the object's constant colour or its texture."""
     slot_reflectance(surface, surface.object_id[t], t, p0, p1, p2, rgb)

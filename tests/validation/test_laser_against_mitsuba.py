@@ -16,7 +16,7 @@ from scipy.stats import binom, t
 from render.camera.camera import Camera
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.integrator import ALL_KINDS, indirect_image
-from render.laser_indirect.path_vertex import BENT, PLAIN
+from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION
 from render.material.material import Conductor, Glass, Lambertian
 from render.mesh.primitives import primitive_mesh
 from render.scene.shape import Box, Sphere
@@ -163,7 +163,7 @@ def test_reflections_in_a_glossy_tee(tmp_path):
     # wide, so that a path tracer meets it
     _, parts = setting(meshes, materials, CAMERA, paper_laser(0.06, fan_angle=math.radians(30)))
     mitsubas = Theirs(meshes, materials, parts, tmp_path)
-    direct, indirect = direct_of(parts), ours_of(parts, PLAIN, 0)
+    direct, indirect = direct_of(parts), ours_of(parts, INTERREFLECTION, 0)
     once = runs(lambda seed: mitsubas.render("path", 2, 128, seed))
     same_flux("direct", direct, once)
     traced = runs(lambda seed: mitsubas.render("path", -1, 1024, 100 + seed)) - once
@@ -177,7 +177,7 @@ def test_a_refracted_caustic(tmp_path):
     meshes, materials = [plane_mesh((0.2, -0.1, 1), 0.9), ball], [Lambertian(albedo=0.5), Glass(index=1.5)]
     _, parts = setting(meshes, materials, CAMERA, paper_laser(0.03, fan_angle=math.radians(30)))
     mitsubas = Theirs(meshes, materials, parts, tmp_path)
-    direct, caustic = direct_of(parts), ours_of(parts, BENT, 0)
+    direct, caustic = direct_of(parts), ours_of(parts, CAUSTIC, 0)
     once = runs(lambda seed: mitsubas.render("ptracer", 2, 128, seed))
     all_light = runs(lambda seed: mitsubas.render("ptracer", -1, 256, 100 + seed))
     same_flux("direct", direct, once)
@@ -195,7 +195,7 @@ def ball_before_a_wall(fan_angle, folder):
 
 def test_a_line_seen_past_and_through_a_glass_ball(tmp_path):
     parts, mitsubas = ball_before_a_wall(30, tmp_path)
-    direct, bent = direct_of(parts), ours_of(parts, BENT, 0, 1 << 20)
+    direct, bent = direct_of(parts), ours_of(parts, CAUSTIC, 0, 1 << 20)
     once = runs(lambda seed: mitsubas.render("path", 2, 256, seed))
     through = runs(lambda seed: mitsubas.render("path", -1, 512, 100 + seed)) - once
     # elsewhere there is the caustic, which a path tracer does not find

@@ -8,24 +8,24 @@ import numpy as np
 import pytest
 
 from render.camera.camera import Camera
-from render.laser_indirect.accumulator import LATER, Gathered
-from render.laser_indirect.connection_buffer import count_joints, no_joints
-from render.laser_indirect.guiding import BINS, NOWHERE, no_guide
-from render.laser_indirect.integrator import empty_take
-from render.laser_indirect.photon_emission import even_fan
+from render.laser_indirect.accumulator import WAVE_WEIGHT_EXPONENT, Accumulator
+from render.laser_indirect.connection_buffer import empty_connections, splat_unoccluded
+from render.laser_indirect.guiding import BINS, NO_PIXELS, no_guide
+from render.laser_indirect.integrator import empty_buffer
+from render.laser_indirect.photon_emission import uniform_fan
 
 CAMERA = Camera(width=4, height=2, fx=4.0, fy=4.0, cx=1.5, cy=0.5)
 
 
 def nothing(pixels=8, size=100, most=8):
     arrays = np.zeros((0, BINS)), np.zeros(pixels), np.zeros(pixels, np.float32)
-    return Gathered(
+    return Accumulator(
         0,
-        even_fan(0.0, 1.0),
+        uniform_fan(0.0, 1.0),
         size,
         4 if size > 100 else 1 << 20,
         0.0,
-        NOWHERE,
+        NO_PIXELS,
         np.zeros(pixels),
         no_guide(CAMERA),
         *arrays,
@@ -33,23 +33,23 @@ def nothing(pixels=8, size=100, most=8):
 
 
 def passes(*images):
-    takes = []
+    buffers = []
     for image in images:
-        take = empty_take(len(image))
-        take.image[:], take.touched[:] = image, True
-        takes.append(take)
-    return takes
+        buffer = empty_buffer(len(image))
+        buffer.image[:], buffer.touched[:] = image, True
+        buffers.append(buffer)
+    return buffers
 
 
 def test_what_is_no_number_is_left_out_and_counted():
-    joints, take = no_joints(6), empty_take(8)
-    joints.worth[:] = (1.0, math.nan, math.inf, -1.0, 2.0, 4.0)
-    joints.pixel[:], joints.kind[:], joints.part[:] = np.arange(6), 0, 0
-    count_joints(joints, np.array([False] * 5 + [True]), 6, 0.5, take)
-    assert take.image.tolist() == [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-    assert take.dropped[0] == 3.0 and np.isfinite(take.found).all() and np.isfinite(take.sums).all()
+    connections, buffer = empty_connections(6), empty_buffer(8)
+    connections.contribution[:] = (1.0, math.nan, math.inf, -1.0, 2.0, 4.0)
+    connections.pixel[:], connections.kind[:], connections.part[:] = np.arange(6), 0, 0
+    splat_unoccluded(connections, np.array([False] * 5 + [True]), 6, 0.5, buffer)
+    assert buffer.image.tolist() == [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    assert buffer.dropped[0] == 3.0 and np.isfinite(buffer.found).all() and np.isfinite(buffer.sums).all()
     so_far = nothing()
-    so_far.add([take, empty_take(8)], np.zeros((2, 0, BINS)))
+    so_far.add([buffer, empty_buffer(8)], np.zeros((2, 0, BINS)))
     assert so_far.dropped == 3.0 and np.isfinite(so_far.radiance((2, 4))).all()
 
 
@@ -77,7 +77,7 @@ def test_later_waves_weigh_more_and_the_error_is_the_scatter_of_what_they_add_up
         errors.append(so_far.error * 5.0)
     scatter = np.std(renders, axis=0, ddof=1)
     sizes = np.array([1.0, 1.0, 2.0, 4.0])
-    weights = sizes**LATER
+    weights = sizes**WAVE_WEIGHT_EXPONENT
     expected = math.sqrt(np.sum(weights**2 / sizes) / 4) / weights.sum()
     # the standard error of 2400 values' scatter is 1.4 %
     assert np.sqrt(np.mean(scatter**2)) == pytest.approx(expected, rel=0.06)
@@ -98,16 +98,26 @@ def test_the_clamp_takes_what_it_says_and_nothing_is_clamped_unasked():
     free, cut = nothing(), nothing()
     free.add(passes(*images), np.zeros((2, 0, BINS)))
     cut.add(passes(*images), np.zeros((2, 0, BINS)), clamp=10.0)
-    assert free.clamped == free.cut == 0.0
-    assert cut.clamped == 1.0 and cut.cut == 90.0
+    assert free.clamped == free.clamped_radiance == 0.0
+    assert cut.clamped == 1.0 and cut.clamped_radiance == 90.0
     assert free.total.sum() - cut.total.sum() == 90.0
 
 
 def test_arrays_hold_all_of_it():
     so_far = nothing()
     so_far.add(passes(np.arange(8.0), np.ones(8)), np.zeros((2, 0, BINS)), clamp=5.0)
-    again = Gathered.of_arrays(so_far.arrays())
+    again = Accumulator.of_arrays(so_far.arrays())
     for name, array in so_far.arrays().items():
         assert np.array_equal(again.arrays()[name], array)
-    assert (again.passes, again.error, again.clamped, again.cut) == (2, so_far.error, 2.0, so_far.cut)
-    assert (again.waves, again.paths, again.spread, again.share) == (1, 800, so_far.spread, so_far.share)
+    assert (again.passes, again.error, again.clamped, again.clamped_radiance) == (
+        2,
+        so_far.error,
+        2.0,
+        so_far.clamped_radiance,
+    )
+    assert (again.waves, again.paths, again.variance_sum, again.camera_share) == (
+        1,
+        800,
+        so_far.variance_sum,
+        so_far.camera_share,
+    )

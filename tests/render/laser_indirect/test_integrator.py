@@ -5,11 +5,16 @@ import pytest
 
 from render.laser.laser import Divergence, LineLaser
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.bdpt_pass import LightPass
+from render.laser_indirect.bdpt_pass import BdptPass, Sampling
 from render.laser_indirect.guiding import no_guide
-from render.laser_indirect.integrator import ALL_KINDS, empty_take, indirect_image, indirect_shares
-from render.laser_indirect.path_vertex import MATERIAL, POWER
-from render.laser_indirect.photon_emission import even_fan, fan_integral, fan_quantile, fan_span, normal_quantile
+from render.laser_indirect.integrator import ALL_KINDS, empty_buffer, indirect_image, indirect_shares
+from render.laser_indirect.photon_emission import (
+    fan_integral,
+    fan_quantile,
+    normal_quantile,
+    uniform_fan,
+    visible_fan_range,
+)
 from render.laser_indirect.transport_plan import choose_plan
 from render.material.material import Coated, Conductor, Glass, Lambertian, Subsurface
 from render.mesh.mesh import Mesh
@@ -60,7 +65,7 @@ def test_a_lone_convex_body_or_plane_has_no_indirect_light():
     for mesh in (plane_mesh((0, 0, 1), 0.9), moved(primitive_mesh(Sphere(radius=0.1)), (0, 0, 0.9))):
         _, parts = setting([mesh], [Lambertian(albedo=0.9)])
         shares = indirect_shares(*parts)
-        assert shares.plain == shares.bent == shares.unjoined == shares.sunk == (0.0, 0.0)
+        assert shares.interreflection == shares.caustic == shares.specular_chain == shares.subsurface == (0.0, 0.0)
 
 
 def test_light_and_camera_paths_agree_on_the_light_in_a_groove():
@@ -182,9 +187,9 @@ def test_light_through_a_glass_plate_loses_what_fresnel_says_and_shifts_as_snell
     plate = moved(primitive_mesh(Box(size_x=0.2, size_y=0.4, size_z=0.02)), (0.12, 0.0, 0.45))
     # wide enough for its centre to be found on pixels
     broad = paper_laser(sheet=Divergence(full_angle=0.012))
-    _, clear = setting([wall], [Lambertian(albedo=0.5)], laser=broad)
+    _, specular = setting([wall], [Lambertian(albedo=0.5)], laser=broad)
     _, parts = setting([wall, plate], [Lambertian(albedo=0.5), Glass(index=1.5)], laser=broad)
-    plain = direct_image(*clear, target=1e-3).radiance.astype(np.float64)
+    plain = direct_image(*specular, target=1e-3).radiance.astype(np.float64)
     assert direct_image(*parts, target=1e-3).radiance.sum() < 1e-3 * plain.sum()
     through = indirect_image(*parts, target=0.02, most_paths=1 << 20).radiance.astype(np.float64)
     _, columns = np.mgrid[0 : plain.shape[0], 0 : plain.shape[1]]
@@ -211,34 +216,35 @@ def test_a_line_seen_through_glass_is_found_from_the_camera_and_a_caustic_there_
     ball = moved(primitive_mesh(Sphere(radius=0.03)), (0.01, 0.0, 0.8))
     _, parts = setting([wall, window, ball], [Lambertian(albedo=0.5), Glass(index=1.5), Glass(index=1.5)])
     shares = indirect_shares(*parts)
-    assert shares.bent[0] > 5 * shares.bent[1] > 0
-    assert shares.unjoined[0] > 3 * shares.unjoined[1] > 0
+    assert shares.caustic[0] > 5 * shares.caustic[1] > 0
+    assert shares.specular_chain[0] > 3 * shares.specular_chain[1] > 0
     # without the window there is only what the ball itself shows of its caustic
     _, without = setting([wall, ball], [Lambertian(albedo=0.5), Glass(index=1.5)])
-    assert indirect_shares(*without).unjoined[0] < 0.5 * shares.unjoined[0]
+    assert indirect_shares(*without).specular_chain[0] < 0.5 * shares.specular_chain[0]
 
 
 def test_camera_and_light_paths_weigh_each_other_without_bias():
     # the same light with hardly any camera paths, and with many
     _, parts = setting([turned_groove(70)], [Conductor(roughness=0.1)])
-    few, many = (flux_of(parts, samples) for samples in (0, 1 << 14))
+    few, many = (flux_of(parts, camera_paths) for camera_paths in (0, 1 << 14))
     mean, error = (np.array([part[k] for part in (few, many)]) for k in (0, 1))
     assert abs(mean[0] - mean[1]) < 4.0 * math.hypot(*error)
     assert math.hypot(*error) < 0.02 * mean[0]
 
 
-def flux_of(parts, samples, passes=16):
-    """Mean radiance over the image and its standard error, with `samples` camera paths a pass."""
+def flux_of(parts, camera_paths, passes=16):
+    """Mean radiance over the image and its standard error, with `camera_paths` camera paths a pass."""
     world, camera, laser, T_world_camera, T_world_laser = parts
-    low, high, reach = fan_span(world, laser, T_world_laser)
-    task = LightPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, 3, ALL_KINDS)
+    low, high, reach = visible_fan_range(world, laser, T_world_laser)
+    task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, 3, ALL_KINDS)
     pixels = camera.width * camera.height
-    expected, looked_at = np.full(pixels, samples / pixels), np.arange(pixels if samples else 0, dtype=np.int32)
+    expected, active = np.full(pixels, camera_paths / pixels), np.arange(pixels if camera_paths else 0, dtype=np.int32)
+    sampling = Sampling(1 << 14, uniform_fan(low, high), expected, active, no_guide(camera))
     sums = []
     for number in range(passes):
-        take = empty_take(pixels)
-        task.run(number, 1 << 14, even_fan(low, high), expected, looked_at, no_guide(camera), take, None)
-        sums.append(take.image.sum())
+        buffer = empty_buffer(pixels)
+        task.run(number, sampling, buffer)
+        sums.append(buffer.image.sum())
     return np.mean(sums), np.std(sums, ddof=1) / math.sqrt(passes)
 
 
@@ -263,12 +269,14 @@ def test_a_deep_medium_reflects_as_chandrasekhar_says(albedo):
     world, camera, laser, T_world_camera, T_world_laser = parts
     # narrow, so that it all falls on the slab, and at one angle
     beam = laser.model_copy(update={"fan_angle": 0.1})
-    low, high, reach = fan_span(world, beam, T_world_laser)
+    low, high, reach = visible_fan_range(world, beam, T_world_laser)
     assert (low, high) == pytest.approx((0.0, 1.0))
-    task = LightPass.of(world, camera, beam, T_world_camera, T_world_laser, reach, 3, ALL_KINDS)
+    task = BdptPass.of(world, camera, beam, T_world_camera, T_world_laser, reach, 3, ALL_KINDS)
     pixels, paths = camera.width * camera.height, 1 << 13
-    found = task.light(7, 0, paths, paths, even_fan(low, high), np.zeros(pixels), empty_take(pixels), True)
-    caught = sum(state[vertex[:, MATERIAL] == 1, POWER].sum() for _, vertex, state in found)
+    nowhere = np.zeros(pixels), np.zeros(0, np.int32)
+    sampling = Sampling(paths, uniform_fan(low, high), *nowhere, no_guide(camera))
+    found = task.trace_light_paths(7, 0, paths, sampling, empty_buffer(pixels), True)
+    caught = sum(traced["throughput"][vertices["material"] == 1].sum() for _, vertices, traced in found)
     (h_laser,) = chandrasekhar_h(albedo, (abs(T_world_laser[2, 2]),))
     expected = 1.0 - math.sqrt(1.0 - albedo) * h_laser
     # the boundary, of index 1.01 at the least, sends 1 - 1 / n^2 = 2 % of the light back inside

@@ -13,9 +13,9 @@ from scipy.stats import binom
 from scipy.stats import t as student
 
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.guiding import clear_pixels
+from render.laser_indirect.guiding import specular_pixels
 from render.laser_indirect.integrator import indirect_image, indirect_shares
-from render.laser_indirect.path_vertex import BENT, PLAIN, SUNK, UNJOINED
+from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.laser_indirect.transport_plan import choose_plan, pilot_shares
 from render.material.material import Conductor, Glass, Lambertian, Subsurface
 from render.mesh.primitives import primitive_mesh
@@ -28,7 +28,12 @@ CAMERA = paper_camera(0.04)
 GREY, GLASS, MIRROR = Lambertian(albedo=0.5), Glass(index=1.5), Conductor(roughness=0.0)
 WAX = Subsurface(index=1.45, roughness=0.3, mean_free_path=0.0005, scattering_albedo=0.95)
 WALL = plane_mesh((0, 0, 1), 0.9)
-WITHOUT = {"plain": (PLAIN, None), "bent": (BENT, PLAIN), "unjoined": (BENT | UNJOINED, BENT), "sunk": (SUNK, PLAIN)}
+WITHOUT = {
+    "interreflection": (INTERREFLECTION, None),
+    "caustic": (CAUSTIC, INTERREFLECTION),
+    "specular_chain": (CAUSTIC | SPECULAR_CHAIN, CAUSTIC),
+    "subsurface": (SUBSURFACE_LIGHT, INTERREFLECTION),
+}
 """Of each kind: the kinds of two renders whose difference it is."""
 
 
@@ -49,13 +54,13 @@ WAX_BESIDE_THE_SHEET = box((0.1, 0.1, 0.05), (-0.15, 0.0, 0.85))
 GROOVE_BESIDE_THE_SHEET = moved(turned_groove(), (-0.2, 0.0, 0.0))
 
 CHOICES = {
-    "a pane that the laser passes, out of the camera's view": (PANE_BEFORE_THE_LASER, GLASS, "bent", True),
-    "a pane that only shows the line": (PANE_BEFORE_THE_CAMERA, GLASS, "bent", True),
-    "a pane that shows no caustic": (PANE_BEFORE_THE_CAMERA, GLASS, "unjoined", False),
-    "a ball that throws its caustic out of view": (BALL_AT_THE_FANS_END, GLASS, "bent", False),
-    "a mirror that shows no laser light": (MIRROR_OF_THE_DARK, MIRROR, "bent", False),
-    "wax beside the sheet": (WAX_BESIDE_THE_SHEET, WAX, "sunk", False),
-    "a groove beside the sheet": (GROOVE_BESIDE_THE_SHEET, Lambertian(albedo=0.9), "plain", False),
+    "a pane that the laser passes, out of the camera's view": (PANE_BEFORE_THE_LASER, GLASS, "caustic", True),
+    "a pane that only shows the line": (PANE_BEFORE_THE_CAMERA, GLASS, "caustic", True),
+    "a pane that shows no caustic": (PANE_BEFORE_THE_CAMERA, GLASS, "specular_chain", False),
+    "a ball that throws its caustic out of view": (BALL_AT_THE_FANS_END, GLASS, "caustic", False),
+    "a mirror that shows no laser light": (MIRROR_OF_THE_DARK, MIRROR, "caustic", False),
+    "wax beside the sheet": (WAX_BESIDE_THE_SHEET, WAX, "subsurface", False),
+    "a groove beside the sheet": (GROOVE_BESIDE_THE_SHEET, Lambertian(albedo=0.9), "interreflection", False),
 }
 
 
@@ -69,9 +74,9 @@ def test_a_wrong_choice_would_look_right(case):
     share, error = shares[kind]
     bits = WITHOUT[kind][0]
     assert (plan.kinds is not None and plan.kinds & bits == bits) == wanted
-    whole = share_of(kind, parts, direct)
-    assert (whole > RenderSettings().negligible) == wanted
-    assert abs(share - whole) <= student.ppf(0.9995, 3) * error + 0.02 * whole
+    full = share_of(kind, parts, direct)
+    assert (full > RenderSettings().negligible) == wanted
+    assert abs(share - full) <= student.ppf(0.9995, 3) * error + 0.02 * full
 
 
 def share_of(kind, parts, direct):
@@ -87,13 +92,17 @@ def share_of(kind, parts, direct):
 
 SEEDS = 24
 KINDS_OF = {
-    "groove": ([turned_groove()], [Conductor(roughness=0.2)], "plain"),
-    "caustic": ([WALL, BALL_IN_THE_BEAM], [GREY, GLASS], "bent"),
-    "line through a pane": ([WALL, PANE_BEFORE_THE_CAMERA], [GREY, GLASS], "bent"),
-    "caustic through a pane": ([WALL, BALL_IN_THE_BEAM, PANE_BEFORE_THE_CAMERA], [GREY, GLASS, GLASS], "unjoined"),
-    "wax": ([box((0.3, 0.3, 0.1), (0.0, 0.0, 0.95))], [WAX], "sunk"),
-    "wax beside": ([WALL, WAX_BESIDE_THE_SHEET], [GREY, WAX], "sunk"),
-    "mirror of the dark": ([WALL, MIRROR_OF_THE_DARK], [GREY, MIRROR], "bent"),
+    "groove": ([turned_groove()], [Conductor(roughness=0.2)], "interreflection"),
+    "caustic": ([WALL, BALL_IN_THE_BEAM], [GREY, GLASS], "caustic"),
+    "line through a pane": ([WALL, PANE_BEFORE_THE_CAMERA], [GREY, GLASS], "caustic"),
+    "caustic through a pane": (
+        [WALL, BALL_IN_THE_BEAM, PANE_BEFORE_THE_CAMERA],
+        [GREY, GLASS, GLASS],
+        "specular_chain",
+    ),
+    "wax": ([box((0.3, 0.3, 0.1), (0.0, 0.0, 0.95))], [WAX], "subsurface"),
+    "wax beside": ([WALL, WAX_BESIDE_THE_SHEET], [GREY, WAX], "subsurface"),
+    "mirror of the dark": ([WALL, MIRROR_OF_THE_DARK], [GREY, MIRROR], "caustic"),
 }
 
 
@@ -119,7 +128,7 @@ def test_light_behind_glass_thinner_than_the_rays_that_look_for_it_is_found():
     expected = (1.0 - 0.04) / (1.0 + 0.04) * np.median(line[line > 0.0]) * 0.006 / 0.5 * parts[1].fy
     for bar in THIN:
         _, parts = setting([WALL, bar], [GREY, GLASS], camera=CAMERA)
-        share, error = indirect_shares(*parts).bent
+        share, error = indirect_shares(*parts).caustic
         assert abs(share - expected) < student.ppf(0.9995, 3) * error + 0.1 * expected
 
 
@@ -133,7 +142,7 @@ def test_light_behind_glass_thinner_than_the_rays_that_look_for_it_is_found():
 )
 def test_every_pixel_that_shows_glass_is_known(thin):
     _, (world, camera, laser, pose, _) = setting([WALL, thin], [GREY, GLASS], camera=CAMERA)
-    clear = clear_pixels(world, world.surface_at((laser.wavelength_nm,) * 3), camera, pose)
+    specular = specular_pixels(world, world.surface_at((laser.wavelength_nm,) * 3), camera, pose)
     steps = (np.arange(4) + 0.5) / 4 - 0.5
     seen = np.zeros((camera.height, camera.width), bool)
     v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(float)
@@ -142,6 +151,6 @@ def test_every_pixel_that_shows_glass_is_known(thin):
             rays, _ = camera.rays(np.stack([u + du, v + dv], axis=-1).reshape(-1, 2))
             hit = world.rays.from_point(np.zeros(3), rays.astype(np.float32))
             seen |= ((hit >= 0) & (world.object_id[hit] == 1)).reshape(seen.shape)
-    assert seen.any() and not np.any(seen & ~clear.reshape(seen.shape))
+    assert seen.any() and not np.any(seen & ~specular.reshape(seen.shape))
     # and not much else
-    assert clear.sum() < seen.sum() + 13 * (seen.sum() + 13)
+    assert specular.sum() < seen.sum() + 13 * (seen.sum() + 13)

@@ -13,8 +13,8 @@ from scipy.stats import t as student
 
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.integrator import ALL_KINDS, indirect_image
-from render.laser_indirect.path_vertex import BENT, PLAIN, SUNK, UNJOINED
-from render.laser_indirect.transport_plan import RUNGS, choose_plan, pilot_shares
+from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
+from render.laser_indirect.transport_plan import TRANSPORT_STEPS, choose_plan, pilot_shares
 from render.material.material import Conductor, Glass, Lambertian, Subsurface
 from render.mesh.primitives import primitive_mesh
 from render.scene.settings import RenderSettings
@@ -23,7 +23,7 @@ from tests.render.laser_indirect.test_integrator import setting, turned_groove
 from tests.render.scenes import moved, paper_camera, plane_mesh
 
 CAMERA = paper_camera(0.04)
-NAMES = [rung.name for rung in RUNGS]
+NAMES = [transport_step.name for transport_step in TRANSPORT_STEPS]
 GREY, GLASS, MIRROR = Lambertian(albedo=0.5), Glass(index=1.5), Conductor(roughness=0.0)
 
 
@@ -52,7 +52,7 @@ class Choice:
         self.shares = pilot_shares(parts[0], self.scene, (self.direct,))
         everything = indirect_image(*parts, target=0.05, most_paths=1 << 20, kinds=ALL_KINDS, seed=77)
         self.flux = everything.radiance.sum(dtype=np.float64)
-        self.whole = self.flux / known if known > 0.0 else math.inf
+        self.full = self.flux / known if known > 0.0 else math.inf
 
     def steps(self):
         """Names of the rungs that are computed."""
@@ -65,44 +65,44 @@ class Choice:
         """The rungs together bring what the full render finds, within the spread of the pilot's four passes."""
         total = sum(share for share, _ in self.shares.values())
         error = math.sqrt(sum(error**2 for _, error in self.shares.values()))
-        assert abs(total - self.whole) <= student.ppf(0.995, 3) * error + 0.01 * self.whole
+        assert abs(total - self.full) <= student.ppf(0.995, 3) * error + 0.01 * self.full
 
 
 def test_a_lone_plane_needs_nothing_but_direct_light():
     found = Choice([wall()], [Conductor(roughness=0.1)])
-    assert found.plan.kinds is None and found.whole == 0.0
-    assert found.shares["plain"] == (0.0, 0.0)
+    assert found.plan.kinds is None and found.full == 0.0
+    assert found.shares["interreflection"] == (0.0, 0.0)
     found.pilot_agrees()
 
 
 def test_a_groove_of_metal_needs_interreflection():
     found = Choice([turned_groove()], [Conductor(roughness=0.2)])
-    assert found.steps() == ["interreflection"] and found.plan.kinds == PLAIN
-    assert found.whole > 0.05
+    assert found.steps() == ["interreflection"] and found.plan.kinds == INTERREFLECTION
+    assert found.full > 0.05
     found.pilot_agrees()
 
 
 def test_a_dark_groove_looks_the_same_and_needs_nothing():
     found = Choice([turned_groove()], [Lambertian(albedo=0.01)])
     assert found.steps() == [] and found.left_out() == ["interreflection"] and found.plan.kinds is None
-    assert 0.0 < found.whole < 0.02
+    assert 0.0 < found.full < 0.02
     found.pilot_agrees()
 
 
 def test_a_glass_ball_in_the_beam_needs_caustics():
     found = Choice([wall(), ball()], [GREY, GLASS])
     assert found.steps() == ["interreflection", "caustic"] or found.steps() == ["caustic"]
-    assert found.plan.kinds & BENT and not found.plan.kinds & (UNJOINED | SUNK)
-    assert found.shares["bent"][0] > 0.02
+    assert found.plan.kinds & CAUSTIC and not found.plan.kinds & (SPECULAR_CHAIN | SUBSURFACE_LIGHT)
+    assert found.shares["caustic"][0] > 0.02
     found.pilot_agrees()
 
 
 def test_the_same_seen_through_a_window_needs_merging():
     found = Choice([wall(), ball(), window(0.1)], [GREY, GLASS, GLASS])
-    assert "specular-chain" in found.steps() and found.plan.kinds & UNJOINED
+    assert "specular-chain" in found.steps() and found.plan.kinds & SPECULAR_CHAIN
     # what is computed with it is not said to be left out
     assert found.left_out() == []
-    assert found.shares["unjoined"][0] > 0.02
+    assert found.shares["specular_chain"][0] > 0.02
     found.pilot_agrees()
 
 
@@ -110,7 +110,7 @@ def test_a_block_of_wax_needs_the_walk_below_its_surface():
     block = moved(primitive_mesh(Box(size_x=0.3, size_y=0.3, size_z=0.1)), (0.0, 0.0, 0.95))
     wax = Subsurface(index=1.45, roughness=0.3, mean_free_path=0.0005, scattering_albedo=0.95)
     found = Choice([block], [wax])
-    assert "subsurface" in found.steps() and found.plan.kinds & SUNK
+    assert "subsurface" in found.steps() and found.plan.kinds & SUBSURFACE_LIGHT
     found.pilot_agrees()
 
 
@@ -118,7 +118,7 @@ def test_glass_that_the_beam_does_not_meet_is_left_out():
     # some of what the wall scatters still finds its way through the ball, and is measured
     found = Choice([wall(), ball(-0.3, 0.0, 0.7)], [GREY, GLASS])
     assert found.plan.kinds is None and "caustic" not in found.steps()
-    assert found.whole < 0.02
+    assert found.full < 0.02
     found.pilot_agrees()
 
 
@@ -128,7 +128,7 @@ def test_a_mirror_that_throws_the_beam_out_of_view_is_left_out():
     found = Choice([wall(), mirror], [GREY, MIRROR])
     _, parts = setting([wall()], [GREY], camera=CAMERA)
     assert found.direct.sum() < 0.8 * direct_image(*parts, target=3e-3).radiance.sum()
-    assert found.plan.kinds is None and found.whole < 0.02
+    assert found.plan.kinds is None and found.full < 0.02
     found.pilot_agrees()
 
 
@@ -137,13 +137,13 @@ def test_behind_a_window_before_the_camera_the_left_out_light_would_be_the_whole
     _, parts = setting([wall()], [GREY], camera=CAMERA)
     plain = direct_image(*parts, target=3e-3).radiance.sum(dtype=np.float64)
     assert found.direct.sum() < 1e-6 * plain
-    assert "caustic" in found.steps() and found.plan.kinds & BENT
+    assert "caustic" in found.steps() and found.plan.kinds & CAUSTIC
     assert "no direct light in the image" in found.plan.text and "inf" not in found.plan.text
     # dimmed by two faces and what goes to and fro between them, near normal incidence
     reflected = dielectric_reflectance(1.0, 1.5)
     assert found.flux / plain == pytest.approx((1.0 - reflected) / (1.0 + reflected), rel=0.03)
     asked = Choice([wall(), window()], [GREY, GLASS], transport="interreflection")
-    assert "caustic" in asked.left_out() and not asked.plan.kinds & BENT
+    assert "caustic" in asked.left_out() and not asked.plan.kinds & CAUSTIC
 
 
 def dielectric_reflectance(cosine, index):

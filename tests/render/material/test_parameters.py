@@ -32,8 +32,8 @@ def test_glass_is_bent_as_the_lasers_wavelength_is():
 
 
 def test_nearly_polished_glass_is_polished():
-    assert bsdf.is_smooth(material_row(Glass(roughness=0.004), BAND_CENTRES_NM))
-    assert not bsdf.is_smooth(material_row(Glass(roughness=0.005), BAND_CENTRES_NM))
+    assert bsdf.is_specular_row(material_row(Glass(roughness=0.004), BAND_CENTRES_NM))
+    assert not bsdf.is_specular_row(material_row(Glass(roughness=0.005), BAND_CENTRES_NM))
 
 
 def test_a_medium_is_interpolated_between_the_bands():
