@@ -116,7 +116,7 @@ def _passes(
     # passes that are done already are gone through again, with their errors, to where the next one begins
     known = iter(tuple(film.errors))
     if most == 1:
-        yield film.expose(paths, np.broadcast_to([1, 0], (film.tiles, 2)), threads, cancelled, progress)
+        yield film.add_samples(paths, np.broadcast_to([1, 0], (film.tiles, 2)), threads, cancelled, progress)
         return
     if film.errors:
         yield film.image(threads, cancelled)
@@ -124,7 +124,7 @@ def _passes(
         wanted, done = float(level), next(known, None)
         if done is None:
             report = _part(progress, 0.0, min(1.0, 2.0 * level / most))
-            image = film.expose(paths, (level * even).astype(np.int64), threads, cancelled, report)
+            image = film.add_samples(paths, (level * even).astype(np.int64), threads, cancelled, report)
             yield image
         error = film.errors[level - 1]
     share = film.shares()
@@ -136,7 +136,7 @@ def _passes(
         if done is None:
             count = np.maximum(PILOT, np.rint(wanted * share)).astype(np.int64)
             report = _part(progress, spent, 2.0 * wanted / most)
-            image = film.expose(paths, count, threads, cancelled, report)
+            image = film.add_samples(paths, count, threads, cancelled, report)
             yield image
         error = film.errors[-1] if done is None else done
     if progress is not None:
@@ -160,7 +160,7 @@ def ambient_image(
     paths = camera_paths(world, scene, camera.view(T_world_camera), surfaces=surfaces, seed=seed)
     film = Film(camera.width, camera.height)
     count = np.broadcast_to([samples - samples // 2, samples // 2], (film.tiles, 2))
-    return film.expose(paths, count, threads, cancelled, progress).radiance
+    return film.add_samples(paths, count, threads, cancelled, progress).radiance
 
 
 class Film:
@@ -179,7 +179,7 @@ class Film:
         """Of each tile and half, sum of the squared differences of a pixel's first and second sample."""
         self.cut = np.zeros((self.tiles, 2))
         """Of each tile and half, the sum of what the clamp took."""
-        self.tally = np.zeros(2)
+        self.invalid_counts = np.zeros(2)
         self.errors: list[float] = []
         """After each pass."""
         self.keep: Callable[[Film], None] | None = None
@@ -187,19 +187,19 @@ class Film:
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
-        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "cut", "tally")}
+        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "cut", "invalid_counts")}
         return {**kept, "errors": np.array(self.errors, dtype=np.float64)}
 
     def load(self, arrays: Arrays) -> None:
         """Go on from `arrays`. InputError: they are not of this image."""
-        for name in ("sums", "done", "spread", "cut", "tally"):
+        for name in ("sums", "done", "spread", "cut", "invalid_counts"):
             mine, found = getattr(self, name), arrays.get(name)
             if found is None or found.shape != mine.shape or found.dtype != mine.dtype:
                 raise InputError("the saved ambient light is damaged", where=name, found=getattr(found, "shape", None))
             setattr(self, name, found)
         self.errors = [float(error) for error in arrays.get("errors", ())]
 
-    def expose(
+    def add_samples(
         self,
         paths: CameraPaths,
         count: NDArray[np.int64],
@@ -211,11 +211,11 @@ class Film:
         more = np.maximum(count - self.done, 0).astype(np.int32)
         pixels_of = self._size_of(np.arange(self.tiles))
         chunks = _chunks(more.sum(axis=1) * pixels_of, WAVE)
-        tallies = np.zeros((len(chunks), 2))
+        counts = np.zeros((len(chunks), 2))
 
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
-                self._expose_tiles(paths, chunks[number], more, tallies[number], cancelled)
+                self._expose_tiles(paths, chunks[number], more, counts[number], cancelled)
 
         group = max(1, len(chunks)) if self.keep is None else GROUP
         try:
@@ -227,7 +227,7 @@ class Film:
                     self.keep(self)
         finally:
             # in the order of the chunks, whichever thread was first
-            self.tally = self.tally + tallies.sum(axis=0)
+            self.invalid_counts = self.invalid_counts + counts.sum(axis=0)
         image = self.image(threads, cancelled)
         self.errors.append(image.error)
         if self.keep is not None:
@@ -241,7 +241,7 @@ class Film:
         parts = np.zeros((self.down, 2))
 
         def work(start: int, stop: int) -> None:
-            parts[start] = develop_halves(self.sums, self.done, self.across, image, start, stop)
+            parts[start] = average_halves(self.sums, self.done, self.across, image, start, stop)
 
         map_chunks(work, self.down, IMAGE_ROWS, threads, cancelled)
         difference, power = (float(part) for part in parts.sum(axis=0))
@@ -253,8 +253,8 @@ class Film:
             image,
             error if halves else math.nan,
             samples,
-            int(self.tally[DROPPED]),
-            int(self.tally[CLAMPED]),
+            int(self.invalid_counts[DROPPED]),
+            int(self.invalid_counts[CLAMPED]),
             float((self.cut / np.maximum(self.done, 1)).sum() / 2 / pixels_of.sum()),
         )
 
@@ -266,7 +266,9 @@ class Film:
         relative = np.where(mean > 0.0, deviation / np.where(mean > 0.0, mean, 1.0), 1.0)
         return np.asarray(EVEN_SHARE + (1.0 - EVEN_SHARE) * np.minimum(relative, MOST_SHARE))
 
-    def _expose_tiles(self, paths: CameraPaths, tiles: Int, more: Int, tally: Float, cancelled: Cancel | None) -> None:
+    def _expose_tiles(
+        self, paths: CameraPaths, tiles: Int, more: Int, invalid_counts: Float, cancelled: Cancel | None
+    ) -> None:
         pixels, place = self._pixels_of(tiles)
         first, count = self.done[tiles][place], more[tiles][place]
         sums = np.zeros((2 * len(pixels), 4))
@@ -274,7 +276,7 @@ class Film:
         step = max(1, WAVE // max(2 * len(pixels), 1)) if len(tiles) == 1 else int(count.max())
         for begin in range(0, int(count.max()), step):
             some = np.clip(count - begin, 0, step).astype(np.int32)
-            paths.add(pixels, (first + begin).astype(np.int32), some, sums, tally, cancelled)
+            paths.add(pixels, (first + begin).astype(np.int32), some, sums, invalid_counts, cancelled)
         new = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32)
         if sums[:, CUT].any():
             for half in range(2):
@@ -319,7 +321,7 @@ def _chunks(rays: NDArray[np.int64], most: int) -> list[Int]:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def develop_halves(sums: Float32, done: Int, across: int, image: Float32, start: int, stop: int) -> tuple[float, float]:
+def average_halves(sums: Float32, done: Int, across: int, image: Float32, start: int, stop: int) -> tuple[float, float]:
     """The mean of both halves -> image (h, w, 3), rows of tiles start .. stop; the sums over these of the halves'
     squared difference, and of the image's square.
 

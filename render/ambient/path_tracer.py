@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.ambient.light_sampling import Lights, pack_lights
-from render.ambient.path_kernels import shade_diffuse, shade_glossy
-from render.ambient.path_state import Shadows, Wave, add_clear, launch
-from render.ambient.random_walk import wander
+from render.ambient.path_kernels import PathScene, bounce_diffuse, bounce_glossy
+from render.ambient.path_state import PathState, PixelSums, ShadowRays, accumulate_unoccluded, camera_rays
+from render.ambient.random_walk import random_walk_step
 from render.base.errors import Cancelled
 from render.base.threads import Cancel
 from render.camera.view import View
@@ -42,92 +42,97 @@ class CameraPaths:
     view: View
     surfaces: int
     """The most that light may meet, counted as in `render.ambient.path_kernels`."""
-    limit: float
+    clamp: float
     """The most radiance that a contribution by way of two and more surfaces may add; infinite: no clamp."""
     seed: int
     _scratch: threading.local = field(default_factory=threading.local, repr=False, compare=False)
 
-    def add(self, pixels: Int, first: Int, count: Int, sums: Float, tally: Float, cancelled: Cancel | None) -> None:
+    def add(
+        self, pixels: Int, first: Int, count: Int, sums: Float, invalid_counts: Float, cancelled: Cancel | None
+    ) -> None:
         """Samples first .. first + count, (m, 2) for both halves, of the pixels (m,), at most WAVE in all.
 
         Their radiance is added to sums (2 m, 4), halves side by side. Raises Cancelled.
         """
-        wave, shadows = self._arrays()
-        rays, glossy, media = self.rays, has_gloss(self.surface), has_medium(self.surface)
-        shade = shade_glossy if glossy else shade_diffuse
-        table = pair_table()
-        n = launch(self.view, table, self.seed, pixels, first, count, rays.centre, wave)
+        paths, shadow_rays = self._arrays()
+        rays, media, film = self.rays, has_medium(self.surface), PixelSums(sums, invalid_counts)
+        bounce = bounce_glossy if has_gloss(self.surface) else bounce_diffuse
+        scene = PathScene(
+            surface=self.surface,
+            lights=self.lights,
+            environment=self.environment,
+            table=pair_table(),
+            seed=self.seed,
+            pixels=pixels,
+            centre=rays.centre,
+            ray_epsilon=rays.surface_offset,
+            max_depth=self.surfaces,
+            clamp=self.clamp,
+        )
+        n = camera_rays(self.view, scene.table, self.seed, pixels, first, count, rays.centre, paths)
         depth = 0
         while n > 0:
             if cancelled is not None and cancelled():
                 raise Cancelled
             # only rays of neighbouring pixels go much the same way, and those from where they meet a surface to a lamp
-            side_by_side = depth == 0
-            triangle, distance = rays.intersect(wave.origin[:n], wave.direction[:n], coherent=side_by_side)
+            coherent = depth == 0
+            triangle, distance = rays.intersect(paths.origin[:n], paths.direction[:n], coherent=coherent)
             if media:
-                self._walk(wave, n, depth, pixels, triangle, distance, cancelled)
-            n, asked = shade(
-                self.surface,
-                self.lights,
-                self.environment,
-                table,
-                self.seed,
-                pixels,
-                rays.centre,
-                rays.surface_offset,
-                depth,
-                self.surfaces,
-                self.limit,
-                triangle,
-                wave,
-                shadows,
-                sums,
-                tally,
-            )
-            if asked:
-                blocked = rays.occluded(
-                    shadows.origin[:asked], shadows.direction[:asked], shadows.far[:asked], coherent=side_by_side
+                self._walk(paths, n, depth, pixels, triangle, distance, cancelled)
+            n, cast = bounce(scene, depth, triangle, paths, shadow_rays, film)
+            if cast:
+                occluded = rays.occluded(
+                    shadow_rays.origin[:cast], shadow_rays.direction[:cast], shadow_rays.far[:cast], coherent=coherent
                 )
-                add_clear(shadows, blocked, self.limit if depth > 0 else np.inf, sums, tally)
+                accumulate_unoccluded(shadow_rays, occluded, self.clamp if depth > 0 else np.inf, film)
             depth += 1
 
     def _walk(
-        self, wave: Wave, n: int, depth: int, pixels: Int, triangle: Int, distance: Float32, cancelled: Cancel | None
+        self,
+        paths: PathState,
+        n: int,
+        depth: int,
+        pixels: Int,
+        triangle: Int,
+        distance: Float32,
+        cancelled: Cancel | None,
     ) -> None:
         """Take every path within a medium to its boundary."""
-        walking = np.flatnonzero(wave.medium[:n]).astype(np.int32)
+        walking = np.flatnonzero(paths.medium[:n] >= 0).astype(np.int32)
         distance = distance[walking]
         for step in range(MOST_STEPS):
-            left = wander(walking, distance, self.surface.rows, self.seed, pixels, depth, step, wave, triangle)
-            if not left:
+            staying = random_walk_step(
+                walking, distance, self.surface.rows, self.seed, pixels, depth, step, paths, triangle
+            )
+            if not staying:
                 break
             if cancelled is not None and cancelled():
                 raise Cancelled
-            walking = walking[:left]
-            triangle[walking], distance = self.rays.intersect(wave.origin[walking], wave.direction[walking])
+            walking = walking[:staying]
+            triangle[walking], distance = self.rays.intersect(paths.origin[walking], paths.direction[walking])
 
-    def _arrays(self) -> tuple[Wave, Shadows]:
+    def _arrays(self) -> tuple[PathState, ShadowRays]:
         """Of this thread: fresh ones would cost as much as tracing, in pages that the system must clear."""
-        arrays: tuple[Wave, Shadows] | None = getattr(self._scratch, "arrays", None)
+        arrays: tuple[PathState, ShadowRays] | None = getattr(self._scratch, "arrays", None)
         if arrays is None:
             m = 2 * WAVE
-            wave = Wave(
+            paths = PathState(
                 origin=np.empty((WAVE, 3), np.float32),
                 direction=np.empty((WAVE, 3), np.float32),
-                weight=np.empty((WAVE, 3), np.float32),
-                density=np.empty(WAVE, np.float32),
-                owner=np.empty(WAVE, np.int32),
+                throughput=np.empty((WAVE, 3), np.float32),
+                bsdf_pdf=np.empty(WAVE, np.float32),
+                pixel_slot=np.empty(WAVE, np.int32),
                 sample=np.empty(WAVE, np.int32),
                 medium=np.empty(WAVE, np.int32),
             )
-            shadows = Shadows(
+            shadow_rays = ShadowRays(
                 origin=np.empty((m, 3), np.float32),
                 direction=np.empty((m, 3), np.float32),
                 far=np.empty(m, np.float32),
-                light=np.empty((m, 3), np.float32),
-                owner=np.empty(m, np.int32),
+                radiance=np.empty((m, 3), np.float32),
+                pixel_slot=np.empty(m, np.int32),
             )
-            arrays = self._scratch.arrays = wave, shadows
+            arrays = self._scratch.arrays = paths, shadow_rays
         return arrays
 
 

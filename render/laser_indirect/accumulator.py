@@ -1,4 +1,4 @@
-"""What the passes of one laser's indirect light have brought so far: all that is needed to go on from there."""
+"""The accumulator of one laser's indirect light: sums over passes, their variance, and the guiding of the next ones."""
 
 from __future__ import annotations
 
@@ -19,90 +19,91 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 MOST_PASS = 1 << 15
 MOST_CAMERA_PASS = 1 << 18
-"""Paths a pass: what a wave may take is what is lost where it is cancelled."""
+"""Most paths of a pass: a cancelled render loses at most one wave."""
 MOST_DOUBLINGS = 2
-"""Of the paths from the laser, where camera paths bring nothing."""
+"""Times that light paths are doubled where camera paths can reach nothing, and would be idle."""
 LEAST_SHARE = 0.1
-"""Of the light, to be looked for from the camera wherever it looks at glass."""
+"""Least share of the effort that camera paths get where the camera sees glass, behind which light tracing is blind."""
 WAVE_WEIGHT_EXPONENT = 1.5
-"""Power of their size with which waves weigh: 1 were best, were the first to look where the last do."""
+"""A wave weighs as its size to this power. 1 is the least variance of waves that sample alike; later ones are better
+guided, so more."""
 PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass
 class Accumulator:
-    """Sums over the waves of passes, and where the next ones look; changes as waves are added.
+    """Weighted sums over waves of passes, and the guiding of the next wave; changes as waves are added.
 
-    The second wave is as large as the first, and each after it as all before together, up to a limit. Later ones know
-    better where to look, so a wave weighs more than its size; its passes, alike and independent, tell its scatter.
+    The second wave is as large as the first, and each after it as all before together, up to a limit. The passes of a
+    wave are independent and alike, so that their spread is an unbiased estimate of its variance.
     """
 
     kinds: int
-    """Of light that is gathered (`render.laser_indirect.path_vertex`)."""
+    """Kinds of light that are traced (`render.laser_indirect.path_vertex`)."""
     fan: FanDistribution
     size: int
-    """Paths from the laser in a pass of the first wave, and half of those from the camera."""
+    """Light paths in a pass of the first wave, and half of its camera paths."""
     growth_limit: int
-    """Limit of the growth of passes (`growth`)."""
+    """Most times that a pass may be larger than those of the first wave."""
     camera_share: float
-    """Of the light, what camera paths could help with."""
+    """Share of the light that techniques which start at the camera can make as well."""
     specular: NDArray[np.bool_]
-    """(pixels,) where the camera looks at a mirror or clear glass; (0,): there is none."""
+    """(pixels,) where the camera sees a mirror or clear glass; (0,): there is none."""
     camera_paths: Float
-    """(pixels,) camera paths to be expected for each pixel, in a pass of the next wave."""
+    """(pixels,) expected camera paths of each pixel in a pass of the next wave."""
     guide: Guide
     guide_moments: Float
-    """(rows of the guide, BINS) behind it."""
+    """(rows of the guide, BINS) second moments that the guide follows from."""
     total: Float
     """(pixels,) weighted sum of the passes' radiance."""
     camera_radiance: Float32
-    """(pixels,) of the sum, what camera paths could help with."""
+    """(pixels,) of the sum, what techniques that start at the camera can make as well."""
     squares: float = 0.0
     """Sum of `total` squared."""
     waves: int = 0
     passes: int = 0
-    """Added so far, in those of the first wave."""
+    """Passes added so far, counted in those of the first wave."""
     weight: float = 0.0
-    """Of all passes."""
+    """Sum of the weights of all passes."""
     paths: int = 0
-    """From the laser."""
+    """Light paths so far."""
     variance_sum: float = 0.0
     """Variance of `total`, summed over the pixels."""
     error: float = math.inf
     """Relative RMS error of the image so far: sqrt(sum of variances / sum of squares)."""
     dropped: float = 0.0
-    """Contributions that were no number, infinite or negative."""
+    """Contributions that were NaN, infinite or negative, and were left out."""
     clamped: float = 0.0
-    """Pixels of passes that the clamp has cut."""
+    """Pixels of passes that the clamp has lowered."""
     clamped_radiance: float = 0.0
-    """Radiance that it took, weighted sum over pixels and passes."""
+    """Radiance that the clamp took, weighted sum over pixels and passes."""
     consistent: bool = True
-    """False within `add`: an interruption there leaves half a wave."""
+    """False within `add`: an interruption there leaves half a wave in the sums."""
 
     @property
     def growth(self) -> int:
-        """Size of the next wave's passes, in that of the first's."""
+        """Size of the next wave's passes, in that of the first wave's."""
         return min(1 << max(self.waves - 1, 0), self.growth_limit)
 
     @property
     def next_paths(self) -> int:
-        """Paths from the laser in a pass of the next wave: more where those from the camera have little to bring."""
+        """Light paths in a pass of the next wave: more where camera paths can reach little."""
         return min(self.size * self.growth, MOST_PASS) << round(MOST_DOUBLINGS * (1.0 - self.camera_share))
 
     @property
     def next_camera_paths(self) -> float:
-        """Paths from the camera in a pass of the next wave."""
+        """Camera paths in a pass of the next wave."""
         return 2 * self.size * self.growth * self.camera_share
 
     def add(
         self, buffers: list[PassBuffer], wave_moments: Float, clamp: float | None = None, threads: int | None = None
     ) -> None:
-        """Fold in a wave of passes (cleared), with what it learnt; clamp: most radiance of one pass in one pixel."""
+        """Add a wave of passes, whose buffers are zeroed; clamp: most radiance of one pass in one pixel."""
         self.consistent = False
-        growth_limit, growth, passes = math.inf if clamp is None else clamp, self.growth, len(buffers)
+        most, growth, passes = math.inf if clamp is None else clamp, self.growth, len(buffers)
         weight = growth**WAVE_WEIGHT_EXPONENT
-        found = sum_passes(buffers, self.total, self.camera_radiance, weight, growth_limit, threads)
+        found = sum_passes(buffers, self.total, self.camera_radiance, weight, most, threads)
         light, by_camera, squares, variance_sum, clamped, clamped_radiance = found
         self.squares += squares
         self.clamped += clamped
@@ -116,7 +117,7 @@ class Accumulator:
         self.weight += passes * weight
         self.variance_sum += weight**2 * variance_sum
         if light > 0.0:
-            # the last wave knows it best; but it does not know what it did not look for
+            # the last wave knows the share best, but nothing of specular pixels that it did not look at
             self.camera_share = min(max(by_camera / light, LEAST_SHARE if len(self.specular) else 0.0), 1.0)
         self.error = (
             math.sqrt(self.variance_sum / max(self.squares - self.variance_sum, 1e-300)) if self.squares > 0.0 else 0.0
@@ -126,12 +127,12 @@ class Accumulator:
         self.consistent = True
 
     def allocate(self, drawn: float) -> None:
-        """Spread the next wave's camera paths over the pixels, after `drawn` times those of `camera_paths`."""
+        """Allocate the next wave's camera paths, where each pixel has had `drawn` times its `camera_paths` so far."""
         allocate_camera_paths(self.camera_radiance, self.guide.width, self.next_camera_paths, self.camera_paths, drawn)
         reserve_for_specular(self.camera_paths, self.specular, self.next_camera_paths)
 
     def radiance(self, shape: tuple[int, int]) -> Float32:
-        """(h, w) the image so far, W/(m^2 sr)."""
+        """(h, w) radiance so far, W/(m^2 sr)."""
         mean = np.empty(len(self.total), np.float32)
 
         def work(start: int, stop: int) -> None:
@@ -141,7 +142,7 @@ class Accumulator:
         return mean.reshape(shape)
 
     def arrays(self) -> Arrays:
-        """As a file holds it."""
+        """What a checkpoint keeps."""
         numbers = (
             self.fan.low,
             self.fan.high,
@@ -168,7 +169,7 @@ class Accumulator:
 
     @classmethod
     def of_arrays(cls, arrays: Arrays) -> Accumulator:
-        """What `arrays` gave. KeyError, ValueError: something else."""
+        """The accumulator that gave `arrays`. KeyError, ValueError: they are of something else."""
         kinds, size, growth_limit, width, waves, passes, paths = (int(number) for number in arrays["whole_numbers"])
         low, high, camera_share, squares, *rest = (float(n) for n in arrays["numbers"])
         weight, variance_sum, error, dropped, clamped, clamped_radiance = rest

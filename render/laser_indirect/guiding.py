@@ -1,7 +1,7 @@
-"""Where the camera looks for a laser's indirect light, and where along the lit curve it expects it from.
+"""Guiding of camera paths: how many each pixel gets, and where on the lit curve RIS draws its candidates.
 
-Both follow from the passes before, so a pass on its own stays unbiased: they decide how often something is tried, and
-every try is weighed by that.
+Both follow from earlier passes alone and decide only how often something is sampled, which every MIS weight takes into
+account: each pass on its own stays unbiased.
 """
 
 from __future__ import annotations
@@ -29,37 +29,37 @@ Int = NDArray[np.int32]
 Bool = NDArray[np.bool_]
 
 NO_PIXELS: Bool = np.zeros(0, np.bool_)
-"""Nothing is clear."""
+"""No pixel shows anything specular."""
 
 TILE, BINS = 8, 128
-"""Pixels a side of the guide's tiles; parts of the lit curve."""
+"""Pixels a side of the tiles that share a row of the guide; bins of the lit curve in a row."""
 COARSE = 4
-"""Pixels a side of the cells in which camera paths are spread."""
+"""Pixels a side of the cells in which the radiance about a pixel is averaged."""
 WINDOWS = ((3, 0.7), (9, 0.2), (27, 0.1))
-"""In cells, of the neighbourhood that tells what to expect of a pixel, and their weights."""
+"""Sides, in cells, of the neighbourhoods whose mean predicts a pixel without paths of its own, and their weights."""
 PRIOR_PATHS = 1.0
-"""Camera paths of its own that a pixel needs to be believed as much as its neighbourhood."""
+"""Camera paths that the prediction by the neighbourhood is worth: with as many of its own a pixel counts half."""
 DIMINISHING_RETURN = 0.15
-"""What a camera path is worth in a pixel that has one in every pass, to that in a pixel where it is left to chance."""
+"""Worth of a pixel's second and further path in a pass beside its first: they only lessen the variance within it."""
 LEAST, MOST_CAMERA_PATHS = 1e-8, 64.0
-"""Least share of all light in a cell worth looking at; most camera paths of a pixel and pass."""
+"""Cells with less than this share of all light get no camera paths; most camera paths of a pixel in a pass."""
 SPECULAR_RESERVE = 0.1
-"""Of the camera paths, for what may be behind glass besides what was found there."""
+"""Share of the camera paths kept for specular pixels, alike: no light path tells what is behind them."""
 SPECULAR_RAY_SPACING = 4
-"""Pixels between the rays that look for glass."""
+"""Pixels between the rays that look for specular surfaces."""
 CELL_ROWS, GUIDE_ROWS, PIXELS_A_CHUNK = 16, 1024, 1 << 18
 """Rows of cells, of the guide, and pixels that a thread does at a time."""
 LEAST_PATHS_TO_LEARN, GUIDE_UNIFORM_FRACTION = 1.0, 0.2
-"""Camera paths a pass in a tile that learns; the part of a guide that stays flat."""
+"""Fewest camera paths of a tile in a pass for a row of its own; the share of a row that stays uniform."""
 
 
 class Guide(NamedTuple):
-    """Where on the lit curve light is expected from, for each tile of the image."""
+    """Distributions over the lit curve, for each tile of the image."""
 
     width: int
-    """Of the image."""
+    """Width of the image."""
     row: Int
-    """(tiles down, tiles across) row of `cumulative`, -1: nothing is known."""
+    """(tiles down, tiles across) row of `cumulative`; -1: uniform."""
     cumulative: Float
     """(n, BINS + 1) distribution over equal parts of the list of light vertices, from 0 to 1."""
 
@@ -180,7 +180,7 @@ def any_specular(surface: Surface) -> bool:
 
 
 def specular_pixels(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> Bool:
-    """(pixels,) whether the camera looks at a mirror or clear glass, to the nearest few pixels."""
+    """(pixels,) whether the camera sees a mirror or clear glass, to the nearest few pixels."""
     v, u = np.mgrid[0 : camera.height : SPECULAR_RAY_SPACING, 0 : camera.width : SPECULAR_RAY_SPACING]
     rays, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float64))
     hit = world.rays.from_point(T_world_camera[:3, 3], (rays @ T_world_camera[:3, :3].T).astype(np.float32))
@@ -195,7 +195,7 @@ def specular_pixels(world: World, surface: Surface, camera: Camera, T_world_came
 
 
 def reserve_for_specular(camera_paths: Float, specular: Bool, count: float) -> None:
-    """Leave a part of (pixels,) samples, `count` in all, to clear pixels alike: no light path tells what is there."""
+    """Leave a share of (pixels,) camera paths, `count` in all, to specular pixels alike."""
     behind = int(specular.sum())
     if behind:
         camera_paths *= 1.0 - SPECULAR_RESERVE
@@ -203,13 +203,13 @@ def reserve_for_specular(camera_paths: Float, specular: Bool, count: float) -> N
 
 
 def no_guide(camera: Camera) -> Guide:
-    """Nothing is known of any tile."""
+    """A guide that is uniform everywhere."""
     tiles = -np.ones((-(-camera.height // TILE), -(-camera.width // TILE)), np.int32)
     return Guide(camera.width, tiles, np.zeros((0, BINS + 1)))
 
 
 def first_guide(camera_paths: Float, camera: Camera) -> Guide:
-    """A guide, flat so far, for the tiles with enough camera paths to learn from."""
+    """A guide, uniform so far, with a row for every tile with enough camera paths to learn from."""
     tiles = no_guide(camera).row
     count = number_tiles(camera_paths, camera.width, tiles)
     cumulative = np.repeat(np.linspace(0.0, 1.0, BINS + 1)[None], count, axis=0)
@@ -235,7 +235,7 @@ def number_tiles(camera_paths: Float, width: int, tiles: Int) -> int:
 
 
 def update_guide(guide: Guide, wave_moments: Float, guide_moments: Float, threads: int | None = None) -> Guide:
-    """Fold what the passes of a wave learnt (cleared) into `guide_moments`; the guide that follows from it."""
+    """Add the moments of a wave, which are zeroed, to `guide_moments`; the guide that follows from them."""
     cumulative = np.empty((len(guide_moments), BINS + 1))
     map_chunks(
         partial(update_guide_rows, wave_moments, guide_moments, cumulative), len(guide_moments), GUIDE_ROWS, threads
@@ -247,7 +247,8 @@ def update_guide(guide: Guide, wave_moments: Float, guide_moments: Float, thread
 def update_guide_rows(wave_moments: Float, guide_moments: Float, cumulative: Float, start: int, stop: int) -> None:
     """Rows start .. stop of `update_guide`.
 
-    The best density is the root of the mean square of what is found; a part stays flat, for what was not found yet.
+    The pdf of least variance goes with the root of the second moment; a share stays uniform, for what no candidate has
+    met yet.
     """
     root = np.empty(BINS)
     for row in range(start, stop):
@@ -276,7 +277,7 @@ def update_guide_rows(wave_moments: Float, guide_moments: Float, cumulative: Flo
 def draw_camera_paths(camera_paths: Float, active: Int, seed: int) -> tuple[Int, Int]:
     """The pixels with camera paths in a pass, and (n + 1,) the number of each one's first path.
 
-    As many as `camera_paths` says up to a whole number, by chance.
+    Their expected number is rounded up or down at random, so that its mean is kept.
     """
     pixels, starts = np.empty(active.shape[0], np.int32), np.empty(active.shape[0] + 1, np.int32)
     n = drawn = 0

@@ -1,8 +1,9 @@
-"""A laser's light that met two or more surfaces: paths from the laser and from the camera, joined wherever they can be.
+"""A laser's light that met two or more surfaces, by guided bidirectional path tracing.
 
 Every pass (`render.laser_indirect.bdpt_pass`) draws light paths, stratified along the fan, and camera paths where the
-passes before saw light. The passes differ only in their random numbers, so their spread is an honest error. What no
-joint can make, light through clear glass on both sides, is found by merging (`render.laser_indirect.photon_merging`).
+passes before saw light. The passes of a wave differ only in their random numbers, so their spread estimates the error.
+What no connection can make, light through clear glass on both sides, is found by merging
+(`render.laser_indirect.photon_merging`). The equations are in `render/README.md`.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ Float32 = NDArray[np.float32]
 Bool = NDArray[np.bool_]
 
 LEAST_PASS = 1 << 12
-"""Paths from the laser in a first pass, and half of those from the camera; a large image is worth longer ones."""
+"""Light paths in a pass of the first wave: at least, more in a large image; and half of its camera paths."""
 LOOK_PATHS = 1 << 11
 PILOT_PATHS = 1 << 13
 WAVE = 4
@@ -75,7 +76,7 @@ class Shares:
     interreflection: tuple[float, float]
     """Over two or more surfaces, none of them a mirror, clear glass or a medium."""
     caustic: tuple[float, float]
-    """Through clear glass or off mirrors, on one side of some joint."""
+    """Through clear glass or off mirrors, with an edge left that a connection can lie on."""
     specular_chain: tuple[float, float]
     """Through clear glass or off mirrors on both sides of a single rough surface."""
     subsurface: tuple[float, float]
@@ -115,9 +116,9 @@ def indirect_images(
     An image at every doubling of the paths, and the final one. The error is that of the whole image: sqrt(sum of
     variances / sum of squares); `most_paths`, or `enough` (the time is over), ends it in any case. kinds: of light,
     besides plain interreflection (`render.laser_indirect.path_vertex`). clamp: most radiance of one pass in one pixel,
-    W/(m^2 sr); biased. before: go on from there, to the same image bit for bit as without interruption. keep: told of
-    what to go on from after every wave of passes; it stays whole when this raises Cancelled, where keeps() says so
-    after one more image.
+    W/(m^2 sr); biased. resume_from: go on from there, to the same image bit for bit as without interruption. keep: is
+    given what to go on from after every wave; it stays consistent when this raises Cancelled, after one more image
+    where keeps() says so.
     """
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     shape = (camera.height, camera.width)
@@ -185,7 +186,7 @@ def indirect_images(
 def initialise_guiding(
     buffers: list[PassBuffer], fan: FanDistribution, camera: Camera, kinds: int, specular: Bool
 ) -> Accumulator:
-    """Nothing gathered yet, but where a first look (cleared) says that light is to be found."""
+    """An empty accumulator, guided by a first look, whose buffers are zeroed."""
     pixels = camera.width * camera.height
     fan = guided_fan(fan, np.sum([buffer.fan_moments for buffer in buffers], axis=0))
     share, camera_radiance = camera_reachable_share(buffers)
@@ -201,7 +202,7 @@ def initialise_guiding(
 
 
 def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: Float, camera: Camera) -> None:
-    """Add what a second look (cleared) has found, and set the size of the passes to come."""
+    """Refine the guiding by a second look, whose buffers are zeroed, and set the size of the passes to come."""
     first.guide = update_guide(first.guide, wave_moments, first.guide_moments)
     first.camera_share, camera_radiance = camera_reachable_share(buffers)
     if len(first.specular):
@@ -219,7 +220,7 @@ def arrived_paths(camera_radiance: Float32) -> Float:
 
 
 def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
-    """What camera paths could help with: its share of the light, and (pixels,) of takes, which are cleared."""
+    """What techniques that start at the camera can make: share of the light, (pixels,) radiance; buffers are zeroed."""
     camera_radiance = np.zeros_like(buffers[0].camera_radiance)
     light, by_camera, *_ = sum_passes(buffers, np.zeros(len(camera_radiance)), camera_radiance)
     for buffer in buffers:
@@ -234,7 +235,7 @@ def sampling_of(so_far: Accumulator, light_paths: int) -> Sampling:
 
 
 def attach_wave_moments(buffers: list[PassBuffer], so_far: Accumulator) -> Float:
-    """Give each take (in place) its part of the array that is returned, to learn in."""
+    """Give each buffer, in place, its part of the array that is returned."""
     wave_moments = np.zeros((WAVE, *so_far.guide_moments.shape))
     buffers[:] = [buffer._replace(wave_moments=wave_moments[i]) for i, buffer in enumerate(buffers)]
     return wave_moments
@@ -280,7 +281,7 @@ def indirect_shares(
 
 
 def empty_buffer(pixels: int) -> PassBuffer:
-    """Nothing yet, and no guide to learn for; of the images the system finds room only where light arrives."""
+    """Zeros, without a guide; the system finds memory for the images only where light arrives."""
     zeros = np.zeros(KINDS), np.zeros(FAN_BINS), np.zeros((0, BINS))
     touched = np.zeros(-(-pixels // BLOCK), np.bool_)
     return PassBuffer(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)

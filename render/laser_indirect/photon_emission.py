@@ -31,17 +31,17 @@ SEQUENCE = _recurrence(5)
 
 
 FAN_BINS, UNIFORM_FRACTION = 128, 0.25
-"""Of the fan, each with its own density of photons; the share of them that is spread evenly."""
+"""Bins of the fan, each with its own density of photons; the share of photons that stays uniform."""
 
 
 class FanDistribution(NamedTuple):
-    """Which photons are sent out."""
+    """With which density photons leave along the fan."""
 
     low: float
     high: float
-    """Shares of the power between which the sheet can hit anything."""
+    """The sheet can hit something between these quantiles of its power, `low` and `high`."""
     cumulative: Float
-    """(PARTS + 1,) distribution over equal parts of what lies between, from 0 to 1."""
+    """(FAN_BINS + 1,) distribution over equal bins of what lies between them, from 0 to 1."""
 
 
 class Photons(NamedTuple):
@@ -142,7 +142,7 @@ def emit(
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def emitted_density(y: float, fan: FanDistribution, beam: Float) -> float:
-    """How much denser photons leave towards Y than the laser's light does, over its whole power; 0: none do."""
+    """Density of photons towards Y over that of the laser's power; 0: none leave."""
     place = (fan_integral(y, beam) - fan.low) / (fan.high - fan.low) * FAN_BINS
     if place < 0.0 or place > FAN_BINS:
         return 0.0
@@ -151,12 +151,12 @@ def emitted_density(y: float, fan: FanDistribution, beam: Float) -> float:
 
 
 def uniform_fan(low: float, high: float) -> FanDistribution:
-    """Photons as the laser's light, between two shares of its power."""
+    """Photons as dense as the laser's power, between two quantiles of it."""
     return FanDistribution(low, high, np.linspace(0.0, 1.0, FAN_BINS + 1))
 
 
 def guided_fan(fan: FanDistribution, found: Float) -> FanDistribution:
-    """Photons where paths brought most: found (PARTS,), their squared worth; a part goes everywhere all the same."""
+    """Photons where the second moments `found` (FAN_BINS,) of contributions are large; a share stays uniform."""
     density = np.sqrt(found)
     density = 0.5 * density + 0.25 * (np.roll(density, 1) + np.roll(density, -1))
     if not density.sum() > 0.0:
@@ -167,7 +167,7 @@ def guided_fan(fan: FanDistribution, found: Float) -> FanDistribution:
 
 
 def visible_fan_range(world: World, laser: LineLaser, T_world_laser: Float) -> tuple[float, float, float]:
-    """Shares of the power (low, high) between which the sheet can hit anything, and the part's middle distance, m."""
+    """Quantiles of the power between which the sheet can hit something, and the part's middle distance, m."""
     local = transform_points(invert(T_world_laser), world.vertices)
     z = local[:, 2]
     if not np.any(z > 0.0):
