@@ -13,7 +13,7 @@ from render.camera.camera import Camera
 from render.camera.rays import camera_rays
 from render.frame import Truth
 from render.world.embree import CHUNK
-from render.world.triangles import Surface
+from render.world.triangles import Surface, facet_of
 from render.world.world import World
 
 Float = NDArray[np.float64]
@@ -35,7 +35,7 @@ def fill_truth(
     item: Int,
 ) -> None:
     """Write the pixels start.. of the flat images (h w, ...) from their hits."""
-    m, vertices, triangles = T_world_camera, surface.vertices, surface.triangles
+    m = T_world_camera
     for r in range(triangle.shape[0]):
         i, t = start + r, triangle[r]
         x, y = normalised[r, 0], normalised[r, 1]
@@ -45,11 +45,7 @@ def fill_truth(
             for axis in range(3):
                 position[i, axis] = normal[i, axis] = np.nan
             continue
-        ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
-        ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
-        ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
-        n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+        a0, a1, a2, n0, n1, n2 = facet_of(surface, t)
         height = n0 * (m[0, 3] - a0) + n1 * (m[1, 3] - a1) + n2 * (m[2, 3] - a2)
         d0 = m[0, 0] * x + m[0, 1] * y + m[0, 2]
         d1 = m[1, 0] * x + m[1, 1] * y + m[1, 2]

@@ -57,14 +57,20 @@ def emission(row: Float, cosine: float, rgb: Float) -> None:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def plane_of(surface: Surface, t: int) -> tuple[float, float, float, float, float, float]:
-    """A corner of triangle t and its unit normal, that of the winding."""
+def facet_of(surface: Surface, t: int) -> tuple[float, float, float, float, float, float]:
+    """A corner of triangle t, and its normal by the winding, of twice its area."""
     vertices, triangles = surface.vertices, surface.triangles
     ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
     ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
     ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
-    n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+    return a0, a1, a2, ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def plane_of(surface: Surface, t: int) -> tuple[float, float, float, float, float, float]:
+    """A corner of triangle t, and its unit normal by the winding; NaN where it has no area."""
+    a0, a1, a2, n0, n1, n2 = facet_of(surface, t)
     length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
     return a0, a1, a2, n0 / length, n1 / length, n2 / length
 
