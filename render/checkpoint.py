@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,22 +20,26 @@ from numpy.typing import NDArray
 from render.base.errors import InputError
 from render.base.files import atomic_write, check_regular
 from render.base.kernel_cache import source_key
-from render.laser_indirect.accumulator import Accumulator
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from render.world.world import World
 
 Arrays = dict[str, NDArray[Any]]
+T = TypeVar("T")
+
+AMBIENT = "ambient"
+"""The part that holds the ambient light."""
 
 TARGETS = {"indirect_error", "light_paths", "ambient_error", "ambient_samples", "truth_images"}
 """Settings that say when to end, which may be others when a render goes on."""
 MAX_BYTES = 2**33
+CURE = "delete it, or render without --resume"
 EVERY = 30.0
 """s between two writings of the file."""
 
 
-class Part(Protocol):
-    """What can be kept: the sums of a light group."""
+class Sums(Protocol):
+    """What can be kept: the sums of a light group under way."""
 
     consistent: bool
     """False while it changes."""
@@ -50,36 +55,37 @@ class RenderState:
     """Of what it is a render."""
     path: Path | None = None
     """The file that follows; None: in memory only."""
-    lasers: dict[int, Accumulator] = field(default_factory=dict)
-    """Reflected light of each laser."""
-    ambient: Arrays | None = None
-    """As read from a file, for `render.ambient.integrator` to go on from."""
-    film: Part | None = None
-    """The ambient light under way."""
+    saved: dict[str, Arrays] = field(default_factory=dict)
+    """By part (AMBIENT, `laser_part`): what to go on from."""
+    under_way: dict[str, Sums] = field(default_factory=dict)
+    """By part: what is rendered now."""
     written: float = field(default_factory=time.monotonic)
 
-    def keep_laser(self, index: int, gathered: Accumulator) -> None:
-        self.lasers[index] = gathered
-        self._write_if_due()
+    def keep(self, part: str, sums: Sums) -> None:
+        """Hold on to the sums of a part, which change from then on; they go to the file every now and then."""
+        self.under_way[part] = sums
+        if self.path is not None and time.monotonic() - self.written > EVERY:
+            self.write()
 
-    def keep_film(self, film: Part) -> None:
-        self.film = film
-        self._write_if_due()
+    def restore(self, part: str, load: Callable[[Arrays], T]) -> T | None:
+        """What `load` makes of a saved part; None: nothing of it is there. InputError: it is damaged."""
+        if part not in self.saved:
+            return None
+        try:
+            return load(self.saved[part])
+        except InputError:
+            raise
+        except (KeyError, ValueError, IndexError, TypeError):
+            raise _damaged(str(self.path or "")) from None
 
     def pause(self) -> None:
-        """What is under way becomes what to go on from."""
-        if self.film is not None and self.film.consistent:
-            self.ambient = self.film.arrays()
-        self.film = None
-        self.lasers = {i: gathered for i, gathered in self.lasers.items() if gathered.consistent}
+        """What is under way becomes what to go on from; what would be half a wave is given up."""
+        self.saved |= self._consistent()
+        self.under_way = {}
 
     def write(self) -> bool:
         """Bring the file up to date; False: there is nothing worth a file. InputError: it cannot be written."""
-        parts = {f"laser {i}": gathered.arrays() for i, gathered in self.lasers.items() if gathered.consistent}
-        if self.film is not None and self.film.consistent:
-            parts["ambient"] = self.film.arrays()
-        elif self.ambient is not None:
-            parts["ambient"] = self.ambient
+        parts = self.saved | self._consistent()
         if self.path is None or not parts:
             return False
         named = {f"{part}/{name}": array for part, arrays in parts.items() for name, array in arrays.items()}
@@ -89,14 +95,18 @@ class RenderState:
         self.written = time.monotonic()
         return True
 
+    def _consistent(self) -> dict[str, Arrays]:
+        return {part: sums.arrays() for part, sums in self.under_way.items() if sums.consistent}
+
     def remove(self) -> None:
         """The frame is finished: no file stays."""
         if self.path is not None:
             self.path.unlink(missing_ok=True)
 
-    def _write_if_due(self) -> None:
-        if self.path is not None and time.monotonic() - self.written > EVERY:
-            self.write()
+
+def laser_part(index: int) -> str:
+    """The part that holds a laser's indirect light."""
+    return f"laser {index}"
 
 
 def state_of(
@@ -121,7 +131,7 @@ def read_state(state: RenderState) -> RenderState:
     """
     if state.path is None or not state.path.is_file():
         return state
-    where, cure = str(state.path), "delete it, or render without --resume"
+    where = str(state.path)
     check_regular(state.path, MAX_BYTES, "saved render")
     try:
         with np.load(state.path, allow_pickle=False) as file:
@@ -131,8 +141,7 @@ def read_state(state: RenderState) -> RenderState:
                 found.setdefault(part, {})[name] = file[key]
         marks = {name: str(mark) for name, mark in found.pop("of").items()}
     except Exception as error:  # a damaged archive fails in any way, also by asking for memory without end
-        found_bytes = "data cut short or changed"
-        raise InputError("the saved render is damaged", where=where, found=found_bytes, cure=cure) from error
+        raise _damaged(where, "data cut short or changed") from error
     others = [name for name, mark in state.marks.items() if marks.get(name) != mark]
     if others:
         raise InputError(
@@ -140,16 +149,13 @@ def read_state(state: RenderState) -> RenderState:
             where=where,
             found=f"another {' and another '.join(others)}",
             allowed="a render of the same scene with the same settings; only targets may differ",
-            cure=cure,
+            cure=CURE,
         )
-    try:
-        lasers = {
-            int(name.split()[1]): Accumulator.of_arrays(arrays) for name, arrays in found.items() if name != "ambient"
-        }
-    except (KeyError, ValueError, IndexError, TypeError):
-        told = "arrays that are missing or of another shape"
-        raise InputError("the saved render is damaged", where=where, found=told, cure=cure) from None
-    return RenderState(state.marks, state.path, lasers, found.get("ambient"))
+    return RenderState(state.marks, state.path, found)
+
+
+def _damaged(where: str, found: str = "arrays that are missing or of another shape") -> InputError:
+    return InputError("the saved render is damaged", where=where, found=found, cure=CURE)
 
 
 def fingerprint(

@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from render.base.errors import Cancelled
 from render.base.progress import Clock, WholeClock
 from render.base.threads import Cancel
 from render.camera.focus import lens_lines
-from render.checkpoint import RenderState
+from render.checkpoint import AMBIENT, RenderState
 from render.frame import Axis, Frame, LaserCurve
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.transport_plan import DIRECT, INDIRECT, choose_plan, clamp_line, indirect_light
@@ -188,8 +189,8 @@ def frames(
                     cancelled=limit.over,
                     progress=report,
                     keeps=limit.keeps,
-                    before=None if state is None else state.ambient,
-                    keep=None if state is None else state.keep_film,
+                    before=None if state is None else state.saved.get(AMBIENT),
+                    keep=None if state is None else partial(state.keep, AMBIENT),
                 )
             ):
                 frame = told(replace(frame, ambient=image.radiance), counts)

@@ -29,6 +29,12 @@ WAVE_WEIGHT_EXPONENT = 1.5
 guided, so more."""
 PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
+IMAGES = ("specular", "camera_paths", "guide_moments", "total", "camera_radiance")
+NUMBERS = (
+    *("kinds", "size", "growth_limit", "camera_share", "squares", "waves", "passes", "weight", "paths"),
+    *("variance_sum", "error", "dropped", "clamped", "clamped_radiance"),
+)
+"""Fields of an accumulator that a checkpoint keeps, beside its fan and its guide."""
 
 
 @dataclass
@@ -143,59 +149,24 @@ class Accumulator:
 
     def arrays(self) -> Arrays:
         """What a checkpoint keeps."""
-        numbers = (
-            self.fan.low,
-            self.fan.high,
-            self.camera_share,
-            self.squares,
-            self.weight,
-            self.variance_sum,
-            self.error,
-        )
         return {
-            "whole_numbers": np.array(
-                (self.kinds, self.size, self.growth_limit, self.guide.width, self.waves, self.passes, self.paths)
-            ),
-            "numbers": np.array((*numbers, self.dropped, self.clamped, self.clamped_radiance)),
-            "fan": self.fan.cumulative,
-            "clear": self.specular,
-            "samples": self.camera_paths,
+            **{name: np.array(getattr(self, name)) for name in NUMBERS},
+            **{name: getattr(self, name) for name in IMAGES},
+            "fan": np.array([self.fan.low, self.fan.high, *self.fan.cumulative]),
+            "guide_width": np.array(self.guide.width),
             "guide_row": self.guide.row,
             "guide": self.guide.cumulative,
-            "knowledge": self.guide_moments,
-            "total": self.total,
-            "helped": self.camera_radiance,
         }
 
     @classmethod
     def of_arrays(cls, arrays: Arrays) -> Accumulator:
-        """The accumulator that gave `arrays`. KeyError, ValueError: they are of something else."""
-        kinds, size, growth_limit, width, waves, passes, paths = (int(number) for number in arrays["whole_numbers"])
-        low, high, camera_share, squares, *rest = (float(n) for n in arrays["numbers"])
-        weight, variance_sum, error, dropped, clamped, clamped_radiance = rest
-        return cls(
-            kinds,
-            FanDistribution(low, high, arrays["fan"]),
-            size,
-            growth_limit,
-            camera_share,
-            arrays["clear"],
-            arrays["samples"],
-            Guide(width, arrays["guide_row"], arrays["guide"]),
-            arrays["knowledge"],
-            arrays["total"],
-            arrays["helped"],
-            squares,
-            waves,
-            passes,
-            weight,
-            paths,
-            variance_sum,
-            error,
-            dropped,
-            clamped,
-            clamped_radiance,
-        )
+        """The accumulator that gave `arrays`, of copies of them. KeyError, ValueError: they are of something else."""
+        numbers: dict[str, Any] = {name: arrays[name].item() for name in NUMBERS}
+        images: dict[str, Any] = {name: arrays[name].copy() for name in IMAGES}
+        low, high, *cumulative = arrays["fan"]
+        fan = FanDistribution(float(low), float(high), np.array(cumulative))
+        guide = Guide(int(arrays["guide_width"].item()), arrays["guide_row"], arrays["guide"])
+        return cls(**numbers, **images, fan=fan, guide=guide)
 
 
 def sum_passes(

@@ -22,7 +22,8 @@ from render.base.counts import (
 )
 from render.base.threads import Cancel, Progress
 from render.camera.focus import lens_lines
-from render.checkpoint import RenderState
+from render.checkpoint import RenderState, laser_part
+from render.laser_indirect.accumulator import Accumulator
 from render.laser_indirect.integrator import indirect_images, indirect_shares
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.sampling.random import wrapped
@@ -99,7 +100,7 @@ def choose_plan(
     seed: int = 0,
     cancelled: Cancel | None = None,
 ) -> Plan:
-    """Decide on the lasers' indirect light; a pilot of a few thousand paths measures what each transport step would add.
+    """Decide on the lasers' indirect light; a pilot of few paths measures what each transport step would add.
 
     direct: (h, w) direct radiance of each laser.
     """
@@ -189,8 +190,8 @@ def indirect_light(
             progress=None if progress is None else partial(_share, progress, i, count),
             keeps=keeps,
             enough=enough(count - i),
-            resume_from=None if state is None else state.lasers.get(i),
-            keep=None if state is None else partial(state.keep_laser, i),
+            resume_from=None if state is None else state.restore(laser_part(i), Accumulator.of_arrays),
+            keep=None if state is None else partial(state.keep, laser_part(i)),
         ):
             images[i] = image.radiance
             counts[INDIRECT_ERROR.of(i)] = image.error

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from render.base.errors import InputError
-from studio.commands.console import print_plan, print_table, stage_progress
 from studio.project.project import Project, project_file
 from studio.project.templates import DESCRIPTIONS, new_project, template_folder
+from studio.runtime.console import print_plan, print_table, stage_progress
 from studio.runtime.streams import print_json
 
 if TYPE_CHECKING:

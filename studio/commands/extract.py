@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from render.base.errors import InputError
-from studio.commands.console import print_table, stage_progress
+from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json
 
 if TYPE_CHECKING:

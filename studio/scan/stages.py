@@ -20,8 +20,8 @@ from render.scan_plan import ScanPlan
 from render.scene.motion import NoMotion
 from render.sensor.develop import Image
 from render.world.world import World, build_world
-from studio.commands.console import FRAMES
 from studio.project.project import Project
+from studio.runtime.console import FRAMES
 from studio.scan.exposure import expose
 from studio.scan.line_extraction import extract_line
 from studio.scan.spacetime_window import Passing, along_time

@@ -77,10 +77,10 @@ def test_a_finished_render_goes_on_to_a_smaller_error_without_beginning_anew(gro
     coarse = SETTINGS.model_copy(update={"indirect_error": 0.02})
     state = state_of(*groove, coarse)
     render_world(*groove, settings=coarse, state=state)
-    passes = state.lasers[0].passes
+    passes = state.under_way["laser 0"].passes
     state.pause()
     frames = list(refine(*groove, settings=SETTINGS, state=state))
-    assert state.lasers[0].passes > passes > 0
+    assert state.under_way["laser 0"].passes > passes > 0
     assert np.array_equal(frames[-1].laser_indirect[0], whole.laser_indirect[0])
 
 
@@ -90,7 +90,7 @@ def test_a_saved_render_of_something_else_is_refused_with_what_differs(groove, t
     state = state_of(world, scene, SETTINGS, path=path)
     render_world(world, scene, settings=SETTINGS, state=state)
     assert state.write()
-    assert read_state(state_of(world, scene, SETTINGS, path=path)).lasers
+    assert read_state(state_of(world, scene, SETTINGS, path=path)).saved
     for settings, changes, difference in (
         (SETTINGS.model_copy(update={"negligible": 0.5}), {}, "render setting"),
         (SETTINGS, {"seed": 4}, "step or seed"),

@@ -8,7 +8,7 @@ import pytest
 
 from render import scan_plan
 from render.laser_indirect.path_vertex import PLAIN
-from render.laser_indirect.transport_plan import RUNGS, pilot_shares
+from render.laser_indirect.transport_plan import TRANSPORT_STEPS, pilot_shares
 from render.material.material import Conductor
 from render.scan_plan import looked_at, plan_scan
 from render.scene.motion import LinearStage
@@ -58,11 +58,11 @@ def test_the_plan_is_the_same_on_any_number_of_threads_and_says_what_it_is(groov
 def test_what_one_frame_needs_is_computed_in_all(groove, monkeypatch, share, computed):
     """A share that only the last frame has, of one that is negligible below 2 %."""
     scene, world = groove
-    nothing = {rung.share: (0.0, 0.0) for rung in RUNGS}
+    nothing = {step.share: (0.0, 0.0) for step in TRANSPORT_STEPS}
 
     def pilot(*args, step, **options):
         assert set(pilot_shares(*args, step=step, **options)) == set(nothing)
-        return {**nothing, "plain": (share, 0.001)} if step == 11 else nothing
+        return {**nothing, "interreflection": (share, 0.001)} if step == 11 else nothing
 
     monkeypatch.setattr(scan_plan, "pilot_shares", pilot)
     plan = plan_scan(scene, RenderSettings(), lambda step: world)

@@ -142,3 +142,13 @@ class JobRunner(QObject):
     def _tell(self) -> None:
         for job in list(self._running.values()):
             self.progress.emit(job)
+
+
+def time_left(seconds: float | None) -> str:
+    """ "0:12 left"."""
+    if seconds is None:
+        return ""
+    whole = max(1, round(seconds))
+    minutes, rest = divmod(whole, 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d} left" if hours else f"{minutes}:{rest:02d} left"

@@ -24,7 +24,6 @@ from analysis.report.model import FrameResult
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.scene.motion import LinearStage, NoMotion, Turntable
-from studio.commands.console import FRAMES, frame_of
 from studio.editing.scene_edits import set_motion
 from studio.project.document import Document
 from studio.project.project import Project
@@ -32,6 +31,7 @@ from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.core.step_bar import StepBar
+from studio.runtime.console import FRAMES, frame_of
 from studio.runtime.jobs import Job, Progress
 from studio.scan.scan import ScanResult, run_scan
 from studio.scan.scan_folder import open_folder

@@ -28,11 +28,10 @@ from render.frame import Frame
 from render.progressive import plan
 from render.world.world import World
 from studio.project.project import Project
-from studio.qt.core.jobs import BUSY, RENDER, JobRunner
+from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Render, Session
 from studio.qt.render.history import History
 from studio.qt.render.render_job import can_go_on, carried, render_frames
-from studio.qt.shell.status import time_left
 from studio.runtime.jobs import Job, Progress, State
 from studio.scan.light_group_status import group_lines, unfinished
 from studio.scan.redevelop import is_stale

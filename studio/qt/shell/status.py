@@ -11,7 +11,7 @@ from PySide6.QtGui import QMouseEvent, QMoveEvent, QResizeEvent
 from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QToolButton, QWidget
 
 from studio.qt.core.icons import icon
-from studio.qt.core.jobs import RENDER, JobRunner
+from studio.qt.core.jobs import RENDER, JobRunner, time_left
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Job, State
 
@@ -151,13 +151,3 @@ class _Message(QLabel):
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         self.clicked.emit()
-
-
-def time_left(seconds: float | None) -> str:
-    """ "0:12 left"."""
-    if seconds is None:
-        return ""
-    whole = max(1, round(seconds))
-    minutes, rest = divmod(whole, 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d} left" if hours else f"{minutes}:{rest:02d} left"

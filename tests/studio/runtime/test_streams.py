@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from studio.commands.console import print_table
+from studio.runtime.console import print_table
 from studio.runtime.streams import clean, print_json, streams
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -53,7 +53,7 @@ def test_names_in_tables_are_shown_as_they_are(name: str, capsys: pytest.Capture
 def test_numbers_are_not_cut_where_a_terminal_is_narrow(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("studio.commands.console.PLAIN_WIDTH", 40)
+    monkeypatch.setattr("studio.runtime.console.PLAIN_WIDTH", 40)
     print_table("", [("a name that needs all of the line to itself", "1234.5 um", "99.9 %")], header=("a", "b", "c"))
     shown = capsys.readouterr().out
     assert "1234.5 um" in shown and "99.9 %" in shown

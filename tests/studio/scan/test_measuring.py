@@ -19,9 +19,9 @@ from analysis.report.record import ScanRecord
 from render.base.errors import InputError
 from render.checkpoint import RenderState
 from render.world.world import build_world
-from studio.commands.console import frame_of
 from studio.project.project import Project
 from studio.project.templates import template_folder
+from studio.runtime.console import frame_of
 from studio.scan import scan
 from studio.scan.scan import run_scan
 from studio.scan.scan_folder import open_folder
