@@ -86,6 +86,8 @@ def streams(as_json: bool) -> Iterator[None]:
         sys.stdout, sys.stderr, warnings.formatwarning, _answer = before
         _flush(results)
         _flush(errors)
+        if results is not before[0]:
+            results.close()
 
 
 def print_json(result: dict[str, Any]) -> None:

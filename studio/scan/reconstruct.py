@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -54,10 +53,7 @@ def _measured(
 ) -> dict[str, Any]:
     how = development(found.project, asked)
     project = how.project
-    image_scale = found.manifest.get("image_scale", 1.0)
-    if not isinstance(image_scale, float | int) or not 0.0 < image_scale < math.inf:
-        where = f"{found.folder / scan_folder.MANIFEST}: image_scale"
-        raise InputError("the image scale is none", where=where, found=image_scale, allowed="a positive number")
+    image_scale = scan_folder.image_scale_of(found)
     cautions = Cautions(project, image_scale, how.laser_power)
     with clock.stage("loading meshes"), cautions.listening():
         first = world = build_world(project.scene, root, 0)

@@ -8,6 +8,7 @@ sidecar (which holds the image's) and of every input file; each sidecar says wha
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -157,9 +158,18 @@ def open_folder(folder: Path) -> ScanFolder:
     return ScanFolder(folder, project, (folder / source).resolve(), frames, inputs, manifest)
 
 
+def image_scale_of(found: ScanFolder) -> float:
+    """Of the scan's images, to the scanner's. InputError: the manifest holds none."""
+    scale = found.manifest.get("image_scale", 1.0)
+    if isinstance(scale, bool) or not isinstance(scale, float | int) or not 0.0 < scale < math.inf:
+        where = f"{found.folder / MANIFEST}: image_scale"
+        raise InputError("the image scale is none", where=where, found=scale, allowed="a positive number")
+    return float(scale)
+
+
 def check_measures(found: ScanFolder, project: Project) -> None:
     """InputError: frames rendered from the folder's project cannot be measured as `project`; it names what differs."""
-    scale = found.manifest.get("image_scale", 1.0)
+    scale = image_scale_of(found)
     cure = "render the project again" + ("" if scale == 1.0 else f"; these frames are of --scale {scale}")
     check_rendered_from(made_of(found.project, {}, found.inputs), project, found.inputs, str(found.folder), cure=cure)
 

@@ -23,7 +23,7 @@ from studio.project.project import Project
 from studio.scan.point_sample import PointSample
 from studio.scan.result_series import MEASURED, ErrorView
 from studio.scan.scan import never
-from studio.scan.scan_folder import MANIFEST, PROJECT, ScanFolder, check_frame
+from studio.scan.scan_folder import MANIFEST, PROJECT, ScanFolder, check_frame, image_scale_of
 from studio.scan.stages import scaled, step_world
 
 Float = NDArray[np.float64]
@@ -134,12 +134,6 @@ def read_results(found: ScanFolder, cancelled: Cancel = never) -> ScanResults:
         _add(sums, piece)
         sample.add(piece)
     return ScanResults(found, image_scale_of(found), sample.points, sums)
-
-
-def image_scale_of(found: ScanFolder) -> float:
-    """Of the scan's images, to the scanner's."""
-    scale = _number(found.manifest, "image_scale")
-    return scale if scale > 0.0 else 1.0
 
 
 def is_scan_of(found: ScanFolder, project: Project) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from html import escape
 from pathlib import Path
 
@@ -32,9 +32,7 @@ from PySide6.QtWidgets import (
 
 from render.base.errors import InputError
 from render.scene.scene import SceneObject
-from studio.editing.forms import kind_label
 from studio.editing.scene_edits import LASERS, LIGHTS, OBJECTS, in_list, rename
-from studio.editing.units import Unit
 from studio.project.document import FieldPath, value_at
 from studio.project.mesh_import import is_mesh
 from studio.project.project import Project
@@ -43,60 +41,11 @@ from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.session import Session
 from studio.qt.scene import scene_actions
 from studio.qt.scene.mesh_importer import import_meshes
-from studio.qt.scene.scene_icons import icon_name, scene_icon
+from studio.qt.scene.scene_icons import scene_icon
+from studio.qt.scene.scene_nodes import Node, nodes
 
 PATH, DETAIL = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
 NAME, EYE = 0, 1
-
-
-@dataclass(frozen=True)
-class Node:
-    """One line of the tree."""
-
-    path: FieldPath
-    parent: FieldPath | None
-    name: str
-    detail: str = ""
-    icon: tuple[str, str] = ("", "")
-    visible: bool | None = None
-    """None: it cannot be hidden."""
-    problem: str = ""
-    """Why it is not as it is set."""
-
-
-def nodes(project: Project) -> list[Node]:
-    """The tree from top to bottom."""
-    scene = project.scene
-    rig: FieldPath = ("scene", "rig")
-    camera = scene.camera
-    found = [
-        Node((), None, project.name),
-        Node(rig, (), "Rig"),
-        Node((*rig, "camera"), rig, "Camera", f"{camera.width} x {camera.height}"),
-        Node(LASERS, rig, "Lasers"),
-    ]
-    for i, laser in enumerate(scene.lasers):
-        detail = f"{Unit.of('W').with_unit(laser.power)}, {laser.wavelength_nm:g} nm"
-        found.append(Node((*LASERS, i), LASERS, laser.name, detail))
-    found.append(Node(OBJECTS, (), "Objects"))
-    for i, item in enumerate(scene.objects):
-        kind = kind_label(type(item.shape)).lower()
-        kind = "" if item.name.startswith(kind) else kind
-        found.append(Node((*OBJECTS, i), OBJECTS, item.name, kind, visible=item.visible))
-    found.append(Node(LIGHTS, (), "Lights"))
-    found += [
-        Node((*LIGHTS, i), LIGHTS, light.name, kind_label(type(light)).lower()) for i, light in enumerate(scene.lights)
-    ]
-    frames = "" if scene.motion.kind == "none" else f", {scene.frame_count} frames"
-    motion = "single frame" if scene.motion.kind == "none" else kind_label(type(scene.motion)).lower() + frames
-    found += [
-        Node(("scene", "environment"), (), "Environment"),
-        Node(("scene", "motion"), (), "Motion", motion),
-        Node(("sensor",), (), "Sensor", Unit.of("s").with_unit(project.sensor.exposure_time)),
-        Node(("render",), (), "Render"),
-        Node(("extraction",), (), "Extraction", project.extraction.method.replace("_", " ")),
-    ]
-    return [Node(n.path, n.parent, n.name, n.detail, icon_name(project, n.path), n.visible) for n in found]
 
 
 class _Delegate(QStyledItemDelegate):

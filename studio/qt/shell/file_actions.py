@@ -18,8 +18,8 @@ from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.runtime.error_messages import trouble
 from studio.runtime.preferences import PreferencesFile, recovery_folder
-from studio.scan.scan_folder import ScanFolder, open_folder
-from studio.scan.scan_results import holds_scan, image_scale_of, is_scan_of, source_of
+from studio.scan.scan_folder import ScanFolder, image_scale_of, open_folder
+from studio.scan.scan_results import holds_scan, is_scan_of, source_of
 
 MAX_NAME = 200
 FILTER = "Blazer project (*.json)"

@@ -92,7 +92,7 @@ def volume(mesh):
 )
 def test_images_that_are_not_there_or_cannot_be_mapped_are_named(material, field, tmp_path):
     scene = scene_with(ball(material=material))
-    with pytest.raises(InputError, match=rf"object 'ball': {field}\.path: the texture is not there.*a\.png"):
+    with pytest.raises(InputError, match=rf"object 'ball': {field}\.path: a\.png: the texture is not there"):
         build_world(scene, tmp_path)
     trimesh.creation.icosphere(subdivisions=1, radius=0.05).export(tmp_path / "plain.stl")
     scene = scene_with(ball(material=material, shape=MeshFile(path="plain.stl")))

@@ -115,7 +115,11 @@ def test_pause_holds_a_pool_of_threads_as_well() -> None:
     calls = []
 
     def work(progress: Progress, cancelled: Cancel) -> None:
-        map_chunks(lambda start, stop: calls.append(start), 10_000_000, 1000, 2, cancelled)
+        def chunk(start: int, stop: int) -> None:
+            calls.append(start)
+            time.sleep(0.01)
+
+        map_chunks(chunk, 10_000_000, 1000, 2, cancelled)
 
     job = started(work)
     until(lambda: len(calls) > 10)

@@ -108,7 +108,7 @@ def test_frames_in_which_the_sheet_has_left_the_part_are_counted(plane: Project,
 
 @pytest.mark.parametrize("scale", ["x", 0, -1.0, None, [1]])
 def test_an_image_scale_that_is_none_is_refused(scale: object, plane: Project, tmp_path: Path) -> None:
-    found = scan_folder.ScanFolder(tmp_path, plane, ROOT, (), {"image_scale": scale})
+    found = scan_folder.ScanFolder(tmp_path, plane, ROOT, (), {}, {"image_scale": scale})
     clock = Clock(lambda stage, done: None, lambda: False)
     with pytest.raises(InputError, match=r"scan\.json: image_scale"):
         reconstruct_folder(found, plane, ROOT, tmp_path, clock, report=False)

@@ -79,7 +79,7 @@ def test_nothing_held_grows_with_the_frames_but_a_few_numbers(
     finally:
         tracemalloc.stop()
     assert (held[1] - held[0]) / (FRAMES - 1 - FRAMES // 3) < 8_000
-    assert done.manifest["notes"] == ["doubtful, by 0 %", "every frame says the same"]
+    assert done.manifest["notes"][-2:] == ["doubtful, by 0 %", "every frame says the same"]
     row = done.manifest["results"][0]
     assert row["sampled_scan_lines"] <= 512 < row["scan_lines"]
     points = read_ply(tmp_path / "points.ply")

@@ -112,7 +112,7 @@ def test_a_frame_of_another_plan_is_another_frame(project: Project) -> None:
     alone, one, other = (
         state_of(world, project.scene, project.render, plan=plan) for plan in (None, "laser light 0", "laser light 1")
     )
-    assert len({str(made_of(project, state)) for state in (alone, one, other)}) == 3
+    assert len({str(made_of(project, state.marks, {})) for state in (alone, one, other)}) == 3
 
 
 def test_what_is_left_of_another_scene_is_refused(project: Project, tmp_path: Path) -> None:

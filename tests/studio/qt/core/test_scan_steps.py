@@ -119,10 +119,10 @@ class TestOpened:
     ) -> None:
         panel, render = results_of(opened), opened.session.shown
         assert render is not None and render.scanner_scale == SCALE
-        assert "0.5 times" in panel.head_text.text() and panel.head.isVisible()
+        assert "image scale 0.5" in panel.head_text.text() and panel.head.isVisible()
         assert "not the scanner's" in unescape(panel.notices[0].text.text())
         assert "0.5 x" in opened.cloud.bar.note
-        assert "0.5 times" in describe(render) and "step 1 of 3" in describe(render)
+        assert "image scale 0.5" in describe(render) and "step 1 of 3" in describe(render)
         asked: list[str] = []
 
         def choose(parent: object, title: str, start: str, kinds: str) -> tuple[str, str]:
@@ -133,7 +133,7 @@ class TestOpened:
         with qtbot.waitSignal(opened.runner.finished, timeout=60_000):
             opened.exports.ask("export_html")
         assert "at 0.5 x" in asked[0]
-        assert "0.5 times the scanner" in (tmp_path / "report.html").read_text()
+        assert "image scale 0.5: not the scanner" in (tmp_path / "report.html").read_text()
         assert "not the scanner's" in opened.panels["log"].as_text()  # type: ignore[attr-defined]
 
     def test_a_scan_is_found_again_at_another_step(self, opened: MainWindow, qtbot: QtBot) -> None:

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import random
-import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMessageBox, QPushButton, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QMainWindow
 from pytestqt.qtbot import QtBot
 
-from render.base.errors import Cancelled
-from render.base.threads import Cancel
 from render.material.material import Texture
 from studio.project.autosave import Autosave
-from studio.project.document import Document
-from studio.project.project import Project
 from studio.qt.core import theme
 from studio.qt.core.actions import COMMANDS, Command
 from studio.qt.core.live_preview import live
@@ -32,41 +24,12 @@ from studio.qt.shell.panels import PANELS
 from studio.qt.shell.window import MainWindow
 from studio.qt.shell.workspaces import WORKSPACES, remembered, restore
 from studio.runtime.fault_log import Fault
-from studio.runtime.jobs import Progress
 from studio.runtime.preferences import PreferencesFile
+from tests.studio.qt.shell.window_hands import contrast, dialog, until_cancelled
 from tests.studio.qt.small_session import small_project as sphere
 from tests.studio.qt.small_session import small_render
 
 POWER = ("scene", "rig", "lasers", 0, "power")
-
-
-def dialog(name: str) -> QMessageBox:
-    """The open message box of that name."""
-    found = [each for each in QApplication.topLevelWidgets() if each.objectName() == name and each.isVisible()]
-    assert len(found) == 1, f"{len(found)} dialogs {name!r}"
-    assert isinstance(found[0], QMessageBox)
-    return found[0]
-
-
-def answer(qtbot: QtBot, name: str, button: str) -> None:
-    """Press a button of a modal dialog as soon as it is there."""
-
-    def press() -> None:
-        for each in QApplication.topLevelWidgets():
-            if each.objectName() == name and each.isVisible():
-                for one in each.findChildren(QPushButton):
-                    if one.text().replace("&", "") == button:
-                        qtbot.mouseClick(one, Qt.MouseButton.LeftButton)
-                        return
-        QTimer.singleShot(10, press)
-
-    QTimer.singleShot(0, press)
-
-
-def choose_file(monkeypatch: pytest.MonkeyPatch, path: Path | str) -> None:
-    """What a person picks in the next file dialogs; "" is Cancel."""
-    for name in ("getOpenFileName", "getSaveFileName"):
-        monkeypatch.setattr(QFileDialog, name, lambda *_, **__: (str(path), ""))
 
 
 class TestWorkspaces:
@@ -322,168 +285,6 @@ class TestTour:
         assert window.tour is None and window.preferences.values.toured
 
 
-class TestFiles:
-    def test_save_as_takes_the_files_along(
-        self, window: MainWindow, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-    ) -> None:
-        from studio.qt.shell.file_actions import template
-
-        window.files.replace(template("weld_seam", window.files.autosave))
-        choose_file(monkeypatch, tmp_path / "elsewhere" / "mine")
-        assert window.files.save()
-        assert (tmp_path / "elsewhere" / "mine.json").is_file()
-        assert (tmp_path / "elsewhere" / "textures" / "weld_tee_albedo.png").is_file()
-        assert not window.session.document.dirty
-        assert window.preferences.values.recent[0] == str(tmp_path / "elsewhere" / "mine.json")
-
-    def test_a_new_project_does_not_touch_the_one_it_comes_from(self, window: MainWindow) -> None:
-        from studio.project.templates import template_folder
-        from studio.qt.shell.file_actions import template
-
-        document = template("weld_seam", window.files.autosave)
-        assert document.root != template_folder("weld_seam")
-        assert (document.root / "textures" / "weld_tee_albedo.png").is_file()
-
-    def test_unsaved_changes_are_asked_about(self, window: MainWindow, qtbot: QtBot, small_project: Path) -> None:
-        window.session.set(POWER, 0.005)
-        assert window.isWindowModified()
-        answer(qtbot, "unsaved", "Cancel")
-        assert not window.close() and window.isVisible()
-        answer(qtbot, "unsaved", "Save")
-        assert window.files.may_close()
-        assert Project.load(small_project).scene.lasers[0].power == 0.005
-
-    def test_an_untouched_project_closes_without_a_question(self, own_window: MainWindow) -> None:
-        assert own_window.close()
-
-    def test_a_project_dropped_on_the_window_is_opened(
-        self, window: MainWindow, qtbot: QtBot, small_project: Path
-    ) -> None:
-        other = small_project.with_name("other.json")
-        window.session.project.model_copy(update={"name": "Other"}).save(other)
-        drop(window, other)
-        qtbot.waitUntil(lambda: window.session.project.name == "Other")
-        assert "Other" in window.windowTitle()
-
-    def test_files_are_copied_from_and_never_moved(self, window: MainWindow, small_project: Path) -> None:
-        data = files(small_project)
-        buttons, shift = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.ShiftModifier
-        either = Qt.DropAction.CopyAction | Qt.DropAction.MoveAction
-        for actions, taken in ((Qt.DropAction.MoveAction, False), (either, True)):
-            entered = QDragEnterEvent(QPoint(9, 9), actions, data, buttons, shift)
-            entered.setDropAction(Qt.DropAction.MoveAction)
-            entered.ignore()
-            window.dragEnterEvent(entered)
-            assert entered.isAccepted() == taken
-        assert entered.dropAction() == Qt.DropAction.CopyAction
-        dropped = QDropEvent(QPointF(9, 9), either, data, buttons, shift)
-        dropped.setDropAction(Qt.DropAction.MoveAction)
-        window.dropEvent(dropped)
-        assert dropped.isAccepted() and dropped.dropAction() == Qt.DropAction.CopyAction
-
-    def test_recent_projects_are_in_the_menu(self, window: MainWindow, small_project: Path) -> None:
-        assert window.files.open(small_project)
-        menu = window.commands.submenus["recent"]
-        menu.aboutToShow.emit()
-        assert any(small_project.name in action.text() for action in menu.actions())
-
-    def test_work_of_a_crashed_program_is_offered(self, window: MainWindow, qtbot: QtBot) -> None:
-        crashed = Autosave(window.files.autosave.folder)
-        document = Document(window.session.project, None, window.session.document.root)
-        document.set(POWER, 0.007)
-        crashed.keep(document)
-        assert crashed._lock is not None
-        crashed._lock.close()
-        answer(qtbot, "recovery", "Open it")
-        assert window.files.recover()
-        assert window.session.project.scene.lasers[0].power == 0.007
-        assert window.files.unsaved
-        assert not crashed.file.exists() and window.files.autosave.file.exists()
-
-
-class TestBadInput:
-    """Each ends in a dialog that names cause and cure; what was open stays as it was."""
-
-    @pytest.fixture(autouse=True)
-    def unharmed(self, window: MainWindow) -> Any:
-        before = window.session.project
-        yield
-        assert window.session.project == before
-
-    def told(self, *words: str) -> None:
-        box = dialog("trouble")
-        text = f"{box.text()}\n{box.informativeText()}"
-        for word in words:
-            assert word in text, text
-        box.close()
-
-    def test_a_newer_file(self, window: MainWindow, tmp_path: Path, small_project: Path) -> None:
-        data = json.loads(small_project.read_text()) | {"schema_version": 99}
-        newer = tmp_path / "newer.json"
-        newer.write_text(json.dumps(data))
-        assert not window.files.open(newer)
-        self.told("Could not open newer.json", "99", "newer")
-
-    def test_a_file_that_is_not_there(self, window: MainWindow, tmp_path: Path) -> None:
-        assert not window.files.open(tmp_path / "nothing.json")
-        self.told("Could not open nothing.json", "nothing.json")
-
-    def test_absurd_numbers(self, window: MainWindow, tmp_path: Path, small_project: Path) -> None:
-        data = json.loads(small_project.read_text())
-        data["scene"]["rig"]["lasers"][0]["power"] = 1e300
-        data["scene"]["rig"]["camera"]["width"] = -4
-        absurd = tmp_path / "absurd.json"
-        absurd.write_text(json.dumps(data))
-        assert not window.files.open(absurd)
-        self.told("power", "width")
-
-    @pytest.mark.skipif(sys.platform == "win32", reason="folders have other permissions there")
-    def test_a_folder_that_may_not_be_written(
-        self, window: MainWindow, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-    ) -> None:
-        (tmp_path / "file").write_text("a file where a folder should be")
-        choose_file(monkeypatch, tmp_path / "file" / "mine.json")
-        assert not window.files.save_as()
-        self.told("Could not save mine.json", "cannot be written", "Choose a folder")
-
-    def test_missing_meshes_can_be_hidden(self, window: MainWindow, qtbot: QtBot, tmp_path: Path) -> None:
-        broken = project_with_missing_mesh(window.session.project, tmp_path)
-        before = window.session.document
-        answer(qtbot, "missing", "Cancel")
-        assert not window.files.open(broken)
-        assert window.session.document is before
-        answer(qtbot, "missing", "Open with them hidden")
-        assert window.files.open(broken)
-        assert not window.session.project.scene.objects[-1].visible
-        assert Project.load(broken).scene.objects[-1].visible, "the file stays as it is until it is saved"
-        window.session.replace_document(before)
-
-    def test_a_mesh_that_is_none(self, window: MainWindow, qtbot: QtBot, small_project: Path) -> None:
-        file = small_project.parent / "broken.stl"
-        file.write_bytes(b"solid nothing\nfacet")
-        window.take([file])
-        qtbot.waitUntil(lambda: any(each.objectName() == "trouble" for each in QApplication.topLevelWidgets()))
-        self.told("Could not import broken.stl", "broken.stl")
-
-    def test_a_render_that_runs_out_of_memory(self, window: MainWindow, qtbot: QtBot) -> None:
-        def work(progress: object, cancelled: object) -> None:
-            raise MemoryError
-
-        with qtbot.waitSignal(window.runner.failed):
-            window.runner.run("render", "render", work)
-        self.told("Could not finish: render", "not enough memory", "smaller image scale")
-
-    def test_a_fault_of_the_program(self, window: MainWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
-        from studio.qt.shell.uncaught_errors import Faults
-
-        uncaught_errors = Faults(window, window.session)
-        uncaught_errors.tell(ZeroDivisionError("division by zero"))
-        uncaught_errors.tell(ZeroDivisionError("again"))  # one dialog at a time
-        self.told("ZeroDivisionError", "unharmed", "report")
-        log = window.panels["log"].as_text()  # type: ignore[attr-defined]
-        assert "division by zero" in log and "again" in log
-
-
 class TestCrash:
     """What an earlier process left is offered, and in no one's way."""
 
@@ -546,47 +347,3 @@ def test_a_bad_project_on_the_command_line_is_told_over_the_sample(
     dialog("trouble").close()
     window.close()
     window.deleteLater()
-
-
-def files(*paths: Path) -> QMimeData:
-    data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
-    return data
-
-
-def until_cancelled(progress: Progress, cancelled: Cancel) -> None:
-    while not cancelled():
-        time.sleep(0.005)
-    raise Cancelled
-
-
-def drop(window: QWidget, path: Path) -> None:
-    data = files(path)
-    buttons, keys = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
-    window.dropEvent(QDropEvent(QPointF(9, 9), Qt.DropAction.CopyAction, data, buttons, keys))
-
-
-def project_with_missing_mesh(project: Project, folder: Path) -> Path:
-    from render.scene.scene import SceneObject
-    from render.scene.shape import MeshFile
-
-    gone = SceneObject(name="gone", shape=MeshFile(path="meshes/gone.ply"))
-    scene = project.scene.model_copy(update={"objects": (*project.scene.objects, gone)})
-    path = folder / "broken" / "broken.json"
-    project.model_copy(update={"scene": scene}).save(path)
-    return path
-
-
-def contrast(a: str, b: str) -> float:
-    """Ratio of relative luminances, WCAG 2.1."""
-    from PySide6.QtGui import QColor
-
-    def luminance(text: str) -> float:
-        parts = [
-            value / 12.92 if value <= 0.03928 else ((value + 0.055) / 1.055) ** 2.4
-            for value in QColor(text).getRgbF()[:3]
-        ]
-        return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
-
-    bright, dark = sorted((luminance(a), luminance(b)), reverse=True)
-    return (bright + 0.05) / (dark + 0.05)
