@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from render.ambient.bounce_state import PathScene
 from render.ambient.light_sampling import Lights, pack_lights
-from render.ambient.path_kernels import PathScene, bounce_diffuse, bounce_glossy
+from render.ambient.path_kernels import bounce_diffuse, bounce_glossy
 from render.ambient.path_state import PathState, PixelSums, ShadowRays, accumulate_unoccluded, camera_rays
 from render.ambient.random_walk import random_walk_step
 from render.base.errors import Cancelled

@@ -91,9 +91,10 @@ def read_bytes(path: Path, most: int, what: str = "file", where: str | None = No
         # a pipe that nobody writes to would block the opening itself
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         try:
-            _check_regular(os.fstat(descriptor), most, what, where)
+            status = os.fstat(descriptor)
+            _check_regular(status, most, what, where)
             with open(descriptor, "rb", closefd=False) as file:
-                data = file.read(most + 1)  # it may have grown since
+                data = file.read(status.st_size)
         finally:
             os.close(descriptor)
     except InputError:
@@ -103,8 +104,6 @@ def read_bytes(path: Path, most: int, what: str = "file", where: str | None = No
     except (OSError, ValueError) as error:  # ValueError: a NUL in the path
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"the {what} cannot be read", where=where, found=reason) from None
-    if len(data) > most:
-        raise InputError(f"the {what} is too big", where=where, found=f"over {most} bytes", allowed=f"{most} bytes")
     return data
 
 

@@ -28,6 +28,7 @@ UNUSED = 24 * 3600.0
 """s; older folders may still be in use by a program that was started before the change."""
 DISPATCHER = "numba.core.dispatcher"
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+KERNEL = re.compile(rb"^\s*@(?:numba\.)?njit\b", re.MULTILINE)
 CONSTANT = re.compile(rb"\b(?:[A-Z][A-Z0-9_]+|Flag)\b")
 
 
@@ -41,7 +42,7 @@ def source_key(root: Path = ROOT) -> str:
                     path = os.path.join(folder, name)
                     with open(path, "rb") as file:
                         texts[os.path.relpath(path, root).replace(os.sep, "/")] = file.read()
-    kernels = {path for path, text in texts.items() if b"@njit" in text}
+    kernels = {path for path, text in texts.items() if KERNEL.search(text)}
     sources = {
         found[1].decode().replace(".", "/") + ".py"
         for path in kernels
@@ -103,7 +104,7 @@ def _remove_old(folder: Path, kept: Path) -> None:
 
 
 def _seal_caches() -> None:
-    """From now on numba asks render.sealed_cache for the cache of a function; numba itself need not be there yet."""
+    """From now on numba asks `render.base.sealed_cache` for a function's cache; numba need not be there yet."""
     if DISPATCHER in sys.modules:
         _use_seals(sys.modules[DISPATCHER])
     elif not any(isinstance(finder, _Dispatcher) for finder in sys.meta_path):

@@ -1,7 +1,7 @@
 """Older project files, brought up to date by one small function a version.
 
 `STEPS[n]` turns the JSON object of version n into that of version n + 1. A step never changes once it is released, and
-one file of every version ever released stays in tests/studio/projects.
+one file of every version ever released stays in tests/studio/project/projects.
 """
 
 from __future__ import annotations

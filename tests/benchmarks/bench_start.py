@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BAR_SECONDS, HELP_SECONDS, KEY_SECONDS = 3.0, 0.3, 0.01
 CHILD = """
 import sys, time
-from studio.qt.app import application, start
+from studio.qt.shell.app import application, start
 app = application()
 window = start(None)
 if window.tour is not None:
@@ -41,7 +41,7 @@ QTest.keyClick(window, Qt.Key.Key_F6)
 app.processEvents()
 answers, busy = time.time(), time.process_time()
 # and shows the part with the line on it
-from studio.qt.live import live
+from studio.qt.core.live_preview import live
 while live(window.session).is_loading or not live(window.session).look.placed:
     app.processEvents()
     time.sleep(0.002)

@@ -27,9 +27,9 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     files = {
         "pyproject.toml": "",
-        "render/__init__.py": "from render.kernel_cache import keep_kernels\n\nkeep_kernels()\n",
-        "render/base/kernel_cache.py": (ROOT / "render" / "kernel_cache.py").read_text(encoding="utf-8"),
-        "render/base/sealed_cache.py": (ROOT / "render" / "sealed_cache.py").read_text(encoding="utf-8"),
+        "render/__init__.py": "from render.base.kernel_cache import keep_kernels\n\nkeep_kernels()\n",
+        "render/base/kernel_cache.py": (ROOT / "render/base/kernel_cache.py").read_text(encoding="utf-8"),
+        "render/base/sealed_cache.py": (ROOT / "render/base/sealed_cache.py").read_text(encoding="utf-8"),
         "render/inner.py": INNER,
         "render/outer.py": OUTER,
         "render/numbers.py": "TEN = 10\n",
@@ -37,7 +37,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "analysis/__init__.py": "",
     }
     for name, text in files.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
     return tmp_path
 
@@ -49,6 +49,22 @@ def run(program: Path, code: str) -> str:
 
 def folders(program: Path) -> list[Path]:
     return list((program / ".cache" / "kernels").iterdir())
+
+
+def test_every_file_with_a_kernel_counts_however_it_names_numba(tmp_path: Path) -> None:
+    (tmp_path / "render").mkdir()
+    keys = set()
+    for kernel in (
+        "@njit\n",
+        "@njit(cache=True)\n",
+        "@numba.njit\n",
+        "    @numba.njit(nogil=True)\n",
+        "# njit, in words only\n",
+    ):
+        for body in ("1", "2"):
+            (tmp_path / "render/one.py").write_text(f"{kernel}def one():\n    return {body}\n")
+            keys.add(source_key(tmp_path))
+    assert len(keys) == 2 * 4 + 1, "a changed kernel is another key, and words are none"
 
 
 def test_a_change_in_an_inlined_kernel_or_a_constant_reaches_the_kernels_that_use_it(program: Path) -> None:

@@ -27,9 +27,9 @@ needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills need fork
 SAVING = """
     import os, sys
     from pathlib import Path
-    from studio.autosave import Autosave
-    from studio.document import Document
-    from studio.project import Project
+    from studio.project.autosave import Autosave
+    from studio.project.document import Document
+    from studio.project.project import Project
 
     project = Project.load(sys.argv[1])
     target, folder = Path(sys.argv[2]), Path(sys.argv[3])

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[3]
 CRASH = """
 import ctypes, sys
 from pathlib import Path
-from studio.fault_log import watch
+from studio.runtime.fault_log import watch
 
 watch(Path(sys.argv[1]))
 def the_culprit():

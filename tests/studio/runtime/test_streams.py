@@ -94,7 +94,7 @@ WORDS = "import os, ctypes; os.system('echo shell'); ctypes.CDLL(None).puts(b'li
 
 @pytest.mark.skipif(os.name == "nt", reason="descriptors of POSIX")
 def test_words_of_libraries_do_not_reach_standard_output() -> None:
-    work = f"from studio.streams import *\nwith streams({{}}):\n    {WORDS}print_json({{{{'ok': True}}}})"
+    work = f"from studio.runtime.streams import *\nwith streams({{}}):\n    {WORDS}print_json({{{{'ok': True}}}})"
     done = process(work.format(True))
     assert json.loads(done.stdout) == {"ok": True}
     assert all(word in done.stderr for word in (b"library", b"shell", b"python"))
@@ -103,12 +103,14 @@ def test_words_of_libraries_do_not_reach_standard_output() -> None:
 
 
 def test_there_is_one_json_object_and_no_second() -> None:
-    done = process("from studio.streams import *\nwith streams(True):\n    print_json({'n': 1}); print_json({'n': 2})")
+    done = process(
+        "from studio.runtime.streams import *\nwith streams(True):\n    print_json({'n': 1}); print_json({'n': 2})"
+    )
     assert json.loads(done.stdout) == {"n": 1}
 
 
 @pytest.mark.parametrize("encoding", ["ascii:strict", "utf-8:strict", "latin-1:strict"])
 def test_a_name_that_no_encoding_has_is_printed_as_an_escape(encoding: str) -> None:
-    code = "from studio.streams import *\nwith streams(False):\n    print('a\\udcff\\u03bc')"
+    code = "from studio.runtime.streams import *\nwith streams(False):\n    print('a\\udcff\\u03bc')"
     done = process(code, PYTHONIOENCODING=encoding)
     assert done.returncode == 0 and b"a\\udcff" in done.stdout

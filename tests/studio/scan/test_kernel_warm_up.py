@@ -22,9 +22,9 @@ import importlib, json, pkgutil, sys
 from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 import analysis, render
-from studio.project import Project
-from studio.stages import scaled
-from studio.warm_up import needed, warm_up
+from studio.project.project import Project
+from studio.scan.stages import scaled
+from studio.scan.kernel_warm_up import needed, warm_up
 
 def quietly(stage, done): pass
 
@@ -43,8 +43,8 @@ def kernels():
 def read():
     return {name: set(map(str, kernel.signatures)) for name, kernel in kernels().items()}
 
-from render.material import Subsurface
-from studio.scan import run_scan
+from render.material.material import Subsurface
+from studio.scan.scan import run_scan
 late = {}
 for folder in map(Path, sys.argv[2:]):
     project = scaled(Project.load(folder / "project.json"), 0.03)

@@ -70,7 +70,7 @@ class TestTheLock:
         assert not (tmp_path / "out" / LOCK).exists()
 
     def test_a_program_that_died_holds_nothing(self, tmp_path: Path) -> None:
-        script = "import os,sys,pathlib; from studio.folder_lock import hold; k=hold(pathlib.Path(sys.argv[1]))\n"
+        script = "import os,sys,pathlib; from studio.scan.folder_lock import hold; k=hold(pathlib.Path(sys.argv[1]))\n"
         script += "k.__enter__(); os.kill(os.getpid(), 9)"
         subprocess.run([sys.executable, "-c", script, tmp_path], check=False)
         assert (tmp_path / LOCK).exists()

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[4]
 CHILD = """
 import json, sys
 from pathlib import Path
-from studio.qt import app
+from studio.qt.shell import app
 
 made = app.start
 
