@@ -357,3 +357,12 @@ class TestAnyFile:
     @given(cut=st.integers(0, len(SAMPLE_FILE.read_bytes())), junk=st.binary(max_size=20))
     def test_cut_and_spoilt_bytes_are_valid_or_refused(self, path: Path, cut: int, junk: bytes) -> None:
         valid_or_refused(SAMPLE_FILE.read_bytes()[:cut] + junk, path)
+
+
+def test_saving_removes_what_a_killed_save_left_long_ago(tmp_path: Path) -> None:
+    old, new, strange = (tmp_path / f".project.{end}.json" for end in ("0123abcd", "0123abce", "words"))
+    for left in (old, new, strange):
+        left.write_text("{")
+    os.utime(old, (0.0, 0.0))
+    Project.load(template_folder("plane") / "project.json").save(tmp_path / "project.json")
+    assert not old.exists() and new.exists() and strange.exists()
