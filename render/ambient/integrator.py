@@ -65,7 +65,7 @@ class AmbientImage:
     """Radiance that the clamp took away, mean over the image."""
 
 
-def ambient_images(
+def ambient_images(  # noqa: PLR0913
     world: World,
     scene: Scene,
     camera: Camera,
@@ -143,7 +143,7 @@ def _passes(
         progress(1.0)
 
 
-def ambient_image(
+def ambient_image(  # noqa: PLR0913
     world: World,
     scene: Scene,
     camera: Camera,

@@ -124,11 +124,11 @@ def keep(
     paths.medium[row] = medium
 
 
-def _bounce_kernel(glossy: bool) -> Any:
+def _bounce_kernel(glossy: bool) -> Any:  # noqa: PLR0915
     """The kernel of one bounce; compiled apart for scenes without gloss, which would pay for the scattering code."""
 
     @numba.njit(nogil=True, cache=True, error_model="numpy")
-    def bounce(
+    def bounce(  # noqa: PLR0915
         scene: PathScene, depth: int, triangle: Int, paths: PathState, rays: ShadowRays, film: PixelSums
     ) -> tuple[int, int]:
         """The triangles (n,) that the paths meet, -1 for none: accumulates what is seen, writes shadow rays.

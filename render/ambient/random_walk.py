@@ -27,7 +27,7 @@ FIRST_WALK_DIMENSION, NUMBERS = 1 << 20, 5
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def random_walk_step(
+def random_walk_step(  # noqa: PLR0913
     walking: Int,
     distance: Float32,
     rows: Float,

@@ -81,7 +81,7 @@ class DirectImage:
     dropped: int
 
 
-def direct_image(
+def direct_image(  # noqa: PLR0913
     world: World,
     camera: Camera,
     laser: LineLaser,

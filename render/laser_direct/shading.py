@@ -197,11 +197,11 @@ def predict(
     return in_cell, about_over_aperture(middle, qu * 0.5, qv * 0.5, lens[0] * math.hypot(qa, qb))
 
 
-def _shade_kernel(glossy: bool, aperture: bool) -> Any:
+def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
     """The shading kernel; compiled apart for diffuse materials alone and for a pinhole, where it is much quicker."""
 
     @numba.njit(nogil=True, cache=True, error_model="numpy")
-    def shade(scene: DirectScene, rays: CellRays, made: Predictions, shadow_rays: ShadowRays) -> tuple[int, int]:
+    def shade(scene: DirectScene, rays: CellRays, made: Predictions, shadow_rays: ShadowRays) -> tuple[int, int]:  # noqa: PLR0915
         """Unoccluded radiance of each ray's cell and whole pixel, and the shadow rays that decide.
 
         Returns how many shadow rays were written, and how many rays were left out since their radiance is NaN,

@@ -44,7 +44,7 @@ def mean_across(q: float, slope_u: float, slope_v: float) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def shade_pixels(
+def shade_pixels(  # noqa: PLR0913
     surface: Surface,
     T_object_camera: Float,
     pixel: Float,

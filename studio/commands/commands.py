@@ -70,7 +70,7 @@ def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
         print(f"\nwarning: {warning}")
 
 
-def run_project(
+def run_project(  # noqa: PLR0913
     path: Path | None,
     *,
     out: Path | None,
