@@ -187,12 +187,12 @@ class Film:
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
-        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "cut", "tally")}
+        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "cut", "invalid_counts")}
         return {**kept, "errors": np.array(self.errors, dtype=np.float64)}
 
     def load(self, arrays: Arrays) -> None:
         """Go on from `arrays`. InputError: they are not of this image."""
-        for name in ("sums", "done", "spread", "cut", "tally"):
+        for name in ("sums", "done", "spread", "cut", "invalid_counts"):
             mine, found = getattr(self, name), arrays.get(name)
             if found is None or found.shape != mine.shape or found.dtype != mine.dtype:
                 raise InputError("the saved ambient light is damaged", where=name, found=getattr(found, "shape", None))
