@@ -51,6 +51,12 @@ class Project(Model):
         """
         return self._folder
 
+    def in_folder(self, folder: Path | str) -> Self:
+        """The same project, whose meshes and textures are looked for below another folder."""
+        copied = self.model_copy()
+        copied._folder = Path(folder)
+        return copied
+
     @classmethod
     def load(cls, path: Path | str) -> Self:
         """Read, migrate and validate a project: a file, a folder with one, or, as a str, the name of a template.
@@ -59,9 +65,7 @@ class Project(Model):
         InputError: one message for all that is wrong with it.
         """
         file = project_file(_template_or_path(path) if isinstance(path, str) else path)
-        found = cls.from_data(read_object(file), str(file))
-        found._folder = file.parent
-        return found
+        return cls.from_data(read_object(file), str(file)).in_folder(file.parent)
 
     @classmethod
     def from_text(cls, text: str, where: str = "project") -> Self:
@@ -88,8 +92,7 @@ class Project(Model):
         signed = self.with_digests(target.parent)
         with atomic_write(target) as temporary:
             temporary.write_text(signed.to_text(), encoding="utf-8")
-        signed._folder = target.parent
-        return signed
+        return signed.in_folder(target.parent)
 
     def with_digests(self, root: Path) -> Self:
         """The same project with the SHA-256 of each mesh file found below `root`; a missing mesh keeps what it had."""
