@@ -10,7 +10,10 @@
     blazer.write_report("report.html", frame, image, line, points, errors)
 
 A scene can be made in Python as well: `Project(scene=Scene(rig=Rig(camera=..., lasers=(...,)), objects=(...,)))`.
-What is bad about an input is one `InputError`. Below are the program's rooms: project file, scan, desktop.
+What is bad about an input of a function or a file is one `InputError`; a model that is made with a bad value raises
+pydantic's `ValidationError`, which names the field. Both are a `ValueError`.
+
+Below are the program's rooms: project file, scan, desktop.
 """
 
 from __future__ import annotations

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analysis.line.result import Line
-from analysis.report.colour import MUTED, TRUTH, method_colour, method_name
+from analysis.report.colour import TRUTH, method_colour, method_name
 from analysis.report.style import RC
-from analysis.report.units import micrometres
+from analysis.report.units import micrometres, millimetres
 from render.base.errors import InputError
 from render.output.tone_mapping import Picture
 from studio.notebook.checks import check_laser
@@ -49,7 +49,11 @@ def frame_figure(frame: RenderedFrame, kind: str | None, laser: int) -> Figure:
         raise InputError("the frame does not have that", where="show: kind", found=kind, allowed=", ".join(names))
     which = check_laser(laser, scene) if kind in ("laser", "reflected") else 0
     chosen = next(view for view in found if view.kind == kind and view.laser == which)
-    return _picture_figure(picture(chosen, scene, frame, [], bright=True), chosen.label)
+    title = chosen.label
+    if kind == "depth" and frame.truth is not None and np.isfinite(frame.truth.depth_z).any():
+        near, far = np.nanmin(frame.truth.depth_z), np.nanmax(frame.truth.depth_z)
+        title = f"{title}, {millimetres(float(near))} (dark) to {millimetres(float(far))} (bright)"
+    return _picture_figure(picture(chosen, scene, frame, [], bright=True), title)
 
 
 def image_figure(image: DevelopedImage, line: Line | None) -> Figure:
@@ -76,9 +80,11 @@ def errors_figure(errors: PointErrors) -> Figure:
         along.plot(points.index[~wrong], error[~wrong], ".", ms=2.5, color=colour)
         along.axhline(0.0, color=TRUTH, lw=1)
         what = "row" if points.axis == "rows" else "column"
-        along.set(xlabel=f"image {what}", ylabel="depth error (µm), + too far")
+        hidden = f"; {int(wrong.sum())} outliers are not shown" if wrong.any() else ""
+        along.set(xlabel=f"image {what}{hidden}", ylabel="depth error (µm), + too far")
         along.set_title(
             f"RMSE {micrometres(measured.rmse)}, bias {micrometres(measured.bias)}, "
+            f"robust sigma {micrometres(measured.robust_sigma)}, "
             f"{errors.completeness:.1%} of the line measured"
         )
         kept = error[np.isfinite(error) & ~wrong]
@@ -88,10 +94,6 @@ def errors_figure(errors: PointErrors) -> Figure:
             )
         spread.axhline(0.0, color=TRUTH, lw=1)
         spread.set(xlabel="points")
-        if wrong.any():
-            along.annotate(
-                f"{int(wrong.sum())} outliers not shown", (0.01, 0.02), xycoords="axes fraction", color=MUTED
-            )
     return made
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -186,6 +186,9 @@ def extract(
         chosen = line_extraction.settings_of(base, method=method, axis=axis, peaks=peaks)
         project = image.project.model_copy(update={"extraction": chosen})
         line = extract_line(project, image, image.laser, threads)
+        if chosen.spacetime:
+            note = "; ".join(filter(None, (line.note, "not along time, which takes a whole scan")))
+            line = replace(line, note=note)
         return extended(ExtractedLine, line, settings=chosen, image=image)
     if not hasattr(image, "__array__"):
         expect(image, np.ndarray, "extract: image", DEVELOP)

@@ -64,7 +64,12 @@ class Project(Model):
         What lies at the path comes before the template of that name.
         InputError: one message for all that is wrong with it.
         """
-        file = project_file(_template_or_path(path) if isinstance(path, str) else path)
+        try:
+            file = project_file(_template_or_path(path) if isinstance(path, str) else Path(path))
+        except TypeError:
+            kind = type(path).__name__
+            allowed = "a template's name or a path"
+            raise InputError("a project is loaded by name", found=kind, allowed=allowed) from None
         return cls.from_data(read_object(file), str(file)).in_folder(file.parent)
 
     @classmethod
