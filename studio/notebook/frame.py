@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from render.base.errors import InputError
 from render.frame import Frame
-from render.scene.settings import RenderSettings
 from render.world.world import World, build_world
 from studio.notebook.checks import check_number, check_threads, check_whole, expect, extended
 from studio.project.project import MAX_SEED, Project
@@ -79,23 +76,19 @@ def render(
     project: Project,
     *,
     error: float | None = None,
-    settings: RenderSettings | None = None,
     step: int = 0,
     image_scale: float = 1.0,
     seed: int | None = None,
     threads: int | None = None,
-    seconds: float | None = None,
     progress: StageProgress = lambda stage, done: None,
     cancelled: Cancel = lambda: False,
-    refined: Callable[[RenderedFrame], None] = lambda frame: None,
 ) -> RenderedFrame:
     """Render one step of a project's motion: each laser and the ambient light apart, and the exact truth.
 
-    error: relative RMS error of the lasers' direct light, a fraction; settings: all targets and the transport; both in
-    place of the project's. step: of the motion. image_scale: so many times the pixels a side, for a quick look; figures
-    measured then are not the scanner's. seed: in place of the project's. threads: None takes all processors; the
-    numbers never depend on it. seconds: time for the light, which then ends short of its errors. progress(stage, done):
-    done is 0 to 1. cancelled(): asked often; refined(frame): hears of every better frame.
+    error: relative RMS error of the lasers' direct light, a fraction, in place of the project's; the other targets and
+    the transport are `project.render`. step: of the motion. image_scale: so many times the pixels a side, for a quick
+    look; figures measured then are not the scanner's. seed: in place of the project's. threads: None takes all
+    processors; the numbers never depend on it. progress(stage, done): done is 0 to 1. cancelled(): asked often.
 
     Meshes and textures are looked for below `project.folder`. A step of a motion gets a plan of its own, where a whole
     scan (`main.py run`) decides on one for all its steps.
@@ -114,35 +107,19 @@ def render(
     scale = check_number(image_scale, "render: image_scale", 0.01, 4.0)
     check_whole(step, "render: step", 0, project.scene.frame_count - 1)
     check_threads(threads)
-    if seconds is not None:
-        check_number(seconds, "render: seconds", 0.1, 1e9)
-    chosen = validated(scaled(_with(project, error, settings, seed), scale), f"at image scale {scale:g}")
+    chosen = validated(scaled(_with(project, error, seed), scale), f"at image scale {scale:g}")
     chosen = chosen.in_folder(project.folder)
     clock = Clock(progress, cancelled)
     with clock.stage("loading meshes"):
         world = build_world(chosen.scene, chosen.folder, step)
 
-    def known(frame: Frame) -> RenderedFrame:
-        made = extended(RenderedFrame, frame, project=chosen, image_scale=scale)
-        vars(made)["world"] = world  # it is there already
-        return made
-
-    return known(
-        render_step(chosen, world, step, clock, threads, seconds=seconds, refined=lambda frame: refined(known(frame)))
-    )
+    frame = render_step(chosen, world, step, clock, threads)
+    made = extended(RenderedFrame, frame, project=chosen, image_scale=scale)
+    vars(made)["world"] = world  # it is there already
+    return made
 
 
-def _with(project: Project, error: float | None, settings: RenderSettings | None, seed: int | None) -> Project:
-    if settings is not None:
-        if error is not None:
-            raise InputError(
-                "the error is told twice",
-                where="render: error, settings",
-                cure="set settings.laser_error, and leave error out",
-            )
-        project = project.model_copy(
-            update={"render": expect(settings, RenderSettings, "render: settings", "blazer.RenderSettings(...)")}
-        )
+def _with(project: Project, error: float | None, seed: int | None) -> Project:
     if error is not None:
         target = check_number(error, "render: error", 1.000001e-6, 1.0)
         project = project.model_copy(update={"render": project.render.model_copy(update={"laser_error": target})})

@@ -23,8 +23,6 @@ class TestBadInputIsNamed:
             ({"step": 0.5}, "render: step"),
             ({"seed": -1}, "render: seed"),
             ({"threads": 0}, "threads"),
-            ({"seconds": -1.0}, "render: seconds"),
-            ({"settings": {}}, "render: settings"),
         ],
     )
     def test_options_of_render(self, options: dict, where: str) -> None:
@@ -32,10 +30,6 @@ class TestBadInputIsNamed:
             blazer.render(blazer.Project.load("plane"), **options)
         assert caught.value.where == where
         assert caught.value.found is not None and caught.value.allowed
-
-    def test_the_error_told_twice(self) -> None:
-        with pytest.raises(blazer.InputError, match="told twice"):
-            blazer.render(blazer.Project.load("plane"), error=0.01, settings=blazer.RenderSettings())
 
     def test_a_scene_rendered_from_a_word(self) -> None:
         with pytest.raises(blazer.InputError, match="found str; allowed: Project; load one"):

@@ -121,17 +121,12 @@ class TestWhatAFrameKnows:
         again = blazer.compare(points, copied)
         assert again.depth_z == errors.depth_z and again.completeness == errors.completeness
 
-    def test_progress_is_told_and_better_frames_are_shown(self) -> None:
-        told, shown = [], []
-        last = blazer.render(
-            blazer.Project.load("plane"),
-            image_scale=0.05,
-            progress=lambda stage, done: told.append((stage, done)),
-            refined=shown.append,
-        )
+    def test_progress_is_told(self) -> None:
+        told: list[tuple[str, float]] = []
+        project = blazer.Project.load("plane")
+        blazer.render(project, image_scale=0.05, progress=lambda stage, done: told.append((stage, done)))
         assert told[0] == ("loading meshes", 0.0) and all(0.0 <= done <= 1.0 for _, done in told)
-        assert all(isinstance(one, blazer.RenderedFrame) for one in shown)
-        assert np.array_equal(shown[-1].laser(0), last.laser(0))
+        assert {"laser light", "ambient light"} <= {stage for stage, _ in told}
 
     def test_it_can_be_cancelled(self) -> None:
         with pytest.raises(blazer.Cancelled):
