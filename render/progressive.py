@@ -70,7 +70,7 @@ def plan(scene: Scene, settings: RenderSettings) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def refine(
+def refine(  # noqa: PLR0913
     world: World,
     scene: Scene,
     *,
@@ -98,7 +98,7 @@ def refine(
     return frames(world, scene, settings, clock, targets, step, axis, seed, threads, cancelled, keeps, seconds, state)
 
 
-def frames(
+def frames(  # noqa: PLR0913
     world: World,
     scene: Scene,
     settings: RenderSettings,

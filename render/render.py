@@ -18,7 +18,7 @@ from render.world.world import World, build_world
 StageProgress = Callable[[str, float], None]
 
 
-def render(
+def render(  # noqa: PLR0913
     scene: Scene,
     root: Path,
     *,
@@ -45,7 +45,7 @@ def render(
     )
 
 
-def render_world(
+def render_world(  # noqa: PLR0913
     world: World,
     scene: Scene,
     *,

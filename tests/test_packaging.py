@@ -24,6 +24,8 @@ TOP_LEVEL = {
 }
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 CONSTRAINTS = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8").splitlines()
+FEWEST_TESTS = 1240
+"""Test functions, each of which may stand for many cases."""
 MOST_LINES = 400
 
 
@@ -139,6 +141,19 @@ def test_files_stay_small() -> None:
             if lines > MOST_LINES:
                 long[str(path)] = lines
     assert long == {}
+
+
+def test_no_test_is_lost_unseen() -> None:
+    """A file that another overwrites takes its tests along; raise the number with the tests, lower it with a reason."""
+    trees = [
+        ast.parse((ROOT / path).read_text(encoding="utf-8"))
+        for path in tracked()
+        if path.parts[0] == "tests" and path.suffix == ".py"
+    ]
+    found = sum(
+        isinstance(node, ast.FunctionDef) and node.name.startswith("test_") for tree in trees for node in ast.walk(tree)
+    )
+    assert found >= FEWEST_TESTS
 
 
 def test_the_project_in_the_readme_is_a_project() -> None:

@@ -25,7 +25,7 @@ CANDIDATES = 5
 """Peaks that one is selected from, unless the settings ask for more."""
 
 
-def extract(
+def extract(  # noqa: PLR0913
     image: NDArray[Any],
     *,
     method: Method | None = None,

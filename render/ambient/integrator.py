@@ -65,7 +65,7 @@ class AmbientImage:
     """Radiance that the clamp took away, mean over the image."""
 
 
-def ambient_images(
+def ambient_images(  # noqa: PLR0913
     world: World,
     scene: Scene,
     camera: Camera,
@@ -143,7 +143,7 @@ def _passes(
         progress(1.0)
 
 
-def ambient_image(
+def ambient_image(  # noqa: PLR0913
     world: World,
     scene: Scene,
     camera: Camera,
@@ -187,12 +187,12 @@ class Film:
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
-        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "cut", "invalid_counts")}
+        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "cut", "tally")}
         return {**kept, "errors": np.array(self.errors, dtype=np.float64)}
 
     def load(self, arrays: Arrays) -> None:
         """Go on from `arrays`. InputError: they are not of this image."""
-        for name in ("sums", "done", "spread", "cut", "invalid_counts"):
+        for name in ("sums", "done", "spread", "cut", "tally"):
             mine, found = getattr(self, name), arrays.get(name)
             if found is None or found.shape != mine.shape or found.dtype != mine.dtype:
                 raise InputError("the saved ambient light is damaged", where=name, found=getattr(found, "shape", None))

@@ -1,4 +1,4 @@
-"""The state of a wavefront of camera paths, how they begin, and how what they see is accumulated."""
+"""The state of a wavefront of paths from the camera, how paths begin, and how what they see is added up."""
 
 from __future__ import annotations
 
@@ -20,10 +20,8 @@ Int = NDArray[np.int32]
 
 ON_IMAGE, ON_LENS, FIRST_SURFACE, EACH_SURFACE = 0, 1, 2, 4
 """Dimensions of the sequence: two pairs for the camera, then four for each surface."""
-DIRECTION, ON_LAMP, LOBE, LAMP = 0, 1, 2, 3
-"""Of a surface's four pairs: the direction; the lamp's point; lobe and blend; which lamp, and Russian roulette."""
 DROPPED, CLAMPED = 0, 1
-"""Of (2,) invalid counts: contributions that were NaN, infinite or negative; those clamped."""
+"""A tally (2,): contributions that were no number, infinite or negative; those clamped."""
 CUT = 3
 """Sums (.., 4): R, G, B, and the mean of what the clamp took of them."""
 
@@ -35,48 +33,33 @@ class PathState(NamedTuple):
     """(n, 3) m, from the centre of the scene."""
     direction: Float32
     """(n, 3) unit."""
-    throughput: Float32
+    weight: Float32
     """(n, 3) what a radiance seen by the ray adds to its pixel."""
-    bsdf_pdf: Float32
-    """(n,) with which the direction was sampled, 1/sr; -1: a delta function's, or the camera's."""
+    bsdf_density: Float32
+    """(n,) with which the direction was drawn, 1/sr; -1: a single direction, or the camera's."""
     pixel_slot: Int
     """(n,) twice the pixel's place in the chunk, and the half of its samples (0 or 1)."""
     sample: Int
     """(n,) number of the sample in its half."""
     medium: Int
-    """(n,) material of the medium that the ray is in; -1: none."""
+    """(n,) one more than the material that the ray is within; 0: in the open."""
 
 
 class ShadowRays(NamedTuple):
-    """Rays that add `radiance` (.., 3) to their pixel if nothing is met before `far`."""
+    """Rays that add `light` (.., 3) to their owner's pixel if nothing is met before `far`."""
 
     origin: Float32
     direction: Float32
     far: Float32
-    radiance: Float32
+    light: Float32
     pixel_slot: Int
-
-
-class PixelSums(NamedTuple):
-    """What paths add to."""
-
-    sums: Float
-    """(2 m, 4) of the chunk's pixels, both halves side by side."""
-    invalid_counts: Float
-    """(2,) DROPPED and CLAMPED."""
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def sequence_index(pixels: Int, pixel_slot: int) -> int:
-    """Index of a pixel's half in the random sequences."""
-    return 2 * pixels[pixel_slot >> 1] + (pixel_slot & 1)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def camera_rays(
     view: View, table: Float32, seed: int, pixels: Int, first: Int, count: Int, centre: Float, paths: PathState
 ) -> int:
-    """Rays of samples first .. first + count of both halves, (m, 2), of pixels (m,) -> paths. Returns how many."""
+    """Rays of samples first .. first + count of both halves, (m, 2), of pixels (m,) -> wave. Returns how many."""
     k = view.distortion
     tilt, distorted = tilt_matrix(k[12], k[13]), bool(np.any(k))
     fx, fy, cx, cy, skew = view.intrinsics
@@ -103,36 +86,41 @@ def camera_rays(
                 o0, o1, o2 = lens_position(view, a, b)
                 d0, d1, d2 = lens_direction(view, x, y, a, b)
                 scale = 1.0 / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-                origin, direction, throughput = paths.origin[n], paths.direction[n], paths.throughput[n]
-                origin[0], origin[1], origin[2] = o0 - centre[0], o1 - centre[1], o2 - centre[2]
-                direction[0], direction[1], direction[2] = scale * d0, scale * d1, scale * d2
-                throughput[0] = throughput[1] = throughput[2] = 1.0
-                paths.bsdf_pdf[n], paths.pixel_slot[n], paths.sample[n], paths.medium[n] = -1.0, 2 * i + half, s, -1
+                paths.origin[n, 0], paths.origin[n, 1], paths.origin[n, 2] = (
+                    o0 - centre[0],
+                    o1 - centre[1],
+                    o2 - centre[2],
+                )
+                paths.direction[n, 0], paths.direction[n, 1], paths.direction[n, 2] = scale * d0, scale * d1, scale * d2
+                paths.weight[n, 0] = paths.weight[n, 1] = paths.weight[n, 2] = 1.0
+                paths.bsdf_density[n], paths.pixel_slot[n], paths.sample[n], paths.medium[n] = -1.0, 2 * i + half, s, 0
                 n += 1
     return n
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def accumulate(film: PixelSums, pixel_slot: int, clamp: float, r: float, g: float, b: float) -> None:
-    """Add a contribution to its pixel; one that is NaN, infinite or negative is dropped and counted."""
+def accumulate(sums: Float, invalid_counts: Float, pixel_slot: int, clamp: float, r: float, g: float, b: float) -> None:
+    """Add a contribution to its owner; what is no number, infinite or negative is dropped and counted."""
     if not (r >= 0.0 and g >= 0.0 and b >= 0.0 and r + g + b < np.inf):
-        film.invalid_counts[DROPPED] += 1.0
+        invalid_counts[DROPPED] += 1.0
         return
     largest = max(r, g, b)
     if largest > clamp:
         scale = clamp / largest
-        film.invalid_counts[CLAMPED] += 1.0
-        film.sums[pixel_slot, CUT] += (1.0 - scale) * (r + g + b) / 3.0
+        invalid_counts[CLAMPED] += 1.0
+        sums[pixel_slot, CUT] += (1.0 - scale) * (r + g + b) / 3.0
         r, g, b = scale * r, scale * g, scale * b
-    film.sums[pixel_slot, 0] += r
-    film.sums[pixel_slot, 1] += g
-    film.sums[pixel_slot, 2] += b
+    sums[pixel_slot, 0] += r
+    sums[pixel_slot, 1] += g
+    sums[pixel_slot, 2] += b
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def accumulate_unoccluded(rays: ShadowRays, occluded: NDArray[np.bool_], clamp: float, film: PixelSums) -> None:
-    """Add what every shadow ray that nothing occludes sees to its pixel."""
+def accumulate_unoccluded(
+    shadow_rays: ShadowRays, occluded: NDArray[np.bool_], clamp: float, sums: Float, invalid_counts: Float
+) -> None:
+    """Add what every clear shadow ray sees to its owner (.., 4)."""
     for j in range(occluded.shape[0]):
         if not occluded[j]:
-            radiance = rays.radiance[j]
-            accumulate(film, rays.pixel_slot[j], clamp, radiance[0], radiance[1], radiance[2])
+            light = shadow_rays.light[j]
+            accumulate(sums, invalid_counts, shadow_rays.pixel_slot[j], clamp, light[0], light[1], light[2])

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from render.ambient.bounce_state import PathScene
 from render.ambient.light_sampling import Lights, pack_lights
-from render.ambient.path_kernels import bounce_diffuse, bounce_glossy
-from render.ambient.path_state import PathState, PixelSums, ShadowRays, accumulate_unoccluded, camera_rays
+from render.ambient.path_kernels import shade_diffuse, shade_glossy
+from render.ambient.path_state import PathState, ShadowRays, accumulate_unoccluded, camera_rays
 from render.ambient.random_walk import random_walk_step
 from render.base.errors import Cancelled
 from render.base.threads import Cancel
@@ -56,36 +55,45 @@ class CameraPaths:
         Their radiance is added to sums (2 m, 4), halves side by side. Raises Cancelled.
         """
         paths, shadow_rays = self._arrays()
-        rays, media, film = self.rays, has_medium(self.surface), PixelSums(sums, invalid_counts)
-        bounce = bounce_glossy if has_gloss(self.surface) else bounce_diffuse
-        scene = PathScene(
-            surface=self.surface,
-            lights=self.lights,
-            environment=self.environment,
-            table=pair_table(),
-            seed=self.seed,
-            pixels=pixels,
-            centre=rays.centre,
-            ray_epsilon=rays.surface_offset,
-            max_depth=self.surfaces,
-            clamp=self.clamp,
-        )
-        n = camera_rays(self.view, scene.table, self.seed, pixels, first, count, rays.centre, paths)
+        rays, glossy, media = self.rays, has_gloss(self.surface), has_medium(self.surface)
+        shade = shade_glossy if glossy else shade_diffuse
+        table = pair_table()
+        n = camera_rays(self.view, table, self.seed, pixels, first, count, rays.centre, paths)
         depth = 0
         while n > 0:
             if cancelled is not None and cancelled():
                 raise Cancelled
             # only rays of neighbouring pixels go much the same way, and those from where they meet a surface to a lamp
-            coherent = depth == 0
-            triangle, distance = rays.intersect(paths.origin[:n], paths.direction[:n], coherent=coherent)
+            side_by_side = depth == 0
+            triangle, distance = rays.intersect(paths.origin[:n], paths.direction[:n], coherent=side_by_side)
             if media:
                 self._walk(paths, n, depth, pixels, triangle, distance, cancelled)
-            n, cast = bounce(scene, depth, triangle, paths, shadow_rays, film)
-            if cast:
-                occluded = rays.occluded(
-                    shadow_rays.origin[:cast], shadow_rays.direction[:cast], shadow_rays.far[:cast], coherent=coherent
+            n, asked = shade(
+                self.surface,
+                self.lights,
+                self.environment,
+                table,
+                self.seed,
+                pixels,
+                rays.centre,
+                rays.surface_offset,
+                depth,
+                self.surfaces,
+                self.clamp,
+                triangle,
+                paths,
+                shadow_rays,
+                sums,
+                invalid_counts,
+            )
+            if asked:
+                blocked = rays.occluded(
+                    shadow_rays.origin[:asked],
+                    shadow_rays.direction[:asked],
+                    shadow_rays.far[:asked],
+                    coherent=side_by_side,
                 )
-                accumulate_unoccluded(shadow_rays, occluded, self.clamp if depth > 0 else np.inf, film)
+                accumulate_unoccluded(shadow_rays, blocked, self.clamp if depth > 0 else np.inf, sums, invalid_counts)
             depth += 1
 
     def _walk(
@@ -99,17 +107,17 @@ class CameraPaths:
         cancelled: Cancel | None,
     ) -> None:
         """Take every path within a medium to its boundary."""
-        walking = np.flatnonzero(paths.medium[:n] >= 0).astype(np.int32)
+        walking = np.flatnonzero(paths.medium[:n]).astype(np.int32)
         distance = distance[walking]
         for step in range(MOST_STEPS):
-            staying = random_walk_step(
+            left = random_walk_step(
                 walking, distance, self.surface.rows, self.seed, pixels, depth, step, paths, triangle
             )
-            if not staying:
+            if not left:
                 break
             if cancelled is not None and cancelled():
                 raise Cancelled
-            walking = walking[:staying]
+            walking = walking[:left]
             triangle[walking], distance = self.rays.intersect(paths.origin[walking], paths.direction[walking])
 
     def _arrays(self) -> tuple[PathState, ShadowRays]:
@@ -120,8 +128,8 @@ class CameraPaths:
             paths = PathState(
                 origin=np.empty((WAVE, 3), np.float32),
                 direction=np.empty((WAVE, 3), np.float32),
-                throughput=np.empty((WAVE, 3), np.float32),
-                bsdf_pdf=np.empty(WAVE, np.float32),
+                weight=np.empty((WAVE, 3), np.float32),
+                bsdf_density=np.empty(WAVE, np.float32),
                 pixel_slot=np.empty(WAVE, np.int32),
                 sample=np.empty(WAVE, np.int32),
                 medium=np.empty(WAVE, np.int32),
@@ -130,7 +138,7 @@ class CameraPaths:
                 origin=np.empty((m, 3), np.float32),
                 direction=np.empty((m, 3), np.float32),
                 far=np.empty(m, np.float32),
-                radiance=np.empty((m, 3), np.float32),
+                light=np.empty((m, 3), np.float32),
                 pixel_slot=np.empty(m, np.int32),
             )
             arrays = self._scratch.arrays = paths, shadow_rays

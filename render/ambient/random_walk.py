@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.ambient.path_state import PathState, sequence_index
+from render.ambient.path_state import PathState
 from render.material.bsdf import ANISOTROPY, EXTINCTION, SCATTERED
 from render.material.medium import MOST_STEPS, henyey_greenstein, turn
 from render.sampling.random import uniform
@@ -27,7 +27,7 @@ FIRST_WALK_DIMENSION, NUMBERS = 1 << 20, 5
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def random_walk_step(
+def random_walk_step(  # noqa: PLR0913
     walking: Int,
     distance: Float32,
     rows: Float,
@@ -40,23 +40,26 @@ def random_walk_step(
 ) -> int:
     """One flight of each path in `walking` (n,): those that scatter before the boundary stay in it, in front.
 
-    distance (n,): to the boundary along each path's ray. Origin, direction and throughput are moved; a path that is
-    absorbed, or found no boundary, has throughput 0 and gets triangle -1. Returns how many stay.
+    distance (n,): to the boundary along each path's ray. Origin, direction and weight in `paths` are moved; a path that
+    is absorbed, or found no boundary, weighs nothing and gets triangle -1. Returns how many stay.
     """
-    staying = 0
+    left = 0
     d, w, extinction, pdf = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for place in range(walking.shape[0]):
         r = walking[place]
-        s, index = paths.sample[r], sequence_index(pixels, paths.pixel_slot[r])
-        first = FIRST_WALK_DIMENSION + NUMBERS * (depth * MOST_STEPS + step)
-        row = rows[paths.medium[r]]
+        pixel_slot, s = paths.pixel_slot[r], paths.sample[r]
+        index, first = (
+            2 * pixels[pixel_slot >> 1] + (pixel_slot & 1),
+            FIRST_WALK_DIMENSION + NUMBERS * (depth * MOST_STEPS + step),
+        )
+        row = rows[paths.medium[r] - 1]
         total = 0.0
         for band in range(3):
-            w[band], extinction[band] = paths.throughput[r, band], row[EXTINCTION + band]
+            w[band], extinction[band] = paths.weight[r, band], row[EXTINCTION + band]
             total += w[band]
         if triangle[r] < 0 or total <= 0.0 or step == MOST_STEPS - 1:
             triangle[r] = -1
-            paths.throughput[r, 0] = paths.throughput[r, 1] = paths.throughput[r, 2] = 0.0
+            paths.weight[r, 0] = paths.weight[r, 1] = paths.weight[r, 2] = 0.0
             continue
         number, chosen = uniform(seed, index, s, first) * total, 0
         while chosen < 2 and (number >= w[chosen] or w[chosen] == 0.0):
@@ -65,20 +68,20 @@ def random_walk_step(
         flight = -math.log(1.0 - uniform(seed, index, s, first + 1)) / extinction[chosen]
         inside = flight < distance[place]
         length = flight if inside else float(distance[place])
-        mean_pdf = 0.0
+        density = 0.0
         for band in range(3):
             pdf[band] = math.exp(-extinction[band] * length) * (extinction[band] if inside else 1.0)
-            mean_pdf += w[band] / total * pdf[band]
+            density += w[band] / total * pdf[band]
         largest = 0.0
         for band in range(3):
-            w[band] *= pdf[band] / mean_pdf * (row[SCATTERED + band] if inside else 1.0)
+            w[band] *= pdf[band] / density * (row[SCATTERED + band] if inside else 1.0)
             largest = max(largest, w[band])
         if inside:
-            # Russian roulette on what is nearly absorbed
+            # what is nearly absorbed ends by chance
             survival = min(1.0, largest)
             if uniform(seed, index, s, first + 4) >= survival:
                 triangle[r] = -1
-                paths.throughput[r, 0] = paths.throughput[r, 1] = paths.throughput[r, 2] = 0.0
+                paths.weight[r, 0] = paths.weight[r, 1] = paths.weight[r, 2] = 0.0
                 continue
             for band in range(3):
                 w[band] /= survival
@@ -90,8 +93,8 @@ def random_walk_step(
             turn(d, sine * math.cos(phi), sine * math.sin(phi), cosine)
             for axis in range(3):
                 paths.direction[r, axis] = d[axis]
-            walking[staying] = r
-            staying += 1
+            walking[left] = r
+            left += 1
         for band in range(3):
-            paths.throughput[r, band] = w[band]
-    return staying
+            paths.weight[r, band] = w[band]
+    return left

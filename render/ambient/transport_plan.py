@@ -100,7 +100,7 @@ def ambient_plan_of(
     return AmbientPlan(settings.max_bounces, (head, line, *_clamp_line(settings), *blind))
 
 
-def planned_images(
+def planned_images(  # noqa: PLR0913
     world: World,
     scene: Scene,
     settings: RenderSettings,

@@ -8,6 +8,7 @@ import re
 import secrets
 import stat
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
@@ -15,6 +16,8 @@ from pathlib import Path, PureWindowsPath
 from render.base.errors import InputError
 
 TEMPORARY = re.compile(r"\.(?P<stem>.+)\.[0-9a-f]{8}(?P<suffix>(\.[^.]*)?)")
+ABANDONED = 3600.0
+"""s; no write of this program takes so long."""
 
 
 @contextmanager
@@ -60,6 +63,15 @@ def unfinished_write(name: str) -> str | None:
     """
     found = TEMPORARY.fullmatch(name)
     return found["stem"] + found["suffix"] if found else None
+
+
+def remove_unfinished(target: Path, seconds: float = ABANDONED) -> None:
+    """Remove what killed programs left of `target` so long ago that none can still be writing it."""
+    with suppress(OSError):
+        for name in os.listdir(target.parent):
+            left = target.with_name(name)
+            if unfinished_write(name) == target.name and time.time() - left.stat().st_mtime > seconds:
+                left.unlink()
 
 
 def inside(root: Path, relative: str, where: str) -> Path:

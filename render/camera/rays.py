@@ -90,7 +90,7 @@ def _net_point(table: Float32, draw: np.uint64, number: int) -> tuple[float, flo
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def lens_rays(
+def lens_rays(  # noqa: PLR0913
     view: View,
     table: Float32,
     pixels: Int,

@@ -8,7 +8,6 @@ whose disc is seen edge-on along the change of q: the density of a semicircle, f
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -22,35 +21,35 @@ SMALL = 0.3
 """Half-widths of a cell, together, in sigmas, below which a series does."""
 
 
-class SheetHit(NamedTuple):
-    """Where a ray d from the camera meets a facet of normal n in a laser's sheet; all in the scene's frame but q."""
-
-    n0: float
-    n1: float
-    n2: float
-    d0: float
-    d1: float
-    d2: float
-    s: float
-    """Of the ray, to the facet."""
-    cosine: float
-    """n . d."""
-    q: float
-    """x / sigma(z) in the laser's frame."""
-    sigma: float
-    slope: float
-    """d sigma / dz."""
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def sheet_slope(hit: SheetHit, T_laser_world: Float, e0: float, e1: float, e2: float) -> float:
-    """Change of q = x / sigma(z) with a coordinate along which the ray d changes by e."""
-    w = T_laser_world
-    f = (hit.n0 * e0 + hit.n1 * e1 + hit.n2 * e2) / hit.cosine
-    g0, g1, g2 = hit.s * (e0 - f * hit.d0), hit.s * (e1 - f * hit.d1), hit.s * (e2 - f * hit.d2)
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def sheet_slope(  # noqa: PLR0913
+    xs: float,
+    ys: float,
+    m: Float,
+    w: Float,
+    n0: float,
+    n1: float,
+    n2: float,
+    d0: float,
+    d1: float,
+    d2: float,
+    s: float,
+    cosine: float,
+    q: float,
+    sigma: float,
+    slope: float,
+) -> float:
+    """Change of q = x / sigma(z) with a pixel coordinate along which the ray's (x, y) changes by (xs, ys)."""
+    e0, e1, e2 = (
+        m[0, 0] * xs + m[0, 1] * ys,
+        m[1, 0] * xs + m[1, 1] * ys,
+        m[2, 0] * xs + m[2, 1] * ys,
+    )
+    f = (n0 * e0 + n1 * e1 + n2 * e2) / cosine
+    g0, g1, g2 = s * (e0 - f * d0), s * (e1 - f * d1), s * (e2 - f * d2)
     dx = w[0, 0] * g0 + w[0, 1] * g1 + w[0, 2] * g2
     dz = w[2, 0] * g0 + w[2, 1] * g1 + w[2, 2] * g2
-    return (dx - hit.q * hit.slope * dz) / hit.sigma
+    return (dx - q * slope * dz) / sigma
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

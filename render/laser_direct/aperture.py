@@ -21,7 +21,7 @@ Int = NDArray[np.int32]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def gather_aperture(
+def gather_aperture(  # noqa: PLR0913
     values: Float,
     planes: Float,
     lens: Float,

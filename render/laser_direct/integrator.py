@@ -28,10 +28,6 @@ from render.laser_direct.aperture import gather_aperture
 from render.laser_direct.centre_ray import gather_first, look_around
 from render.laser_direct.rasterise import reachable_pixels
 from render.laser_direct.shading import (
-    CellRays,
-    DirectScene,
-    Predictions,
-    ShadowRays,
     gather,
     place,
     shade_diffuse,
@@ -81,7 +77,7 @@ class DirectImage:
     dropped: int
 
 
-def direct_image(
+def direct_image(  # noqa: PLR0913
     world: World,
     camera: Camera,
     laser: LineLaser,
@@ -227,33 +223,36 @@ class _Task:
                 planes = np.empty((count, 4))
             camera_rays(view, pixels, cells, self.seed, cells > 1, normalised, offsets, directions)
             triangle = rays.from_point(self.T_world_camera[:3, 3], directions)
-        made = Predictions(np.empty((count, 2)), planes)
-        shadow_rays = ShadowRays(
-            origin=np.empty((count, 3), np.float32),
-            direction=np.empty((count, 3), np.float32),
-            far=np.empty(count, np.float32),
-            sample=np.empty(count, np.int32),
-        )
-        scene = DirectScene(
-            surface=surface,
-            camera=view,
-            T_laser_world=invert(self.T_world_laser),
-            laser_centre=self.T_world_laser[:3, 3].copy(),
-            beam=self.laser.packed(),
-            weights=np.array(reflectance_weights(self.laser.wavelength_nm)),
-            centre=rays.centre,
-            ray_epsilon=rays.surface_offset,
-        )
+        values = np.empty((count, 2))
+        origins, towards = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+        far, sample = np.empty(count, np.float32), np.empty(count, np.int32)
         if aperture:
             shade = shade_glossy_lens if has_gloss(surface) else shade_diffuse_lens
         else:
             shade = shade_glossy if has_gloss(surface) else shade_diffuse
-        cell_rays = CellRays(cells, triangle, normalised, offsets, lens)
-        shadows, dropped = shade(scene, cell_rays, made, shadow_rays)
+        shadows, dropped = shade(
+            surface,
+            view,
+            triangle,
+            normalised,
+            offsets,
+            lens,
+            cells,
+            invert(self.T_world_laser),
+            self.T_world_laser[:3, 3].copy(),
+            self.laser.packed(),
+            np.array(reflectance_weights(self.laser.wavelength_nm)),
+            rays.centre,
+            rays.surface_offset,
+            values,
+            planes,
+            origins,
+            towards,
+            far,
+            sample,
+        )
         self.dropped.append(dropped)
-        cast = shadow_rays.origin[:shadows], shadow_rays.direction[:shadows], shadow_rays.far[:shadows]
-        blocked = rays.occluded(*cast, coherent=True)
-        values, sample = made.values, shadow_rays.sample
+        blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows], coherent=True)
         mean, error, jump = (np.empty(len(pixels)) for _ in range(3))
         if aperture:
             gather_aperture(values, planes, lens, view.lens[0], blocked, sample, shadows, cells, mean, error)

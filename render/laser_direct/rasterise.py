@@ -51,7 +51,7 @@ def _clip(polygon: Float, count: int, plane: Float, out: Float) -> int:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def triangle_spans(
+def triangle_spans(  # noqa: PLR0913, PLR0915
     start: int,
     stop: int,
     surface: Surface,

@@ -8,7 +8,7 @@ sampled.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
@@ -18,10 +18,10 @@ from render.camera.distortion import distort, tilt_matrix
 from render.camera.lens import lens_direction, lens_position
 from render.camera.view import View
 from render.laser.irradiance import fan_density, sheet_sigma
-from render.laser.sheet_integral import SheetHit, about_over, about_over_aperture, mean_over, sheet_slope
+from render.laser.sheet_integral import about_over, about_over_aperture, mean_over, sheet_slope
 from render.material.bsdf import evaluate, is_diffuse
 from render.world.surface_interaction import detailed, light_side
-from render.world.triangles import Surface, lookup, plane_of, slot_reflectance, to_local
+from render.world.triangles import Surface, lookup, slot_reflectance, to_local
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -75,167 +75,74 @@ def eval_bsdf(
     return total
 
 
-class DirectScene(NamedTuple):
-    """What a laser lights, and what sees it."""
-
-    surface: Surface
-    camera: View
-    T_laser_world: Float
-    laser_centre: Float
-    beam: Float
-    """`LineLaser.packed`."""
-    weights: Float
-    """(3,) of the RGB reflectance at the wavelength."""
-    centre: Float
-    """(3,) that the ray engine's coordinates are relative to."""
-    ray_epsilon: float
-    """m, how far off a surface a ray begins."""
-
-
-class CellRays(NamedTuple):
-    """One ray in each of cells x cells cells of every pixel."""
-
-    cells: int
-    triangle: Int
-    """(n,) that it hits; -1: none."""
-    normalised: Float
-    """(n, 2) slopes x, y in the camera's frame; NaN: the lens makes no such ray."""
-    offsets: Float32
-    """(n, 2) px, from the middle of its cell."""
-    lens: Float
-    """(n, 2) its point of the aperture; (0, 2) for a pinhole."""
-
-
-class Predictions(NamedTuple):
-    """What each ray says of its cell and of its whole pixel."""
-
-    values: Float
-    """(n, 2) unoccluded mean radiance over both."""
-    planes: Float
-    """With an aperture (n, 5): q in the middle of the pixel and its change with u, v, a and b; without one (n, 4) what
-    `render.laser_direct.centre_ray` needs, or (0, 4)."""
-
-
-class ShadowRays(NamedTuple):
-    """(n, .) rays to the laser, the first `count` of which are in use; `sample`: the camera ray of each."""
-
-    origin: Float32
-    direction: Float32
-    far: Float32
-    sample: Int
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def pixel_jacobian(
-    view: View, x: float, y: float, tilt: Float, distorted: bool, a: float, b: float
-) -> tuple[float, float, float, float]:
-    """dx/du, dx/dv, dy/du, dy/dv of the slopes x, y of a ray through the lens point (a, b)."""
-    intrinsics = view.intrinsics
-    xu, xv = 1.0 / intrinsics[0], -intrinsics[4] / (intrinsics[0] * intrinsics[1])
-    yu, yv = 0.0, 1.0 / intrinsics[1]
-    if distorted:
-        _, _, jxx, jxy, jyx, jyy = distort(x, y, view.distortion, tilt)
-        det = jxx * jyy - jxy * jyx
-        xu, xv, yu, yv = (
-            jyy * xu / det,
-            (jyy * xv - jxy * yv) / det,
-            -jyx * xu / det,
-            (-jyx * xv + jxx * yv) / det,
-        )
-    # the focus differs along a tilted sensor, which turns a ray through the rim
-    gu, gv = view.lens[2] * xu + view.lens[3] * yu, view.lens[2] * xv + view.lens[3] * yv
-    return xu + gu * a, xv + gv * a, yu + gu * b, yv + gv * b
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def slope_along(scene: DirectScene, hit: SheetHit, xs: float, ys: float) -> float:
-    """Change of q with a coordinate along which the ray's slopes (x, y) change by (xs, ys)."""
-    m = scene.camera.T_world_camera
-    return sheet_slope(
-        hit,
-        scene.T_laser_world,
-        m[0, 0] * xs + m[0, 1] * ys,
-        m[1, 0] * xs + m[1, 1] * ys,
-        m[2, 0] * xs + m[2, 1] * ys,
-    )
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def predict(
-    scene: DirectScene,
-    rays: CellRays,
-    r: int,
-    hit: SheetHit,
-    tilt: Float,
-    distorted: bool,
-    aperture: bool,
-    planes: Float,
-) -> tuple[float, float]:
-    """Mean of the Gaussian across the sheet over ray r's cell, and over its whole pixel; fills its plane."""
-    x, y = rays.normalised[r, 0], rays.normalised[r, 1]
-    a = b = 0.0
-    if aperture:
-        a, b = rays.lens[r, 0], rays.lens[r, 1]
-    xu, xv, yu, yv = pixel_jacobian(scene.camera, x, y, tilt, distorted, a, b)
-    q = hit.q
-    qu, qv = slope_along(scene, hit, xu, yu), slope_along(scene, hit, xv, yv)
-    du, dv, half = rays.offsets[r, 0], rays.offsets[r, 1], 0.5 / rays.cells
-    in_cell = mean_over(q - qu * du - qv * dv, qu * half, qv * half)
-    if not aperture and planes.shape[0] > 0:
-        planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3] = q, qu, qv, 0.0
-        return in_cell, in_cell
-    cell = r % (rays.cells * rays.cells)
-    pixel_u = (cell % rays.cells + 0.5) / rays.cells - 0.5 + du
-    pixel_v = (cell // rays.cells + 0.5) / rays.cells - 0.5 + dv
-    if not aperture:
-        return in_cell, about_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
-    lens = scene.camera.lens
-    off_focus = 1.0 / hit.s - (lens[1] - lens[2] * x - lens[3] * y)
-    qa, qb = off_focus * slope_along(scene, hit, 1.0, 0.0), off_focus * slope_along(scene, hit, 0.0, 1.0)
-    middle = q - qu * pixel_u - qv * pixel_v - qa * a - qb * b
-    planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3], planes[r, 4] = middle, qu, qv, qa, qb
-    return in_cell, about_over_aperture(middle, qu * 0.5, qv * 0.5, lens[0] * math.hypot(qa, qb))
-
-
-def _shade_kernel(glossy: bool, aperture: bool) -> Any:
+def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
     """The shading kernel; compiled apart for diffuse materials alone and for a pinhole, where it is much quicker."""
 
     @numba.njit(nogil=True, cache=True, error_model="numpy")
-    def shade(scene: DirectScene, rays: CellRays, made: Predictions, shadow_rays: ShadowRays) -> tuple[int, int]:
-        """Unoccluded radiance of each ray's cell and whole pixel, and the shadow rays that decide.
+    def shade(  # noqa: PLR0913, PLR0915
+        surface: Surface,
+        view: View,
+        triangle: Int,
+        normalised: Float,
+        offsets: Float32,
+        lens: Float,
+        cells: int,
+        T_laser_world: Float,
+        laser_centre: Float,
+        beam: Float,
+        weights: Float,
+        centre: Float,
+        surface_offset: float,
+        values: Float,
+        planes: Float,
+        origins: Float32,
+        directions: Float32,
+        far: Float32,
+        sample: Int,
+    ) -> tuple[int, int]:
+        """Unoccluded radiance of each ray's cell and whole pixel -> values (n, 2), and the shadow rays that decide.
 
-        Returns how many shadow rays were written, and how many rays were left out since their radiance is NaN,
-        infinite or negative.
+        Returns how many shadow rays were written; `sample` says whose each is; and how many rays were left out since
+        their radiance is no number, infinite or negative. With an aperture, lens (n, 2) are the
+        rays' points of it, and planes (n, 5) take q in the middle of the pixel and its change with u, v, a and b;
+        without one planes (n, 4), unless empty, take what `render.laser_direct.centre_ray` needs.
         """
-        surface, view, m, w = scene.surface, scene.camera, scene.camera.T_world_camera, scene.T_laser_world
-        beam, laser_centre, weights = scene.beam, scene.laser_centre, scene.weights
-        values, planes = made.values, made.planes
-        tilt = tilt_matrix(view.distortion[12], view.distortion[13])
-        distorted = bool(np.any(view.distortion))
+        intrinsics, k, m, w = view.intrinsics, view.distortion, view.T_world_camera, T_laser_world
+        vertices, triangles = surface.vertices, surface.triangles
+        tilt = tilt_matrix(k[12], k[13])
+        distorted = bool(np.any(k))
         o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
         emitter, _ = sheet_sigma(0.0, beam)
         to_light, to_camera, point, normal, rgb = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
         count = dropped = 0
         facet = -1
-        a0 = a1 = a2 = n0 = n1 = n2 = height_laser = 0.0
+        a0 = a1 = a2 = n0 = n1 = n2 = area = height_laser = 0.0
+        half = 0.5 / cells
         looking = not aperture and planes.shape[0] > 0
-        for r in range(rays.triangle.shape[0]):
+        for r in range(triangle.shape[0]):
             values[r, 0] = values[r, 1] = 0.0
             if looking:
                 planes[r, 3] = 0.0
-            t = rays.triangle[r]
-            x, y = rays.normalised[r, 0], rays.normalised[r, 1]
+            t = triangle[r]
+            x, y = normalised[r, 0], normalised[r, 1]
             if t < 0 or x != x:
                 continue
             if t != facet:
                 # rays of a pixel mostly meet one triangle
                 facet = t
-                a0, a1, a2, n0, n1, n2 = plane_of(surface, t)
+                ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+                a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
+                ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
+                ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
+                n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+                area = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+                n0, n1, n2 = n0 / area, n1 / area, n2 / area
                 height_laser = n0 * (laser_centre[0] - a0) + n1 * (laser_centre[1] - a1) + n2 * (laser_centre[2] - a2)
+            if area == 0.0:
+                continue
             if aperture:
-                o0, o1, o2 = lens_position(view, rays.lens[r, 0], rays.lens[r, 1])
+                o0, o1, o2 = lens_position(view, lens[r, 0], lens[r, 1])
             height_camera = n0 * (o0 - a0) + n1 * (o1 - a1) + n2 * (o2 - a2)
-            # a facet without area has no normal, and NaN is not above 0
             if not height_camera * height_laser > 0.0:
                 continue
             side = 1.0 if height_camera > 0.0 else -1.0
@@ -246,7 +153,7 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
                 m[2, 0] * x + m[2, 1] * y + m[2, 2],
             )
             if aperture:
-                d0, d1, d2 = lens_direction(view, x, y, rays.lens[r, 0], rays.lens[r, 1])
+                d0, d1, d2 = lens_direction(view, x, y, lens[r, 0], lens[r, 1])
             cosine = n0 * d0 + n1 * d1 + n2 * d2
             if cosine == 0.0:
                 continue
@@ -262,17 +169,52 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
             if h == 0.0:
                 continue
             sigma, slope = sheet_sigma(lz, beam)
-            hit = SheetHit(n0, n1, n2, d0, d1, d2, s, cosine, lx / sigma, sigma, slope)
-            in_cell, in_pixel = predict(scene, rays, r, hit, tilt, distorted, aperture, planes)
+            # dP/du and dP/dv on the facet
+            xu, xv = 1.0 / intrinsics[0], -intrinsics[4] / (intrinsics[0] * intrinsics[1])
+            yu, yv = 0.0, 1.0 / intrinsics[1]
+            if distorted:
+                _, _, jxx, jxy, jyx, jyy = distort(x, y, k, tilt)
+                det = jxx * jyy - jxy * jyx
+                xu, xv, yu, yv = (
+                    jyy * xu / det,
+                    (jyy * xv - jxy * yv) / det,
+                    -jyx * xu / det,
+                    (-jyx * xv + jxx * yv) / det,
+                )
+            if aperture:
+                # the focus differs along a tilted sensor, which turns a ray through the rim
+                gu, gv = view.lens[2] * xu + view.lens[3] * yu, view.lens[2] * xv + view.lens[3] * yv
+                xu, xv = xu + gu * lens[r, 0], xv + gv * lens[r, 0]
+                yu, yv = yu + gu * lens[r, 1], yv + gv * lens[r, 1]
+            q = lx / sigma
+            qu = sheet_slope(xu, yu, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+            qv = sheet_slope(xv, yv, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+            du, dv = offsets[r, 0], offsets[r, 1]
+            cell = r % (cells * cells)
+            pixel_u, pixel_v = (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
+            in_cell = mean_over(q - qu * du - qv * dv, qu * half, qv * half)
+            if aperture:
+                off_focus = 1.0 / s - (view.lens[1] - view.lens[2] * x - view.lens[3] * y)
+                qa = off_focus * sheet_slope(1.0, 0.0, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+                qb = off_focus * sheet_slope(0.0, 1.0, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+                middle = q - qu * pixel_u - qv * pixel_v - qa * lens[r, 0] - qb * lens[r, 1]
+                in_pixel = about_over_aperture(middle, qu * 0.5, qv * 0.5, view.lens[0] * math.hypot(qa, qb))
+                planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3], planes[r, 4] = middle, qu, qv, qa, qb
+            else:
+                if not looking:
+                    in_pixel = about_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
+                else:
+                    in_pixel = in_cell
+                    planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3] = q, qu, qv, 0.0
             if in_cell == 0.0 and in_pixel == 0.0:
                 continue
             # irradiance without the Gaussian: P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)|
             ln0 = w[0, 0] * n0 + w[0, 1] * n1 + w[0, 2] * n2
             ln1 = w[1, 0] * n0 + w[1, 1] * n1 + w[1, 2] * n2
             ln2 = w[2, 0] * n0 + w[2, 1] * n1 + w[2, 2] * n2
-            power = beam[0] * h / (lz * sigma) * abs(ln0 * hit.q * slope + ln1 * ly / lz + ln2)
+            power = beam[0] * h / (lz * sigma) * abs(ln0 * q * slope + ln1 * ly / lz + ln2)
             # the light comes from the emitting segment at z = 0, of half-width `emitter` for a focused sheet
-            shift = hit.q * emitter
+            shift = q * emitter
             t0 = laser_centre[0] + w[0, 0] * shift - p0
             t1 = laser_centre[1] + w[0, 1] * shift - p1
             t2 = laser_centre[2] + w[0, 2] * shift - p2
@@ -296,13 +238,13 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:
             values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
             if looking:
                 planes[r, 3] = radiance
-            epsilon = scene.ray_epsilon
-            shadow_rays.origin[count, 0] = p0 - scene.centre[0] + side * n0 * epsilon
-            shadow_rays.origin[count, 1] = p1 - scene.centre[1] + side * n1 * epsilon
-            shadow_rays.origin[count, 2] = p2 - scene.centre[2] + side * n2 * epsilon
-            shadow_rays.direction[count, 0] = t0 / distance
-            shadow_rays.direction[count, 1], shadow_rays.direction[count, 2] = t1 / distance, t2 / distance
-            shadow_rays.far[count], shadow_rays.sample[count] = distance, r
+            origins[count, 0] = p0 - centre[0] + side * n0 * surface_offset
+            origins[count, 1] = p1 - centre[1] + side * n1 * surface_offset
+            origins[count, 2] = p2 - centre[2] + side * n2 * surface_offset
+            directions[count, 0] = t0 / distance
+            directions[count, 1], directions[count, 2] = t1 / distance, t2 / distance
+            far[count] = distance
+            sample[count] = r
             count += 1
         return count, dropped
 

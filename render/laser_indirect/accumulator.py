@@ -192,7 +192,7 @@ def sum_passes(
 
 
 @numba.njit(nogil=True, cache=True)
-def sum_pixels(
+def sum_pixels(  # noqa: PLR0913
     images: tuple[Float, ...],
     camera_radiance: tuple[Float32, ...],
     touched: tuple[NDArray[np.bool_], ...],

@@ -91,7 +91,7 @@ def indirect_image(
     return last
 
 
-def indirect_images(
+def indirect_images(  # noqa: PLR0913
     world: World,
     camera: Camera,
     laser: LineLaser,

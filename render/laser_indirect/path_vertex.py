@@ -79,7 +79,7 @@ class PassContext(NamedTuple):
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def intersect(
+def intersect(  # noqa: PLR0913
     surface: Surface,
     weights: Float,
     context: PassContext,

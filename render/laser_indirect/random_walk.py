@@ -26,7 +26,7 @@ FIRST_WALK_DIMENSION = 1000
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def random_walk_step(
+def random_walk_step(  # noqa: PLR0913
     walking: Int,
     distance: Float32,
     paths: Records,

@@ -108,7 +108,7 @@ def connect_by_ris(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def weigh_candidates(
+def weigh_candidates(  # noqa: PLR0913
     v: Record,
     path: Record,
     light: LightVertices,

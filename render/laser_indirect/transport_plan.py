@@ -150,7 +150,7 @@ def plan_of(shares: Shares, scene: Scene, settings: RenderSettings) -> Plan:
     return Plan(kinds, (*lines, *clamped, *lens_lines(scene.camera)))
 
 
-def indirect_light(
+def indirect_light(  # noqa: PLR0913
     world: World,
     scene: Scene,
     settings: RenderSettings,

@@ -67,7 +67,7 @@ def specular_share(eta: float, reflectance: float, cosine: float) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def evaluate(
+def evaluate(  # noqa: PLR0913
     row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, f: Array
 ) -> None:
     """f(o, i) in 1/sr, without the cosine -> f (3,) for each band; 0 for the delta parts."""
@@ -77,7 +77,7 @@ def evaluate(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def eval_lobes(
+def eval_lobes(  # noqa: PLR0913
     kind: float, ax: float, ay: float, eta: float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
 ) -> tuple[float, float, float]:
     """What of f(o, i) is alike in all bands: facets, 1/sr, their cosine with o, and the diffuse base, 1/sr."""
@@ -119,7 +119,7 @@ def eval_band(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def rough_dielectric(
+def rough_dielectric(  # noqa: PLR0913
     index: float, ax: float, ay: float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
 ) -> float:
     """f(o, i) of a rough glass boundary, o the direction light is followed from (Walter et al. 2007, eqs. 20, 21).
@@ -168,7 +168,7 @@ def pdf(row: Array, rgb: Array, ox: float, oy: float, oz: float, ix: float, iy: 
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def pdf_lobes(
+def pdf_lobes(  # noqa: PLR0913
     kind: float,
     ax: float,
     ay: float,
@@ -211,7 +211,7 @@ def pdf_lobes(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def sample(
+def sample(  # noqa: PLR0913
     row: Array,
     rgb: Array,
     ox: float,

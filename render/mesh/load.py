@@ -162,7 +162,7 @@ def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str, fille
 
 
 @lru_cache(maxsize=16)
-def _read(
+def _read(  # noqa: PLR0913
     path: Path,
     root: Path,
     where: str,

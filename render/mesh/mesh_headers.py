@@ -11,7 +11,7 @@ from typing import Any
 
 from render.base.errors import InputError
 
-MAX_FILE_BYTES = 2**30
+MAX_FILE_BYTES = 2**29
 MAX_TEXT_BYTES = 2**28
 """Of OBJ, OFF, glTF and the text kinds of PLY and STL, which take some ten times their size to read."""
 MAX_TRIANGLES = 20_000_000

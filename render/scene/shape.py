@@ -51,7 +51,7 @@ class Sphere(Model):
 
     kind: Literal["sphere"] = "sphere"
     radius: float = quantity(0.05, unit="m", label="Radius", ge=SMALLEST, le=1e4)
-    segments: int = quantity(256, label="Segments", ge=8, le=4096)
+    segments: int = quantity(256, label="Segments", ge=8, le=2048)
 
 
 class Cylinder(Model):

@@ -73,7 +73,7 @@ def defocus(image: Float32, diameter: Float, threads: int | None = None) -> Floa
 
 
 @numba.njit(nogil=True, cache=True)
-def _spread(
+def _spread(  # noqa: PLR0913
     image: Float32,
     kind: Int,
     taps: Float,

@@ -162,7 +162,7 @@ def _unevenness(slope: float) -> float:
 
 
 @numba.njit(nogil=True, cache=True)
-def _scintillate(
+def _scintillate(  # noqa: PLR0913
     image: Float32,
     start: int,
     first: int,

@@ -120,7 +120,7 @@ def clip_to_fan(segments: Float, T_laser_world: Float, tan_half_fan: float) -> F
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def scan_line_crossings(
+def scan_line_crossings(  # noqa: PLR0915
     segments: Float, spans: Float, view: View, height: int, along_rows: bool
 ) -> tuple[Float, Int, Int]:
     """Solve for the points of camera-frame segments (m, 2, 3) that fall on the centre of a scan line.
@@ -228,7 +228,7 @@ def laser_curve(
     )
 
 
-def curve_of_cut(
+def curve_of_cut(  # noqa: PLR0913
     segments: Float,
     normals: Float,
     object_id: Int,

@@ -22,7 +22,7 @@ Int = NDArray[np.int32]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def fill_truth(
+def fill_truth(  # noqa: PLR0913
     surface: Surface,
     T_world_camera: Float,
     start: int,

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.laser.irradiance import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2, fan_density, sheet_sigma
-from render.laser.sheet_integral import SheetHit, sheet_slope
-from render.world.triangles import Surface, plane_of, reflectance
+from render.world.triangles import Surface, reflectance
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -44,7 +43,7 @@ def mean_across(q: float, slope_u: float, slope_v: float) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def shade_pixels(
+def shade_pixels(  # noqa: PLR0913
     surface: Surface,
     T_object_camera: Float,
     pixel: Float,
@@ -61,16 +60,21 @@ def shade_pixels(
 
     pixel (2,): 1 / fx and 1 / fy. Of each laser: pose (l, 4, 4), `LineLaser.packed` (l, 8), weights of R, G, B (l, 3).
     """
-    m = T_object_camera
+    v, triangles, m = surface.vertices, surface.triangles, T_object_camera
     rgb, steps = np.empty(3), np.empty(2)
     for i in range(triangle.shape[0]):
         t = triangle[i]
         if t < 0:
             continue
-        a0, a1, a2, n0, n1, n2 = plane_of(surface, t)
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
+        ac0, ac1, ac2 = v[c, 0] - v[a, 0], v[c, 1] - v[a, 1], v[c, 2] - v[a, 2]
+        n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
+        length = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+        n0, n1, n2 = n0 / length, n1 / length, n2 / length
         d0, d1, d2 = float(directions[i, 0]), float(directions[i, 1]), float(directions[i, 2])
         facing = n0 * d0 + n1 * d1 + n2 * d2
-        s = (n0 * (a0 - m[0, 3]) + n1 * (a1 - m[1, 3]) + n2 * (a2 - m[2, 3])) / facing
+        s = (n0 * (v[a, 0] - m[0, 3]) + n1 * (v[a, 1] - m[1, 3]) + n2 * (v[a, 2] - m[2, 3])) / facing
         far[i] = s
         p0, p1, p2 = m[0, 3] + s * d0, m[1, 3] + s * d1, m[2, 3] + s * d2
         reflectance(surface, t, p0, p1, p2, rgb)
@@ -94,10 +98,12 @@ def shade_pixels(
                 continue
             q = x / sigma
             # from one pixel to the next the point moves on the facet by s (e - (n e) / (n d) d)
-            hit = SheetHit(n0, n1, n2, d0, d1, d2, s, facing, q, sigma, slope)
             for axis in range(2):
                 e0, e1, e2 = m[0, axis] * pixel[axis], m[1, axis] * pixel[axis], m[2, axis] * pixel[axis]
-                steps[axis] = sheet_slope(hit, w, e0, e1, e2)
+                f = (n0 * e0 + n1 * e1 + n2 * e2) / facing
+                g0, g1, g2 = s * (e0 - f * d0), s * (e1 - f * d1), s * (e2 - f * d2)
+                dx, dz = w[0, 0] * g0 + w[0, 1] * g1 + w[0, 2] * g2, w[2, 0] * g0 + w[2, 1] * g1 + w[2, 2] * g2
+                steps[axis] = (dx - q * slope * dz) / sigma
             mean = mean_across(q, steps[0], steps[1])
             if mean == 0.0:
                 continue

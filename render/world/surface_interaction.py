@@ -34,7 +34,7 @@ LEAST_COSINE = 0.05
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def interaction(
+def interaction(  # noqa: PLR0913
     surface: Surface,
     t: int,
     p0: float,
@@ -105,7 +105,7 @@ def bump_slopes(surface: Surface, slot: int, u: float, v: float, rgb: Float) -> 
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def detailed(
+def detailed(  # noqa: PLR0913, PLR0915
     surface: Surface,
     t: int,
     slot: int,

@@ -160,7 +160,7 @@ def to_world(frame: Float, direction: Float) -> None:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def lookup(
+def lookup(  # noqa: PLR0913
     surface: Surface, start: int, rows: int, columns: int, t: int, p0: float, p1: float, p2: float, rgb: Float
 ) -> None:
     """Bilinear value -> rgb (3,) of the texture of rows x columns from `start`, at the point p of triangle t."""

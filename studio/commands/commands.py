@@ -70,7 +70,7 @@ def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
         print(f"\nwarning: {warning}")
 
 
-def run_project(
+def run_project(  # noqa: PLR0913
     path: Path | None,
     *,
     out: Path | None,
@@ -196,15 +196,17 @@ def reconstruct_source(
 
 
 def rebuild_report(folder: Path, *, threads: int | None, quiet: bool, as_json: bool) -> None:
-    """`report`: measure the frames of a finished scan again and write its report."""
+    """`report`: measure the frames of a finished scan again, as its points were last, and write its report."""
     from studio.scan.reconstruct import reconstruct_folder
-    from studio.scan.scan_folder import open_folder
+    from studio.scan.scan_folder import measured_project, open_folder
     from studio.scan.stages import Clock
 
     found = open_folder(folder)
     with stage_progress(quiet, frames=len(found.frames)) as progress:
         clock = Clock(progress, never)
-        result = reconstruct_folder(found, found.project, found.root, folder, clock, report=True, threads=threads)
+        result = reconstruct_folder(
+            found, measured_project(found), found.root, folder, clock, report=True, threads=threads
+        )
     _print_reconstruction(result, as_json)
 
 

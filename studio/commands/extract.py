@@ -35,7 +35,7 @@ class Asked:
         return self.offs[number if len(self.offs) > 1 else 0]
 
 
-def extract_images(
+def extract_images(  # noqa: PLR0913
     images: tuple[Path, ...],
     *,
     off: tuple[Path, ...],

@@ -240,7 +240,7 @@ def _label(name: str, field: FieldInfo) -> str:
     return field.title or LABELS.get(name) or words(name)
 
 
-def _spec(owner: type[BaseModel], name: str, annotation: Any, limits: list[Any], value: Any, default: Any, label: str,
+def _spec(owner: type[BaseModel], name: str, annotation: Any, limits: list[Any], value: Any, default: Any, label: str,  # noqa: PLR0913
           help: str, unit: Unit = PLAIN) -> FieldSpec:  # fmt: skip
     members = [annotation]
     if get_origin(annotation) in (Union, UnionType):

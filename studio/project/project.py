@@ -11,7 +11,7 @@ from pydantic import PrivateAttr, ValidationError
 
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
-from render.base.files import atomic_write, inside, sha256
+from render.base.files import atomic_write, inside, remove_unfinished, sha256
 from render.base.model import Model, quantity
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
@@ -97,6 +97,7 @@ class Project(Model):
         signed = self.with_digests(target.parent)
         with atomic_write(target) as temporary:
             temporary.write_text(signed.to_text(), encoding="utf-8")
+        remove_unfinished(target)
         return signed.in_folder(target.parent)
 
     def with_digests(self, root: Path) -> Self:

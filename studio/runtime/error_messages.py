@@ -34,7 +34,8 @@ def trouble(error: BaseException, doing: str) -> Trouble:
         return Trouble(
             title,
             "There is not enough memory for it.",
-            "Choose a smaller image scale or lighter meshes, or close other programs. The project is unharmed.",
+            "Fewer pixels (a smaller image scale, where it renders), lighter meshes or smaller textures need less. "
+            "The project is unharmed.",
             details,
         )
     if isinstance(error, OSError):

@@ -23,7 +23,7 @@ METHODS: tuple[Method, ...] = ("likelihood", "gaussian", "centre_of_mass")
 LIBRARIES = ("blazer-studio", "embreex", "numba", "numpy", "opencv-contrib-python-headless", "open3d", "OpenEXR")
 
 
-def measure_frame(
+def measure_frame(  # noqa: PLR0913
     project: Project,
     frame: Frame,
     world: World,

@@ -29,7 +29,7 @@ def saved_path(out: Path, step: int) -> Path:
     return out / f"{scan_folder.frame_stem(step)}.state.npz"
 
 
-def frame_of_step(
+def frame_of_step(  # noqa: PLR0913
     project: Project,
     world: World,
     step: int,

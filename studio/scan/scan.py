@@ -82,7 +82,7 @@ def never() -> bool:
     return False
 
 
-def run_scan(
+def run_scan(  # noqa: PLR0913
     project: Project,
     root: Path,
     *,

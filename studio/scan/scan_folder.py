@@ -167,6 +167,21 @@ def image_scale_of(found: ScanFolder) -> float:
     return float(scale)
 
 
+def measured_project(found: ScanFolder) -> Project:
+    """The project with the sensor and extraction that the folder's points were measured with, which may be others.
+
+    InputError: the manifest's record of them is none.
+    """
+    record = found.manifest.get("measured_with")
+    if record is None:
+        return found.project
+    data = found.project.model_dump(mode="json")
+    if not isinstance(record, dict) or not record.keys() <= {"sensor", "extraction"}:
+        where = f"{found.folder / MANIFEST}: measured_with"
+        raise InputError("the settings of the measurement are none", where=where, allowed="sensor and extraction")
+    return Project.from_data({**data, **record}, f"{found.folder / MANIFEST}: measured_with")
+
+
 def check_measures(found: ScanFolder, project: Project) -> None:
     """InputError: frames rendered from the folder's project cannot be measured as `project`; it names what differs."""
     scale = image_scale_of(found)

@@ -100,7 +100,7 @@ def step_world(project: Project, root: Path, step: int, before: World | None) ->
     return before if before is not None and not objects_move else build_world(project.scene, root, step)
 
 
-def render_step(
+def render_step(  # noqa: PLR0913
     project: Project,
     world: World,
     step: int,

@@ -100,7 +100,7 @@ def _on_hump(response: Float32, i: int, base: float, spread: float, still: float
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _measure(
+def _measure(  # noqa: PLR0913
     row: Float32,
     response: Float32,
     mask: Mask,
@@ -157,7 +157,7 @@ def _measure(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def detect(
+def detect(  # noqa: PLR0913
     signal: Float32,
     mask: Mask,
     floor: Float32,

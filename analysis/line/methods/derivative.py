@@ -51,7 +51,7 @@ def _derivatives(y: Array, n: int, x: float, spread: float, weight: Array) -> tu
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def differentiate_seeds(
+def differentiate_seeds(  # noqa: PLR0913
     signal: Float32,
     mask: Mask,
     floor: Float32,

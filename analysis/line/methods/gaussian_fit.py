@@ -117,7 +117,7 @@ def _hold_sigma(hessian: Array, score: Array) -> None:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _optimise(
+def _optimise(  # noqa: PLR0913
     x: Array, y: Array, floor: Array, n: int, p: Array, likelihood: bool, integrated: bool, shape: Array, hessian: Array
 ) -> bool:
     """Refine p in place; on return `shape` and `hessian` belong to p. True if converged."""
@@ -178,7 +178,7 @@ def _gather(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def fit_seeds(
+def fit_seeds(  # noqa: PLR0913
     signal: Float32,
     mask: Mask,
     floor: Float32,

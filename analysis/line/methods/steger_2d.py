@@ -120,7 +120,7 @@ def normal(r: Array) -> tuple[float, float, float]:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def ridge_seeds(
+def ridge_seeds(  # noqa: PLR0913
     signal: Float32,
     raw: Float32,
     mask: Mask,

@@ -150,7 +150,7 @@ def between(table: Array, u: float, v: float) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def settle(
+def settle(  # noqa: PLR0913
     signal: Float32,
     mask: Mask,
     floor: Float32,

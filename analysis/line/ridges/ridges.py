@@ -151,7 +151,7 @@ def _candidates(
     return np.concatenate([parts[start] for start in sorted(parts)])
 
 
-def _settle(
+def _settle(  # noqa: PLR0913
     signal: NDArray[np.float32],
     mask: NDArray[np.uint8],
     floor: NDArray[np.float32],

@@ -36,7 +36,7 @@ SETTLED = 0.005
 """px; of the last step, or a tenth of sigma_u."""
 
 
-def along_time(
+def along_time(  # noqa: PLR0913
     line: Line,
     frames: Sequence[NDArray[Any]],
     at: int,

@@ -18,7 +18,7 @@ from studio.runtime.jobs import Progress
 from studio.scan.kernel_warm_up import begin, needed, warm_up
 
 
-def render_frames(
+def render_frames(  # noqa: PLR0913
     project: Project,
     root: Path,
     step: int,

@@ -86,7 +86,7 @@ def test_a_rectangle_is_seen_from_its_front_only():
 def test_points_of_a_shining_object_are_uniform_on_it():
     ball = moved(primitive_mesh(Sphere(radius=0.3)), (1, 2, 3))
     lights, surface = lights_of(objects=((ball, Emitter()),))
-    assert lights.rows[0]["area"] == pytest.approx(4 * np.pi * 0.09, rel=2e-3)
+    assert lights.rows[0, 16] == pytest.approx(4 * np.pi * 0.09, rel=2e-3)
     random, n = np.random.default_rng(4), 20000
     points, normals = np.empty((n, 3)), np.empty((n, 3))
     for i in range(n):

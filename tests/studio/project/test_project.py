@@ -386,3 +386,12 @@ class TestWhatLoadTakes:
         assert project.model_copy(update={"seed": 5}).folder == project.folder
         assert project.save(tmp_path / "a.json").folder == tmp_path
         assert Project.from_text(project.to_text()).folder == Path()
+
+
+def test_saving_removes_what_a_killed_save_left_long_ago(tmp_path: Path) -> None:
+    old, new, strange = (tmp_path / f".project.{end}.json" for end in ("0123abcd", "0123abce", "words"))
+    for left in (old, new, strange):
+        left.write_text("{")
+    os.utime(old, (0.0, 0.0))
+    Project.load(template_folder("plane") / "project.json").save(tmp_path / "project.json")
+    assert not old.exists() and new.exists() and strange.exists()

@@ -53,6 +53,11 @@ def reconstruct(
     )
 
 
+def small(made: Path) -> Project:
+    """The project as it was run."""
+    return Project.load(made / "out" / "scan_project.json")
+
+
 def edit(path: Path, change: Callable[[dict], None]) -> None:
     data = json.loads(path.read_text())
     change(data)
@@ -228,6 +233,21 @@ class TestMeasuringFrames:
         edit(made / "out" / "frame_0001.json", lambda data: data["lasers"][0]["curve"]["position"].reverse())
         with pytest.raises(InputError, match=r"frame_0001\.json: the frame's description has changed"):
             reconstruct(made)
+
+    def test_what_the_points_were_measured_with_is_kept_for_the_report(self, made: Path) -> None:
+        assert scan_folder.measured_project(scan_folder.open_folder(made / "out")) == small(made)
+        other = replaced(small(made), ("extraction", "method"), "centre_of_mass")
+        reconstruct(made, other, made / "out")
+        assert scan_folder.measured_project(scan_folder.open_folder(made / "out")) == other
+        rebuild_report(made / "out", threads=1, quiet=True, as_json=False)
+        results = json.loads((made / "out" / "scan.json").read_text())["results"]
+        assert results[0]["method"] == "centre_of_mass"
+
+    @pytest.mark.parametrize("record", [5, {"scene": {}}, {"extraction": {"method": "guess"}}])
+    def test_a_record_of_the_measurement_that_is_none_is_named(self, record: object, made: Path) -> None:
+        edit(made / "out" / "scan.json", lambda data: data.update(measured_with=record))
+        with pytest.raises(InputError, match="measured_with"):
+            scan_folder.measured_project(scan_folder.open_folder(made / "out"))
 
     def test_in_the_scan_s_own_folder_the_manifest_tells_the_new_result(self, made: Path) -> None:
         out = made / "out"
