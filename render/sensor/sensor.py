@@ -35,13 +35,20 @@ class BandPass(Model):
     transmission: UnitInterval = quantity(0.9, label="Transmission")
 
 
+CMOS = SpectralCurve(
+    wavelength_nm=(350, 400, 450, 500, 525, 550, 600, 650, 700, 750, 800, 850, 900, 950, 1000),
+    value=(0.1, 0.42, 0.6, 0.66, 0.67, 0.65, 0.57, 0.46, 0.34, 0.24, 0.16, 0.1, 0.06, 0.03, 0.01),
+)
+"""Quantum efficiency of a typical monochrome CMOS sensor: that of the ready-made projects."""
+
+
 class Sensor(Model):
     """An area sensor. Levels in electrons refer to one pixel; DN are the numbers in the image file."""
 
     colour: Literal["mono", "bayer"] = quantity("mono", label="Colour")
     pattern: PATTERNS = quantity("RGGB", label="Bayer pattern", help="Colours of the first 2 x 2 pixels.")
     efficiency: tuple[SpectralCurve, ...] = quantity(
-        label="Quantum efficiency", help="One curve for mono; R, G, B for Bayer.", min_length=1, max_length=3
+        (CMOS,), label="Quantum efficiency", help="One curve for mono; R, G, B for Bayer.", min_length=1, max_length=3
     )
     band_pass: BandPass | None = quantity(None, label="Band-pass filter")
     exposure_time: float = quantity(1e-3, unit="s", label="Exposure time", ge=1e-9, le=1e4)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import ValidationError
+from pydantic import PrivateAttr, ValidationError
 
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
@@ -18,26 +19,58 @@ from render.scene.shape import MeshFile
 from render.sensor.sensor import Sensor
 from studio.project.migrations import migrate
 from studio.project.strict_json import parse_object, pretty, read_object
+from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.project.validation_messages import input_error
 
 MAX_SEED = 2**63 - 1
 
 
 class Project(Model):
-    """Frozen; what a file leaves out takes the defaults, and what it should not hold is refused."""
+    """Frozen; what a file leaves out takes the defaults, and what it should not hold is refused.
+
+    >>> import studio as blazer
+    >>> project = blazer.Project.load("plane")
+    >>> project.scene.camera.width, project.scene.lasers[0].power
+    (2448, 0.02)
+    """
 
     schema_version: Literal[2] = 2
     name: str = quantity("untitled", label="Name", min_length=1, max_length=200)
     seed: int = quantity(0, label="Seed", help="Decides every random number of the scan.", ge=0, le=MAX_SEED)
     scene: Scene
-    sensor: Sensor
+    sensor: Sensor = Sensor()
     render: RenderSettings = RenderSettings()
     extraction: ExtractionSettings = ExtractionSettings()
+    _folder: Path = PrivateAttr(default_factory=Path)
+
+    @property
+    def folder(self) -> Path:
+        """What the paths of meshes and textures start from: the file's folder, of a project made in Python ".".
+
+        Not part of the project: two that differ in nothing else are equal.
+        """
+        return self._folder
+
+    def in_folder(self, folder: Path | str) -> Self:
+        """The same project, whose meshes and textures are looked for below another folder."""
+        copied = self.model_copy()
+        copied._folder = Path(folder)
+        return copied
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Read, migrate and validate a project file. InputError: one message for all that is wrong with it."""
-        return cls.from_data(read_object(Path(path)), str(path))
+        """Read, migrate and validate a project: a file, a folder with one, or, as a str, the name of a template.
+
+        What lies at the path comes before the template of that name.
+        InputError: one message for all that is wrong with it.
+        """
+        try:
+            file = project_file(_template_or_path(path) if isinstance(path, str) else Path(path))
+        except TypeError:
+            kind = type(path).__name__
+            allowed = "a template's name or a path"
+            raise InputError("a project is loaded by name", found=kind, allowed=allowed) from None
+        return cls.from_data(read_object(file), str(file)).in_folder(file.parent)
 
     @classmethod
     def from_text(cls, text: str, where: str = "project") -> Self:
@@ -65,7 +98,7 @@ class Project(Model):
         with atomic_write(target) as temporary:
             temporary.write_text(signed.to_text(), encoding="utf-8")
         remove_unfinished(target)
-        return signed
+        return signed.in_folder(target.parent)
 
     def with_digests(self, root: Path) -> Self:
         """The same project with the SHA-256 of each mesh file found below `root`; a missing mesh keeps what it had."""
@@ -78,6 +111,22 @@ class Project(Model):
             objects.append(item)
         scene = self.scene.model_copy(update={"objects": tuple(objects)})
         return self.model_copy(update={"scene": scene})
+
+
+def _template_or_path(name: str) -> Path:
+    """What a word means. InputError: neither a path that is there nor a template, and it does not look like a path."""
+    path = Path(name)
+    if not name.strip() or path.exists() or path.suffix or len(path.parts) != 1:
+        return path
+    if name in DESCRIPTIONS:
+        return template_folder(name)
+    near = difflib.get_close_matches(name, DESCRIPTIONS, n=1)
+    raise InputError(
+        "there is no such project",
+        found=name,
+        allowed=f"a file, a folder, or a template: {', '.join(DESCRIPTIONS)}",
+        cure=f"did you mean {near[0]}?" if near else "",
+    )
 
 
 def project_file(path: Path) -> Path:

@@ -1,6 +1,9 @@
-"""How well each light group of a frame is known so far, in words: for progress, results and the render panel."""
+"""How well each light group of a frame is known so far, in words and as data: for progress, results, a notebook."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
 
 from render.ambient.transport_plan import has_ambient
 from render.base.counts import (
@@ -10,6 +13,7 @@ from render.base.counts import (
     AMBIENT_SAMPLES,
     DIRECT_DROPPED,
     DIRECT_ERROR,
+    DIRECT_SAMPLES,
     INDIRECT_CLAMPED,
     INDIRECT_DROPPED,
     INDIRECT_ERROR,
@@ -90,3 +94,49 @@ def _ambient(frame: Frame, settings: RenderSettings) -> str:
 
 def _left_out(dropped: float | None) -> list[str]:
     return [f"{dropped:.0f} contributions were no number, and were left out"] if dropped else []
+
+
+@dataclass(frozen=True)
+class GroupQuality:
+    """How well one light group is known: the numbers behind `group_lines`."""
+
+    group: Literal["direct", "indirect", "ambient"]
+    laser: str | None
+    """Its name; None: ambient light."""
+    error: float
+    """Relative RMS error, a fraction; NaN: not known."""
+    target: float
+    """The error that was requested."""
+    work: float
+    """In `unit`."""
+    unit: Literal["samples", "light paths", "samples a pixel"]
+    dropped: float
+    """Contributions that were no number, and were left out."""
+    clamped: float
+    """Contributions cut by a clamp, which biases the group."""
+
+    @property
+    def reached(self) -> bool:
+        """The error is at most the target; where it is not, the work or the time that was allowed ended it."""
+        return self.error <= self.target
+
+
+def group_qualities(frame: Frame, scene: Scene, settings: RenderSettings) -> tuple[GroupQuality, ...]:
+    """Of every group that has begun: each laser's direct and indirect light, then ambient light."""
+    counts, found = frame.counts, []
+    for i, laser in enumerate(scene.lasers):
+        if DIRECT_ERROR.of(i) in counts:
+            direct = (counts.get(one.of(i), 0.0) for one in (DIRECT_ERROR, DIRECT_SAMPLES, DIRECT_DROPPED))
+            error, work, dropped = direct
+            target = settings.laser_error
+            found.append(GroupQuality("direct", laser.name, error, target, work, "samples", dropped, 0.0))
+        if INDIRECT_ERROR.of(i) in counts:
+            indirect = (INDIRECT_ERROR, LIGHT_PATHS, INDIRECT_DROPPED, INDIRECT_CLAMPED)
+            error, work, dropped, clamped = (counts.get(one.of(i), 0.0) for one in indirect)
+            target = settings.indirect_error
+            found.append(GroupQuality("indirect", laser.name, error, target, work, "light paths", dropped, clamped))
+    if frame.ambient is not None:
+        work, dropped, clamped = (counts.get(one, 0.0) for one in (AMBIENT_SAMPLES, AMBIENT_DROPPED, AMBIENT_CLAMPED))
+        error, target = counts.get(AMBIENT_ERROR, float("nan")), settings.ambient_error
+        found.append(GroupQuality("ambient", None, error, target, work, "samples a pixel", dropped, clamped))
+    return tuple(found)

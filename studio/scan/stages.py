@@ -19,6 +19,7 @@ from render.render import render_world
 from render.scan_plan import ScanPlan
 from render.scene.motion import NoMotion
 from render.sensor.develop import Image
+from render.sensor.sensor import Sensor
 from render.world.world import World, build_world
 from studio.project.project import Project
 from studio.runtime.console import FRAMES
@@ -79,8 +80,12 @@ def scaled(project: Project, image_scale: float) -> Project:
     if image_scale == 1.0:
         return project
     scene = project.scene.scaled(image_scale)
-    sensor = project.sensor.model_copy(update={"exposure_time": project.sensor.exposure_time * image_scale**2})
-    return project.model_copy(update={"scene": scene, "sensor": sensor})
+    return project.model_copy(update={"scene": scene, "sensor": scaled_sensor(project.sensor, image_scale)})
+
+
+def scaled_sensor(sensor: Sensor, image_scale: float) -> Sensor:
+    """The sensor of `scaled`."""
+    return sensor.model_copy(update={"exposure_time": sensor.exposure_time * image_scale**2})
 
 
 def validated(project: Project, where: str) -> Project:
@@ -136,14 +141,24 @@ def develop_step(
 
     laser_power: W of each, in place of the scene's, which the frame was rendered with.
     """
-    scene, images = project.scene, []
-    powers = [laser.power for laser in scene.lasers] if laser_power is None else laser_power
     frame.check()  # it may come from a file
     with clock.stage("sensor"):
-        for i in range(len(scene.lasers)):
-            power = [value if i == k else 0.0 for k, value in enumerate(powers)]
-            images.append(expose(project, frame, power, i, threads=threads))
-    return images
+        return [develop_laser(project, frame, i, threads, laser_power) for i in range(len(project.scene.lasers))]
+
+
+def develop_laser(
+    project: Project,
+    frame: Frame,
+    laser: int,
+    threads: int | None = None,
+    laser_power: Sequence[float] | None = None,
+    *,
+    noise: bool = True,
+) -> Image:
+    """The image while one laser fires; laser_power as in `develop_step`."""
+    powers = [one.power for one in project.scene.lasers] if laser_power is None else laser_power
+    alone = [value if laser == k else 0.0 for k, value in enumerate(powers)]
+    return expose(project, frame, alone, laser, noise=noise, threads=threads)
 
 
 def measure_step(
@@ -169,8 +184,7 @@ def measure_step(
         with clock.stage("triangulation"):
             points = triangulate_line(project, line, i, frame.step)
         with clock.stage("comparison with the truth"):
-            pose = project.scene.T_world_camera(frame.step)
-            errors = compare(points, line, frame.curves[i], world.vertices, world.triangles, pose)
+            errors = compare_points(project, frame, world, points, line, i)
         found.append(Measurement(frame.step, i, image, line, points, errors))
     return found
 
@@ -185,3 +199,9 @@ def triangulate_line(project: Project, line: Line, laser: int, step: int) -> Poi
         T_rig_camera=scene.camera.T_rig_camera.matrix,
         T_world_camera=scene.T_world_camera(step),
     )
+
+
+def compare_points(project: Project, frame: Frame, world: World, points: Points, line: Line, laser: int) -> Errors:
+    """Errors of one laser's points against the truth of a frame; world: placed for its step."""
+    pose = project.scene.T_world_camera(frame.step)
+    return compare(points, line, frame.curves[laser], world.vertices, world.triangles, pose)

@@ -213,9 +213,14 @@ class TestDamagedFiles:
         with pytest.raises(InputError, match="no such project file"):
             Project.load(tmp_path / "a.json")
 
-    def test_a_folder(self, tmp_path: Path) -> None:
-        with pytest.raises(InputError, match="a folder"):
+    def test_a_folder_without_a_project(self, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match="the folder does not hold one project; found none"):
             Project.load(tmp_path)
+
+    def test_a_word_that_is_no_path_and_no_template(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(InputError, match=r"no such project; found weld_sea.*v_groove.*did you mean weld_seam"):
+            Project.load("weld_sea")
 
     def test_an_empty_file(self, tmp_path: Path) -> None:
         assert "is empty" in self.write(tmp_path / "a.json", b" \n")
@@ -357,6 +362,30 @@ class TestAnyFile:
     @given(cut=st.integers(0, len(SAMPLE_FILE.read_bytes())), junk=st.binary(max_size=20))
     def test_cut_and_spoilt_bytes_are_valid_or_refused(self, path: Path, cut: int, junk: bytes) -> None:
         valid_or_refused(SAMPLE_FILE.read_bytes()[:cut] + junk, path)
+
+
+class TestWhatLoadTakes:
+    def test_a_template_by_its_name_a_folder_and_a_file_are_the_same_project(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        folder = template_folder("plane")
+        named = Project.load("plane")
+        assert named == Project.load(folder) == Project.load(str(folder / "project.json"))
+        assert named.folder == folder
+
+    def test_what_lies_there_comes_before_the_template_of_its_name(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        Project.load("sphere").save(tmp_path / "plane" / "own.json")
+        assert Project.load("plane").name == Project.load("sphere").name
+
+    def test_copies_keep_the_folder_of_the_files_and_saving_moves_it(self, tmp_path: Path) -> None:
+        project = Project.load("plane")
+        assert project.model_copy(update={"seed": 5}).folder == project.folder
+        assert project.save(tmp_path / "a.json").folder == tmp_path
+        assert Project.from_text(project.to_text()).folder == Path()
 
 
 def test_saving_removes_what_a_killed_save_left_long_ago(tmp_path: Path) -> None:
