@@ -1,4 +1,4 @@
-"""Materials. Each object has one; `kind` tells which model, so that more can join without changing a file.
+"""Materials. Each object has one; `kind` tells which model, so that older projects stay readable when one joins.
 
 Two-sided are the opaque ones: light on either side is treated alike. One-sided are glass and subsurface, whose normals
 point out of the substance, and the light of an emitter, which leaves where its normals point.

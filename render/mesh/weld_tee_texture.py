@@ -1,6 +1,6 @@
 """Procedural albedo of the tee joint on its developed front: rust, a ground band along the seam, and the bead.
 
-`python -m render.weld_tee_texture FOLDER` writes the images that the sample project uses.
+`python -m render.mesh.weld_tee_texture FOLDER` writes the images that the sample project uses.
 """
 
 from __future__ import annotations
