@@ -65,6 +65,8 @@ class Commands(click.Group):
                     raise ended
                 code: Any = ended if isinstance(ended, int) else 0
                 finish(code)
+                if args is None:
+                    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done and said
             except SystemExit as ended:  # click's end of shell completion, and of help that nobody reads
                 code = BROKEN_PIPE if ended.code == 1 else ended.code
             except BaseException as error:

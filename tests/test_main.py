@@ -287,7 +287,7 @@ class TestProcess:
     @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
     def test_a_second_ctrl_c_ends_the_wait_for_threads_without_a_word(self) -> None:
         code = (
-            "import main, sys, threading, studio.commands as commands\n"
+            "import main, sys, threading, studio.commands.commands as commands\n"
             "def busy(*_, **__):\n"
             "    threading.Thread(target=threading.Event().wait, args=(600,)).start()\n"
             "    raise KeyboardInterrupt\n"

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from render import scan_plan
-from render.laser_indirect.path_vertex import PLAIN
+from render.laser_indirect.path_vertex import INTERREFLECTION
 from render.laser_indirect.transport_plan import TRANSPORT_STEPS, pilot_shares
 from render.material.material import Conductor
 from render.scan_plan import looked_at, plan_scan
@@ -49,9 +49,9 @@ def test_the_plan_is_the_same_on_any_number_of_threads_and_says_what_it_is(groov
 
     one, two = (plan_scan(scene, RenderSettings(), at, seed=3, threads=threads) for threads in (1, 2))
     assert one == two and set(asked) == set(looked_at(12))
-    assert one.light.kinds == PLAIN
+    assert one.light.kinds == INTERREFLECTION
     assert "the same for all 12 frames: pilots on the steps 0, 2, 5, 8, 11" in one.light.text
-    assert one.mark == f"laser light {PLAIN}, ambient light 1"
+    assert one.mark == f"laser light {INTERREFLECTION}, ambient light 1"
 
 
 @pytest.mark.parametrize(("share", "computed"), [(0.03, True), (0.015, False), (math.inf, True)])

@@ -44,10 +44,10 @@ def passes(*images):
 def test_what_is_no_number_is_left_out_and_counted():
     connections, buffer = empty_connections(6), empty_buffer(8)
     connections.contribution[:] = (1.0, math.nan, math.inf, -1.0, 2.0, 4.0)
-    connections.pixel[:], connections.kind[:], connections.part[:] = np.arange(6), 0, 0
+    connections.pixel[:], connections.kind[:], connections.fan_bin[:] = np.arange(6), 0, 0
     splat_unoccluded(connections, np.array([False] * 5 + [True]), 6, 0.5, buffer)
     assert buffer.image.tolist() == [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-    assert buffer.dropped[0] == 3.0 and np.isfinite(buffer.found).all() and np.isfinite(buffer.sums).all()
+    assert buffer.dropped[0] == 3.0 and np.isfinite(buffer.fan_moments).all() and np.isfinite(buffer.sums).all()
     so_far = nothing()
     so_far.add([buffer, empty_buffer(8)], np.zeros((2, 0, BINS)))
     assert so_far.dropped == 3.0 and np.isfinite(so_far.radiance((2, 4))).all()

@@ -149,10 +149,6 @@ def test_a_gigantic_mesh_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     # The header alone tells; nothing of that size is made.
     header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nelement face 60000000\n"
     assert "too many triangles; found 60000000" in message_of_text(tmp_path, "a.ply", header + "end_header\n")
-    with open(tmp_path / "b.stl", "wb") as file:  # sparse: takes no disk
-        file.write(bytes(80) + struct.pack("<I", 21_000_000))
-        file.truncate(84 + 50 * 21_000_000)
-    assert "too many triangles; found 21000000" in message(tmp_path, "b.stl")
     with open(tmp_path / "c.stl", "wb") as file:
         file.truncate(5 * 2**30)
     assert "c.stl: the mesh file is too big; found 5368709120 bytes" in message(tmp_path, "c.stl")

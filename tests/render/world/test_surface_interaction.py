@@ -320,4 +320,4 @@ def test_no_light_leaks_through_a_sheet_whatever_its_relief(tmp_path, steep, lea
     image = indirect_image(world, scene.camera, scene.lasers[0], pose, T_laser, target=0.5, most_paths=1 << 20)
     assert not image.radiance.any()
     # there is light behind
-    assert indirect_shares(world, scene.camera, scene.lasers[0], T_laser, T_laser).plain[0] > 0.0
+    assert indirect_shares(world, scene.camera, scene.lasers[0], T_laser, T_laser).interreflection[0] > 0.0
