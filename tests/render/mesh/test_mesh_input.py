@@ -161,6 +161,8 @@ def test_a_gigantic_mesh_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     scene.export(tmp_path / "d.glb")
     monkeypatch.setattr(render.mesh.mesh_headers, "MAX_TRIANGLES", 59)
     assert "too many triangles; found 60" in message(tmp_path, "d.glb")
+    (tmp_path / "b.stl").write_bytes(bytes(80) + struct.pack("<I", 61) + bytes(61 * 50))
+    assert "too many triangles; found 61" in message(tmp_path, "b.stl")
 
 
 @pytest.mark.parametrize("kind", ["ply", "ply_ascii", "stl", "stl_ascii", "obj", "off", "glb", "gltf"])
