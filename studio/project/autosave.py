@@ -7,7 +7,6 @@ however it ends, so that a file without a holder is what a crash left behind.
 from __future__ import annotations
 
 import contextlib
-import datetime
 import json
 import os
 import re
@@ -19,6 +18,7 @@ from typing import IO, Any
 
 from render.base.errors import InputError
 from render.base.files import atomic_write
+from studio.project.date_and_time import now
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.project.strict_json import read_object
@@ -86,7 +86,7 @@ class Autosave:
             "format_version": FORMAT_VERSION,
             "path": None if document.path is None else str(document.path.absolute()),
             "root": str(document.root.absolute()),
-            "when": datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds"),
+            "when": now(),
             "project": document.project.model_dump(mode="json"),
         }
         with atomic_write(self.file) as temporary:

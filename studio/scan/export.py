@@ -18,12 +18,13 @@ from render.frame import Frame
 from render.output.frame_files import write_frame
 from render.sensor.develop import Image
 from render.world.world import World, build_world
+from studio.project.date_and_time import now
 from studio.project.input_files import input_files
 from studio.project.project import Project
 from studio.scan.cautions import Cautions
 from studio.scan.own_files import check_not_read, check_replaceable
 from studio.scan.remarks import Measurements, best, frame_result
-from studio.scan.results import now, report_input
+from studio.scan.results import report_input
 from studio.scan.summary import summarise
 
 

@@ -16,6 +16,7 @@ from filelock import FileLock, Timeout
 
 from render.base.errors import InputError
 from render.base.files import read_bytes
+from studio.project.date_and_time import now
 
 LOCK = ".scan.lock"
 LONGEST = 4096
@@ -65,7 +66,7 @@ def _sign(descriptor: int) -> None:
     holder = {
         "pid": os.getpid(),
         "host": socket.gethostname(),
-        "since": _now(),
+        "since": now(),
         "command": " ".join(Path(word).name if i == 0 else word for i, word in enumerate(sys.argv))[:1000],
     }
     with suppress(OSError):  # a full disk: the lock holds all the same
@@ -81,9 +82,3 @@ def _holder(path: Path) -> str:
     except (InputError, ValueError, KeyError, TypeError):  # just begun, or the system keeps a lock from being read
         return "a program that does not say which"
     return "".join(letter if letter.isprintable() else "?" for letter in words)
-
-
-def _now() -> str:
-    import datetime
-
-    return datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")

@@ -15,8 +15,9 @@ from analysis.report.record import ScanRecord
 from render.frame import Frame
 from render.sensor.develop import Image
 from render.world.world import World
+from studio.project.date_and_time import now
 from studio.project.project import Project
-from studio.scan.results import compared_methods, measure_frame, now, report_input
+from studio.scan.results import compared_methods, measure_frame, report_input
 from studio.scan.spacetime_window import Passing, Sweep, Taken
 from studio.scan.stages import Clock
 

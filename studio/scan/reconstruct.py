@@ -10,13 +10,13 @@ from render.base.errors import InputError
 from render.output.frame_files import read_frame
 from render.world.material_checks import scene_warnings
 from render.world.world import build_world
+from studio.project.date_and_time import now
 from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
 from studio.scan.measuring import Measuring
 from studio.scan.redevelop import development
 from studio.scan.remarks import result_remarks
-from studio.scan.results import now
 from studio.scan.stages import Clock, develop_step, step_world
 from studio.scan.summary import summarise
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import platform
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -117,8 +116,3 @@ def versions() -> dict[str, str]:
         with suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(name)
     return found
-
-
-def now() -> str:
-    """Date and time with its zone, to the second."""
-    return datetime.datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")

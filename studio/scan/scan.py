@@ -17,6 +17,7 @@ from render.output.frame_files import write_frame
 from render.scan_plan import ScanPlan, plan_scan
 from render.sensor.develop import Image, develop
 from render.world.world import World, build_world
+from studio.project.date_and_time import now
 from studio.project.input_files import input_hashes
 from studio.project.project import Project
 from studio.scan import scan_folder
@@ -26,7 +27,6 @@ from studio.scan.light_group_status import group_lines
 from studio.scan.measuring import Measuring
 from studio.scan.remarks import result_remarks
 from studio.scan.rendered_from import made_of
-from studio.scan.results import now
 from studio.scan.resume import Refined, frame_of_step, settle
 from studio.scan.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world, validated
 from studio.scan.summary import summarise
