@@ -1,8 +1,17 @@
-"""Every run of the tests is the same run: property tests draw from a fixed seed and never fail for being slow."""
+"""Every run of the tests is the same run: property tests draw from a fixed seed and never fail for being slow.
+
+A shell has the programs that it starts in the background ignore Ctrl-C, and their own programs with them: here it is
+heard, so that tests of it mean the same however they were started.
+"""
 
 from __future__ import annotations
+
+import signal
 
 from hypothesis import settings
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, print_blob=True)
 settings.load_profile("repeatable")
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
