@@ -274,8 +274,8 @@ def indirect_shares(
     for number in range(passes):
         buffer = empty_buffer(camera.width * camera.height)
         task.run(number, sampling, buffer, cancelled)
-        diffuse, caustic, subsurface, both, specular_chain = buffer.sums
-        sums.append((diffuse, caustic, specular_chain, subsurface + both))
+        interreflection, caustic, subsurface, both, specular_chain = buffer.sums
+        sums.append((interreflection, caustic, specular_chain, subsurface + both))
     mean, error = np.mean(sums, axis=0), np.std(sums, axis=0, ddof=1) / math.sqrt(passes)
     return Shares(*((float(m), float(e)) for m, e in zip(mean, error, strict=True)))
 
