@@ -31,6 +31,8 @@ except ModuleNotFoundError as missing:
 
 VERSION = "0.1.0"
 BAD_INPUT, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 3, 130, 141
+LONGEST_MESSAGE = 2000
+"""Characters; what click and the system quote may be of any length."""
 NEEDS_LESS = "fewer pixels (--scale, where a command has it) or smaller meshes, textures and images need less"
 ISSUE_HINT = "this is a fault of Blazer Studio, please report it; --debug shows where it happened"
 
@@ -117,6 +119,8 @@ def _report_error(error: BaseException, debug: bool, as_json: bool) -> int:
         import traceback
 
         traceback.print_exception(error)
+    if len(text) > LONGEST_MESSAGE:
+        text = f"{text[: LONGEST_MESSAGE // 2]} ... {text[-LONGEST_MESSAGE // 2 :]}"
     print(f"error: {text}", file=sys.stderr)
     if as_json:
         with suppress(OSError):

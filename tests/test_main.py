@@ -100,6 +100,11 @@ class TestExitCodes:
         assert told.exit_code == 2 and answer["ok"] is False and answer["exit_code"] == 2
         assert answer["error"]["message"] in told.stderr
 
+    @pytest.mark.parametrize("arguments", [["render", "x/" * 5000], ["reconstruct", "scan", "--laser", "x" * 10_000]])
+    def test_what_is_wrong_is_told_on_one_screen_however_long_it_is(self, arguments: list[str]) -> None:
+        done = call(*arguments, "--json")
+        assert done.exit_code == 2 and len(json.loads(done.stdout)["error"]["message"]) <= main.LONGEST_MESSAGE + 5
+
     def test_every_option_of_every_command_that_is_wrong_is_told_as_json(self) -> None:
         for name, command in main.cli.commands.items():
             for option in [item for item in command.params if item.opts[0].startswith("--")]:

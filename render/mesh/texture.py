@@ -14,8 +14,8 @@ from render.base.files import read_bytes
 
 Float32 = NDArray[np.float32]
 
-MAX_PIXELS = 2**26
-"""Of one image, and of all of a scene together; about 0.8 GB once decoded."""
+MAX_PIXELS = 25_000_000
+"""Of one image, and of all of a scene together; 0.3 GB once decoded, and twice that while a world is put together."""
 MAX_FILE_BYTES = 2**29
 ALLOWED = "a whole PNG, JPEG, TIFF, BMP or WebP image of 8 or 16 bit"
 

@@ -135,6 +135,7 @@ def _words_after(keyword: bytes, data: bytes) -> list[str]:
     return [line.decode("utf-8", "replace").strip() for line in lines[:MAX_PARTS]]
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # coordinates beyond all bounds are refused in words
 def read_parts(path: Path, where: str, files: SideFiles, *, colours: bool) -> list[Part]:
     """All triangles of a file, placed by its scene graph; polygons are cut into triangles.
 

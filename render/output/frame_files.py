@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from render.base.counts import counts_from
 from render.base.errors import InputError
-from render.base.files import atomic_write, read_bytes
+from render.base.files import atomic_write, check_regular, read_bytes, sha256
 from render.frame import Frame, Truth
 from render.output.exr import decode_exr
 from render.output.sidecar import (
@@ -99,11 +99,11 @@ def read_frame(path: Path | str) -> Frame:
     except UnicodeDecodeError:
         raise InputError("the frame's description is not UTF-8 text", where=str(sidecar), cure=AGAIN) from None
     record = from_text(text, str(sidecar))
-    content = read_bytes(exr, MAX_EXR_BYTES, "frame's image")
-    if hashlib.sha256(content).hexdigest() != record.get("exr_sha256"):
+    check_regular(exr, MAX_EXR_BYTES, "frame's image")
+    if sha256(exr) != record.get("exr_sha256"):  # before it is read: the wrong file may be of any size
         allowed = f"the file written together with {sidecar.name}"
         raise InputError("the image is damaged or of another frame", where=str(exr), allowed=allowed, cure=AGAIN)
-    layers = decode_exr(content, str(exr))
+    layers = decode_exr(read_bytes(exr, MAX_EXR_BYTES, "frame's image"), str(exr))
     try:
         return _frame(record, layers)
     except (AttributeError, KeyError, OverflowError, TypeError, ValueError):

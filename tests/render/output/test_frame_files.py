@@ -18,8 +18,10 @@ import numpy as np
 import OpenEXR
 import pytest
 
+import render.output.frame_files
 from render.base.counts import DIRECT_ERROR, DIRECT_SAMPLES, LIT_PIXELS, RAYS, Quantity, counts_from
 from render.base.errors import InputError
+from render.base.files import read_bytes
 from render.base.pose import Pose
 from render.camera.camera import Camera
 from render.frame import Frame, LaserCurve, Truth
@@ -282,6 +284,24 @@ def test_a_description_changed_since_it_was_written_is_refused(written: list[Pat
     written[2].write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(InputError, match=r"frame_0003\.json: the frame's description was changed.*render the"):
         read_frame(written[0])
+
+
+def test_an_image_of_another_frame_is_refused_before_it_is_read(
+    written: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """3 GB of nothing, say: its checksum takes no memory."""
+    read = []
+
+    def reading(path: Path, most: int, what: str) -> bytes:
+        read.append(path.suffix)
+        return read_bytes(path, most, what)
+
+    monkeypatch.setattr(render.output.frame_files, "read_bytes", reading)
+    with open(written[0], "r+b") as file:
+        file.truncate(1 << 20)
+    with pytest.raises(InputError, match="of another frame"):
+        read_frame(written[0])
+    assert read == [".json"]
 
 
 def test_no_message_about_a_damaged_frame_is_in_a_librarys_words(written: list[Path]) -> None:
