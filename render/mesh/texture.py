@@ -17,6 +17,8 @@ Float32 = NDArray[np.float32]
 MAX_PIXELS = 25_000_000
 """Of one image, and of all of a scene together; 0.3 GB once decoded, and twice that while a world is put together."""
 MAX_FILE_BYTES = 2**29
+CHUNK = 2**20
+"""Codes looked up at a time: NumPy indexes by a copy of 8 bytes a code."""
 ALLOWED = "a whole PNG, JPEG, TIFF, BMP or WebP image of 8 or 16 bit"
 
 
@@ -36,7 +38,13 @@ def linear_reflectance(codes: NDArray[Any], *, srgb: bool = True) -> Float32:
     """Codes of any shape, uint8 or uint16, to linear float32 in [0, 1]."""
     top = np.iinfo(codes.dtype).max
     table = np.arange(top + 1) / top
-    return (srgb_to_linear(table) if srgb else table).astype(np.float32)[codes]
+    table = (srgb_to_linear(table) if srgb else table).astype(np.float32)
+    linear = np.empty(codes.shape, np.float32)
+    given, found = np.ascontiguousarray(codes).reshape(-1), linear.reshape(-1)
+    for start in range(0, given.size, CHUNK):
+        part = slice(start, start + CHUNK)
+        found[part] = table[given[part]]
+    return linear
 
 
 def load_texture(path: Path, *, srgb: bool, scale: float, where: str) -> Float32:
@@ -93,15 +101,16 @@ def decode_texture(data: bytes, *, srgb: bool, scale: float, where: str) -> Floa
     ImageFile.LOAD_TRUNCATED_IMAGES = False
     image_size(data, where)
     try:
-        # Pillow refuses a cut image; OpenCV keeps 16 bit.
         with Image.open(io.BytesIO(data)) as image:
-            image.load()
-            codes: NDArray[Any] | None = cv2.imdecode(
-                np.frombuffer(data, dtype=np.uint8),
-                cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION,
-            )
-            if codes is None:  # a format that only Pillow knows
-                codes = np.asarray(image.convert("RGB"))[:, :, ::-1]
+            image.load()  # Pillow refuses a cut image; OpenCV keeps 16 bit
+        del image
+        codes: NDArray[Any] | None = cv2.imdecode(
+            np.frombuffer(data, dtype=np.uint8),
+            cv2.IMREAD_COLOR_RGB | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION,
+        )
+        if codes is None:  # a format that only Pillow knows
+            with Image.open(io.BytesIO(data)) as image:
+                codes = np.asarray(image.convert("RGB"))
     except MemoryError:
         raise
     except Exception as error:  # Pillow and OpenCV raise many kinds on damaged data, in words of their own
@@ -109,6 +118,6 @@ def decode_texture(data: bytes, *, srgb: bool, scale: float, where: str) -> Floa
         raise InputError("the texture cannot be read", where=where, found=found, allowed=ALLOWED) from error
     if codes.dtype not in (np.uint8, np.uint16):
         raise InputError("the texture's number type is not known", where=where, found=codes.dtype, allowed=ALLOWED)
-    linear = linear_reflectance(codes[:, :, ::-1], srgb=srgb)
+    linear = linear_reflectance(codes, srgb=srgb)
     linear *= np.float32(scale)
-    return np.ascontiguousarray(linear)
+    return linear

@@ -91,6 +91,12 @@ class MaterialAtlas:
         self.known[id(image)] = image, place
         return place
 
+    def joined_images(self) -> Float32:
+        """(n,) all images, one after the other; a single one is not copied."""
+        if len(self.images) == 1:
+            return self.images[0]
+        return np.concatenate(self.images) if self.images else np.zeros(0, dtype=np.float32)
+
     def _add_detail(self, material: BaseMaterial, mesh: Mesh, where: str) -> None:
         flags = SMOOTH_NORMALS if mesh.normals is not None else 0
         roughness, relief, least, factors = NOWHERE, NOWHERE, 1.0, (0.0, 0.0)

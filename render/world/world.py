@@ -136,7 +136,7 @@ def place_meshes(scene: Scene, meshes: list[Mesh], step: int = 0, root: Path | N
         object_id=np.concatenate(object_ids) if object_ids else np.zeros(0, dtype=np.int32),
         uv=np.ascontiguousarray(np.concatenate(uvs), dtype=np.float32) if keep_uv else np.zeros((0, 3, 2), np.float32),
         albedo=np.array(atlas.albedo).reshape(-1, 3),
-        textures=np.concatenate(atlas.images) if atlas.images else np.zeros(0, dtype=np.float32),
+        textures=atlas.joined_images(),
         texture_shape=np.array(atlas.shapes, dtype=np.int32).reshape(-1, 3),
         second=np.array(atlas.second, dtype=np.int32),
         mask_shape=np.array(atlas.masks, dtype=np.int32).reshape(-1, 3),
