@@ -7,8 +7,8 @@
 Goodman, Speckle Phenomena in Optics (2007), 4.6 (integrated speckle is nearly gamma) and 4.5 (circular pupil). A
 depolarised surface throws two independent patterns, which halves C. Each pixel is cut into 2 x 2, over which the light
 is taken to run exponentially, since the flanks of a narrow line fill their pixels unevenly. Fully developed, from a
-surface rough against the wavelength; the grain does not depend on focus. A wide line's centre then scatters by
-C sqrt(A_c s / (4 sqrt(pi) p^2)) px, A_c = 4 (lambda N)^2 / pi.
+surface rough against the wavelength; the grain does not depend on focus. How far it moves the centre of a line, and how
+alike it moves neighbouring rows, is `position_covariance`.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ STEEPEST = 4.0
 SURFACE = 0x53504543
 """Keeps the surface's numbers apart from the sensor's."""
 _PATTERN = 16
+SPECTRUM = 513
+"""Frequencies across the line at which a row's power spectrum is tabled."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ def speckle(wavelength_nm: float, f_number: float, pixel_pitch: float, depolaris
     from scipy.special import gammaincinv, ndtr
 
     patterns = 2.0 if depolarised else 1.0
-    grain = wavelength_nm * 1e-9 * f_number / pixel_pitch
+    grain = speckle_grain(wavelength_nm, f_number, pixel_pitch)
     whole, _ = _covariance(grain)
     part, evenness = _covariance(CUTS * grain)
     middle, centre = whole.shape[0] // 2, part.shape[0] // 2
@@ -74,6 +76,64 @@ def speckle(wavelength_nm: float, f_number: float, pixel_pitch: float, depolaris
     taps = _taps(_normal_correlation(part / part[centre, centre], shape))
     variance = whole[middle, middle]
     return Speckle(math.sqrt(variance / patterns), whole / variance, taps, quantile, evenness)
+
+
+def speckle_grain(wavelength_nm: float, f_number: float, pixel_pitch: float) -> float:
+    """Diameter lambda N of the speckles in pixels; f_number is the working one, pixel_pitch in m."""
+    return wavelength_nm * 1e-9 * f_number / pixel_pitch
+
+
+def position_covariance(grain: float, widths: Float, lags: int = 0, depolarised: bool = False) -> Float:
+    """(n,) widths of Gaussian lines, sigma in px before the pixels -> (n, lags + 1) covariance, px^2, of the centres
+    of two rows 0..lags apart: the variance stands first. grain: lambda N in px, as `speckle_grain` gives it.
+
+    A centre of mass, and a fit by maximum likelihood in shot noise, moves to the first order of the contrast by the
+    mean of x S(x, y) over the light of its row. With the power spectrum A_c T of the speckle, T the transfer function
+    of a circular pupil (Goodman 2007, 4.5), and f, h in cycles per pixel across and along the line, that is
+
+        cov(m) = A_c int int w(f) sinc^2(h) cos(2 pi m h) T(grain sqrt(f^2 + h^2)) df dh,      A_c = 4 grain^2 / pi
+        w(f)   = s^2 (2 pi s f)^2 exp(-(2 pi s f)^2) + sum over k != 0 of exp(-(2 pi s (f - k))^2) / (2 pi k)^2
+
+    where the sum holds the place of the pixels under the line, all being alike. A fine grain under a wide line leaves
+    A_c s / (4 sqrt(pi)), the line's form of Dorsch, Haeusler and Herrmann 1994: its deviation is 14 % high for a grain
+    of 0.5 px and 50 to 165 % from 1.5 px. The deviation here is that of coherent simulation within 9 % for widths from
+    0.5 px and grains up to four of them. Beyond, rows that lost nearly all of their light scatter with long tails, and
+    it is low: by 8, 20 and 34 % at five, seven and ten widths. Least squares, which weigh the flanks less by light,
+    scatter 1.3 (0.5 px) to 1.7 times (wide lines) more; an estimator's own share follows from `Speckle.correlation`.
+    """
+    cutoff = 1.0 / grain
+    count = math.ceil(16.0 * (1 + lags) * (cutoff + 2.0))
+    along = (np.arange(count) + 0.5) / count * cutoff
+    across = np.linspace(0.0, cutoff, SPECTRUM)
+    rho = np.minimum(np.hypot(across[:, None], along) * grain, 1.0)
+    transfer = 2.0 / math.pi * (np.arccos(rho) - rho * np.sqrt(1.0 - rho**2))
+    rows = np.sinc(along)[:, None] ** 2 * np.cos(2.0 * np.pi * along[:, None] * np.arange(lags + 1))
+    spectrum = 4.0 * grain**2 / math.pi * (2.0 * cutoff / count) * (transfer @ rows)
+    found = np.empty((len(widths), lags + 1))
+    for i, width in enumerate(widths):
+        f = np.linspace(-cutoff, cutoff, 2 * max(256, math.ceil(50.0 * cutoff * width)) + 1)
+        square = (2.0 * math.pi * width * f) ** 2
+        weight = width**2 * square * np.exp(-square)
+        for k in range(1, int(cutoff + 1.0 / width) + 1):
+            for other in (f - k, f + k):
+                weight += np.exp(-((2.0 * math.pi * width * other) ** 2)) / (2.0 * math.pi * k) ** 2
+        power = np.stack([np.interp(np.abs(f), across, column) for column in spectrum.T])
+        found[i] = (power @ weight) * (f[1] - f[0])
+    return found / (2.0 if depolarised else 1.0)
+
+
+def position_variance(grain: float, widths: Float, depolarised: bool = False) -> Float:
+    """(n,) variance, px^2, of the centres of lines of (n,) widths by speckle: `position_covariance` of a row alone."""
+    return position_covariance(grain, widths, 0, depolarised)[:, 0]
+
+
+def position_correlation(grain: float, width: float, lags: int) -> Float:
+    """(lags + 1,) correlation of the centres of two rows 0..lags apart, 1 at 0, of a line of one width in px.
+
+    The variance of a mean over n rows is that of one times (1 + 2 sum over m < n of (1 - m / n) correlation[m]) / n.
+    """
+    covariance = position_covariance(grain, np.array([width]), lags)[0]
+    return np.asarray(covariance / covariance[0])
 
 
 def _covariance(grain: float) -> tuple[Float, float]:

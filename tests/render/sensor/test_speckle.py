@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from render.sensor.develop import develop
-from render.sensor.speckle import scintillate, speckle
+from render.sensor.speckle import position_correlation, position_variance, scintillate, speckle
 from tests.render.sensor.test_develop import flat_frame, radiance_for, scene_of, sensor_of
 
 Float = NDArray[np.float64]
@@ -77,6 +77,59 @@ def test_fine_grain_follows_the_closed_form():
         field = speckle(450, f_number, PITCH, depolarised)
         centres = centroids(scintillate(line, 0, 4000, field, 2, 0, 0).astype(np.float64), sigma)
         assert centres.std() == pytest.approx(factor * expected, rel=0.10)
+
+
+def coherent_lines(grain: float, sigma: float, fields: int) -> Float:
+    """(fields, 64) errors of centres, px, of lines at random places on the pixels, in fully developed speckle."""
+    rng = np.random.default_rng(5)
+    cuts, half, height = max(6, int(np.ceil(4.0 / grain))), int(np.ceil(4.0 * sigma)) + 4, 64
+    shape = (height * cuts, (2 * half + 1) * cuts)
+    inside = np.hypot(np.fft.fftfreq(shape[0], 1 / cuts)[:, None], np.fft.fftfreq(shape[1], 1 / cuts)) < 0.5 / grain
+    x = (np.arange(shape[1]) + 0.5) / cuts - 0.5 - half
+    found = []
+    for centre in rng.uniform(-0.5, 0.5, fields):
+        light = np.abs(np.fft.ifft2((rng.normal(size=shape) + 1j * rng.normal(size=shape)) * inside)) ** 2
+        light = light * np.exp(-0.5 * ((x - centre) / sigma) ** 2)
+        pixels = light.reshape(height, cuts, 2 * half + 1, cuts).mean(axis=(1, 3))
+        found.append(centroids(pixels, sigma) - centre)
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("grain", "sigma"), [(0.185, 0.7), (0.185, 3.0), (0.5, 1.0), (1.0, 3.0), (1.5, 1.5), (3.0, 1.5), (3.0, 3.0)]
+)
+def test_variance_of_the_line_and_of_its_mean_are_those_of_a_coherent_simulation(grain, sigma):
+    """The deviation within the 9 % that the docstring states; where rows are alike, the mean of eight as well."""
+    errors = coherent_lines(grain, sigma, 80)
+    predicted = np.sqrt(position_variance(grain, np.array([sigma]))[0])
+    assert errors.std() == pytest.approx(predicted, rel=0.09)
+    # 80 x 8 means, as alike as the rows: at least 160 independent ones, whose deviation is known to 6 %
+    correlation = position_correlation(grain, sigma, 7)
+    of_mean = np.sqrt((1.0 + 2.0 * np.sum((1.0 - np.arange(1, 8) / 8.0) * correlation[1:])) / 8.0)
+    assert errors.reshape(80, 8, 8).mean(axis=2).std() == pytest.approx(predicted * of_mean, rel=0.09 + 2.0 * 0.06)
+
+
+@pytest.mark.parametrize("grain", [0.185, 0.5, 1.0, 2.0])
+def test_images_scatter_and_neighbouring_rows_agree_as_the_formula_says(grain):
+    sigma, rows, step = 1.5, 20000, 0.45e-6 / PITCH
+    line = np.tile(line_of(sigma, 10), (rows, 1)).astype(np.float32)
+    for depolarised in (False, True):
+        field = speckle(450.0, grain / step, PITCH, depolarised)
+        centres = centroids(scintillate(line, 0, rows, field, 7, 0, 0).astype(np.float64), sigma)
+        assert centres.var() == pytest.approx(position_variance(grain, np.array([sigma]), depolarised)[0], rel=0.06)
+        correlation = position_correlation(grain, sigma, 2)
+        for lag in (1, 2):
+            found = np.mean(centres[lag:] * centres[:-lag]) / np.mean(centres**2)
+            # five deviations of a correlation from 20,000 rows
+            assert found == pytest.approx(correlation[lag], abs=5.0 / np.sqrt(rows))
+
+
+def test_formula_tends_to_the_closed_form_of_a_fine_grain_under_a_wide_line():
+    for grain, width in ((0.02, 4.0), (0.02, 10.0)):
+        closed = 4.0 / np.pi * grain**2 * width / (4.0 * np.sqrt(np.pi))
+        assert position_variance(grain, np.array([width]))[0] == pytest.approx(closed, rel=0.02)
+    # and is far from it where the grain is as wide as the line
+    assert np.sqrt(4.0 / np.pi * 9.0 / (4.0 * np.sqrt(np.pi)) / position_variance(3.0, np.array([1.0]))[0]) > 2.0
 
 
 def test_neighbouring_pixels_are_as_correlated_as_the_pupil_says():
