@@ -179,7 +179,10 @@ def _plain_material(material: BaseMaterial) -> str:
             return f"{_albedo(material)} under {coat}"
         case Glass():
             what = material.substance.replace("_", " ") if material.index is None else f"index {material.index:g}"
-            return f"transparent, {what}, roughness {_numbers(material.roughness)}, tint {_numbers(material.tint)}"
+            rank = f", priority {material.priority}" if material.priority else ""
+            return (
+                f"transparent, {what}, roughness {_numbers(material.roughness)}, tint {_numbers(material.tint)}{rank}"
+            )
         case Subsurface():
             return (
                 f"translucent, index {material.index:g}, roughness {material.roughness:g}, mean free path "

@@ -29,6 +29,7 @@ from render.ambient.light_sampling import (
 from render.ambient.path_state import EACH_SURFACE, FIRST_SURFACE, PathState, ShadowRays, accumulate
 from render.material.bsdf import ROW, SUBSURFACE, evaluate, is_boundary, is_diffuse, is_specular_row, pdf, sample
 from render.sampling.low_discrepancy import pair
+from render.world.interior_list import bit_of, index_beside, medium_within
 from render.world.surface_interaction import interaction
 from render.world.triangles import Surface, scattering, to_world
 
@@ -119,7 +120,7 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
             o0, o1, o2 = paths.origin[r, 0] + centre[0], paths.origin[r, 1] + centre[1], paths.origin[r, 2] + centre[2]
             d0, d1, d2 = float(paths.direction[r, 0]), float(paths.direction[r, 1]), float(paths.direction[r, 2])
             w0, w1, w2 = float(paths.weight[r, 0]), float(paths.weight[r, 1]), float(paths.weight[r, 2])
-            bsdf_density = float(paths.bsdf_density[r])
+            bsdf_density, outside, bit = float(paths.bsdf_density[r]), paths.interior[r], 0
             distance, cosine = np.inf, 0.0
             n0 = n1 = n2 = p0 = p1 = p2 = 0.0
             if t >= 0:
@@ -145,26 +146,16 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                         far = rows[k, 13] * (o0 - rows[k, 4]) + rows[k, 14] * (o1 - rows[k, 5])
                         far = (far + rows[k, 15] * (o2 - rows[k, 6])) / facing
                         mis_weight = bsdf_mis_weight(lights, k, bsdf_density, o0, o1, o2, far, facing)
-                    accumulate(
-                        sums,
-                        invalid_counts,
-                        pixel_slot,
-                        bound,
+                    l0, l1, l2 = (
                         mis_weight * w0 * rows[k, 1],
                         mis_weight * w1 * rows[k, 2],
                         mis_weight * w2 * rows[k, 3],
                     )
+                    accumulate(sums, invalid_counts, pixel_slot, bound, l0, l1, l2)
                     continue
             if t < 0:
-                accumulate(
-                    sums,
-                    invalid_counts,
-                    pixel_slot,
-                    bound,
-                    w0 * environment[0],
-                    w1 * environment[1],
-                    w2 * environment[2],
-                )
+                l0, l1, l2 = w0 * environment[0], w1 * environment[1], w2 * environment[2]
+                accumulate(sums, invalid_counts, pixel_slot, bound, l0, l1, l2)
                 continue
             index = 2 * pixels[pixel_slot >> 1] + (pixel_slot & 1)
             choice = mask_choice = 0.0
@@ -176,6 +167,10 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                 for column in range(ROW):
                     row[column] = surface.rows[slot, column]
                 row[1], row[2] = alpha[0], alpha[1]
+                bit = bit_of(surface.rows, slot)
+                if bit > 0:
+                    outside &= ~bit
+                    row[3] /= index_beside(surface.rows, outside)
             else:
                 slot = scattering(surface, t, p0, p1, p2, mask_choice, rho)
             k = lights.light_of_material[slot]
@@ -183,15 +178,8 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                 mis_weight = 1.0
                 if bsdf_density > 0.0:
                     mis_weight = bsdf_mis_weight(lights, k, bsdf_density, o0, o1, o2, distance, -cosine)
-                accumulate(
-                    sums,
-                    invalid_counts,
-                    pixel_slot,
-                    bound,
-                    mis_weight * w0 * rows[k, 1],
-                    mis_weight * w1 * rows[k, 2],
-                    mis_weight * w2 * rows[k, 3],
-                )
+                l0, l1, l2 = mis_weight * w0 * rows[k, 1], mis_weight * w1 * rows[k, 2], mis_weight * w2 * rows[k, 3]
+                accumulate(sums, invalid_counts, pixel_slot, bound, l0, l1, l2)
             if depth >= surfaces:
                 continue
             diffuse = not glossy or (is_diffuse(row) and surface.detail[slot] == 0)
@@ -262,12 +250,13 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                             shadow_rays.direction[count, 0], shadow_rays.direction[count, 1] = t0, t1
                             shadow_rays.direction[count, 2] = t2
                             shadow_rays.far[count], shadow_rays.pixel_slot[count] = far, pixel_slot
+                            shadow_rays.interior[count] = outside if diffuse or i[2] > 0.0 else outside | bit
                             shadow_rays.light[count, 0] = weight * w0 * f[0] * rows[k, 1]
                             shadow_rays.light[count, 1] = weight * w1 * f[1] * rows[k, 2]
                             shadow_rays.light[count, 2] = weight * w2 * f[2] * rows[k, 3]
                             count += 1
             r1, r2 = pair(table, seed, index, s, base)
-            side, medium = surface_offset, 0
+            side, medium, interior = surface_offset, 0, outside
             if diffuse:
                 t0, t1, t2, bsdf_density = cosine_direction(r1, r2, n0, n1, n2)
                 bsdf_density *= 1.0 / math.pi
@@ -283,10 +272,15 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                 if facing * leaves <= 0.0:
                     continue
                 side = surface_offset if facing > 0.0 else -surface_offset
+                interior = outside | bit if leaves < 0.0 else outside
                 if row[0] == SUBSURFACE and leaves < 0.0:
-                    # what is met within was connected to nothing
-                    medium, bsdf_density = slot + 1, -1.0
+                    medium = slot + 1
                 w0, w1, w2 = w0 * f[0], w1 * f[1], w2 * f[2]
+            if interior > 0:
+                medium = medium_within(surface.rows, interior) + 1
+            if medium > 0:
+                # what is met within was connected to nothing
+                bsdf_density = -1.0
             if not w0 + w1 + w2 > 0.0:
                 continue
             if last:
@@ -306,11 +300,8 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                 shadow_rays.origin[count, 0] = p0 - centre[0] + side * n0
                 shadow_rays.origin[count, 1] = p1 - centre[1] + side * n1
                 shadow_rays.origin[count, 2] = p2 - centre[2] + side * n2
-                shadow_rays.direction[count, 0], shadow_rays.direction[count, 1], shadow_rays.direction[count, 2] = (
-                    t0,
-                    t1,
-                    t2,
-                )
+                shadow_rays.direction[count, 0], shadow_rays.direction[count, 1] = t0, t1
+                shadow_rays.direction[count, 2], shadow_rays.interior[count] = t2, interior
                 shadow_rays.light[count, 0], shadow_rays.light[count, 1], shadow_rays.light[count, 2] = l0, l1, l2
                 shadow_rays.far[count], shadow_rays.pixel_slot[count] = far, pixel_slot
                 count += 1
@@ -326,7 +317,7 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
             paths.direction[going, 0], paths.direction[going, 1], paths.direction[going, 2] = t0, t1, t2
             paths.weight[going, 0], paths.weight[going, 1], paths.weight[going, 2] = w0, w1, w2
             paths.bsdf_density[going], paths.pixel_slot[going], paths.sample[going] = bsdf_density, pixel_slot, s
-            paths.medium[going] = medium
+            paths.medium[going], paths.interior[going] = medium, interior
             going += 1
         return going, count
 

@@ -17,6 +17,7 @@ from render.sampling.low_discrepancy import LENGTH, pair, pair_at, pair_draw
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
+Long = NDArray[np.int64]
 
 ON_IMAGE, ON_LENS, FIRST_SURFACE, EACH_SURFACE = 0, 1, 2, 4
 """Dimensions of the sequence: two pairs for the camera, then four for each surface."""
@@ -43,6 +44,8 @@ class PathState(NamedTuple):
     """(n,) number of the sample in its half."""
     medium: Int
     """(n,) one more than the material that the ray is within; 0: in the open."""
+    interior: Long
+    """(n,) the overlapping bodies that the ray is within (`render.world.interior_list`)."""
 
 
 class ShadowRays(NamedTuple):
@@ -53,6 +56,7 @@ class ShadowRays(NamedTuple):
     far: Float32
     light: Float32
     pixel_slot: Int
+    interior: Long
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

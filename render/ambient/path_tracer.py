@@ -19,6 +19,7 @@ from render.material.medium import MOST_STEPS
 from render.sampling.low_discrepancy import pair_table
 from render.scene.scene import Scene
 from render.world.embree import RayScene
+from render.world.interior_list import cross_hidden, has_overlaps, occluded_by_visible, pass_hidden, surroundings
 from render.world.triangles import Surface, has_gloss, has_medium
 from render.world.world import World
 
@@ -45,6 +46,10 @@ class CameraPaths:
     clamp: float
     """The most radiance that a contribution by way of two and more surfaces may add; infinite: no clamp."""
     seed: int
+    interior: int
+    """The overlapping bodies that the camera is within (`render.world.interior_list`)."""
+    immersed: float
+    """What radiance gains where the camera is: the square of the refractive index there."""
     _scratch: threading.local = field(default_factory=threading.local, repr=False, compare=False)
 
     def add(
@@ -59,6 +64,10 @@ class CameraPaths:
         shade = shade_glossy if glossy else shade_diffuse
         table = pair_table()
         n = camera_rays(self.view, table, self.seed, pixels, first, count, rays.centre, paths)
+        nested = has_overlaps(self.surface)
+        paths.interior[:n] = self.interior
+        if self.immersed != 1.0:
+            paths.weight[:n] *= self.immersed
         depth = 0
         while n > 0:
             if cancelled is not None and cancelled():
@@ -68,6 +77,9 @@ class CameraPaths:
             triangle, distance = rays.intersect(paths.origin[:n], paths.direction[:n], coherent=side_by_side)
             if media:
                 self._walk(paths, n, depth, pixels, triangle, distance, cancelled)
+            if nested:
+                ahead = paths.origin[:n], paths.direction[:n], triangle, paths.interior[:n]
+                pass_hidden(self.surface, rays, *ahead)
             n, asked = shade(
                 self.surface,
                 self.lights,
@@ -87,12 +99,11 @@ class CameraPaths:
                 invalid_counts,
             )
             if asked:
-                blocked = rays.occluded(
-                    shadow_rays.origin[:asked],
-                    shadow_rays.direction[:asked],
-                    shadow_rays.far[:asked],
-                    coherent=side_by_side,
-                )
+                ends = shadow_rays.origin[:asked], shadow_rays.direction[:asked], shadow_rays.far[:asked]
+                if nested:
+                    blocked = occluded_by_visible(self.surface, rays, *ends, shadow_rays.interior[:asked])
+                else:
+                    blocked = rays.occluded(*ends, coherent=side_by_side)
                 accumulate_unoccluded(shadow_rays, blocked, self.clamp if depth > 0 else np.inf, sums, invalid_counts)
             depth += 1
 
@@ -108,16 +119,22 @@ class CameraPaths:
     ) -> None:
         """Take every path within a medium to its boundary."""
         walking = np.flatnonzero(paths.medium[:n]).astype(np.int32)
-        distance = distance[walking]
+        distance, nested = distance[walking], has_overlaps(self.surface)
         for step in range(MOST_STEPS):
+            before = walking.copy() if nested else walking
             left = random_walk_step(
                 walking, distance, self.surface.rows, self.seed, pixels, depth, step, paths, triangle
             )
-            if not left:
+            walking = walking[:left]
+            if nested:
+                # a flight that ends on a hidden boundary goes on beyond it, as if it had begun there
+                ended = np.setdiff1d(before, walking, assume_unique=True)
+                ahead = paths.origin, paths.direction, triangle, paths.interior, self.rays.centre
+                walking = np.append(walking, cross_hidden(self.surface, self.rays, ended, *ahead))
+            if not len(walking):
                 break
             if cancelled is not None and cancelled():
                 raise Cancelled
-            walking = walking[:left]
             triangle[walking], distance = self.rays.intersect(paths.origin[walking], paths.direction[walking])
 
     def _arrays(self) -> tuple[PathState, ShadowRays]:
@@ -133,6 +150,7 @@ class CameraPaths:
                 pixel_slot=np.empty(WAVE, np.int32),
                 sample=np.empty(WAVE, np.int32),
                 medium=np.empty(WAVE, np.int32),
+                interior=np.empty(WAVE, np.int64),
             )
             shadow_rays = ShadowRays(
                 origin=np.empty((m, 3), np.float32),
@@ -140,6 +158,7 @@ class CameraPaths:
                 far=np.empty(m, np.float32),
                 light=np.empty((m, 3), np.float32),
                 pixel_slot=np.empty(m, np.int32),
+                interior=np.empty(m, np.int64),
             )
             arrays = self._scratch.arrays = paths, shadow_rays
         return arrays
@@ -156,6 +175,7 @@ def camera_paths(
 ) -> CameraPaths:
     """surfaces: None for as many as roulette lets a path meet; clamp in W/(m^2 sr)."""
     surface = world.surface
+    interior, index = surroundings(world, surface, view.T_world_camera[:3, 3])
     return CameraPaths(
         surface,
         world.rays,
@@ -165,4 +185,6 @@ def camera_paths(
         UNBOUNDED if surfaces is None else surfaces,
         np.inf if clamp is None else clamp,
         seed,
+        interior,
+        index * index,
     )

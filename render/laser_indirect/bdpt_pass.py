@@ -52,6 +52,7 @@ from render.laser_indirect.ris import LightVertices, connect_by_ris
 from render.material.material import reflectance_weights
 from render.material.medium import MOST_STEPS
 from render.sampling.random import uniform, wrapped
+from render.world.interior_list import cross_hidden, has_overlaps, occluded_by_visible, pass_hidden, surroundings
 from render.world.triangles import Surface
 from render.world.world import World
 
@@ -101,6 +102,8 @@ class BdptPass:
     """Of light that is wanted, besides plain interreflection."""
     specular: bool
     """Some material is a mirror or clear glass."""
+    interiors: tuple[int, int]
+    """The overlapping bodies that the laser and the camera are within (`render.world.interior_list`)."""
 
     @classmethod
     def of(
@@ -127,6 +130,10 @@ class BdptPass:
             seed=seed,
             kinds=kinds,
             specular=bool(kinds & CAUSTIC) and any_specular(surface),
+            interiors=(
+                surroundings(world, surface, T_world_laser[:3, 3])[0],
+                surroundings(world, surface, T_world_camera[:3, 3])[0],
+            ),
         )
 
     def run(
@@ -195,7 +202,7 @@ class BdptPass:
             emitted,
         )
         origin, direction = emitted.origin, emitted.direction
-        paths = _begun(count)
+        paths = _begun(count, self.interiors[0])
         paths["throughput"], paths["index"], paths["fan_bin"] = emitted.power, emitted.path_index, emitted.fan_bin
         connections = empty_connections(count)
         kept: list[Vertices] = []
@@ -232,7 +239,7 @@ class BdptPass:
         """
         context, laser, camera = self._context(seed), self._laser(sampling), self._camera(sampling)
         count = int(starts[-1] - starts[0])
-        origin, direction, paths = np.empty((count, 3)), np.empty((count, 3)), _begun(count)
+        origin, direction, paths = np.empty((count, 3)), np.empty((count, 3)), _begun(count, self.interiors[1])
         pixel_rays(camera, pixels, starts, seed, origin, direction, paths)
         connections = empty_connections(count)
         unused = np.zeros(3)
@@ -265,23 +272,38 @@ class BdptPass:
         # a chunk's first rays lie side by side in the image, or in the sheet
         triangle, distance = rays.intersect(start, towards, coherent=depth == 0)
         walking = np.flatnonzero(paths["medium"] >= 0).astype(np.int32)
-        distance = distance[walking]
+        distance, nested = distance[walking], has_overlaps(self.surface)
         for step in range(MOST_STEPS):
+            before = walking.copy() if nested else walking
             left = random_walk_step(walking, distance, paths, context, depth, step, origin, direction, triangle)
-            if not left:
-                break
             walking = walking[:left]
+            if nested:
+                # a flight that ends on a hidden boundary goes on beyond it, as if it had begun there
+                ended = np.setdiff1d(before, walking, assume_unique=True)
+                ahead = origin, direction, triangle, paths["interior"], np.zeros(3)
+                walking = np.append(walking, cross_hidden(self.surface, rays, ended, *ahead))
+            if not len(walking):
+                break
             triangle[walking], distance = rays.intersect(
                 (origin[walking] - rays.centre).astype(np.float32), direction[walking].astype(np.float32)
             )
+        if nested:
+            interior = paths["interior"].copy()
+            pass_hidden(self.surface, rays, (origin - rays.centre).astype(np.float32), towards, triangle, interior)
+            paths["interior"] = interior
         n = intersect(self.surface, self.weights, context, depth, origin, direction, triangle, paths, vertices)
         return vertices[:n], paths[:n]
 
     def splat(self, connections: Connections, connected: int, scale: float, buffer: PassBuffer) -> None:
         """Splat the connections that nothing occludes."""
         if connected:
-            rays = connections.origin[:connected], connections.direction[:connected], connections.distance[:connected]
-            splat_unoccluded(connections, self.world.rays.occluded(*rays), connected, scale, buffer)
+            ends = connections.origin[:connected], connections.direction[:connected], connections.distance[:connected]
+            if has_overlaps(self.surface):
+                interior = connections.interior[:connected]
+                occluded = occluded_by_visible(self.surface, self.world.rays, *ends, interior)
+            else:
+                occluded = self.world.rays.occluded(*ends)
+            splat_unoccluded(connections, occluded, connected, scale, buffer)
 
     def photon_map(self, parts: list[Vertices], number: int, sampling: Sampling) -> PhotonMap:
         """The light vertices that only merging can use; the radius is a pixel's, less with each pass."""
@@ -332,10 +354,10 @@ def pixel_rays(
             r += 1
 
 
-def _begun(count: int) -> Records:
-    """Paths that have met nothing yet."""
+def _begun(count: int, interior: int) -> Records:
+    """Paths that have met nothing yet, and begin within some bodies."""
     paths = np.zeros(count, PATH)
-    paths["all_specular"], paths["medium"] = True, -1
+    paths["all_specular"], paths["medium"], paths["interior"] = True, -1, interior
     return paths
 
 

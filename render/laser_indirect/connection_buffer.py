@@ -14,6 +14,7 @@ from render.laser_indirect.path_vertex import PassContext, Record, cosine_to
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
+Long = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 
 RIS_SAMPLE_WEIGHT = 32.0
@@ -40,6 +41,8 @@ class Connections(NamedTuple):
     origin: Float32
     direction: Float32
     distance: Float32
+    interior: Long
+    """The overlapping bodies that the shadow ray begins in (`render.world.interior_list`)."""
 
 
 class PassBuffer(NamedTuple):
@@ -72,6 +75,7 @@ def empty_connections(n: int) -> Connections:
         np.empty((n, 3), np.float32),
         np.empty((n, 3), np.float32),
         np.empty(n, np.float32),
+        np.empty(n, np.int64),
     )
 
 

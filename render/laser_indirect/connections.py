@@ -34,6 +34,7 @@ from render.laser_indirect.path_vertex import (
     bsdf_pdf,
     cosine_to,
     eval_bsdf,
+    interior_beyond,
     is_specular,
     shading_normal_factor,
     to_shading,
@@ -109,6 +110,7 @@ def connect_to_camera(
         connections.reachable_from_camera[n] = reachable
         connections.contribution[n] = path.throughput * f * camera_pdf * mis_weight * shading_normal_factor(v)
         set_shadow_ray(connections, n, v, e0, e1, e2, distance, context)
+        connections.interior[n] = interior_beyond(v, path, rows, i2)
         n += 1
     return n
 
@@ -145,6 +147,7 @@ def connect_to_laser(
         connections.reachable_from_camera[n] = True
         connections.contribution[n] = path.throughput * f * light * abs(i2 / out) / mis_divisor
         set_shadow_ray(connections, n, v, e0, e1, e2, distance, context)
+        connections.interior[n] = interior_beyond(v, path, rows, i2)
         n += 1
     return n
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from render.laser_indirect.photon_emission import SEQUENCE
 from render.material.bsdf import SUBSURFACE, eval_band, eval_lobes, is_specular_kind, pdf_lobes, sample
 from render.sampling.random import uniform
+from render.world.interior_list import bit_of, index_beside, medium_within
 from render.world.surface_interaction import interaction
 from render.world.triangles import Surface, off_surface, plane_of
 
@@ -35,7 +36,9 @@ VERTEX = np.dtype(
         ("wo", "f8", 3),  # direction back along the path, in the shading frame
         ("reflectance", "f8"),  # at the wavelength
         ("alpha", "f8", 2),  # roughness along and across the tangent
+        ("index", "f8"),  # of refraction, over that of what is around
         ("material", "i4"),
+        ("turbid", "i4"),  # sides on which light scatters: bits INNER, OUTER
     ],
     align=True,
 )
@@ -45,6 +48,7 @@ PATH = np.dtype(
         ("dvcm", "f8"),  # partial sums of the MIS weights (Georgiev et al. 2012, dVCM and dVC)
         ("dvc", "f8"),
         ("index", "i8"),  # number of the path
+        ("interior", "i8"),  # the overlapping bodies that it is within (`render.world.interior_list`)
         ("pixel", "i4"),  # of camera paths
         ("kind", "i4"),  # of light: bits CAUSTIC, SUBSURFACE_LIGHT
         ("medium", "i4"),  # material of the medium it is in; -1: none
@@ -56,6 +60,8 @@ PATH = np.dtype(
 )
 INTERREFLECTION, CAUSTIC, SUBSURFACE_LIGHT, SPECULAR_CHAIN = 0, 1, 2, 4
 """Kinds of light, as bits: none; through clear glass or off a mirror; through a medium; found by merging alone."""
+INNER, OUTER = 1, 2
+"""Sides of a surface, as bits: behind its shading normal, and before it."""
 SURFACE = 11
 """Columns of a material's row that say how its surface scatters."""
 MOST_BOUNCES = 64
@@ -122,12 +128,41 @@ def intersect(  # noqa: PLR0913
         v.material = material
         v.reflectance = weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
         v.alpha[0], v.alpha[1] = alpha[0], alpha[1]
+        v.index = context.rows[material, 3]
+        v.turbid = INNER if context.rows[material, 0] == SUBSURFACE else 0
         paths[hits] = paths[r]
         path = paths[hits]
+        bit = bit_of(context.rows, material)
+        if bit > 0 or path.interior > 0:
+            set_surroundings(v, context.rows, path.interior & ~bit, bit)
         path.dvcm *= s * s / abs(cosine)
         path.dvc /= abs(cosine)
         hits += 1
     return hits
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def set_surroundings(v: Record, rows: Float, outside: int, bit: int) -> None:
+    """What transparent bodies that overlap make of a vertex; outside: those that it is in, without its own (bit)."""
+    beside = medium_within(rows, outside) >= 0
+    if bit > 0:
+        v.index /= index_beside(rows, outside)
+        v.turbid |= OUTER if beside else 0
+    elif beside:
+        v.turbid |= OUTER if v.wo[2] > 0.0 else INNER
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def is_turbid(v: Record, cosine: float) -> bool:
+    """Light that leaves a vertex under this cosine with its shading normal is scattered on its way."""
+    return v.turbid & (INNER if cosine < 0.0 else OUTER) != 0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def interior_beyond(v: Record, path: Record, rows: Float, cosine: float) -> int:
+    """The overlapping bodies that a ray is within which leaves a vertex under this cosine with its normal."""
+    bit = bit_of(rows, v.material)
+    return path.interior & ~bit | (bit if cosine < 0.0 else 0)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
@@ -140,7 +175,7 @@ def is_specular(v: Record, rows: Float) -> bool:
 def eval_bsdf(v: Record, rows: Float, o0: float, o1: float, o2: float, i0: float, i1: float, i2: float) -> float:
     """f(wo, wi) at a vertex, 1/sr (`render.material.bsdf`)."""
     row = rows[v.material]
-    facets, cosine, base = eval_lobes(row[0], v.alpha[0], v.alpha[1], row[3], o0, o1, o2, i0, i1, i2)
+    facets, cosine, base = eval_lobes(row[0], v.alpha[0], v.alpha[1], v.index, o0, o1, o2, i0, i1, i2)
     return eval_band(row[0], facets, cosine, base, v.reflectance, row[4], row[7], row[10])
 
 
@@ -148,7 +183,7 @@ def eval_bsdf(v: Record, rows: Float, o0: float, o1: float, o2: float, i0: float
 def bsdf_pdf(v: Record, rows: Float, o0: float, o1: float, o2: float, i0: float, i1: float, i2: float) -> float:
     """pdf with which a vertex scatters a path from wo to wi, 1/sr (`render.material.bsdf`)."""
     row = rows[v.material]
-    return pdf_lobes(row[0], v.alpha[0], v.alpha[1], row[3], v.reflectance, o0, o1, o2, i0, i1, i2)
+    return pdf_lobes(row[0], v.alpha[0], v.alpha[1], v.index, v.reflectance, o0, o1, o2, i0, i1, i2)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
@@ -225,7 +260,7 @@ def scatter(
             continue
         for c in range(SURFACE):
             row[c] = rows[v.material, c]
-        row[1], row[2] = v.alpha[0], v.alpha[1]
+        row[1], row[2], row[3] = v.alpha[0], v.alpha[1], v.index
         rgb[0] = rgb[1] = rgb[2] = v.reflectance
         pdf = sample(row, rgb, o0, o1, o2, choice, r1, r2, i, f)
         if pdf == 0.0:
@@ -239,14 +274,15 @@ def scatter(
             continue
         crosses = o2 * i[2] < 0.0
         kind = path.kind | CAUSTIC if specular else path.kind
-        medium = -1
-        if row[0] == SUBSURFACE:
-            if crosses:
-                # what comes out of a medium is left to the paths from the laser
-                if not from_light or not context.kinds & SUBSURFACE_LIGHT:
-                    continue
-                kind |= SUBSURFACE_LIGHT
-            medium = v.material if i[2] < 0.0 else -1
+        medium = v.material if row[0] == SUBSURFACE and i[2] < 0.0 else -1
+        interior = interior_beyond(v, path, rows, i[2])
+        if interior > 0:
+            medium = medium_within(rows, interior)
+        if crosses and (row[0] == SUBSURFACE or medium >= 0 or path.medium >= 0):
+            # what comes out of a medium is left to the paths from the laser
+            if not from_light or not context.kinds & SUBSURFACE_LIGHT:
+                continue
+            kind |= SUBSURFACE_LIGHT
         throughput = path.throughput * f[0]
         if from_light:
             throughput *= shading_normal_factor(v) * abs(out / i[2])
@@ -273,7 +309,7 @@ def scatter(
         paths[going] = paths[r]
         after = paths[going]
         after.throughput, after.dvcm, after.dvc = throughput, dvcm, dvc
-        after.kind, after.medium = kind, medium
+        after.kind, after.medium, after.interior = kind, medium, interior
         after.all_specular, after.after_specular = all_specular, specular
         going += 1
     return going

@@ -24,11 +24,12 @@ from render.laser_indirect.path_vertex import (
     bsdf_pdf,
     cosine_to,
     eval_bsdf,
+    interior_beyond,
     is_specular,
+    is_turbid,
     shading_normal_factor,
     to_shading,
 )
-from render.material.bsdf import SUBSURFACE
 from render.sampling.random import uniform
 from render.world.triangles import off_surface
 
@@ -103,6 +104,8 @@ def connect_by_ris(
         resampled = total / light.light_paths
         connections.contribution[n] = mis_weighted(v, path, w, w_path, resampled, context.rows)
         set_shadow_ray_between(connections, n, v, w, context)
+        e0, e1, e2, _ = towards(v, w.p[0], w.p[1], w.p[2])
+        connections.interior[n] = interior_beyond(v, path, context.rows, cosine_to(v, e0, e1, e2))
         n += 1
     return n
 
@@ -164,7 +167,7 @@ def target_function(v: Record, path: Record, w: Record, w_path: Record, rows: Fl
     if out * i2 <= 0.0 or in_ * g2 <= 0.0:
         return 0.0
     # no straight way through a medium
-    if (i2 < 0.0 and rows[v.material, 0] == SUBSURFACE) or (g2 < 0.0 and rows[w.material, 0] == SUBSURFACE):
+    if is_turbid(v, i2) or is_turbid(w, g2):
         return 0.0
     value = eval_bsdf(v, rows, i0, i1, i2, v.wo[0], v.wo[1], v.wo[2])
     if value <= 0.0:

@@ -92,6 +92,7 @@ POLISHED = 0.005
 """A GGX alpha below this is taken for a perfectly smooth surface, a mirror."""
 Radiance = Annotated[float, Field(ge=0.0, le=1e9)]
 ScatteringAlbedo = Annotated[float, Field(ge=0.0, le=0.99999)]
+PRIORITY = "Where transparent bodies overlap, the one of the highest priority is there: glass 1 over water 0."
 MeanFreePath = Annotated[float, Field(ge=1e-6, le=10.0)]
 
 
@@ -132,7 +133,7 @@ Substance = Literal["BK7", "fused_silica", "SF11", "sapphire", "acrylic", "polyc
 class Glass(Model):
     """Glass, clear plastic or liquid: reflects and refracts. The mesh is closed; what it encloses is filled.
 
-    One-sided: the normals point out of the substance, into air. Bodies that touch need a gap of air between them.
+    One-sided: the normals point out of the substance. Bodies keep a gap of air between them, or overlap by priority.
     """
 
     kind: Literal["glass"] = "glass"
@@ -146,6 +147,7 @@ class Glass(Model):
     tint: UnitInterval | RGBReflectance = quantity(
         1.0, label="Tint", help="What is left of light at each surface; one number, or R, G, B."
     )
+    priority: int = quantity(0, label="Priority", help=PRIORITY, ge=0, le=99)
     relief: NormalMap | BumpMap | None = _relief()
 
     @property
@@ -172,6 +174,7 @@ class Subsurface(Model):
     anisotropy: float = quantity(
         0.0, label="Anisotropy", help="Mean cosine g of scattering: 0 even, towards 1 forward.", ge=-0.98, le=0.98
     )
+    priority: int = quantity(0, label="Priority", help=PRIORITY, ge=0, le=99)
     relief: NormalMap | BumpMap | None = _relief()
 
     @property

@@ -14,6 +14,7 @@ from render.laser.irradiance import SHEET_SIGMAS
 from render.laser.laser import LineLaser
 from render.material.material import Emitter
 from render.scene.scene import Scene
+from render.world.overlaps import MOST_BODIES, priority_of
 from render.world.world import World
 
 Float = NDArray[np.float64]
@@ -24,7 +25,10 @@ VISIBLE_ANGLE = math.radians(5.0)
 
 
 def check_materials(world: World, scene: Scene) -> None:
-    """InputError: what an object is made of is not known at the wavelength of a laser or of the ambient light."""
+    """InputError: what an object is made of is not known at the wavelength of a laser or of the ambient light, or two
+    transparent bodies are in one place.
+    """
+    _check_overlaps(world, scene)
     for i, laser in enumerate(scene.lasers):
         try:
             world.surface_at((laser.wavelength_nm,) * 3)
@@ -35,6 +39,36 @@ def check_materials(world: World, scene: Scene) -> None:
             ) from error
     if has_ambient_source(scene):
         _ = world.surface
+
+
+def _check_overlaps(world: World, scene: Scene) -> None:
+    nesting, names = world.nesting, [item.name for item in scene.visible_objects]
+    for a, b in nesting.touching:
+        raise InputError(
+            "two transparent bodies touch, and rounding decides which of them light meets first",
+            where=f"object {names[a]!r}: shape",
+            found=f"facets of {names[a]!r} lie on facets of {names[b]!r}",
+            allowed=f"a gap, or an overlap with priorities, of more than {world.rays.surface_offset * 1e6:.2g} um",
+            cure="move them apart, or draw one a little into the other and give them priorities",
+        )
+    for a, b in nesting.overlapping:
+        priority = priority_of(world, a)
+        if priority == priority_of(world, b):
+            raise InputError(
+                "two transparent bodies overlap, and nothing says which of them is there",
+                where=f"object {names[a]!r}: material.priority",
+                found=f"{names[a]!r} and {names[b]!r} have priority {priority}",
+                allowed="bodies apart, or of different priorities",
+                cure="raise the priority of the one that is there: of the glass, not of the water in it",
+            )
+    if len(nesting.ranked) > MOST_BODIES:
+        raise InputError(
+            "too many transparent bodies overlap others",
+            where="scene.objects",
+            found=f"{len(nesting.ranked)} of them",
+            allowed=f"at most {MOST_BODIES}",
+            cure="join bodies of the same substance in one mesh, or keep some apart",
+        )
 
 
 def scene_warnings(world: World, scene: Scene, step: int = 0) -> tuple[str, ...]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from render.base.errors import InputError
 from render.base.pose import invert, transform_points
 from render.camera.focus import check_lens
+from render.material.material import Glass
 from render.scene.scene import Scene
+from render.world.enclosure import objects_around
 from render.world.world import World
 
 CENTRE_TOLERANCE = 1e-6
@@ -37,13 +37,15 @@ def check_placement(world: World, scene: Scene, step: int = 0) -> None:
                 cure="move the laser sideways (a baseline) or turn its sheet away from the camera",
             )
     check_lens(scene.camera)
-    inside = _object_around(world, scene.T_world_camera(step)[:3, 3])
-    if inside is not None:
+    # a camera may look through the water that it is in
+    solid = [item for item, one in enumerate(scene.visible_objects) if not isinstance(one.material, Glass)]
+    around = objects_around(world, solid, scene.T_world_camera(step)[:3, 3])
+    if around:
         raise InputError(
             "the camera is inside an object",
             where="scene.rig.camera",
-            found=f"its centre lies within {scene.visible_objects[inside].name!r}",
-            allowed="a camera outside every solid",
+            found=f"its centre lies within {scene.visible_objects[around[0]].name!r}",
+            allowed="a camera outside every solid that is not of glass",
             cure="move the rig or the object, or check the object's unit and scale",
         )
     if not _in_view(world, scene, step):
@@ -54,33 +56,6 @@ def check_placement(world: World, scene: Scene, step: int = 0) -> None:
             allowed="at least one triangle ahead of the camera and within its image",
             cure="turn the camera (z looks forward, y down) or move the objects",
         )
-
-
-def _object_around(world: World, point: np.ndarray) -> int | None:
-    """The object whose closed surface encloses the point, by its winding number (Van Oosterom and Strackee 1983)."""
-    # only objects whose box holds the point can enclose it
-    boxed = [item for item in range(int(world.object_id[-1]) + 1) if _in_box(world, item, point)]
-    if not boxed:
-        return None
-    mine = np.isin(world.object_id, boxed)
-    a, b, c = np.moveaxis(world.vertices[world.triangles[mine]] - point, 1, 0)
-    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
-    dots = np.einsum("ij,ij->i", a, b) * lc + np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb
-    angle = 2.0 * np.arctan2(triple, la * lb * lc + dots)
-    winding = np.bincount(world.object_id[mine], angle) / (4.0 * math.pi)
-    # open surfaces give fractions; a closed one gives a whole number
-    around = np.flatnonzero(np.abs(winding) > 0.9)
-    return int(around[0]) if len(around) else None
-
-
-def _in_box(world: World, item: int, point: np.ndarray) -> bool:
-    used = world.triangles[world.object_id == item]
-    if len(used) == 0:
-        return False
-    # an object's vertices stand together
-    points = world.vertices[used.min() : used.max() + 1]
-    return bool(np.all(points.min(axis=0) <= point) and np.all(points.max(axis=0) >= point))
 
 
 def _in_view(world: World, scene: Scene, step: int) -> bool:

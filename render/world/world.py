@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.pose import transform_points
-from render.material.bsdf import ROW
 from render.material.material import BAND_CENTRES_NM, BaseMaterial, Blend
 from render.material.parameters import material_row
 from render.mesh.mesh import Mesh
 from render.scene.scene import Scene
 from render.world.embree import RayScene
+from render.world.interior_list import COLUMNS, RANK, RANKED
 from render.world.material_atlas import MaterialAtlas
+from render.world.overlaps import Nesting, nesting_of
 from render.world.triangles import Surface
 
 Float = NDArray[np.float64]
@@ -66,6 +67,11 @@ class World:
         """The scene for ray queries, built at first use."""
         return RayScene(self.vertices, self.triangles)
 
+    @cached_property
+    def nesting(self) -> Nesting:
+        """Which transparent bodies overlap, found at first use."""
+        return nesting_of(self)
+
     @property
     def surface(self) -> Surface:
         """The arrays, as the kernels take them, for ambient light."""
@@ -76,9 +82,11 @@ class World:
 
         InputError: a material is not known at one of them.
         """
-        rows = np.empty((len(self.materials), ROW))
+        rows = np.zeros((len(self.materials), COLUMNS))
         for i, (material, least) in enumerate(zip(self.materials, self.least_alpha, strict=True)):
-            rows[i] = material_row(material, bands_nm, float(least), self.places[i])
+            rows[i, :RANK] = material_row(material, bands_nm, float(least), self.places[i])
+        for rank, item in enumerate(self.nesting.ranked):
+            rows[item, RANK], rows[rank, RANKED] = rank + 1, item
         return Surface(
             self.vertices,
             self.triangles,

@@ -148,6 +148,8 @@ def light(cancelled: Cancel) -> None:
     """Every kind of light: of lamps and shining objects, reflected, through glass, below surfaces."""
     _render(CAMERA, cancelled, "subsurface")
     _render(CAMERA, cancelled, "subsurface", Glass(), Conductor(), WAX, Emitter())
+    # drawn into each other
+    _render(CAMERA, cancelled, "subsurface", Glass(), WAX.model_copy(update={"priority": 1}), apart=0.03)
 
 
 def lens(cancelled: Cancel) -> None:
@@ -157,15 +159,16 @@ def lens(cancelled: Cancel) -> None:
     _render(blurred, cancelled, "direct", Conductor())
 
 
-def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Material) -> None:
-    """A plate, and blocks of some materials before it, under all sorts of lamps, by few paths."""
+def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Material, apart: float = 0.05) -> None:
+    """A plate, and blocks of some materials before it, so far apart, under all sorts of lamps, by few paths."""
     from render.render import render_world
     from render.world.world import build_world
     from studio.scan.exposure import expose
 
     blocks = []
     for i, material in enumerate(materials):
-        shape, pose = Box(size_x=0.04, size_y=0.04, size_z=0.02), Pose(translation=(0.05 * i - 0.05, 0.0, 0.45))
+        shape = Box(size_x=0.04, size_y=0.04, size_z=0.02)
+        pose = Pose(translation=(apart * i - 0.05, 0.005 * i, 0.45 + 0.005 * i))
         blocks.append(SceneObject(name=material.kind, shape=shape, material=material, T_world_object=pose))
     lamps = PointLight(), RectangleLight(T_world_light=Pose(translation=(0.0, -0.3, 0.0)))
     scene = Scene(

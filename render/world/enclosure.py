@@ -1,0 +1,48 @@
+"""Which bodies enclose a point, by the winding number of their surface (Van Oosterom and Strackee 1983)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from render.world.world import World
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int32]
+
+CLOSED = 0.9
+"""Open surfaces give fractions; a closed one gives a whole number."""
+
+
+def objects_around(world: World, items: Iterable[int], point: Float) -> list[int]:
+    """Which of some objects have a closed surface that encloses the point (3,), world m."""
+    # only objects whose box holds the point can enclose it
+    boxed = [item for item in items if _in_box(world, item, point)]
+    around = []
+    for item in boxed:
+        if abs(winding_number(world.vertices, world.triangles[world.object_id == item], point)) > CLOSED:
+            around.append(item)
+    return around
+
+
+def winding_number(vertices: Float, triangles: Int, point: Float) -> float:
+    """How often a surface (v, 3), (t, 3) goes around a point (3,): 1 inside a closed one wound outwards, 0 outside."""
+    a, b, c = np.moveaxis(vertices[triangles] - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    triple = np.einsum("ij,ij->i", a, np.cross(b, c))
+    dots = np.einsum("ij,ij->i", a, b) * lc + np.einsum("ij,ij->i", b, c) * la + np.einsum("ij,ij->i", c, a) * lb
+    return float(np.sum(2.0 * np.arctan2(triple, la * lb * lc + dots))) / (4.0 * math.pi)
+
+
+def _in_box(world: World, item: int, point: Float) -> bool:
+    used = world.triangles[world.object_id == item]
+    if len(used) == 0:
+        return False
+    # an object's vertices stand together
+    points = world.vertices[used.min() : used.max() + 1]
+    return bool(np.all(points.min(axis=0) <= point) and np.all(points.max(axis=0) >= point))

@@ -1,0 +1,194 @@
+"""What a path is within where transparent bodies overlap: a bit for each, and the highest is the substance there.
+
+Schmidt and Budge (2002) carry a list of interiors with priorities. Here bodies are ranked by priority, so that the list
+is a number, `interior`: bit k stands for the body of rank k, and no list is too short. A boundary between two bodies is
+seen with the index of the one over that of the other; a boundary within a body of a higher rank is hidden: nothing is
+there, and paths and shadow rays go on through it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from render.material.bsdf import DIELECTRIC, ROW, SUBSURFACE
+from render.world.embree import RayScene
+from render.world.enclosure import objects_around
+from render.world.triangles import Surface, off_surface, plane_of
+
+if TYPE_CHECKING:
+    from render.world.world import World
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+Long = NDArray[np.int64]
+
+RANK, RANKED = ROW, ROW + 1
+"""Columns behind a material's row: its body's rank from 1, 0 for one that overlaps none; in row k, the material of the
+body of rank k + 1."""
+COLUMNS = ROW + 2
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def bit_of(rows: Float, slot: int) -> int:
+    """The bit of a material's body; 0: it overlaps no other."""
+    rank = int(rows[slot, RANK])
+    return 1 << (rank - 1) if rank > 0 else 0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def substance(rows: Float, interior: int) -> int:
+    """The material that a path is in; -1: none of those that overlap."""
+    rank = -1
+    while interior > 0:
+        interior >>= 1
+        rank += 1
+    return int(rows[rank, RANKED]) if rank >= 0 else -1
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def medium_within(rows: Float, interior: int) -> int:
+    """The material that a path is in, if light scatters there; -1: it goes straight."""
+    slot = substance(rows, interior)
+    return slot if slot >= 0 and rows[slot, 0] == SUBSURFACE else -1
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def index_beside(rows: Float, outside: int) -> float:
+    """Index of refraction on the outer side of a boundary; outside: what is there, without its own body."""
+    slot = substance(rows, outside)
+    return float(rows[slot, 3]) if slot >= 0 else 1.0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def is_hidden(rows: Float, slot: int, interior: int) -> bool:
+    """A boundary of this material is within a body of a higher rank."""
+    bit = bit_of(rows, slot)
+    return bit > 0 and (interior & ~bit) > bit
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def hidden_hits(surface: Surface, triangle: Int, interior: Long) -> Long:
+    """(n,) hits, -1 for none, of rays within (n,) interiors -> (m,) those that met a hidden boundary."""
+    out, count = np.empty(triangle.shape[0], np.int64), 0
+    for r in range(triangle.shape[0]):
+        t = triangle[r]
+        if t >= 0 and is_hidden(surface.rows, surface.object_id[t], interior[r]):
+            out[count] = r
+            count += 1
+    return out[:count].copy()
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def cross_boundary(surface: Surface, t: int, centre: Float, offset: float, origin: Any, direction: Any) -> int:
+    """Move a ray's origin (3,), from the centre, to the far side of triangle t; returns the bit that this changes.
+
+    Positive: the ray is now within the body; negative: it has left it.
+    """
+    a0, a1, a2, n0, n1, n2 = plane_of(surface, t)
+    o0, o1, o2 = origin[0] + centre[0], origin[1] + centre[1], origin[2] + centre[2]
+    d0, d1, d2 = float(direction[0]), float(direction[1]), float(direction[2])
+    cosine = n0 * d0 + n1 * d1 + n2 * d2
+    s = (n0 * (a0 - o0) + n1 * (a1 - o1) + n2 * (a2 - o2)) / cosine if cosine != 0.0 else 0.0
+    side = offset if cosine > 0.0 else -offset
+    p0, p1, p2 = off_surface(o0 + s * d0, o1 + s * d1, o2 + s * d2, n0, n1, n2, side)
+    origin[0], origin[1], origin[2] = p0 - centre[0], p1 - centre[1], p2 - centre[2]
+    bit = bit_of(surface.rows, surface.object_id[t])
+    return bit if cosine < 0.0 else -bit
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def changed(interior: int, bit: int) -> int:
+    """What a path is within after `cross_boundary`."""
+    return interior | bit if bit > 0 else interior & ~(-bit)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def cross_all(
+    surface: Surface, triangle: Int, centre: Float, offset: float, start: Float32, direction: Float32, interior: Long
+) -> Float:
+    """Take rays (m, 3) to the far side of the triangles (m,) that they met; returns how far each has moved, (m,) m."""
+    moved = np.empty(triangle.shape[0])
+    for r in range(triangle.shape[0]):
+        o0, o1, o2 = float(start[r, 0]), float(start[r, 1]), float(start[r, 2])
+        interior[r] = changed(interior[r], cross_boundary(surface, triangle[r], centre, offset, start[r], direction[r]))
+        moved[r] = math.sqrt((start[r, 0] - o0) ** 2 + (start[r, 1] - o1) ** 2 + (start[r, 2] - o2) ** 2)
+    return moved
+
+
+def has_overlaps(surface: Surface) -> bool:
+    """Some transparent bodies overlap."""
+    return bool(np.any(surface.rows[:, RANK] > 0.0))
+
+
+def surroundings(world: World, surface: Surface, point: Float) -> tuple[int, float]:
+    """Where paths begin, (3,) world m: the interior there, and the refractive index."""
+    bodies = np.flatnonzero(np.isin(surface.rows[:, 0], (DIELECTRIC, SUBSURFACE)))
+    around = objects_around(world, bodies.tolist(), point)
+    interior = sum(bit_of(surface.rows, item) for item in around)
+    # a body that overlaps no other is the only one there
+    slot = substance(surface.rows, interior) if interior else next(iter(around), -1)
+    return interior, float(surface.rows[slot, 3]) if slot >= 0 else 1.0
+
+
+def pass_hidden(
+    surface: Surface, rays: RayScene, origin: Float32, direction: Float32, triangle: Int, interior: Long
+) -> None:
+    """Rays (n, 3), scene-centred, and what they met first (n,): where that is hidden, what they meet beyond it.
+
+    triangle and interior (n,) are changed; origins stay, so that distances remain those of the whole way.
+    """
+    hidden = hidden_hits(surface, triangle, interior)
+    start, towards = origin[hidden], direction[hidden]
+    while len(hidden):
+        within = interior[hidden]
+        cross_all(surface, triangle[hidden], rays.centre, rays.surface_offset, start, towards, within)
+        interior[hidden] = within
+        triangle[hidden] = rays.intersect(start, towards)[0]
+        again = hidden_hits(surface, triangle[hidden], within)
+        hidden, start, towards = hidden[again], start[again], towards[again]
+
+
+def cross_hidden(
+    surface: Surface,
+    rays: RayScene,
+    which: Int,
+    origin: Any,
+    direction: Any,
+    triangle: Int,
+    interior: Long,
+    centre: Float,
+) -> Int:
+    """Take those of the rays `which` that met a hidden boundary from their origin to beyond it; returns them.
+
+    Origin, from the centre (3,), and interior (n, ...) are changed.
+    """
+    hidden = which[hidden_hits(surface, triangle[which], interior[which])]
+    start, within = origin[hidden], interior[hidden]
+    cross_all(surface, triangle[hidden], centre, rays.surface_offset, start, direction[hidden], within)
+    origin[hidden], interior[hidden] = start, within
+    return hidden
+
+
+def occluded_by_visible(
+    surface: Surface, rays: RayScene, origin: Float32, direction: Float32, far: Float32, interior: Long
+) -> NDArray[np.bool_]:
+    """Shadow rays (n, 3), scene-centred, of length (n,), within (n,) interiors -> (n,) something not hidden is met."""
+    blocked = rays.occluded(origin, direction, far.copy())
+    at = np.flatnonzero(blocked)
+    start, towards, left, within = origin[at], direction[at], far[at].astype(np.float64), interior[at]
+    while len(at):
+        triangle, _ = rays.intersect(start, towards, left.astype(np.float32))
+        blocked[at] = triangle >= 0
+        hidden = hidden_hits(surface, triangle, within)
+        at, start, towards, left, within = at[hidden], start[hidden], towards[hidden], left[hidden], within[hidden]
+        left = left - cross_all(surface, triangle[hidden], rays.centre, rays.surface_offset, start, towards, within)
+        ended = left <= 0.0
+        blocked[at[ended]] = False
+        at, start, towards, left, within = (part[~ended] for part in (at, start, towards, left, within))
+    return blocked

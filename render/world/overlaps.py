@@ -1,0 +1,144 @@
+"""Which transparent bodies overlap or touch, and which of them stands where: the one of the higher priority.
+
+Where bodies overlap, as water does that is drawn a little into the wall of its glass, priorities say which substance
+is there (Schmidt and Budge 2002, "Simple nested dielectrics in ray traced images"). Only bodies that overlap another
+have a rank; all others are what they always were, and cost nothing. Touching surfaces are no arrangement at all: which
+of them a ray meets first is left to rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.material.material import Glass, Subsurface
+from render.world.embree import RayScene
+from render.world.enclosure import winding_number
+
+if TYPE_CHECKING:
+    from render.world.world import World
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+
+MOST_BODIES = 62
+"""That overlap others in one scene: one bit each of what a path is within."""
+INSET = 0.02
+"""Share of the way to the middle of a triangle at which its corners are looked at."""
+PARALLEL = 1.0 - 1e-4
+"""Least cosine of two facets that touch; those that cross at a point do not."""
+
+
+@dataclass(frozen=True)
+class Nesting:
+    """The transparent bodies, numbered as the objects, that share space with others."""
+
+    overlapping: tuple[tuple[int, int], ...]
+    """Pairs, the first number the smaller."""
+    touching: tuple[tuple[int, int], ...]
+    """Pairs with facets that coincide, or lie nearer than rays can tell."""
+    ranked: tuple[int, ...]
+    """Those that overlap, from the lowest priority to the highest; what is last stands where several are."""
+
+
+def nesting_of(world: World) -> Nesting:
+    """Of all pairs of bodies of glass or with a medium below their surface."""
+    overlapping, touching = [], []
+    boxes = {
+        item: _corners(world, item)
+        for item, material in enumerate(world.materials)
+        if isinstance(material, Glass | Subsurface)
+    }
+    bodies: dict[int, _Body] = {}
+    # a little more than the offset of rays, which takes the whole scene's tree to ask for
+    margin = 2e-6 * float(np.ptp(world.vertices, axis=0).max()) if len(boxes) > 1 else 0.0
+    for a, b in combinations(boxes, 2):
+        if np.any(np.maximum(boxes[a][0], boxes[b][0]) > np.minimum(boxes[a][1], boxes[b][1]) + margin):
+            continue
+        near = world.rays.surface_offset
+        for item in (a, b):
+            if item not in bodies:
+                bodies[item] = _Body.of(world, item)
+        if bodies[a].touches(bodies[b], near) or bodies[b].touches(bodies[a], near):
+            touching.append((a, b))
+        if bodies[a].overlaps(bodies[b]):
+            overlapping.append((a, b))
+    found = {item for pair in overlapping for item in pair}
+    return Nesting(tuple(overlapping), tuple(touching), tuple(sorted(found, key=lambda i: (priority_of(world, i), i))))
+
+
+def priority_of(world: World, item: int) -> int:
+    """Of a transparent body; 0 for every other."""
+    material = world.materials[item]
+    return material.priority if isinstance(material, Glass | Subsurface) else 0
+
+
+@dataclass(frozen=True)
+class _Body:
+    """One closed surface, ready for rays."""
+
+    vertices: Float
+    triangles: Int
+    rays: RayScene
+
+    @classmethod
+    def of(cls, world: World, item: int) -> _Body:
+        used, index = np.unique(world.triangles[world.object_id == item], return_inverse=True)
+        vertices, triangles = world.vertices[used], np.asarray(index.reshape(-1, 3), dtype=np.int32)
+        return cls(vertices, triangles, RayScene(vertices, triangles))
+
+    def overlaps(self, other: _Body) -> bool:
+        """The surfaces cross, or one body is within the other."""
+        if self.crosses(other) or other.crosses(self):
+            return True
+        inside = winding_number(other.vertices, other.triangles, self.vertices[0])
+        around = winding_number(self.vertices, self.triangles, other.vertices[0])
+        return max(abs(inside), abs(around)) > 0.5
+
+    def crosses(self, other: _Body) -> bool:
+        """Some edge passes through the other's surface."""
+        edges = np.sort(self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        start, end = np.moveaxis(self.vertices[np.unique(edges, axis=0)], 1, 0)
+        low, high = other.vertices.min(axis=0), other.vertices.max(axis=0)
+        near = np.all((np.minimum(start, end) <= high) & (np.maximum(start, end) >= low), axis=1)
+        start, end = start[near], end[near]
+        length = np.linalg.norm(end - start, axis=1)
+        start, end, length = start[length > 0.0], end[length > 0.0], length[length > 0.0]
+        towards = ((end - start) / length[:, None]).astype(np.float32)
+        far = length.astype(np.float32)
+        return bool(np.any(other.rays.occluded((start - other.rays.centre).astype(np.float32), towards, far)))
+
+    def touches(self, other: _Body, near: float) -> bool:
+        """Some facet lies on one of the other's, within `near` m."""
+        corners = self.vertices[self.triangles]
+        low, high = other.vertices.min(axis=0) - near, other.vertices.max(axis=0) + near
+        corners = corners[np.all((corners.min(axis=1) <= high) & (corners.max(axis=1) >= low), axis=1)]
+        normals = _unit_normals(corners)
+        middle = corners.mean(axis=1, keepdims=True)
+        points = np.concatenate([middle, (1.0 - INSET) * corners + INSET * middle], axis=1)
+        along = np.repeat(normals, points.shape[1], axis=0)
+        start = (points.reshape(-1, 3) + near * along - other.rays.centre).astype(np.float32)
+        far = np.full(len(start), 2.0 * near, np.float32)
+        triangle, _ = other.rays.intersect(start, (-along).astype(np.float32), far)
+        hit = triangle >= 0
+        theirs = _unit_normals(other.vertices[other.triangles[triangle[hit]]])
+        return bool(np.any(np.abs(np.einsum("ij,ij->i", theirs, along[hit])) > PARALLEL))
+
+
+def _corners(world: World, item: int) -> tuple[Float, Float]:
+    """Lowest and highest corner of an object's box."""
+    used = world.triangles[world.object_id == item]
+    # an object's vertices stand together
+    points = world.vertices[used.min() : used.max() + 1]
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _unit_normals(corners: Float) -> Float:
+    """(n, 3, 3) corners -> (n, 3), 0 for triangles without area."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
