@@ -36,6 +36,8 @@ class Errors:
     """m, off the mesh: positive is on the camera's side. Also where no truth is matched."""
     sigma_distance: Float
     """m, predicted from sigma_u."""
+    sheet_bias: Float
+    """px: the part of `position` that the sheet's own width explains, on bent surfaces and at edges, from the truth."""
     outlier: NDArray[np.bool_]
     """Position wrong by more than 1 px, and by more than 5 robust sigma or than half of the line's own 1/e^2 width."""
     u: Measures
@@ -79,7 +81,8 @@ def compare(
     truth = match(points.index, np.where(points.valid, along, np.nan), curve.index[lit], curve.position[lit])
     matched = truth >= 0
     truth[matched] = lit[truth[matched]]
-    position, depth = np.full(len(along), np.nan), np.full(len(along), np.nan)
+    position, depth, sheet_bias = (np.full(len(along), np.nan) for _ in range(3))
+    sheet_bias[matched] = curve.sheet_bias[truth[matched]]
     position[matched] = along[matched] - curve.position[truth[matched]]
     depth[matched] = points.depth_z[matched] - curve.depth_z[truth[matched]]
     distance, nearest = signed_distance(points.world, vertices, triangles, T_world_camera[:3, 3])
@@ -101,6 +104,7 @@ def compare(
         depth=depth,
         distance=distance,
         sigma_distance=per_pixel * points.sigma_pixel,
+        sheet_bias=sheet_bias,
         outlier=wrong,
         u=measure(position, points.sigma_pixel, 1.0, *where),
         depth_z=measure(depth, points.sigma_depth, np.abs(points.gradient[:, 2]), *where),

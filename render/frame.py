@@ -42,6 +42,9 @@ class LaserCurve:
     """W/m^2 on the facet, at the centre of the sheet."""
     segments: Float
     """(m, 2, 3) m, world frame: the curve cut from the triangles that face camera and laser (before occlusion)."""
+    sheet_bias: Float
+    """px along the scan line, to the centre of mass of the sheet's light on the surface (`render.truth.sheet_bias`):
+    what the sheet's width adds to a measured position. NaN: not known."""
 
 
 @dataclass(frozen=True)

@@ -179,20 +179,22 @@ def _plain_material(material: BaseMaterial) -> str:
             return f"{_albedo(material)} under {coat}"
         case Glass():
             what = material.substance.replace("_", " ") if material.index is None else f"index {material.index:g}"
-            rank = f", priority {material.priority}" if material.priority else ""
-            return (
-                f"transparent, {what}, roughness {_numbers(material.roughness)}, tint {_numbers(material.tint)}{rank}"
-            )
+            surface = f"roughness {_numbers(material.roughness)}, tint {_numbers(material.tint)}"
+            return f"transparent, {what}, {surface}{_priority(material)}"
         case Subsurface():
             return (
                 f"translucent, index {material.index:g}, roughness {material.roughness:g}, mean free path "
                 f"{_numbers(material.mean_free_path, 1e3)} mm, scattering albedo "
-                f"{_numbers(material.scattering_albedo)}, anisotropy {material.anisotropy:g}"
+                f"{_numbers(material.scattering_albedo)}, anisotropy {material.anisotropy:g}{_priority(material)}"
             )
         case Emitter():
             return f"shines with {_numbers(material.radiance)} W/(m^2 sr), {_albedo(material)}"
         case _:
             return f"diffuse, {_albedo(material)}"
+
+
+def _priority(material: Glass | Subsurface) -> str:
+    return f", priority {material.priority}" if material.priority else ""
 
 
 def _albedo(material: Lambertian | Coated | Emitter) -> str:

@@ -13,6 +13,8 @@ from analysis.measures import Measures, measure
 from analysis.report.sample import Rows
 from analysis.report.sums import Moments, Sums
 
+Float = NDArray[np.float64]
+
 NARROW_PX = 0.4
 """Sigma of a line below which the pixels are too coarse for it."""
 
@@ -55,6 +57,8 @@ class Total:
     """Share of the points on which the line is too narrow for the pixels, its sigma below `NARROW_PX`."""
     saturated: float = 0.0
     """Share of the points that are saturated."""
+    sheet_bias: tuple[float, float] = (0.0, 0.0)
+    """px: RMS and 95th percentile of what the sheet's own width adds to the positions; 0: not known."""
 
     @property
     def completeness(self) -> float:
@@ -90,11 +94,17 @@ def total(chosen: Chosen) -> Total:
         lines=chosen.lines,
         narrow=_share(rows["width"][np.isfinite(rows["width"])] < NARROW_PX),
         saturated=_share(rows["flag"] == Flag.SATURATED),
+        sheet_bias=_sheet_bias(rows["sheet_bias"]),
     )
 
 
 def _share(there: NDArray[np.bool_]) -> float:
     return float(np.mean(there)) if len(there) else 0.0
+
+
+def _sheet_bias(values: Float) -> tuple[float, float]:
+    known = np.abs(values[np.isfinite(values)])
+    return (float(np.sqrt(np.mean(known**2))), float(np.quantile(known, 0.95))) if len(known) else (0.0, 0.0)
 
 
 def position_measures(rows: Rows) -> Measures:

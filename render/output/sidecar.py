@@ -38,6 +38,7 @@ CURVE_SHAPES: dict[str, tuple[int, ...]] = {
     "laser_angle": (-1,),
     "irradiance": (-1,),
     "segments": (-1, 2, 3),
+    "sheet_bias": (-1,),
 }
 INTEGERS = ("index", "object_id")
 SEAL = "record_sha256"
@@ -171,6 +172,8 @@ def _curve(laser: Record) -> LaserCurve:
     axis, columns = laser["axis"], laser["curve"]
     if axis not in ("rows", "columns"):
         raise ValueError(f"axis {axis!r} is neither rows nor columns")
+    # frames of before do not say
+    columns = {"sheet_bias": [None] * len(columns["index"])} | columns
     arrays: dict[str, Any] = {name: _array(name, columns[name]) for name in CURVE_SHAPES}
     if len({len(array) for name, array in arrays.items() if name != "segments"}) != 1:
         raise ValueError("the curve's arrays differ in length")

@@ -8,13 +8,13 @@ through their common point is counted once.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from render.base.pose import invert, transform_points
-from render.base.threads import map_chunks
 from render.camera.camera import Camera
 from render.camera.distortion import tilt_matrix
 from render.camera.projection import NEAR, project_point
@@ -22,7 +22,8 @@ from render.camera.view import View
 from render.frame import Axis, LaserCurve
 from render.laser.irradiance import irradiance_at
 from render.laser.laser import LineLaser
-from render.world.embree import CHUNK, RayScene
+from render.truth.sheet_bias import sheet_bias
+from render.truth.visibility import visible
 from render.world.world import World
 
 Float = NDArray[np.float64]
@@ -223,9 +224,10 @@ def laser_curve(
     def clear(points: Float, facing: Float, towards: Float) -> NDArray[np.bool_]:
         return visible(world.rays, points, facing, towards, threads)
 
-    return curve_of_cut(
+    curve = curve_of_cut(
         segments, normals, world.object_id[triangle], camera, laser, T_world_camera, T_world_laser, axis, clear
     )
+    return replace(curve, sheet_bias=sheet_bias(world, curve, camera, laser, T_world_camera, T_world_laser, threads))
 
 
 def curve_of_cut(  # noqa: PLR0913
@@ -281,26 +283,8 @@ def curve_of_cut(  # noqa: PLR0913
             laser.packed(),
         ),
         segments=ends,
+        sheet_bias=np.full(len(order), np.nan),
     )
-
-
-def visible(
-    rays: RayScene, points: Float, normals: Float, towards: Float, threads: int | None = None
-) -> NDArray[np.bool_]:
-    """(n, 3) world points on surfaces, unit normals and vectors to a target on their side -> (n,) not occluded."""
-    if len(points) == 0:
-        return np.zeros(0, dtype=np.bool_)
-    origins = (points - rays.centre + normals * rays.surface_offset).astype(np.float32)
-    distance = np.linalg.norm(towards, axis=1)
-    directions = (towards / distance[:, None]).astype(np.float32)
-    far = distance.astype(np.float32)
-    clear = np.empty(len(points), dtype=np.bool_)
-
-    def work(start: int, stop: int) -> None:
-        clear[start:stop] = ~rays.occluded(origins[start:stop], directions[start:stop], far[start:stop], coherent=True)
-
-    map_chunks(work, len(points), CHUNK // 4, threads)
-    return clear
 
 
 def _angle(normals: Float, towards: Float) -> Float:

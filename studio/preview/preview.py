@@ -22,7 +22,8 @@ from render.frame import Axis, LaserCurve
 from render.material.material import Lambertian
 from render.mesh.load import load_mesh
 from render.scene.scene import Rig, Scene, SceneObject
-from render.truth.laser_curve import curve_of_cut, cut_triangles, visible
+from render.truth.laser_curve import curve_of_cut, cut_triangles
+from render.truth.visibility import visible
 from render.world.embree import RayScene
 from render.world.plane_culling import block_boxes, crossing_in_blocks
 from render.world.preview_shading import reflectance_at
@@ -318,7 +319,7 @@ def _cut_body(item: Placed, T_world_camera: Float, T_world_laser: Float) -> tupl
 
 def _no_curve(axis: Axis) -> LaserCurve:
     none, integers, points = np.zeros(0), np.zeros(0, np.int32), np.zeros((0, 3))
-    return LaserCurve(axis, integers, none, points, none, none, integers, none, none, none, np.zeros((0, 2, 3)))
+    return LaserCurve(axis, integers, none, points, none, none, integers, none, none, none, np.zeros((0, 2, 3)), none)
 
 
 def _arrays(surface: Surface) -> tuple[Float, NDArray[np.int32]]:

@@ -80,7 +80,7 @@ def test_other_programs_read_the_ply(tmp_path):
 def test_the_table_names_its_units(tmp_path):
     write_csv(tmp_path / "p.csv", cloud(some_points(3), None, 0, 0))
     assert (tmp_path / "p.csv").read_text().splitlines()[0] == (
-        "x_m,y_m,z_m,sigma_m,error_depth_m,error_distance_m,u_px,v_px,row,laser,step"
+        "x_m,y_m,z_m,sigma_m,error_depth_m,error_distance_m,sheet_bias_px,u_px,v_px,row,laser,step"
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from analysis import distance
+from analysis.cloud import cloud
 from analysis.distance import point_triangle_distance, signed_distance
 from analysis.error import compare, match
 from analysis.line.result import Flag, Line
@@ -35,7 +36,7 @@ def wall_curve(rows: np.ndarray) -> LaserCurve:
     zero = np.zeros(n)
     return LaserCurve(
         "rows", rows.astype(np.int32), np.full(n, u), point, point[:, 2].copy(), np.linalg.norm(point, axis=1),
-        np.zeros(n, np.int32), zero, zero, zero + 30.0, np.zeros((0, 2, 3)),
+        np.zeros(n, np.int32), zero, zero, zero + 30.0, np.zeros((0, 2, 3)), zero,
     )  # fmt: skip
 
 
@@ -81,6 +82,18 @@ def test_noise_and_bias_come_out_as_they_went_in():
     assert np.allclose(errors.sigma_distance, points.sigma_depth, rtol=1e-9)
     assert abs(errors.u.autocorrelation) < 4 / math.sqrt(2048)
     assert errors.u.rmse**2 == pytest.approx(errors.u.bias**2 + errors.u.sigma**2)
+
+
+def test_what_the_sheet_adds_goes_with_the_point_that_its_crossing_is_matched_to():
+    curve = wall_curve(np.arange(100, 1900))
+    curve = dataclasses.replace(curve, sheet_bias=np.linspace(-0.1, 0.1, 1800))
+    u = np.full((2048, 1), np.nan)
+    u[200:2000, 0] = curve.position[0]
+    points, errors = errors_of(line_of(u, 0.05), curve)
+    for row, expected in ((200, curve.sheet_bias[100]), (1899, 0.1), (150, np.nan), (1950, np.nan)):
+        np.testing.assert_equal(errors.sheet_bias[points.index == row], expected)
+    table = cloud(points, errors, 0, 0)
+    np.testing.assert_equal(table["sheet_bias"], errors.sheet_bias[points.valid])
 
 
 def test_coverage_tells_an_honest_sigma_from_a_boastful_one():

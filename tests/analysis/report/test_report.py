@@ -79,7 +79,7 @@ def wall_curve(scene: Scene, visible: bool = True) -> LaserCurve:
     zero = np.zeros(n)
     return LaserCurve(
         "rows", rows.astype(np.int32), np.full(n, camera.fx * x / DEPTH + camera.cx), point, point[:, 2].copy(),
-        np.linalg.norm(point, axis=1), np.zeros(n, np.int32), zero, zero, zero + 30.0, np.zeros((0, 2, 3)),
+        np.linalg.norm(point, axis=1), np.zeros(n, np.int32), zero, zero, zero + 30.0, np.zeros((0, 2, 3)), zero,
     )  # fmt: skip
 
 
@@ -265,6 +265,8 @@ def test_remarks_name_what_is_wrong():
     assert "outliers" in said(extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 3, 9.0, noise)))
     narrow = dataclasses.replace(first.line, width=0.3 * np.ones_like(first.line.width))
     assert "narrower" in said(dataclasses.replace(first, line=narrow))
+    bent = dataclasses.replace(first.errors, sheet_bias=np.where(np.arange(100) < 50, 0.04, np.nan))
+    assert "own width moves the line by 0.04" in said(dataclasses.replace(first, errors=bent))
     lost = extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 60, np.nan, noise))
     assert said(lost).startswith("Only 40.0% of the line was found")
 
@@ -350,6 +352,7 @@ def test_colour_limits_are_round_and_hold_nearly_all_errors():
         (Lambertian(relief=BumpMap(path="grain.png")), "diffuse, albedo 0.5, relief of grain.png"),
         (Glass(roughness=0.1), "transparent, BK7, roughness 0.1, tint 1"),
         (Glass(index=1.6, tint=(1, 0.9, 0.9)), "transparent, index 1.6, roughness 0, tint 1, 0.9, 0.9"),
+        (Glass(priority=2), "transparent, BK7, roughness 0, tint 1, priority 2"),
         (
             Subsurface(mean_free_path=(1e-3, 2e-3, 3e-3)),
             "translucent, index 1.5, roughness 0.3, mean free path 1, 2, 3 mm, scattering albedo 0.99, anisotropy 0",

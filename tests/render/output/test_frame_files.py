@@ -28,7 +28,7 @@ from render.frame import Frame, LaserCurve, Truth
 from render.laser.laser import LineLaser
 from render.output.exr import decode_exr
 from render.output.frame_files import read_frame, write_frame
-from render.output.sidecar import safe_name, sealed
+from render.output.sidecar import curves_from, safe_name, sealed
 from render.scene.motion import LinearStage
 from render.scene.scene import Rig, Scene, SceneObject
 from render.scene.shape import Box
@@ -253,6 +253,13 @@ def test_counts_of_a_first_version_are_read_by_the_names_that_they_had() -> None
         Quantity("else"): 2.0,
     }
     assert LIT_PIXELS.of(0).kind == "count" and LIT_PIXELS.of(0).label(lasers) == "lit pixels, error probe"
+
+
+def test_a_frame_of_before_does_not_know_what_the_sheet_adds(written: list[Path]) -> None:
+    record = json.loads(written[2].read_text(encoding="utf-8"))
+    del record["lasers"][1]["curve"]["sheet_bias"]
+    curve = curves_from(record)[1]
+    np.testing.assert_array_equal(curve.sheet_bias, np.full(len(curve.index), np.nan))
 
 
 @pytest.mark.parametrize("name", mutilations())
