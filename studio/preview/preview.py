@@ -137,7 +137,7 @@ class Preview:
         with self._lock:
             if shape_key not in self._rays:
                 self._rays[shape_key] = (
-                    RayScene(world.vertices, world.triangles, gently=True),
+                    RayScene(world.vertices, world.triangles),
                     block_boxes(world.vertices, world.triangles),
                 )
             rays, boxes = self._rays[shape_key]
