@@ -6,6 +6,7 @@ Panels never talk to each other: they change the session, and follow its signals
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QObject, Signal
@@ -46,6 +47,10 @@ class Render:
     """The project at full scale, None: `project` is."""
     images: list[Image] = field(default_factory=list)
     """As developed last: one for each laser, or one without any."""
+    noise: bool = True
+    """`images` have the sensor's noise."""
+    report: Path | None = None
+    """Where a report of it was written last."""
     scan: ScanResults | None = None
     """The scan that the frame is a step of; None: it was rendered alone."""
 
