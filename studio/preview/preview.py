@@ -144,12 +144,6 @@ class Preview:
         bounds = np.stack([world.vertices.min(axis=0), world.vertices.max(axis=0)])
         return Body(surface, rays, boxes, bounds)
 
-    def forget(self) -> None:
-        """Read every mesh anew (files may have changed)."""
-        self._rays.clear()
-        self._bodies.clear()
-        self._failed.clear()
-
     def look(self, project: Project, root: Path, step: int = 0, *, wait: bool = True) -> Look:
         """The project as it is. wait: load what is missing now; otherwise leave it out."""
         if wait:

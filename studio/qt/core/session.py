@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 
@@ -20,6 +20,8 @@ from studio.project.document import Document, FieldPath
 from studio.project.project import Project
 from studio.scan.scan import Measurement
 from studio.scan.scan_results import ScanResults
+
+Follower = TypeVar("Follower", bound=QObject)
 
 
 @dataclass
@@ -191,3 +193,9 @@ class Session(QObject):
                 self.shown = self.renders[i] if self.shown is other else self.shown
                 self.renders_changed.emit()
                 return
+
+
+def one_of(kind: type[Follower], session: Session) -> Follower:
+    """What panels share of a session beside itself, made when it is first asked for."""
+    found = session.findChild(kind)
+    return found if found is not None else kind(session)
