@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QMenu
 
 from render.render import render_world
@@ -74,3 +75,10 @@ def test_the_history_copies_the_render_that_was_clicked(qtbot, session, monkeypa
     session.set(("seed",), 11)
     panel._menu(panel.list.visualItemRect(panel.list.item(0)).center())
     assert 'developed = project.replaced({"seed": 11})' in QApplication.clipboard().text()
+
+
+def test_the_shortcut_copies_the_open_project_by_its_file(qtbot, window):
+    QApplication.clipboard().clear()
+    qtbot.keyClick(window, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier)
+    qtbot.waitUntil(lambda: "steps.json" in QApplication.clipboard().text())
+    assert ".replaced(" not in QApplication.clipboard().text()
