@@ -116,7 +116,7 @@ def take(folder: Path, scale: float, readme: bool) -> None:
         settle()
         dialog.grab().save(str(folder / f"{name}.png"))
         dialog.close()
-    window.files.give_up()
+    window.files.count_as_saved(window.session.project)
     window.close()
     app.processEvents()
 

@@ -21,6 +21,8 @@ Int = NDArray[np.int32]
 
 EDGE_SHARE = 0.3
 """RMS error of the middle of a pixel for its mean, over the jump, where an edge crosses it anywhere: 1 / sqrt(12)."""
+BEYOND = -1.0
+"""In place of the radiance, where the sheet would not reach the pixel whatever stood in its way."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -37,8 +39,8 @@ def look_around(
     """Fill mean and error (n,) of pixels start..stop of (n,) ascending flat indices.
 
     planes (n, 4): q in the middle of the pixel, its change with u and with v, and the radiance in the sheet's middle,
-    0 where no light is seen, and then the others are anything; middle (n,): the Gaussian's mean over the pixel times
-    that.
+    0 where no light is seen, and then the others are anything; or BEYOND. middle (n,): the Gaussian's mean over the
+    pixel times that.
     """
     n = len(pixels)
     # three places in the set that walk along with i: the row before, its own, the row after
@@ -69,15 +71,17 @@ def look_around(
             walk[row] = j
             while j < n and pixels[j] <= low + 2:
                 other = planes[j, 3]
+                predicted = planes[j, 0] + planes[j, 1] * (low + 1 - pixels[j]) + planes[j, 2] * (1 - row)
                 if peak > 0.0 and other > 0.0:
-                    predicted = planes[j, 0] + planes[j, 1] * (low + 1 - pixels[j]) + planes[j, 2] * (1 - row)
                     worst = max(worst, peak * slope * min(abs(predicted - q), 1.0) + share * abs(other - peak))
                     if row == 1:
                         along_u += 0.5 * (other - peak) * (pixels[j] - low - 1)
                     elif pixels[j] == low + 1:
                         along_v += 0.5 * (other - peak) * (row - 1)
                 elif peak > 0.0 or other > 0.0:
-                    worst = max(worst, middle[i], middle[j])
+                    # dark beside the line is no edge where the same surface goes on there
+                    beyond = min(peak, other) == BEYOND
+                    worst = max(worst, max(middle[i], middle[j]) * (min(abs(predicted - q), 1.0) if beyond else 1.0))
                 j += 1
         error[i] = EDGE_SHARE * worst
         # the mean of u times the Gaussian over the pixel, the pixel taken for a Gaussian of its variance

@@ -19,6 +19,7 @@ from render.camera.lens import lens_direction, lens_position
 from render.camera.view import View
 from render.laser.irradiance import fan_density, sheet_sigma
 from render.laser.sheet_integral import about_over, about_over_aperture, mean_over, sheet_slope
+from render.laser_direct.centre_ray import BEYOND
 from render.material.bsdf import evaluate, is_diffuse
 from render.world.surface_interaction import detailed, light_side
 from render.world.triangles import Surface, lookup, slot_reflectance, to_local
@@ -205,7 +206,8 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
                     in_pixel = about_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
                 else:
                     in_pixel = in_cell
-                    planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3] = q, qu, qv, 0.0
+                    planes[r, 0], planes[r, 1], planes[r, 2] = q, qu, qv
+                    planes[r, 3] = BEYOND if in_cell == 0.0 else 0.0
             if in_cell == 0.0 and in_pixel == 0.0:
                 continue
             # irradiance without the Gaussian: P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)|

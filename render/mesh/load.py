@@ -17,14 +17,14 @@ from render.material.material import Blend, BumpMap, FromMesh, Glass, GreyTextur
 from render.mesh.file_colours import merged_look, part_look
 from render.mesh.mesh import Mesh
 from render.mesh.mesh_headers import MAX_FILE_BYTES, MAX_TRIANGLES, check_together
-from render.mesh.primitives import Primitive, primitive_mesh, triangle_count
+from render.mesh.primitives import primitive_mesh, triangle_count
 from render.mesh.texture import MAX_PIXELS, load_texture
 from render.mesh.trimesh_reader import EXTENSIONS, SideFiles, read_parts
 from render.mesh.vertex_normals import corner_normals
 from render.mesh.watertight import closed_outward
 from render.mesh.weld_tee import weld_tee_mesh
 from render.scene.scene import SceneObject
-from render.scene.shape import UNITS, MeshFile, Sphere, WeldTee
+from render.scene.shape import UNITS, MeshFile, Parametric, Sphere, WeldTee
 
 MAX_EXTENT = 1e4
 """m; farther from its origin a mesh keeps no micrometres in float32 rays."""
@@ -117,7 +117,7 @@ def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
 
 
 @lru_cache(maxsize=8)
-def _made(shape: Primitive | WeldTee, crease_angle: float, filled: str) -> Mesh:
+def _made(shape: Parametric, crease_angle: float, filled: str) -> Mesh:
     """filled: whose material needs a closed surface; empty: it does not."""
     mesh = weld_tee_mesh(shape) if isinstance(shape, WeldTee) else primitive_mesh(shape)
     mesh = closed_outward(mesh, f"{filled}: shape") if filled else mesh

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.mesh.mesh import Mesh
-from render.scene.shape import Box, Cylinder, Plane, Sphere, StepBlock, VGroove
+from render.scene.shape import Box, Cylinder, Plane, Primitive, Sphere, StepBlock, VGroove
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-Primitive = Plane | Box | Sphere | Cylinder | StepBlock | VGroove
 
 
 def primitive_mesh(shape: Primitive) -> Mesh:

@@ -122,6 +122,8 @@ class WeldTee(Model):
         return self
 
 
-Shape = Annotated[
-    MeshFile | Plane | Box | Sphere | Cylinder | StepBlock | VGroove | WeldTee, Field(discriminator="kind")
-]
+Primitive = Plane | Box | Sphere | Cylinder | StepBlock | VGroove
+"""What `render.mesh.primitives` makes."""
+Parametric = Primitive | WeldTee
+"""What is made of numbers, and not read from a file."""
+Shape = Annotated[MeshFile | Parametric, Field(discriminator="kind")]

@@ -89,15 +89,9 @@ def _fill(to: Buffer, width: int, first: int, origins: Float32, towards: Float32
 
 @numba.njit(nogil=True, cache=True)
 def intersect_packets(
-    packets: Packets,
-    room: Buffer,
-    origins: Float32,
-    directions: Float32,
-    far: Float32,
-    starts: Int32,
-    triangle: Int32,
+    packets: Packets, room: Buffer, origins: Float32, directions: Float32, far: Float32, triangle: Int32
 ) -> None:
-    """First hits of (n,) rays -> triangle (n,), or -1, and far (n,), in place; starts (m,) of each mesh's triangles."""
+    """First hits of (n,) rays -> triangle (n,), or -1, and far (n,), in place."""
     width = packets.width
     for first in range(0, directions.shape[0], width):
         count = _fill(room, width, first, origins, directions, far)
@@ -107,18 +101,13 @@ def intersect_packets(
         _call(packets.intersect, room.valid_at, packets.scene, room.values_at, packets.arguments)
         for j in range(count):
             far[first + j] = room.values[8 * width + j]
-            mesh = room.words[18 * width + j]
-            triangle[first + j] = -1 if mesh == _NONE else np.int32(room.words[17 * width + j]) + starts[np.int64(mesh)]
+            missed = room.words[18 * width + j] == _NONE
+            triangle[first + j] = -1 if missed else np.int32(room.words[17 * width + j])
 
 
 @numba.njit(nogil=True, cache=True)
 def occluded_packets(
-    packets: Packets,
-    room: Buffer,
-    origins: Float32,
-    directions: Float32,
-    far: Float32,
-    blocked: NDArray[np.bool_],
+    packets: Packets, room: Buffer, origins: Float32, directions: Float32, far: Float32, blocked: NDArray[np.bool_]
 ) -> None:
     """Whether anything is hit before far (n,) -> blocked (n,)."""
     width = packets.width

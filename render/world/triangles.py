@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.material.bsdf import EMITTED, EMITTER, LAMBERTIAN, SUBSURFACE
+from render.material.bsdf import EMITTER, LAMBERTIAN, SUBSURFACE
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -44,16 +44,6 @@ def has_gloss(surface: Surface) -> bool:
 def has_medium(surface: Surface) -> bool:
     """Light scatters within some object."""
     return bool(np.any(surface.rows[:, 0] == SUBSURFACE))
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def emission(row: Float, cosine: float, rgb: Float) -> None:
-    """Radiance (W/(m^2 sr), RGB) that a material emits -> rgb (3,).
-
-    cosine: of the direction it leaves by with the mesh's own normal; an emitter's back is dark.
-    """
-    for band in range(3):
-        rgb[band] = row[EMITTED + band] if cosine > 0.0 else 0.0
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)

@@ -11,10 +11,9 @@ from render.base.model import Vector3
 from render.base.pose import Pose, invert
 from render.laser.laser import LineLaser
 from render.scene.scene import Scene
-from render.scene.shape import Box, Cylinder, Plane, Sphere, StepBlock, VGroove, WeldTee
+from render.scene.shape import Box, Cylinder, Parametric, Plane, Sphere, StepBlock, VGroove, WeldTee
 
 Array = NDArray[np.float64]
-Primitive = Plane | Box | Sphere | Cylinder | StepBlock | VGroove | WeldTee
 
 USUAL_DISTANCE = 0.5
 NEAR, FAR = 0.02, 50.0
@@ -58,7 +57,7 @@ def object_pose(scene: Scene, flat: bool = False) -> Pose:
     return Pose(translation=vector(target(scene)), rotation=rotation)
 
 
-def sized(kind: type[Primitive], side: float) -> Primitive:
+def sized(kind: type[Parametric], side: float) -> Parametric:
     """A primitive about `side` (m) across, with round measures."""
     s = rounded(side)
     if kind is Plane:

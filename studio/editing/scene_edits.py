@@ -13,9 +13,8 @@ from render.laser.laser import LineLaser
 from render.scene.lights import PointLight, RectangleLight
 from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
 from render.scene.scene import SceneObject
-from render.scene.shape import MeshFile, Plane
+from render.scene.shape import MeshFile, Parametric, Plane
 from studio.editing.placement import (
-    Primitive,
     field_of_view,
     light_pose,
     new_laser,
@@ -35,7 +34,7 @@ LISTS = (LASERS, OBJECTS, LIGHTS)
 """Where items can be added, removed and put in another order."""
 
 Result = tuple[Project, FieldPath]
-Kind = type[Primitive]
+Kind = type[Parametric]
 
 
 def in_list(path: FieldPath) -> bool:
@@ -59,7 +58,7 @@ def add_laser(project: Project) -> Result:
     return _append(project, LASERS, new_laser(project.scene, unique_name("laser", _names(project, LASERS))))
 
 
-def add_primitive(project: Project, kind: type[Primitive]) -> Result:
+def add_primitive(project: Project, kind: type[Parametric]) -> Result:
     """A shape on the camera's axis in the middle of the working range, a quarter of the view wide."""
     from studio.editing.forms import kind_label
 

@@ -21,6 +21,7 @@ from studio.notebook.checks import check_laser, check_number, check_threads, che
 from studio.notebook.frame import LOAD, RENDER, RenderedFrame
 from studio.project.project import MAX_SEED, Project
 from studio.scan.line_extraction import extract_line
+from studio.scan.redevelop import development, is_stale
 from studio.scan.stages import compare_points, develop_laser, scaled, scaled_sensor, triangulate_line, validated
 
 if TYPE_CHECKING:
@@ -115,6 +116,7 @@ def develop(
     frame: RenderedFrame,
     *,
     laser: int = 0,
+    project: Project | None = None,
     sensor: Sensor | None = None,
     power: float | None = None,
     seed: int | None = None,
@@ -123,11 +125,13 @@ def develop(
 ) -> DevelopedImage:
     """What the sensor takes of a frame while one laser fires: milliseconds, never a new render.
 
-    laser: its index; the others are off. sensor: in place of the project's, as at full image scale. power: of this
-    laser, W. seed: of shot, dark and read noise, in place of the project's. noise off: the mean, still quantised.
-    The extraction's `exposures` are all taken; the shorter ones are `image.shorter`.
+    laser: its index; the others are off. project: whose sensor, power of the lasers, lens of a pinhole, extraction and
+    seed count in place of those of the frame's, at full image scale, as in the window's Develop panel. sensor: in place
+    of the project's, as at full image scale. power: of this laser, W. seed: of shot, dark and read noise, in place of
+    the project's. noise off: the mean, still quantised. The extraction's `exposures` are all taken; the shorter ones
+    are `image.shorter`.
 
-    InputError: no such laser, a number out of range, a frame without light.
+    InputError: no such laser, a number out of range, a frame without light, a project with other light than the frame.
 
     >>> import studio as blazer
     >>> frame = blazer.render(blazer.Project.load("plane"), image_scale=0.1)
@@ -137,19 +141,22 @@ def develop(
     """
     expect(frame, RenderedFrame, "develop: frame", RENDER)
     check_threads(threads)
-    project = frame.project
+    project = (
+        frame.project if project is None else _developing(frame, expect(project, Project, "develop: project", LOAD))
+    )
     check_laser(laser, project.scene)
     if sensor is not None:
         given = expect(sensor, Sensor, "develop: sensor", "blazer.Sensor(exposure_time=0.002)")
         project = project.model_copy(update={"sensor": scaled_sensor(given, frame.image_scale)})
     if power is not None:
         watts = check_number(power, "develop: power", 0.0, 1e4)
-        project = _with_power(project, laser, watts)
+        project = _with_powers(project, {laser: watts})
     if seed is not None:
         project = project.model_copy(update={"seed": check_whole(seed, "develop: seed", 0, MAX_SEED)})
     frame.check()
     powers = [one.power for one in project.scene.lasers]
-    rendered = project.model_copy(update={"scene": frame.project.scene})  # powers are told relative to what it holds
+    # powers are told relative to what the frame holds
+    rendered = _with_powers(project, {i: one.power for i, one in enumerate(frame.project.scene.lasers)})
     image = develop_laser(rendered, frame, laser, threads, powers, noise=noise)
     return extended(DevelopedImage, image, frame=frame, project=project, laser=laser)
 
@@ -281,8 +288,22 @@ def compare(points: TriangulatedPoints, frame: RenderedFrame) -> PointErrors:
     return extended(PointErrors, found, points=points)
 
 
-def _with_power(project: Project, laser: int, watts: float) -> Project:
+def _developing(frame: RenderedFrame, now: Project) -> Project:
+    """How a project develops a frame. InputError: its light is another."""
+    if is_stale(frame.project, scaled(now, frame.image_scale)):
+        raise InputError(
+            "the project has other light than the frame",
+            where="develop: project",
+            found="a change that sensor, power and lens cannot show",
+            allowed="other sensor, power of a laser that was on, lens of a pinhole, extraction, seed",
+            cure="render it: frame = blazer.render(project)",
+        )
+    return development(frame.project, now, frame.image_scale).powered
+
+
+def _with_powers(project: Project, watts: dict[int, float]) -> Project:
+    """watts: of the lasers by their index."""
     scene = project.scene
-    lasers = tuple(one.model_copy(update={"power": watts}) if i == laser else one for i, one in enumerate(scene.lasers))
+    lasers = tuple(one.model_copy(update={"power": watts.get(i, one.power)}) for i, one in enumerate(scene.lasers))
     rig = scene.rig.model_copy(update={"lasers": lasers})
     return project.model_copy(update={"scene": scene.model_copy(update={"rig": rig})})

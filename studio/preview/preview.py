@@ -138,18 +138,12 @@ class Preview:
         with self._lock:
             if shape_key not in self._rays:
                 self._rays[shape_key] = (
-                    RayScene(world.vertices, world.triangles, gently=True),
+                    RayScene(world.vertices, world.triangles),
                     block_boxes(world.vertices, world.triangles),
                 )
             rays, boxes = self._rays[shape_key]
         bounds = np.stack([world.vertices.min(axis=0), world.vertices.max(axis=0)])
         return Body(surface, rays, boxes, bounds)
-
-    def forget(self) -> None:
-        """Read every mesh anew (files may have changed)."""
-        self._rays.clear()
-        self._bodies.clear()
-        self._failed.clear()
 
     def look(self, project: Project, root: Path, step: int = 0, *, wait: bool = True) -> Look:
         """The project as it is. wait: load what is missing now; otherwise leave it out."""

@@ -47,6 +47,11 @@ class Document:
         return self.project != self._saved
 
     @property
+    def saved(self) -> Project | None:
+        """As the file at `path` holds it; None: it was never saved."""
+        return self._saved
+
+    @property
     def undo_label(self) -> str | None:
         return self._undo[-1].label if self._undo else None
 

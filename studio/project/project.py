@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
 from pydantic import PrivateAttr, ValidationError
+from pydantic_core import to_jsonable_python
 
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
@@ -23,6 +26,8 @@ from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.project.validation_messages import input_error
 
 MAX_SEED = 2**63 - 1
+_KEY = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]")
+"""A part of a path: a name, or an index."""
 
 
 class Project(Model):
@@ -87,6 +92,26 @@ class Project(Model):
         except ValidationError as error:
             raise input_error(error, cls, data, where) from None
 
+    def replaced(self, values: Mapping[str, Any]) -> Self:
+        """The same project with other values, by their places: {"scene.rig.lasers[0].power": 0.05}.
+
+        values: models, or plain data as in the file; all are taken before the whole is checked.
+        InputError: there is no such place, or a value is not allowed.
+
+        >>> import studio as blazer
+        >>> project = blazer.Project.load("plane").replaced({"seed": 3, "scene.rig.lasers[0].power": 0.05})
+        >>> project.seed, project.scene.lasers[0].power
+        (3, 0.05)
+        """
+        data = self.model_dump(mode="json")
+        for place, value in values.items():
+            keys = [int(index) if index else name for name, index in _KEY.findall(place)]
+            node: Any = data
+            for key in keys[:-1]:
+                node = node[_there(key, node, place)]
+            node[_there(keys[-1] if keys else place, node, place)] = to_jsonable_python(value)
+        return self.from_data(data, "replaced").in_folder(self.folder)
+
     def to_text(self) -> str:
         """The file's text: every value written out, so that a project outlives a change of defaults."""
         return pretty(self.model_dump(mode="json")) + "\n"
@@ -111,6 +136,15 @@ class Project(Model):
             objects.append(item)
         scene = self.scene.model_copy(update={"objects": tuple(objects)})
         return self.model_copy(update={"scene": scene})
+
+
+def _there(key: str | int, node: Any, place: str) -> Any:
+    """The key. InputError: the node, an object or a list of the project file, does not have it."""
+    keys = range(len(node)) if isinstance(node, list) else node if isinstance(node, dict) else ()
+    if key not in keys:
+        allowed = ", ".join(str(one) for one in keys) or "nothing below it"
+        raise InputError("the project has no such place", where=f"{place!r}", found=str(key), allowed=allowed)
+    return key
 
 
 def _template_or_path(name: str) -> Path:

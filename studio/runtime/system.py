@@ -34,31 +34,46 @@ class Need:
     purpose: str
 
 
+def _needs(purpose: str, packages: dict[str, str]) -> tuple[Need, ...]:
+    """packages: what brings each library."""
+    return tuple(Need(library, package, purpose) for library, package in packages.items())
+
+
 LIBRARIES = (
-    Need("libgomp.so.1", "libgomp1", "geometry (open3d)"),
-    Need("libusb-1.0.so.0", "libusb-1.0-0", "geometry (open3d)"),
-    Need("libGL.so.1", "libgl1", "geometry and 3D pictures (open3d, VTK)"),
-    Need("libEGL.so.1", "libegl1", "geometry and 3D pictures (open3d, VTK)"),
-    Need("libX11.so.6", "libx11-6", "geometry and 3D pictures (open3d, VTK)"),
-    Need("libpango-1.0.so.0", "libpango-1.0-0", "the PDF report (WeasyPrint)"),
-    Need("libpangoft2-1.0.so.0", "libpangoft2-1.0-0", "the PDF report (WeasyPrint)"),
-    Need("libharfbuzz-subset.so.0", "libharfbuzz-subset0", "the PDF report (WeasyPrint)"),
+    *_needs("geometry (open3d)", {"libgomp.so.1": "libgomp1", "libusb-1.0.so.0": "libusb-1.0-0"}),
+    *_needs(
+        "geometry and 3D pictures (open3d, VTK)",
+        {"libGL.so.1": "libgl1", "libEGL.so.1": "libegl1", "libX11.so.6": "libx11-6"},
+    ),
+    *_needs(
+        "the PDF report (WeasyPrint)",
+        {
+            "libpango-1.0.so.0": "libpango-1.0-0",
+            "libpangoft2-1.0.so.0": "libpangoft2-1.0-0",
+            "libharfbuzz-subset.so.0": "libharfbuzz-subset0",
+        },
+    ),
 )
 VALIDATION_LIBRARIES = (
-    Need("libatomic.so.1", "libatomic1", "the comparison with another renderer (Mitsuba)"),
-    Need("libLLVM-19.so", "libllvm19", "the fastest variants of another renderer (Mitsuba)"),
+    *_needs("the comparison with another renderer (Mitsuba)", {"libatomic.so.1": "libatomic1"}),
+    *_needs("the fastest variants of another renderer (Mitsuba)", {"libLLVM-19.so": "libllvm19"}),
 )
 DESKTOP_LIBRARIES = (
-    Need("libxcb.so.1", "libxcb1", "the desktop (Qt)"),
-    Need("libxcb-cursor.so.0", "libxcb-cursor0", "the desktop (Qt)"),
-    Need("libxcb-icccm.so.4", "libxcb-icccm4", "the desktop (Qt)"),
-    Need("libxcb-keysyms.so.1", "libxcb-keysyms1", "the desktop (Qt)"),
-    Need("libxcb-shape.so.0", "libxcb-shape0", "the desktop (Qt)"),
-    Need("libxkbcommon-x11.so.0", "libxkbcommon-x11-0", "the desktop (Qt)"),
-    Need("libX11-xcb.so.1", "libx11-xcb1", "the desktop (Qt)"),
-    Need("libdbus-1.so.3", "libdbus-1-3", "the desktop (Qt)"),
-    Need("libfontconfig.so.1", "libfontconfig1", "the desktop (Qt)"),
-    Need("libglib-2.0.so.0", "libglib2.0-0", "the desktop (Qt)"),
+    *_needs(
+        "the desktop (Qt)",
+        {
+            "libxcb.so.1": "libxcb1",
+            "libxcb-cursor.so.0": "libxcb-cursor0",
+            "libxcb-icccm.so.4": "libxcb-icccm4",
+            "libxcb-keysyms.so.1": "libxcb-keysyms1",
+            "libxcb-shape.so.0": "libxcb-shape0",
+            "libxkbcommon-x11.so.0": "libxkbcommon-x11-0",
+            "libX11-xcb.so.1": "libx11-xcb1",
+            "libdbus-1.so.3": "libdbus-1-3",
+            "libfontconfig.so.1": "libfontconfig1",
+            "libglib-2.0.so.0": "libglib2.0-0",
+        },
+    ),
 )
 VIRTUAL_DISPLAY = Need("Xvfb", "xvfb", "the tests of the desktop")
 DRIVER = Need("an OpenGL driver", "libgl1-mesa-dri", "3D pictures (VTK)")

@@ -29,6 +29,17 @@ class Development:
     laser_power: tuple[float, ...]
     """W, of each laser."""
 
+    @property
+    def powered(self) -> Project:
+        """The project whose lasers have these powers."""
+        scene = self.project.scene
+        lasers = tuple(
+            laser.model_copy(update={"power": power})
+            for laser, power in zip(scene.lasers, self.laser_power, strict=True)
+        )
+        rig = scene.rig.model_copy(update={"lasers": lasers})
+        return self.project.model_copy(update={"scene": scene.model_copy(update={"rig": rig})})
+
 
 def is_stale(rendered: Project, now: Project) -> bool:
     """Another render would show something that developing again cannot. Both projects at full scale."""

@@ -47,7 +47,7 @@ while live(window.session).is_loading or not live(window.session).look.placed:
     time.sleep(0.002)
 app.processEvents()
 print(answers, busy, time.time(), flush=True)
-window.files.give_up()
+window.files.count_as_saved(window.session.project)
 window.close()
 """
 

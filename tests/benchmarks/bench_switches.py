@@ -113,7 +113,7 @@ def switch_about(seed: int, switches: int) -> int:
         if chance.random() < 0.05:
             window.panels["render"].start(0.125)
     print("closing", flush=True)
-    window.files.give_up()
+    window.files.count_as_saved(window.session.project)
     window.close()
     app.processEvents()
     print("closed", flush=True)

@@ -20,7 +20,6 @@ from analysis.line.measure import measure
 from analysis.line.result import Flag
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
-from render.camera.camera import Camera
 
 Float = NDArray[np.float64]
 
@@ -91,24 +90,3 @@ def _follow(frame: NDArray[Any], motion: tuple[float, float], time: float, noise
     if bad.any():
         moved[shift(bad.astype(np.float32), offset, order=1) > 0.0] = np.nan
     return moved
-
-
-def passage_points(found: Passage, camera: Camera, planes: Float) -> Float:
-    """Passage (h, w) and the laser plane (t, 4) of each frame in the camera's frame -> points (h, w, 3) m, NaN: none.
-
-    The plane between two frames is on the straight line between theirs, exact for a sheet that is shifted.
-    """
-    rows, columns = np.nonzero(found.valid)
-    points = np.full((*found.time.shape, 3), np.nan)
-    normalised, seen = camera.normalise(np.column_stack([columns, rows]).astype(np.float64))
-    rays = np.column_stack([normalised, np.ones(len(rows))])
-    unit = planes / np.linalg.norm(planes[:, :3], axis=1)[:, None]
-    time = np.clip(found.time[rows, columns], 0.0, len(planes) - 1.0)
-    before = np.minimum(time.astype(np.intp), len(planes) - 2)
-    t = (time - before)[:, None]
-    plane = (1.0 - t) * unit[before] + t * unit[before + 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        depth = -plane[:, 3] / (rays * plane[:, :3]).sum(axis=1)
-    good = seen & np.isfinite(depth) & (depth > 0.0)
-    points[rows[good], columns[good]] = rays[good] * depth[good, None]
-    return points

@@ -25,8 +25,6 @@ class Command:
     checkable: bool = False
 
 
-SEPARATOR = "-"
-
 COMMANDS: tuple[Command | str, ...] = (
     Command("new", "File", "New from &template…", "Ctrl+N", "new", "Start from a project that comes with the program"),
     Command("open", "File", "&Open…", "Ctrl+O", "open", "Open a project file"),
@@ -55,6 +53,9 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("rename", "Edit", "Re&name", "F2"),
     Command("hide", "Edit", "&Hide or show", "H", "", "Hidden objects are neither drawn nor measured"),
     "Edit/-",
+    Command(
+        "copy_python", "Edit", "Copy as &Python", "Ctrl+Shift+C", "", "Lines for a notebook that give what is shown"
+    ),
     Command("deselect", "Edit", "Select &nothing", "Ctrl+Shift+A"),
     Command("setup", "View", "&Set up", "F6", "", "", True),
     Command("render_workspace", "View", "&Render", "F7", "", "", True),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QByteArray, QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QIcon, QIconEngine, QPainter, QPalette, QPixmap
 from PySide6.QtSvg import QSvgRenderer
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QToolButton
 
 SHAPES = {
     "new": "<path d='M6 3h8l4 4v14H6zM14 3v4h4M12 11v6M9 14h6'/>",
@@ -68,3 +70,12 @@ def drawn(shape: str, accent: str = "") -> QIcon:
 def icon(name: str) -> QIcon:
     """One of `SHAPES`."""
     return drawn(SHAPES[name])
+
+
+def icon_button(name: str, tip: str, handler: Callable[[], None]) -> QToolButton:
+    """A button that shows an icon and calls the handler."""
+    button = QToolButton()
+    button.setIcon(icon(name))
+    button.setToolTip(tip)
+    button.clicked.connect(handler)
+    return button

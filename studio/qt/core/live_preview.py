@@ -15,7 +15,7 @@ from render.scene.scene import SceneObject
 from studio.preview.preview import Look, Preview
 from studio.preview.problem_fields import problem_fields
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Session
+from studio.qt.core.session import Session, one_of
 from studio.runtime.jobs import Progress
 from studio.scan.kernel_warm_up import warm_up
 
@@ -24,8 +24,7 @@ LANE = "load meshes"
 
 def live(session: Session) -> Live:
     """The one of this session."""
-    found = session.findChild(Live)
-    return found if found is not None else Live(session)
+    return one_of(Live, session)
 
 
 class Live(QObject):
@@ -67,11 +66,6 @@ class Live(QObject):
     def show_step(self, step: int) -> None:
         """Stand where a step of the motion puts things."""
         self.session.look_at_step(step)
-
-    def reload(self) -> None:
-        """Read all meshes anew: their files have changed."""
-        self.preview.forget()
-        self.refresh()
 
     def refresh(self) -> None:
         """Look now, without waiting for the event loop."""

@@ -16,7 +16,7 @@ from render.frame import Frame
 from render.world.world import World
 from studio.project.project import Project
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Render, Session
+from studio.qt.core.session import Render, Session, one_of
 from studio.runtime.jobs import Job, Progress
 from studio.scan.scan_folder import ScanFolder
 from studio.scan.scan_results import read_results
@@ -26,8 +26,7 @@ LANE = "read a step"
 
 def scan_steps(session: Session) -> ScanSteps:
     """The one of this session."""
-    found = session.findChild(ScanSteps)
-    return found if found is not None else ScanSteps(session)
+    return one_of(ScanSteps, session)
 
 
 class ScanSteps(QObject):

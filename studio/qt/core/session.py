@@ -6,7 +6,8 @@ Panels never talk to each other: they change the session, and follow its signals
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 from PySide6.QtCore import QObject, Signal
 
@@ -19,6 +20,8 @@ from studio.project.document import Document, FieldPath
 from studio.project.project import Project
 from studio.scan.scan import Measurement
 from studio.scan.scan_results import ScanResults
+
+Follower = TypeVar("Follower", bound=QObject)
 
 
 @dataclass
@@ -46,6 +49,10 @@ class Render:
     """The project at full scale, None: `project` is."""
     images: list[Image] = field(default_factory=list)
     """As developed last: one for each laser, or one without any."""
+    noise: bool = True
+    """`images` have the sensor's noise."""
+    report: Path | None = None
+    """Where a report of it was written last."""
     scan: ScanResults | None = None
     """The scan that the frame is a step of; None: it was rendered alone."""
 
@@ -186,3 +193,9 @@ class Session(QObject):
                 self.shown = self.renders[i] if self.shown is other else self.shown
                 self.renders_changed.emit()
                 return
+
+
+def one_of(kind: type[Follower], session: Session) -> Follower:
+    """What panels share of a session beside itself, made when it is first asked for."""
+    found = session.findChild(kind)
+    return found if found is not None else kind(session)

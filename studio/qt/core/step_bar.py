@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QHBoxLayout, QSlider, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
 
-from studio.qt.core.icons import icon
+from studio.qt.core.icons import icon, icon_button
 from studio.qt.core.session import Session
 
 PLAY_MS = 100
@@ -23,17 +21,17 @@ class StepBar(QWidget):
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setMaximum(0)
         self.slider.valueChanged.connect(look)
-        self.play = self._button("play", "Play the motion", self.toggle_play)
+        self.play = icon_button("play", "Play the motion", self.toggle_play)
         self._timer = QTimer(self, interval=PLAY_MS)
         self._timer.timeout.connect(self._next)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         for widget in (
-            self._button("first", "First step", lambda: look(0)),
-            self._button("previous", "Step back", lambda: look(session.step - 1)),
+            icon_button("first", "First step", lambda: look(0)),
+            icon_button("previous", "Step back", lambda: look(session.step - 1)),
             self.play,
-            self._button("next", "Step on", lambda: look(min(session.step + 1, self.slider.maximum()))),
-            self._button("last", "Last step", lambda: look(self.slider.maximum())),
+            icon_button("next", "Step on", lambda: look(min(session.step + 1, self.slider.maximum()))),
+            icon_button("last", "Last step", lambda: look(self.slider.maximum())),
         ):
             row.addWidget(widget)
         row.addWidget(self.slider, 1)
@@ -68,10 +66,3 @@ class StepBar(QWidget):
         self.slider.blockSignals(True)
         self.slider.setValue(self.session.step)
         self.slider.blockSignals(False)
-
-    def _button(self, name: str, tip: str, handler: Callable[[], None]) -> QToolButton:
-        button = QToolButton()
-        button.setIcon(icon(name))
-        button.setToolTip(tip)
-        button.clicked.connect(handler)
-        return button

@@ -239,6 +239,7 @@ class DevelopPanel(QWidget):
             seconds = time.perf_counter() - start
             blur = how.project.sensor.defocus_by(how.project.scene.camera.lens.model)
             told = brightness(images, names) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
+            render.noise = noise
             self._images_ready.emit(render, images, seconds, told)
             return images
 

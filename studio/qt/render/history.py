@@ -23,6 +23,7 @@ from render.base.counts import AMBIENT_SAMPLES, DIRECT_ERROR
 from render.output.tone_mapping import Picture, grey
 from studio.qt.core.session import Render, Session
 from studio.qt.image.compare_view import CompareView
+from studio.qt.render.python_copy import copy_as_python
 from studio.scan.remarks import scale_name, scale_notes
 
 THUMBNAIL = QSize(64, 54)
@@ -230,6 +231,8 @@ class History(QWidget):
         menu.addAction("Rename", lambda: self.list.editItem(item))
         compare = menu.addAction("Compare", self.compare)
         compare.setEnabled(len(self.list.selectedItems()) == 2)
+        render = item.data(Qt.ItemDataRole.UserRole)
+        menu.addAction("Copy as Python", lambda: copy_as_python(self.session, render))
         menu.addAction("Delete", self.delete)
         menu.exec(self.list.mapToGlobal(where))
         menu.deleteLater()

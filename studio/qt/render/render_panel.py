@@ -190,12 +190,15 @@ class RenderPanel(QWidget):
     def _lay_out(self) -> None:
         form = QFormLayout()
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        form.addRow("Light transport", self.transport)
-        form.addRow("Laser error", self.laser_error)
-        form.addRow("Ambient error", self.ambient_error)
-        form.addRow("Ambient samples", self.samples)
-        form.addRow("Time limit", self.limit)
-        form.addRow("Image", self.scale)
+        for name, widget in (
+            ("Light transport", self.transport),
+            ("Laser error", self.laser_error),
+            ("Ambient error", self.ambient_error),
+            ("Ambient samples", self.samples),
+            ("Time limit", self.limit),
+            ("Image", self.scale),
+        ):
+            form.addRow(name, widget)
         buttons = QHBoxLayout()
         for button in (
             self.start_button,

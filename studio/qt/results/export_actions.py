@@ -79,14 +79,8 @@ class ExportActions(QObject):
         if render is None:
             return
         how = development(render.project, self.session.project, render.image_scale)
-        lasers = tuple(
-            laser.model_copy(update={"power": power})
-            for laser, power in zip(how.project.scene.lasers, how.laser_power, strict=True)
-        )
-        rig = how.project.scene.rig.model_copy(update={"lasers": lasers})
-        scene = how.project.scene.model_copy(update={"rig": rig})
         what = export.Exported(
-            how.project.model_copy(update={"scene": scene}),
+            how.powered,
             render.project,
             self.session.document.root,
             render.world,
@@ -108,7 +102,13 @@ class ExportActions(QObject):
             return export.export_unless(cancelled, writer, path, what)
 
         notes = scale_notes(render.scanner_scale)
-        self._job = self.runner.run(LANE, f"export {path.name}", work, lambda written: self._tell(written, notes))
+
+        def then(written: list[Path]) -> None:
+            if writer is export.export_report:
+                render.report = written[0]
+            self._tell(written, notes)
+
+        self._job = self.runner.run(LANE, f"export {path.name}", work, then)
         self.preferences.change(folder=str(path.parent))
 
     def screenshot(self) -> None:

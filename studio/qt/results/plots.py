@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, Qt
+from PySide6.QtCore import QPointF
 
 from studio.qt.core import theme
 
@@ -26,6 +26,17 @@ def new_plot(bottom: str = "", left: str = "", left_unit: str = "") -> pg.PlotIt
     return plot
 
 
+def only_plot(widget: pg.GraphicsLayoutWidget, bottom: str, left: str, angle: float) -> tuple[Any, Any, Any]:
+    """The one plot of a widget, a line through its zero at an angle, degrees, and its cursor."""
+    plot = new_plot(bottom, left)
+    widget.addItem(plot)
+    plot.getAxis("left").setWidth(62)
+    widget.ci.layout.setContentsMargins(2, 4, 8, 2)
+    zero = pg.InfiniteLine(angle=angle, pos=0.0)
+    plot.addItem(zero, ignoreBounds=True)
+    return plot, zero, cursor(plot)
+
+
 def paint(plot: pg.PlotItem) -> None:
     """Give a plot the theme's colours."""
     c = theme.colours()
@@ -34,6 +45,15 @@ def paint(plot: pg.PlotItem) -> None:
         axis.setPen(pg.mkPen(c.line))
         axis.setTextPen(pg.mkPen(c.muted))
         axis.label.setDefaultTextColor(pg.mkColor(c.muted))
+
+
+def paint_only(widget: pg.GraphicsLayoutWidget, plot: Any, zero: Any, mark: Any) -> None:
+    """Give what `only_plot` made the theme's colours."""
+    c = theme.colours()
+    widget.setBackground(c.base)
+    paint(plot)
+    zero.setPen(pg.mkPen(c.muted, width=1))
+    mark.setPen(pg.mkPen(c.text, width=1))
 
 
 def set_title(plot: pg.PlotItem, text: str) -> None:
@@ -73,9 +93,3 @@ def at(plot: pg.PlotItem, scene_position: QPointF) -> QPointF | None:
         return None
     point: Any = plot.vb.mapSceneToView(scene_position)
     return QPointF(point.x(), point.y())
-
-
-def reset_on_double_click(plot: pg.PlotItem, event: Any) -> None:
-    """Show everything again."""
-    if event.double() and event.button() == Qt.MouseButton.LeftButton:
-        plot.enableAutoRange()

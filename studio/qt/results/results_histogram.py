@@ -7,7 +7,6 @@ from typing import Any
 import pyqtgraph as pg
 
 from analysis.report.colour import method_colour
-from studio.qt.core import theme
 from studio.qt.results import plots
 from studio.scan.result_series import ErrorView, Float, histogram, symmetric_limit
 
@@ -20,13 +19,7 @@ class ErrorHistogram(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__()
-        self.plot = plots.new_plot("Depth error / µm", "Points")
-        self.addItem(self.plot)
-        self.plot.getAxis("left").setWidth(62)
-        self.ci.layout.setContentsMargins(2, 4, 8, 2)
-        self.zero = pg.InfiniteLine(angle=90, pos=0.0)
-        self.plot.addItem(self.zero, ignoreBounds=True)
-        self.cursor = plots.cursor(self.plot)
+        self.plot, self.zero, self.cursor = plots.only_plot(self, "Depth error / µm", "Points", 90.0)
         self._outlines: list[Any] = []
         self.repaint_theme()
 
@@ -58,8 +51,4 @@ class ErrorHistogram(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             self.cursor.setPos(error)
 
     def repaint_theme(self) -> None:
-        c = theme.colours()
-        self.setBackground(c.base)
-        plots.paint(self.plot)
-        self.zero.setPen(pg.mkPen(c.muted, width=1))
-        self.cursor.setPen(pg.mkPen(c.text, width=1))
+        plots.paint_only(self, self.plot, self.zero, self.cursor)

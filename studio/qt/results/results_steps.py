@@ -9,7 +9,6 @@ import pyqtgraph as pg
 from PySide6.QtCore import Signal
 
 from analysis.report.colour import method_colour
-from studio.qt.core import theme
 from studio.qt.results import plots
 from studio.scan.result_series import ErrorView, Float
 
@@ -21,13 +20,7 @@ class StepsPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__()
-        self.plot = plots.new_plot("Step", "Error")
-        self.addItem(self.plot)
-        self.plot.getAxis("left").setWidth(62)
-        self.ci.layout.setContentsMargins(2, 4, 8, 2)
-        self.zero = pg.InfiniteLine(angle=0, pos=0.0)
-        self.plot.addItem(self.zero, ignoreBounds=True)
-        self.cursor = plots.cursor(self.plot)
+        self.plot, self.zero, self.cursor = plots.only_plot(self, "Step", "Error", 0.0)
         self.rmse = pg.PlotDataItem(connect="finite", symbolSize=5, symbolPen=None)
         self.bias = pg.PlotDataItem(connect="finite")
         for item in (self.bias, self.rmse):
@@ -54,11 +47,7 @@ class StepsPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.cursor.setPos(step + 1)
 
     def repaint_theme(self) -> None:
-        c = theme.colours()
-        self.setBackground(c.base)
-        plots.paint(self.plot)
-        self.zero.setPen(pg.mkPen(c.muted, width=1))
-        self.cursor.setPen(pg.mkPen(c.text, width=1))
+        plots.paint_only(self, self.plot, self.zero, self.cursor)
 
     def _click(self, event: Any) -> None:
         point = plots.at(self.plot, event.scenePos())

@@ -41,7 +41,8 @@ class ImportThread(QThread):
                 self.failed.emit(file, error)
 
 
-_running: set[ImportThread] = set()
+running: set[ImportThread] = set()
+"""Imports under way."""
 
 
 def choose_file(parent: QWidget, title: str, kinds: str) -> Path | None:
@@ -98,19 +99,14 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
     thread = ImportThread(files, document.root, field_of_view(session.project.scene))
     thread.imported.connect(done)
     thread.failed.connect(failed)
-    thread.finished.connect(lambda: _running.discard(thread))
-    _running.add(thread)
+    thread.finished.connect(lambda: running.discard(thread))
+    running.add(thread)
     application = QCoreApplication.instance()
     if application is not None:
         application.aboutToQuit.connect(thread.requestInterruption)
         application.aboutToQuit.connect(thread.wait)
     session.message.emit("info", f"reading {', '.join(file.name for file in files[:3])}")
     thread.start()
-
-
-def importing() -> bool:
-    """Files are being read."""
-    return bool(_running)
 
 
 def _add(session: Session, mesh: ImportedMesh) -> None:

@@ -147,7 +147,7 @@ class FileActions(QObject):
 
     def replace(self, document: Document) -> None:
         """Make another document the session's."""
-        self._pristine = document.project
+        self.count_as_saved(document.project)
         self.autosave.forget()
         self.session.replace_document(document)
         self.session.message.emit("info", f"Opened {document.project.name}")
@@ -172,9 +172,9 @@ class FileActions(QObject):
         answer = ask_unsaved(self.window, self.session.project.name)
         return answer == "discard" or (answer == "save" and self.save())
 
-    def give_up(self) -> None:
-        """What is unsaved is not wanted."""
-        self._pristine = self.session.project
+    def count_as_saved(self, project: Project) -> None:
+        """A project of which closing loses nothing."""
+        self._pristine = project
 
     def keep(self) -> None:
         """Autosave, but not in the middle of a drag."""
@@ -235,7 +235,7 @@ class FileActions(QObject):
             self._tell(error, f"save {path.name}")
             return False
         self.autosave.forget()
-        self._pristine = document.project
+        self.count_as_saved(document.project)
         self.preferences.add_recent(path)
         self.session.message.emit("info", f"Saved {path}")
         return True

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from html import escape
 from typing import Any
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent, QMoveEvent, QResizeEvent
-from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QWidget
 
-from studio.qt.core.icons import icon
+from studio.qt.core.icons import icon, icon_button
 from studio.qt.core.jobs import RENDER, JobRunner, time_left
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Job, State
@@ -39,8 +38,8 @@ class StatusBar(QStatusBar):
         self.bar.setTextVisible(False)
         self.left = QLabel()
         self.left.setObjectName("muted")
-        self.pause = self._button("pause", "Pause", self.toggle_pause)
-        self.cancel = self._button("cancel", "Cancel (Shift+F5)", self.cancel_work)
+        self.pause = icon_button("pause", "Pause", self.toggle_pause)
+        self.cancel = icon_button("cancel", "Cancel (Shift+F5)", self.cancel_work)
         self.text = _Message()
         self.text.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.text.clicked.connect(self.log_asked)
@@ -132,13 +131,6 @@ class StatusBar(QStatusBar):
             whole.move(self.x() + MARGIN, self.y() - whole.height() - MARGIN)
             whole.raise_()
         whole.setVisible(cut)
-
-    def _button(self, name: str, tip: str, handler: Callable[[], None]) -> QToolButton:
-        button = QToolButton()
-        button.setIcon(icon(name))
-        button.setToolTip(tip)
-        button.clicked.connect(handler)
-        return button
 
 
 class _Message(QLabel):

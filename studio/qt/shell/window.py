@@ -19,6 +19,7 @@ from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
+from studio.qt.render.python_copy import copy_as_python
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
 from studio.qt.scene import scene_actions
@@ -253,6 +254,7 @@ class MainWindow(QMainWindow):
             "delete": lambda: scene_actions.remove(session),
             "rename": self._rename,
             "hide": lambda: scene_actions.toggle_visible(session),
+            "copy_python": lambda: copy_as_python(session, session.shown),
             "deselect": lambda: session.select(()),
             "import_mesh": lambda: choose_meshes(session, self),
             "arrange": self.rearrange,

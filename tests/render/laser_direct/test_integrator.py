@@ -66,7 +66,8 @@ def test_the_line_centre_is_unbiased_to_a_thousandth_of_a_pixel(name):
 def test_radiance_equals_a_brute_force_integral_over_the_pixel():
     laser = paper_laser(half_width=1e-3)
     scene, parts = setting([plane_mesh((0.3, 0.5, 0.8), 0.7)], laser=laser)
-    image = direct_image(*parts, target=1e-4).radiance
+    # the target is of the whole image; a single pixel of few rays may be off by some times as much
+    image = direct_image(*parts, target=2e-5).radiance
     row = 300
     n = np.array([0.3, 0.5, 0.8]) / np.linalg.norm((0.3, 0.5, 0.8))
     columns = np.flatnonzero(image[row] > 0.02 * image[row].max())

@@ -9,8 +9,8 @@ import pytest
 import trimesh
 
 from render.mesh.mesh import Mesh
-from render.mesh.primitives import Primitive, primitive_mesh, triangle_count
-from render.scene.shape import Box, Cylinder, Plane, Sphere, StepBlock, VGroove
+from render.mesh.primitives import primitive_mesh, triangle_count
+from render.scene.shape import Box, Cylinder, Plane, Primitive, Sphere, StepBlock, VGroove
 from tests.closed_forms import step_block_tops, v_groove_tops
 
 STEPS = StepBlock(steps=5, tread=0.02, rise=0.01, width=0.1)

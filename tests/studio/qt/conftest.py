@@ -104,7 +104,7 @@ def one_window(qapp: QApplication, tmp_path_factory: pytest.TempPathFactory) -> 
     """Making a window takes a second: tests share one, and get it as if it were new."""
     made = new_window(tmp_path_factory.mktemp("desktop"), "plane")
     yield made
-    made.files.give_up()
+    made.files.count_as_saved(made.session.project)
     made.close()
     made.deleteLater()
 
@@ -159,7 +159,7 @@ def window(qtbot: QtBot, one_window: MainWindow, small_project: Path, tmp_path: 
     for dialog in QApplication.topLevelWidgets():
         if isinstance(dialog, QDialog):
             dialog.close()
-    one_window.files.give_up()
+    one_window.files.count_as_saved(one_window.session.project)
     one_window.files.autosave.forget()
 
 
@@ -170,6 +170,6 @@ def own_window(qtbot: QtBot, tmp_path: Path) -> Iterator[MainWindow]:
     made.show()
     qtbot.waitExposed(made)
     yield made
-    made.files.give_up()
+    made.files.count_as_saved(made.session.project)
     made.close()
     made.deleteLater()

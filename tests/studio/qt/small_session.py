@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
+
+from pytestqt.qtbot import QtBot
 
 from render.frame import Frame
 from render.render import render_world
@@ -10,7 +14,10 @@ from render.world.world import World, build_world
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.project.templates import template_folder
+from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
+from studio.qt.image.camera_view import CameraView
+from studio.qt.render.develop_panel import DevelopPanel
 from studio.scan.stages import scaled
 
 FOLDER = template_folder("sphere")
@@ -36,3 +43,22 @@ def small_session(rendered: bool = False) -> Session:
         world, frame = small_render()
         session.add_render(Render(1, small_project(), world, frame))
     return session
+
+
+@contextmanager
+def measured_view(qtbot: QtBot) -> Iterator[CameraView]:
+    """The camera view of a session with a render, on the screen, developed and measured."""
+    session = small_session(rendered=True)
+    view, develop = CameraView(session), DevelopPanel(session)
+    qtbot.addWidget(view)
+    qtbot.addWidget(develop)
+    view.resize(800, 700)
+    view.show()
+    qtbot.waitExposed(view)
+    with qtbot.waitSignal(session.measured, timeout=20000):
+        develop.refresh()
+    qtbot.waitUntil(lambda: not view.runner.busy)
+    yield view
+    view.close()
+    develop.close()
+    live(session).close()

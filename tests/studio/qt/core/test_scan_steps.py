@@ -153,7 +153,7 @@ class TestOpened:
         assert "as they were scanned" in said.text()
         panel.scan_bar.scope.setCurrentIndex(1)
         assert "as they were scanned" not in said.text()
-        opened.files.give_up()
+        opened.files.count_as_saved(opened.session.project)
 
     def test_a_folder_that_is_dropped_is_opened(
         self, window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot
@@ -173,7 +173,7 @@ class TestOpened:
         assert window.session.document.path is None and not window.files.unsaved
         assert "at 0.5 x" in window.session.project.name
         assert render.scanner_scale == SCALE and not window.panels["camera"].stale  # type: ignore[attr-defined]
-        window.files.give_up()
+        window.files.count_as_saved(window.session.project)
 
     def test_a_step_that_is_damaged_is_named_and_the_others_are_shown(
         self, window: MainWindow, scanned: tuple[Path, Path], qtbot: QtBot, tmp_path: Path
@@ -300,7 +300,7 @@ class TestRun:
         assert rendered == [0, 1, 1, 2] and moving.go_on.isHidden()
         assert open_folder(tmp_path / "scan").project.sensor.bits == 12
         shown(window, qtbot, 0)
-        window.files.give_up()
+        window.files.count_as_saved(window.session.project)
 
     def test_the_folder_of_an_unfinished_scan_is_gone_on_with(
         self, moving: MotionPanel, qtbot: QtBot, scanned: tuple[Path, Path], tmp_path: Path,

@@ -11,27 +11,14 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render
 from studio.qt.image.camera_view import CameraView
 from studio.qt.image.row_profile import REASONS, fitted_profile
-from studio.qt.render.develop_panel import DevelopPanel
-from tests.studio.qt.small_session import small_project, small_render, small_session
+from tests.studio.qt.small_session import measured_view, small_project, small_render, small_session
 
 
 @pytest.fixture
 def made(qtbot):
     """Camera view and develop panel over one session with a render, developed and measured."""
-    session = small_session(rendered=True)
-    view, develop = CameraView(session), DevelopPanel(session)
-    qtbot.addWidget(view)
-    qtbot.addWidget(develop)
-    view.resize(800, 700)
-    view.show()
-    qtbot.waitExposed(view)
-    with qtbot.waitSignal(session.measured, timeout=20000):
-        develop.refresh()
-    qtbot.waitUntil(lambda: not view.runner.busy)
-    yield view
-    view.close()
-    develop.close()
-    live(session).close()
+    with measured_view(qtbot) as view:
+        yield view
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from studio.qt.render.render_panel import RenderPanel
 from studio.qt.results.readout_panel import ReadoutPanel
 from studio.qt.results.results_panel import ResultsPanel
 from studio.scan.stages import scaled
-from tests.studio.qt.small_session import small_project, small_render, small_session
+from tests.studio.qt.small_session import measured_view, small_project, small_render, small_session
 
 
 def another_document() -> Document:
@@ -38,22 +38,10 @@ def another_render(number: int = 2) -> Render:
 
 @pytest.fixture
 def camera(qtbot: QtBot):
-    session = small_session(rendered=True)
-    view, develop = CameraView(session), DevelopPanel(session)
-    for widget in (view, develop):
-        qtbot.addWidget(widget)
-    view.resize(800, 700)
-    view.show()
-    qtbot.waitExposed(view)
-    with qtbot.waitSignal(session.measured, timeout=20_000):
-        develop.refresh()
-    qtbot.waitUntil(lambda: not view.runner.busy)
-    view._moved((view.view.box.mapViewToScene(QPointF(60, 40)),))
-    assert "60, 40" in view.readout.text()
-    yield view
-    view.close()
-    develop.close()
-    live(session).close()
+    with measured_view(qtbot) as view:
+        view._moved((view.view.box.mapViewToScene(QPointF(60, 40)),))
+        assert "60, 40" in view.readout.text()
+        yield view
 
 
 class TestReadOut:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
@@ -24,22 +21,9 @@ from tests.studio.qt.scene.inspector_hands import (
     LASER,
     drag,
     field,
-    inspector_window,
     row,
-    sample_session,
     type_into,
 )
-
-
-@pytest.fixture
-def session(tmp_path: Path) -> Session:
-    return sample_session(tmp_path)
-
-
-@pytest.fixture
-def inspector(session: Session, qtbot: QtBot) -> Iterator[Inspector]:
-    with inspector_window(session, qtbot) as panel:
-        yield panel
 
 
 class TestTyping:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +17,7 @@ from render.scene.shape import MeshFile
 from studio.qt.core.session import Session
 from studio.qt.scene import mesh_importer
 from studio.qt.scene.inspector import Inspector
-from tests.studio.qt.scene.inspector_hands import CAMERA, LASER, field, inspector_window, sample_session, type_into
-
-
-@pytest.fixture
-def session(tmp_path: Path) -> Session:
-    return sample_session(tmp_path)
-
-
-@pytest.fixture
-def inspector(session: Session, qtbot: QtBot) -> Iterator[Inspector]:
-    with inspector_window(session, qtbot) as panel:
-        yield panel
+from tests.studio.qt.scene.inspector_hands import CAMERA, LASER, field, type_into
 
 
 def tools(inspector: Inspector) -> list[QToolButton]:
@@ -98,7 +86,7 @@ class TestKinds:
         qtbot.waitUntil(lambda: isinstance(session.project.scene.objects[1].shape, MeshFile))
         shape = session.project.scene.objects[1].shape
         assert (shape.path, shape.unit) == ("meshes/part.stl", "mm")
-        qtbot.waitUntil(lambda: not mesh_importer.importing())
+        qtbot.waitUntil(lambda: not mesh_importer.running)
 
     def test_a_file_dialog_that_is_cancelled_changes_nothing(
         self, qtbot: QtBot, session: Session, inspector: Inspector, monkeypatch: pytest.MonkeyPatch

@@ -24,12 +24,6 @@ from studio.qt.scene.scene_tree import DETAIL, EYE, NAME, SceneTree
 
 
 @pytest.fixture
-def session(tmp_path: Path) -> Session:
-    project = Project.load(template_folder("scan") / "project.json").save(tmp_path / "project.json")
-    return Session(Document(project, tmp_path / "project.json"))
-
-
-@pytest.fixture
 def tree(session: Session, qtbot: QtBot) -> Iterator[SceneTree]:
     panel = SceneTree(session)
     qtbot.addWidget(panel)
@@ -330,7 +324,7 @@ class TestDropping:
         session.message.connect(lambda level, text: told.append(text))
         self.agree(monkeypatch, True)
         assert self.drop(tree, outside)
-        qtbot.waitUntil(lambda: "part" in names(session) and not mesh_importer.importing())
+        qtbot.waitUntil(lambda: "part" in names(session) and not mesh_importer.running)
         assert session.selection == (*OBJECTS, 2)
         assert tree.item((*OBJECTS, 2)).isSelected()
         assert (session.document.root / "meshes" / "part.stl").is_file()
@@ -343,7 +337,7 @@ class TestDropping:
     ) -> None:
         self.agree(monkeypatch, False)
         assert self.drop(tree, outside)
-        assert not mesh_importer.importing()
+        assert not mesh_importer.running
         assert not (session.document.root / "meshes").exists()
 
     def test_what_is_no_mesh_is_not_taken(self, tree: SceneTree, tmp_path: Path) -> None:
@@ -355,7 +349,7 @@ class TestDropping:
         before, told = session.project, []
         session.message.connect(lambda level, text: told.append(level))
         assert self.drop(tree, broken)
-        qtbot.waitUntil(lambda: "error" in told and not mesh_importer.importing())
+        qtbot.waitUntil(lambda: "error" in told and not mesh_importer.running)
         assert session.project is before
 
     def test_a_mesh_that_arrives_after_another_project_was_opened_is_dropped(
@@ -364,5 +358,5 @@ class TestDropping:
         self.agree(monkeypatch, True)
         assert self.drop(tree, outside)
         session.replace_document(Document(Project.load(template_folder("sphere") / "project.json")))
-        qtbot.waitUntil(lambda: not mesh_importer.importing())
+        qtbot.waitUntil(lambda: not mesh_importer.running)
         assert "part" not in names(session)

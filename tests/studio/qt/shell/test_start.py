@@ -29,7 +29,7 @@ def start(path):
     def end():
         log = window.panels["log"].as_text()
         print(json.dumps({"title": window.windowTitle(), "log": log}), flush=True)
-        window.files.give_up()
+        window.files.count_as_saved(window.session.project)
         window.close()
 
     QTimer.singleShot(0, window, end)
