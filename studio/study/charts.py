@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from matplotlib.ticker import NullFormatter
 
 from analysis.report.colour import INK, MUTED, method_colour, method_name
 from analysis.report.style import figure
@@ -25,7 +26,16 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
     with figure(3.4) as made:
         axes = made.subplots()
         draw(axes, answer, labels)
+        for axis in (axes.xaxis, axes.yaxis):
+            if axis.get_scale() == "log":  # matplotlib's own ticks are formulas
+                low, high = axis.get_view_interval()
+                axis.set_major_formatter(_tick)
+                axis.set_minor_formatter(_tick if high < 10.0 * low else NullFormatter())
         return made
+
+
+def _tick(value: float, place: object) -> str:
+    return f"{value:g}"
 
 
 def field_label(parameter: Parameter, labels: dict[str, str]) -> str:
@@ -124,7 +134,7 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     what = "frame" if answer.sweep.time == "frame" else "line's extraction"
     axes.set(xscale="log", yscale="log", xlabel=f"processor time of a {what} (s)", ylabel=_axis_label(measure))
     _roomy(axes)
-    if not named:
+    if not named and len(methods) > 1:
         axes.legend()
 
 
