@@ -363,6 +363,58 @@ def new(template: str | None, folder: Path | None, **options: Any) -> None:
     start_project(template, folder, **options)
 
 
+@cli.group()
+def study() -> None:
+    """Many runs with one question: speed against accuracy, where a method breaks; as a table and charts."""
+
+
+@study.command("list")
+@common
+def list_studies(**options: Any) -> None:
+    """The studies that come with the program."""
+    from studio.commands.study import list_studies
+
+    list_studies(**options)
+
+
+@study.command("run")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/study-<name>].")
+@click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor].")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://host:8786, in place of processes here.")
+@click.option("--shard", default="1/1", show_default=True, help="Only this part of the work: 3/40. Then: study merge.")
+@common
+def run_study(file: Path, **options: Any) -> None:
+    """Run a study file, or a ready-made study by its name. The same command goes on after an interrupt or a kill."""
+    _require_system()
+    from studio.commands.study import run_file
+
+    run_file(file, **options)
+
+
+@study.command("show")
+@click.argument("folder", type=click.Path(path_type=Path))
+@common
+def show_study(folder: Path, **options: Any) -> None:
+    """What a study's folder says so far; its tables and charts are made anew."""
+    _require_system()
+    from studio.commands.study import show_folder
+
+    show_folder(folder, **options)
+
+
+@study.command("merge")
+@click.argument("folders", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of the whole study.")
+@common
+def merge_studies(folders: tuple[Path, ...], **options: Any) -> None:
+    """Put the shards of a study together: the same table as of one run."""
+    _require_system()
+    from studio.commands.study import merge_folders
+
+    merge_folders(folders, **options)
+
+
 def _require_system() -> None:
     """Before heavy imports: name the system libraries that are missing, and the command that brings them."""
     missing, reason = missing_needs(), why_not_in_this_folder()

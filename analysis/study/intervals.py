@@ -1,0 +1,43 @@
+"""A number from repeated runs with the interval that it is known to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A mean over `count` repeats; `low` and `high` bound its 95 % interval, NaN with fewer than two repeats."""
+
+    mean: float
+    low: float
+    high: float
+    count: int
+
+
+NOTHING = Interval(float("nan"), float("nan"), float("nan"), 0)
+
+
+def mean_interval(values: Float) -> Interval:
+    """(n,) repeats -> mean with Student's t interval; values that are not finite are left out.
+
+    Source: Student (1908), Biometrika 6, 1; exact for normal repeats.
+    """
+    from scipy.stats import t
+
+    found = np.asarray(values, dtype=np.float64)
+    found = found[np.isfinite(found)]
+    if len(found) == 0:
+        return NOTHING
+    mean = float(found.mean())
+    if len(found) == 1:
+        return Interval(mean, float("nan"), float("nan"), 1)
+    half = float(t.ppf(0.5 + LEVEL / 2.0, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    return Interval(mean, mean - half, mean + half, len(found))

@@ -1,0 +1,177 @@
+"""Cells: every run that a study asks for, and which of them share a render."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from analysis.study.breakdown import Search, next_values
+from render.base.errors import InputError
+from studio.project.project import MAX_SEED, Project
+from studio.study.study import MOST_CELLS, Study, Sweep, Value, with_fields
+
+Point = tuple[Value, ...]
+"""One value for each parameter of a sweep."""
+Rows = Mapping[str, Mapping[str, Any]]
+"""Measured rows by the cell's key."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One measurement: a sweep's point, a method and a repeat."""
+
+    sweep: int
+    point: Point
+    method: str
+    repeat: int
+    project: Project
+    """With the point's values, the method and the repeat's seed."""
+    key: str
+    """Names the measurement by what decides it: the same in every study, shard and machine."""
+    render_key: str
+    """Cells with the same one differ only in sensor, laser power or method."""
+
+    def part_key(self, study: Study) -> str:
+        """Cells with the same one belong to one shard: those of a render, or of a bisection, which needs its own."""
+        sweep = study.sweeps[self.sweep]
+        return _digest([sweep.name, self.method]) if sweep.sampling == "bisection" else self.render_key
+
+
+@dataclass(frozen=True)
+class Shard:
+    """Part `number` of `count`, counted from 1."""
+
+    number: int = 1
+    count: int = 1
+
+    def holds(self, key: str) -> bool:
+        """By the key and not by the order, so that what is a shard's own stays so as a study grows."""
+        return int(key, 16) % self.count == self.number - 1
+
+
+WHOLE = Shard()
+
+
+def search_of(sweep: Sweep) -> Search:
+    """The bisection of a sweep."""
+    parameter, limit = sweep.vary[0], sweep.limit
+    assert limit is not None and parameter.low is not None and parameter.high is not None
+    logarithmic = parameter.spacing == "logarithmic"
+    return Search(parameter.low, parameter.high, limit.value, limit.above, logarithmic, sweep.tolerance)
+
+
+def methods_of(study: Study, sweep: Sweep) -> tuple[str, ...]:
+    return sweep.methods or study.methods
+
+
+def points(sweep: Sweep) -> list[Point]:
+    """What a sweep without bisection measures, in order."""
+    if sweep.sampling == "sobol":
+        from scipy.stats import qmc
+
+        places = qmc.Sobol(len(sweep.vary), scramble=True, seed=0).random(sweep.samples)
+        return [tuple(one.at(float(u)) for one, u in zip(sweep.vary, row, strict=True)) for row in places]
+    return list(itertools.product(*(one.grid() for one in sweep.vary)))
+
+
+def check_size(study: Study) -> int:
+    """The number of cells of all grids. InputError: too many."""
+    total = 0
+    for sweep in study.sweeps:
+        many = sweep.samples if sweep.sampling == "sobol" else math.prod(len(one.grid()) for one in sweep.vary)
+        total += 0 if sweep.sampling == "bisection" else many * len(methods_of(study, sweep)) * study.repeats
+    if total > MOST_CELLS:
+        cure = "vary less, or fewer values"
+        raise InputError("the study is too large", found=f"{total} cells", allowed=f"{MOST_CELLS}", cure=cure)
+    return total
+
+
+def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Sequence[Point]) -> Iterator[Cell]:
+    """The cells of one sweep at some points. InputError: a field or value that the project does not allow."""
+    sweep = study.sweeps[number]
+    base = bases[sweep.base or study.base]
+    where = f"sweep {sweep.name!r}"
+    for point in wanted:
+        values = {**study.set, **sweep.set, **{p.field: v for p, v in zip(sweep.vary, point, strict=True)}}
+        varied = with_fields(base, values, where)
+        for method, repeat in itertools.product(methods_of(study, sweep), range(study.repeats)):
+            extraction = varied.extraction.model_copy(update={"method": method})
+            seed = (varied.seed + repeat) % (MAX_SEED + 1)
+            project = varied.model_copy(update={"extraction": extraction, "seed": seed}).in_folder(base.folder)
+            yield Cell(number, point, method, repeat, project, *_keys(project, study.image_scale))
+
+
+def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Shard = WHOLE) -> list[Cell]:
+    """What is to be measured next of a shard, without what has been; empty: it is complete.
+
+    A bisection goes on by what it has measured, each method for itself.
+    """
+    found: dict[str, Cell] = {}
+    for number, sweep in enumerate(study.sweeps):
+        if sweep.sampling != "bisection":
+            for cell in cells_at(study, number, bases, points(sweep)):
+                found.setdefault(cell.key, cell)
+            continue
+        for method in methods_of(study, sweep):
+            for cell in _bisected(study, number, method, bases, rows):
+                found.setdefault(cell.key, cell)
+    return [cell for key, cell in found.items() if key not in rows and shard.holds(cell.part_key(study))]
+
+
+def measured_along(
+    study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows
+) -> dict[float, np.ndarray]:
+    """Repeats of a bisection's measure by the parameter's value, as far as the search has asked for them."""
+    sweep = study.sweeps[number]
+    assert sweep.limit is not None
+    known: dict[float, np.ndarray] = {}
+    search = search_of(sweep)
+    while True:
+        values = next_values(search, known)
+        found = {value: _repeats(study, number, method, bases, rows, value) for value in values}
+        complete = {value: repeats for value, repeats in found.items() if repeats is not None}
+        known |= complete
+        if not values or len(complete) < len(values):
+            return known
+
+
+def _bisected(study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows) -> Iterator[Cell]:
+    known = measured_along(study, number, method, bases, rows)
+    values = next_values(search_of(study.sweeps[number]), known)
+    for cell in cells_at(study, number, bases, [(value,) for value in values]):
+        if cell.method == method:
+            yield cell
+
+
+def _repeats(
+    study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows, value: float
+) -> np.ndarray | None:
+    """None: not all repeats are measured."""
+    limit = study.sweeps[number].limit
+    assert limit is not None
+    cells = [cell for cell in cells_at(study, number, bases, [(value,)]) if cell.method == method]
+    if not all(cell.key in rows for cell in cells):
+        return None
+    return np.array([rows[cell.key][limit.measure] for cell in cells], dtype=np.float64)
+
+
+def _keys(project: Project, image_scale: float) -> tuple[str, str]:
+    data = project.model_dump(mode="json")
+    del data["name"], data["schema_version"]
+    whole = _digest({**data, "image_scale": image_scale})
+    sensor, extraction = data.pop("sensor"), data.pop("extraction")
+    del sensor
+    for laser in data["scene"]["rig"]["lasers"]:
+        laser["power"] = laser["power"] > 0.0  # light is scaled; a laser that is off leaves none to scale
+    return whole, _digest({**data, "axis": extraction["axis"], "image_scale": image_scale})
+
+
+def _digest(data: Any) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:32]

@@ -1,0 +1,177 @@
+"""The charts of a study: every mark a mean with its 95 % interval, told apart in colour and in black and white."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.ticker import NullFormatter
+
+from analysis.report.colour import INK, MUTED, method_colour, method_name
+from analysis.report.style import figure
+from studio.study.answers import Answer, Spot
+from studio.study.measures import MEASURES, Measure
+from studio.study.study import Parameter, Value
+
+MARKERS = "osD^vP*X<>"
+MOST_IN_LEGEND = 5
+"""Methods; more are named at their marks."""
+DASHES = ("-", "--", "-.", ":")
+
+
+def chart(answer: Answer, labels: dict[str, str]) -> Any:
+    """A matplotlib figure of one sweep. labels: of the fields, with their units."""
+    draw = {"sweep": _sweep, "speed": _speed, "map": _map}[answer.sweep.chart]
+    with figure(3.4) as made:
+        axes = made.subplots()
+        draw(axes, answer, labels)
+        for axis in (axes.xaxis, axes.yaxis):
+            if axis.get_scale() == "log":  # matplotlib's own ticks are formulas
+                low, high = axis.get_view_interval()
+                axis.set_major_formatter(_tick)
+                axis.set_minor_formatter(_tick if high < 10.0 * low else NullFormatter())
+        return made
+
+
+def _tick(value: float, place: object) -> str:
+    return f"{value:g}"
+
+
+def field_label(parameter: Parameter, labels: dict[str, str]) -> str:
+    return parameter.label or labels.get(parameter.field, parameter.field)
+
+
+def shown(value: Value) -> str:
+    """A value as text on a chart."""
+    if isinstance(value, float) and math.isfinite(value):
+        text = f"{value:.3g}"
+        return text if "e" not in text else f"{value:.2e}".replace("e-0", "e-").replace("e+0", "e")
+    return str(value).replace("_", " ")
+
+
+def _bands(spots: list[Spot], measure: Measure) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean, lower and upper end of each mark, in the unit shown."""
+    rows = np.array([(spot.measure.mean, spot.measure.low, spot.measure.high) for spot in spots]).reshape(-1, 3)
+    mean, low, high = rows.T * measure.scale
+    return mean, low, high
+
+
+def _axis_label(measure: Measure) -> str:
+    return f"{measure.label} ({measure.unit})" if measure.unit else measure.label
+
+
+def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
+    """A measure over the first parameter, a line for each method and each combination of the others."""
+    sweep, measure = answer.sweep, MEASURES[answer.sweep.measure]
+    series: dict[tuple[Any, ...], list[Spot]] = {}
+    for spot in answer.spots:
+        series.setdefault((spot.method, *spot.point[1:]), []).append(spot)
+    numbers = all(
+        isinstance(spot.point[0], int | float) and not isinstance(spot.point[0], bool) for spot in answer.spots
+    )
+    names = list(dict.fromkeys(spot.point[0] for spot in answer.spots))
+    for number, (key, spots) in enumerate(series.items()):
+        spots = sorted(spots, key=lambda one: one.point[0] if numbers else names.index(one.point[0]))  # type: ignore[arg-type,return-value]
+        x = np.array([spot.point[0] if numbers else names.index(spot.point[0]) for spot in spots], dtype=np.float64)
+        mean, low, high = _bands(spots, measure)
+        label = ", ".join([method_name(key[0]), *map(shown, key[1:])])
+        style: dict[str, Any] = {
+            "color": method_colour(key[0]),
+            "marker": MARKERS[number % len(MARKERS)],
+            "ls": DASHES[number % len(DASHES)],
+        }
+        axes.errorbar(x, mean, yerr=np.abs([mean - low, high - mean]), ms=4, lw=1.2, capsize=2, label=label, **style)
+    if sweep.limit is not None and sweep.limit.measure == sweep.measure:
+        axes.axhline(sweep.limit.value * measure.scale, color=INK, lw=0.8, ls=(0, (6, 2)))
+    for found in answer.broken:
+        ended = found.breakdown
+        if ended.ending == "found":
+            axes.axvspan(ended.low, ended.high, color=method_colour(found.method), alpha=0.3, lw=0)
+            axes.axvline(ended.value, color=method_colour(found.method), lw=1, ls=":")
+    if numbers:
+        axes.set_xscale("log" if sweep.vary[0].spacing == "logarithmic" else "linear")
+    else:
+        axes.set_xticks(range(len(names)), [shown(name) for name in names])
+    _vertical(axes, answer)
+    axes.set(xlabel=field_label(sweep.vary[0], labels), ylabel=_axis_label(measure))
+    axes.legend()
+
+
+def _vertical(axes: Any, answer: Answer) -> None:
+    """Logarithmic where errors span more than one power of ten."""
+    means = np.array([spot.measure.mean for spot in answer.spots])
+    positive = means[np.isfinite(means) & (means > 0.0)]
+    if answer.sweep.measure.endswith(("rmse", "sigma", "p95")) and len(positive) and np.ptp(np.log10(positive)) > 1.0:
+        axes.set_yscale("log")
+
+
+def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
+    """Error over seconds on logarithmic axes; what nothing beats is joined, the knee is ringed and named."""
+    measure = MEASURES[answer.sweep.measure]
+    methods = list(dict.fromkeys(spot.method for spot in answer.spots))
+    named = len(methods) > MOST_IN_LEGEND
+    varied = len({spot.point for spot in answer.spots}) > 1
+    for number, method in enumerate(methods):
+        spots = [spot for spot in answer.spots if spot.method == method and spot.measure.mean > 0.0]
+        mean, low, high = _bands(spots, measure)
+        low = np.maximum(low, 1e-3 * mean)  # a logarithmic axis has no 0
+        style: dict[str, Any] = {"fmt": MARKERS[number % len(MARKERS)], "color": method_colour(method), "ms": 5}
+        error = np.abs([mean - low, high - mean])
+        axes.errorbar([spot.seconds for spot in spots], mean, yerr=error, capsize=2, label=method_name(method), **style)
+        for spot, height in zip(spots, mean, strict=True):
+            words = [method_name(method)] * named + list(map(shown, spot.point)) * varied
+            _note(axes, ", ".join(words), (spot.seconds, height), MUTED, 6.0, (5, 4))
+    front = answer.front
+    if front is not None:
+        on = sorted((answer.spots[i] for i in np.flatnonzero(front.member)), key=lambda spot: spot.seconds)
+        axes.plot([s.seconds for s in on], [s.measure.mean * measure.scale for s in on], color=INK, lw=0.8, zorder=0)
+        if front.knee is not None:
+            spot = answer.spots[front.knee]
+            place = spot.seconds, spot.measure.mean * measure.scale
+            axes.plot(*place, "o", ms=12, mfc="none", mec=INK)
+            _note(axes, f"knee, {front.knee_probability[front.knee]:.0%} sure", place, INK, 7.0, (9, -11))
+    what = "frame" if answer.sweep.time == "frame" else "line's extraction"
+    axes.set(xscale="log", yscale="log", xlabel=f"processor time of a {what} (s)", ylabel=_axis_label(measure))
+    _roomy(axes)
+    if not named and len(methods) > 1:
+        axes.legend()
+
+
+def _note(axes: Any, text: str, place: tuple[float, float], colour: str, size: float, off: tuple[int, int]) -> None:
+    axes.annotate(text, place, xytext=off, textcoords="offset points", fontsize=size, color=colour)
+
+
+def _roomy(axes: Any) -> None:
+    """At least a factor of two to see along a logarithmic axis, so that small differences do not look like large."""
+    for get, put in ((axes.get_xlim, axes.set_xlim), (axes.get_ylim, axes.set_ylim)):
+        low, high = get()
+        widen = max(1.0, math.sqrt(2.0 * low / high))
+        put(low / widen, high * widen)
+
+
+def _map(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
+    """A measure over two parameters, of the first method, with the limit as a line where there is one."""
+    import matplotlib.colors
+
+    sweep, measure = answer.sweep, MEASURES[answer.sweep.measure]
+    method = answer.spots[0].method if answer.spots else ""
+    spots = [spot for spot in answer.spots if spot.method == method]
+    x, y = (sorted({float(spot.point[i]) for spot in spots}) for i in (0, 1))  # type: ignore[arg-type]
+    z = np.full((len(y), len(x)), math.nan)
+    for spot in spots:
+        z[y.index(float(spot.point[1])), x.index(float(spot.point[0]))] = spot.measure.mean * measure.scale  # type: ignore[arg-type]
+    positive = z[np.isfinite(z) & (z > 0.0)]
+    spread = len(positive) > 0 and positive.max() > 10.0 * positive.min() and not np.any(z <= 0.0)
+    norm = matplotlib.colors.LogNorm() if spread else None
+    mesh = axes.pcolormesh(x, y, z, cmap="cividis", norm=norm, shading="nearest")
+    axes.figure.colorbar(mesh, ax=axes, label=_axis_label(measure))
+    if sweep.limit is not None and sweep.limit.measure == sweep.measure and min(z.shape) > 1:
+        axes.contour(x, y, z, levels=[sweep.limit.value * measure.scale], colors="white", linewidths=1.5)
+    for axis, parameter in zip("xy", sweep.vary, strict=True):
+        axes.set(**{f"{axis}label": field_label(parameter, labels), f"{axis}scale": _scale(parameter)})
+    axes.set_title(method_name(method), fontweight="normal")
+
+
+def _scale(parameter: Parameter) -> str:
+    return "log" if parameter.spacing == "logarithmic" else "linear"

@@ -1,0 +1,47 @@
+"""A Dask cluster by its scheduler's address; needs the extra `cluster` (dask.distributed)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from typing import Any
+
+from render.base.errors import InputError
+from studio.study.measuring import Task, measure_task
+
+PATIENCE = "20s"
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[tuple[Callable[[Task], Any], int]]:
+    """How to hand a task to the cluster, and how many at a time. Dask's own configuration, TLS included, holds.
+
+    Workers find meshes and textures at the paths of this machine: a folder that all share.
+    InputError: dask.distributed is not installed, or no scheduler answers.
+    """
+    try:
+        from distributed import Client
+    except ModuleNotFoundError:
+        cure = 'install it: pip install "blazer-studio[cluster]"'
+        raise InputError("dask.distributed is not installed", where="--scheduler", cure=cure) from None
+    try:
+        client = Client(address, timeout=PATIENCE)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(
+            "no Dask scheduler answers",
+            where="--scheduler",
+            found=f"{address} ({type(error).__name__})",
+            allowed="tcp://HOST:PORT or tls://HOST:PORT of a running one",
+            cure="start one: dask scheduler",
+        ) from None
+    try:
+        threads = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
+        with client.get_executor(pure=False, retries=2) as executor:
+
+            def submit(task: Task) -> Future[Any]:
+                return executor.submit(measure_task, task)  # type: ignore[no-any-return]
+
+            yield submit, max(2 * threads, 2)
+    finally:
+        client.close()

@@ -1,0 +1,84 @@
+"""What a run is measured by: one row of numbers for each cell of a study, in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.error import Errors
+from analysis.line.result import Flag, Line
+from analysis.triangulate import Points
+
+
+@dataclass(frozen=True)
+class Measure:
+    """label: on an axis; scale: from the stored number to the unit shown."""
+
+    label: str
+    unit: str = ""
+    scale: float = 1.0
+    of_repeats: bool = True
+    """Its mean over repeats says something; of a bias also whether it differs from 0."""
+
+
+MEASURES: dict[str, Measure] = {
+    "depth_rmse": Measure("depth error, RMS", "µm", 1e6),
+    "depth_bias": Measure("depth bias", "µm", 1e6),
+    "depth_sigma": Measure("depth sigma", "µm", 1e6),
+    "depth_robust_sigma": Measure("depth sigma, robust", "µm", 1e6),
+    "depth_p95": Measure("depth error, 95 % below", "µm", 1e6),
+    "depth_predicted_sigma": Measure("predicted depth sigma, median", "µm", 1e6),
+    "depth_coverage": Measure("depth errors within 2 predicted sigma", "%", 100.0),
+    "position_rmse": Measure("line error, RMS", "px"),
+    "position_bias": Measure("line bias", "px"),
+    "position_robust_sigma": Measure("line sigma, robust", "px"),
+    "position_p95": Measure("line error, 95 % below", "px"),
+    "completeness": Measure("rows measured, of those to be seen", "%", 100.0),
+    "wrong_rows": Measure("rows measured wrong, of those to be seen", "%", 100.0),
+    "false_rows": Measure("rows found without a line", "%", 100.0),
+    "autocorrelation": Measure("correlation of neighbouring rows", ""),
+    "no_peak_rows": Measure("rows without a peak", "%", 100.0),
+    "saturated_rows": Measure("rows saturated", "%", 100.0),
+    "unmeasured_rows": Measure("rows with a peak that could not be measured", "%", 100.0),
+    "visible_rows": Measure("rows on which the line can be seen", "%", 100.0),
+    "signal": Measure("peak, median", "e-"),
+    "line_width": Measure("line width, median sigma", "px"),
+}
+
+
+def measures(line: Line, points: Points, errors: Errors) -> dict[str, float]:
+    """One number for each of MEASURES, NaN where there is none."""
+    rows = len(line.u)
+    first = line.flag[:, 0]
+    visible = max(errors.truth_rows, 1)
+    wrong = np.unique(points.index[errors.outlier]).size
+    found = line.valid
+    return {
+        "depth_rmse": errors.depth_z.rmse,
+        "depth_bias": errors.depth_z.bias,
+        "depth_sigma": errors.depth_z.sigma,
+        "depth_robust_sigma": errors.depth_z.robust_sigma,
+        "depth_p95": errors.depth_z.p95,
+        "depth_predicted_sigma": _median(points.sigma_depth[points.valid]),
+        "depth_coverage": errors.depth_z.coverage,
+        "position_rmse": errors.u.rmse,
+        "position_bias": errors.u.bias,
+        "position_robust_sigma": errors.u.robust_sigma,
+        "position_p95": errors.u.p95,
+        "completeness": errors.completeness,
+        "wrong_rows": wrong / visible,
+        "false_rows": errors.false_rows / rows,
+        "autocorrelation": errors.depth_z.autocorrelation,
+        "no_peak_rows": float(np.mean(first == Flag.NO_PEAK)),
+        "saturated_rows": float(np.mean(first == Flag.SATURATED)),
+        "unmeasured_rows": float(np.mean(first > Flag.NO_PEAK)),
+        "visible_rows": errors.truth_rows / rows,
+        "signal": _median(line.amplitude[found]),
+        "line_width": _median(line.width[found]),
+    }
+
+
+def _median(values: np.ndarray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else float("nan")

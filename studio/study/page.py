@@ -1,0 +1,120 @@
+"""A study's page: one self-contained HTML file with its charts and what they say, and each chart as a PNG."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from analysis.report.colour import method_name
+from analysis.report.style import png_uri
+from render.base.files import atomic_write
+from studio.project.project import Project
+from studio.study.answers import Answer, Broken, answers
+from studio.study.charts import chart, field_label, shown
+from studio.study.labels import field_labels
+from studio.study.measures import MEASURES
+from studio.study.store import Row
+from studio.study.study import Study
+
+STYLE = Path(__file__).resolve().parents[2] / "analysis" / "report" / "style.css"
+
+
+def write_page(
+    folder: Path, study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]
+) -> tuple[Path, list[Answer]]:
+    """Write `study.html` and one PNG a chart into a folder; the page's path, and what it says."""
+    found = answers(study, bases, rows)
+    labels = field_labels(bases.values(), [one.field for sweep in study.sweeps for one in sweep.vary])
+    parts = []
+    for number, answer in enumerate(found):
+        if not answer.spots:
+            continue
+        made = chart(answer, labels)
+        picture = io.BytesIO()
+        made.savefig(picture, format="png", dpi=160)
+        with atomic_write(folder / f"chart_{number + 1}.png") as temporary:
+            temporary.write_bytes(picture.getvalue())
+        parts.append(
+            {
+                "name": answer.sweep.name,
+                "question": answer.sweep.question,
+                "picture": png_uri(made),
+                "lines": sentences(answer, labels),
+                "header": [*(field_label(one, labels) for one in answer.sweep.vary), "method", *_columns(answer)],
+                "table": _table(answer),
+            }
+        )
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    page = environment.get_template("page.html").render(
+        study=study,
+        parts=parts,
+        style=STYLE.read_text(encoding="utf-8"),
+        cells=len(rows),
+        repeats=study.repeats,
+        bases=", ".join(sorted(bases)),
+    )
+    with atomic_write(folder / "study.html") as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return folder / "study.html", found
+
+
+def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
+    """What a sweep found, in words."""
+    said = [_breakdown_sentence(one, answer, labels) for one in answer.broken]
+    front = answer.front
+    if front is not None and front.knee is not None:
+        spot = answer.spots[front.knee]
+        where = ", ".join(
+            f"{field_label(one, labels)} {shown(value)}"
+            for one, value in zip(answer.sweep.vary, spot.point, strict=True)
+        )
+        said.append(
+            f"More time pays most up to {where} by {method_name(spot.method)}: the knee of the front, in "
+            f"{front.knee_probability[front.knee]:.0%} of the resamples."
+        )
+    return said
+
+
+def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -> str:
+    sweep, ended = answer.sweep, found.breakdown
+    assert sweep.limit is not None
+    measure = MEASURES[sweep.limit.measure]
+    limit = f"{measure.label} {'below' if sweep.limit.above else 'above'} {sweep.limit.value * measure.scale:.4g}"
+    limit = f"{limit} {measure.unit}".rstrip()
+    parameter = field_label(sweep.vary[0], labels)
+    name = method_name(found.method)
+    if ended.ending == "holds":
+        return f"{name}: {limit} holds as far as {parameter} {shown(ended.last_good)}."
+    if ended.ending == "fails":
+        return f"{name}: {limit} is not kept even at {parameter} {shown(ended.first_bad)}."
+    interval = f"95 % interval {shown(ended.low)} to {shown(ended.high)}"
+    return f"{name}: {limit} holds up to {parameter} {shown(ended.value)} ({interval}); beyond, {found.cause}."
+
+
+def _columns(answer: Answer) -> list[str]:
+    measure = MEASURES[answer.sweep.measure]
+    unit = f" ({measure.unit})" if measure.unit else ""
+    columns = [f"{measure.label}{unit}", "95 % interval", "repeats", "time (s)"]
+    return [*columns, "on the front"] if answer.front is not None else columns
+
+
+def _table(answer: Answer) -> list[list[str]]:
+    scale, rows = MEASURES[answer.sweep.measure].scale, []
+    for number, spot in enumerate(answer.spots):
+        one = spot.measure
+        row: list[Any] = [*map(shown, spot.point), method_name(spot.method), _number(one.mean * scale)]
+        row += [f"{_number(one.low * scale)} to {_number(one.high * scale)}", one.count, _number(spot.seconds)]
+        if answer.front is not None:
+            row.append(f"{answer.front.member_probability[number]:.0%}")
+        rows.append([str(cell) for cell in row])
+    return rows
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if value == value else "-"

@@ -1,0 +1,263 @@
+"""The study file: a base project, what to vary, by which methods, how often, and what to draw."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+import re
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from analysis.line.settings import Method
+from render.base.errors import InputError
+from render.base.files import inside
+from render.base.model import Model, quantity
+from studio.project.project import Project
+from studio.project.strict_json import read_object
+from studio.project.templates import DESCRIPTIONS, template_folder
+from studio.project.validation_messages import input_error
+from studio.study.measures import MEASURES
+
+FOLDER = Path(__file__).resolve().parents[2] / "assets" / "studies"
+MOST_VALUES, MOST_CELLS, MOST_VARIED, MOST_SWEEPS = 10_000, 1_000_000, 8, 100
+Value = bool | int | float | str | None
+
+
+class Parameter(Model):
+    """A field of the project by its path, and its values: a list, or a range."""
+
+    field: str = quantity(label="Field", help="Path in the project file: sensor.exposure_time.", max_length=200)
+    label: str = quantity("", label="Label", help="On the charts; empty: the field's own.", max_length=100)
+    values: tuple[Value, ...] = quantity((), label="Values", max_length=MOST_VALUES)
+    low: float | None = quantity(None, label="From")
+    high: float | None = quantity(None, label="To")
+    count: int = quantity(5, label="How many", ge=2, le=MOST_VALUES)
+    spacing: Literal["linear", "logarithmic"] = "linear"
+
+    @model_validator(mode="after")
+    def _has_values(self) -> Self:
+        if (self.low is None) != (self.high is None):
+            raise ValueError("a range has two ends; allowed: both low and high")
+        ranged = self.low is not None
+        if bool(self.values) == ranged:
+            raise ValueError("it has both values and a range, or neither; allowed: values, or low and high")
+        if ranged and self.spacing == "logarithmic" and not (self.low > 0 and self.high > 0):  # type: ignore[operator]
+            raise ValueError("a logarithmic range reaches 0; allowed: low and high above 0")
+        if ranged and self.low == self.high:
+            raise ValueError("the range is empty; allowed: low and high that differ")
+        if len({json.dumps(value) for value in self.values}) < len(self.values):
+            raise ValueError("a value is there twice; allowed: each once")
+        return self
+
+    def at(self, place: float) -> float:
+        """The value at a place in the range, 0 to 1."""
+        assert self.low is not None and self.high is not None
+        if place in (0.0, 1.0):
+            return self.high if place else self.low
+        if self.spacing == "logarithmic":
+            return float(self.low * (self.high / self.low) ** place)
+        return self.low + place * (self.high - self.low)
+
+    def grid(self) -> tuple[Value, ...]:
+        """All values."""
+        return self.values or tuple(self.at(i / (self.count - 1)) for i in range(self.count))
+
+
+class Limit(Model):
+    """A bar of a measure that a set-up has to keep."""
+
+    measure: str = quantity(label="Measure")
+    value: float = quantity(label="Limit", help="In the unit of the measure.")
+    above: bool = quantity(True, label="Broken above", help="Off: broken by what is below it.")
+
+    @model_validator(mode="after")
+    def _is_known(self) -> Self:
+        check_measure(self.measure)
+        return self
+
+
+class Sweep(Model):
+    """One chart's worth of runs: some parameters varied, all else as the study has it."""
+
+    name: str = quantity(label="Name", min_length=1, max_length=100)
+    question: str = quantity("", label="Question", max_length=500)
+    base: str | None = quantity(None, label="Base project", help="In place of the study's.")
+    set: dict[str, Value] = Field(default_factory=dict, description="Fields of the project that are fixed.")
+    vary: tuple[Parameter, ...]
+    sampling: Literal["grid", "sobol", "bisection"] = quantity(
+        "grid",
+        label="Sampling",
+        help="grid: all combinations. sobol: quasi-random in the ranges. bisection: where the limit is crossed, from "
+        "low, where it is to hold, to high.",
+    )
+    samples: int = quantity(64, label="Samples", help="Of sobol.", ge=2, le=65536)
+    tolerance: float = quantity(0.01, label="Tolerance", help="Of bisection, as a share of the range.", gt=1e-6, le=0.5)
+    methods: tuple[Method, ...] = Field(default=(), description="In place of the study's.")
+    chart: Literal["sweep", "speed", "map"] = quantity(
+        "sweep",
+        label="Chart",
+        help="sweep: a measure over the first parameter. speed: a measure over processor time. map: over two.",
+    )
+    time: Literal["frame", "line"] = quantity(
+        "frame", label="Time", help="Of a chart of speed: the whole frame, or finding the line in its image."
+    )
+    measure: str = quantity("depth_rmse", label="Measure")
+    limit: Limit | None = None
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        check_measure(self.measure)
+        if not 1 <= len(self.vary) <= MOST_VARIED:
+            raise ValueError(f"{len(self.vary)} fields are varied; allowed: 1 to {MOST_VARIED}")
+        fields = [one.field for one in self.vary]
+        if len(set(fields)) < len(fields) or set(fields) & self.set.keys():
+            raise ValueError("a field is there twice; allowed: each once in vary and set together")
+        if self.sampling != "grid" and any(one.values for one in self.vary):
+            raise ValueError(f"{self.sampling} takes ranges; allowed: low and high for every parameter")
+        if self.sampling == "bisection" and (len(self.vary) != 1 or self.limit is None):
+            raise ValueError("bisection looks for one limit along one parameter; allowed: one in vary, and a limit")
+        if self.chart == "map" and len(self.vary) != 2:
+            raise ValueError(f"a map has two parameters; found {len(self.vary)}; allowed: two in vary")
+        return self
+
+
+class Study(Model):
+    """Frozen; what a file leaves out takes the defaults, and what it should not hold is refused."""
+
+    schema_version: Literal[1] = 1
+    name: str = quantity("study", label="Name", min_length=1, max_length=100)
+    question: str = quantity("", label="Question", max_length=500)
+    base: str = quantity(label="Base project", help="A template's name, or a path beside the study file.")
+    image_scale: float = quantity(1.0, label="Image scale", ge=0.01, le=4.0)
+    laser: int = quantity(0, label="Laser", help="Index of the laser that is measured.", ge=0, le=63)
+    methods: tuple[Method, ...] = ("likelihood",)
+    repeats: int = quantity(8, label="Repeats", help="Of every cell, each with a seed of its own.", ge=1, le=10_000)
+    set: dict[str, Value] = Field(default_factory=dict, description="Fields of the project that are fixed.")
+    sweeps: tuple[Sweep, ...]
+
+    @model_validator(mode="after")
+    def _names_are_apart(self) -> Self:
+        names = [sweep.name for sweep in self.sweeps]
+        if not 1 <= len(names) <= MOST_SWEEPS or not self.methods:
+            raise ValueError(f"there is nothing to run; allowed: a method, and 1 to {MOST_SWEEPS} sweeps")
+        if len(set(names)) < len(names):
+            raise ValueError("two sweeps have one name; allowed: each its own")
+        if self.repeats < 3 and any(sweep.sampling == "bisection" for sweep in self.sweeps):
+            raise ValueError("bisection tells noise from change by repeats; allowed: repeats of at least 3")
+        return self
+
+    @classmethod
+    def load(cls, path: Path | str) -> tuple[Self, Path]:
+        """A study and the folder that its paths start from; path: a file, or the name of a ready-made one.
+
+        InputError: one message for all that is wrong with it.
+        """
+        file = study_file(path)
+        data = read_object(file, "study file")
+        try:
+            return cls.model_validate_json(json.dumps(data), strict=True), file.parent
+        except ValidationError as error:
+            raise input_error(error, cls, data, str(file)) from None
+
+    def digest(self, bases: dict[str, Project]) -> str:
+        """What decides the study's numbers, as SHA-256: two files that differ only in charts have the same."""
+        said = {
+            "image_scale": self.image_scale,
+            "laser": self.laser,
+            "set": self.set,
+            "bases": {name: base.model_dump(mode="json") for name, base in sorted(bases.items())},
+        }
+        return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+    def bases(self, root: Path) -> dict[str, Project]:
+        """Every base project by its name in the file. InputError: one cannot be read, or lies outside `root`."""
+        names = {self.base, *(sweep.base for sweep in self.sweeps if sweep.base is not None)}
+        return {name: base_project(name, root) for name in sorted(names)}
+
+
+def study_file(path: Path | str) -> Path:
+    """The file meant by a path or by a ready-made study's name. InputError: neither."""
+    file = Path(path)
+    if file.exists() or file.suffix or len(file.parts) != 1:
+        return file
+    ready = FOLDER / f"{file.name}.json"
+    if ready.is_file():
+        return ready
+    names = ready_made()
+    near = difflib.get_close_matches(file.name, names, n=1)
+    raise InputError(
+        "there is no such study",
+        found=str(path),
+        allowed=f"a file, or a ready-made one: {', '.join(names)}",
+        cure=f"did you mean {near[0]}?" if near else "",
+    )
+
+
+def ready_made() -> list[str]:
+    """Names of the studies that come with the program."""
+    return sorted(file.stem for file in FOLDER.glob("*.json"))
+
+
+def base_project(name: str, root: Path) -> Project:
+    """A template by its name, or a project beside the study file. InputError: neither."""
+    if name in DESCRIPTIONS:
+        return Project.load(template_folder(name))
+    return Project.load(inside(root, name, "base"))
+
+
+def with_fields(project: Project, values: dict[str, Value], where: str) -> Project:
+    """The project with fields at their paths replaced. InputError: no such field, or a value that it does not allow."""
+    data = project.model_dump(mode="json")
+    for path, value in values.items():
+        _set(data, path, value, where)
+    return Project.from_data(data, where).in_folder(project.folder)
+
+
+def field_value(project: Project, path: str, where: str) -> Any:
+    """What stands at a path. InputError: no such field."""
+    place: Any = project.model_dump(mode="json")
+    for part in parts_of(path):
+        place = _child(place, part, path, where)
+    return place
+
+
+def check_measure(name: str) -> None:
+    """ValueError: no such measure."""
+    if name not in MEASURES:
+        near = difflib.get_close_matches(name, MEASURES, n=1)
+        cure = f"; did you mean {near[0]}?" if near else ""
+        raise ValueError(f"there is no measure {name[:60]!r}; allowed: {', '.join(MEASURES)}{cure}")
+
+
+def parts_of(path: str) -> list[str | int]:
+    return [int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", path)]
+
+
+def _set(data: dict[str, Any], path: str, value: Value, where: str) -> None:
+    parts = parts_of(path)
+    place: Any = data
+    for part in parts[:-1]:
+        place = _child(place, part, path, where)
+    _child(place, parts[-1] if parts else "", path, where)
+    place[parts[-1]] = value
+
+
+def _child(place: Any, part: str | int, path: str, where: str) -> Any:
+    if isinstance(place, dict) and part in place:
+        return place[part]
+    if isinstance(place, list) and isinstance(part, int) and part < len(place):
+        return place[part]
+    names = list(place) if isinstance(place, dict) else []
+    if isinstance(place, list):
+        names = [str(i) for i in range(len(place))]
+    near = difflib.get_close_matches(str(part), names, n=1)
+    raise InputError(
+        "the project has no such field",
+        where=where,
+        found=f"{path}: {part}",
+        allowed=", ".join(names) or "nothing below a plain value",
+        cure=f"did you mean {near[0]}?" if near else "",
+    )

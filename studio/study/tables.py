@@ -1,0 +1,109 @@
+"""A study's results as one tidy table, a row a cell: table.csv and table.parquet, and the seconds in times.csv.
+
+The table holds what seeds decide and is the same to the bit on every run; seconds are not, and stand apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from render.base.files import atomic_write
+from studio.project.project import Project
+from studio.study.cells import Cell, Point, cells_at, measured_along, methods_of, points
+from studio.study.measures import MEASURES
+from studio.study.store import Row
+from studio.study.study import Study
+
+SECONDS = ("seconds_render", "seconds_develop", "seconds_extract")
+
+
+def measured_cells(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> Iterator[tuple[Cell, Row]]:
+    """Every cell that is measured, with its row: by sweep, point, method and repeat, whatever the order of work."""
+    for number, sweep in enumerate(study.sweeps):
+        wanted: dict[str | None, list[Point]]
+        if sweep.sampling != "bisection":
+            wanted = {None: points(sweep)}
+        else:
+            wanted = {
+                method: [(value,) for value in sorted(measured_along(study, number, method, bases, rows))]
+                for method in methods_of(study, sweep)
+            }
+        for method, found in wanted.items():
+            for cell in cells_at(study, number, bases, found):
+                if cell.key in rows and method in (None, cell.method):
+                    yield cell, rows[cell.key]
+
+
+def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Path]:
+    """Write the three files, each whole or not at all; their paths.
+
+    Columns: sweep, key, method, repeat, seed, one for every field varied, the measures in SI units, reason.
+    """
+    import pyarrow as pa
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    fields = sorted({one.field for sweep in study.sweeps for one in sweep.vary})
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("sweep", "key", "method", "repeat", "seed", *fields, *MEASURES, "reason")
+    }
+    times: dict[str, list[Any]] = {name: [] for name in ("key", *SECONDS)}
+    for cell, row in measured_cells(study, bases, rows):
+        sweep = study.sweeps[cell.sweep]
+        values = {one.field: value for one, value in zip(sweep.vary, cell.point, strict=True)}
+        said = {"sweep": sweep.name, "key": cell.key, "method": cell.method, "repeat": cell.repeat}
+        for name, column in columns.items():
+            if name == "seed":
+                column.append(cell.project.seed)
+            else:
+                column.append(said[name] if name in said else values.get(name) if name in fields else row.get(name))
+        for name, column in times.items():
+            column.append(cell.key if name == "key" else row.get(name, math.nan))
+    tables = {"table": pa.table({k: _typed(v, k in MEASURES) for k, v in columns.items()})}
+    tables["times"] = pa.table({k: _typed(v, k in SECONDS) for k, v in times.items()})
+    written = []
+    for name, suffix in (("table", "csv"), ("table", "parquet"), ("times", "csv")):
+        write = pyarrow.csv.write_csv if suffix == "csv" else pyarrow.parquet.write_table
+        with atomic_write(folder / f"{name}.{suffix}") as temporary:
+            write(tables[name], str(temporary))
+        written.append(folder / f"{name}.{suffix}")
+    return written
+
+
+def _typed(values: list[Any], number: bool) -> Any:
+    """A column; numbers and other values of one field side by side become text, and what is not finite is missing."""
+    import pyarrow as pa
+
+    if number:
+        return pa.array([None if v is None or not math.isfinite(v) else float(v) for v in values], pa.float64())
+    kinds = {type(value) for value in values if value is not None}
+    if kinds == {int, float}:
+        return pa.array([None if v is None else float(v) for v in values], pa.float64())
+    return pa.array(values if len(kinds) <= 1 else [None if v is None else str(v) for v in values])
+
+
+def grouped(
+    study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row], number: int
+) -> dict[tuple[Any, str], list[Row]]:
+    """Rows of one sweep's repeats by point and method, in order."""
+    groups: dict[tuple[Any, str], list[Row]] = {}
+    for cell, row in measured_cells(study, bases, rows):
+        if cell.sweep == number:
+            groups.setdefault((cell.point, cell.method), []).append(row)
+    return groups
+
+
+def seconds_of(rows: list[Row], time: str) -> np.ndarray:
+    """(repeats,) processor seconds: of the whole "frame", or of finding the "line"."""
+    parts = SECONDS if time == "frame" else SECONDS[-1:]
+    return np.array([sum(row.get(part, math.nan) for part in parts) for row in rows])
+
+
+def values_of(rows: list[Row], name: str) -> np.ndarray:
+    """(repeats,) of a measure."""
+    return np.array([np.nan if row.get(name) is None else row[name] for row in rows], dtype=np.float64)

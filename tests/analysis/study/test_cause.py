@@ -1,0 +1,29 @@
+"""A breakdown is named by what takes the most rows, or else by what became of the line."""
+
+from __future__ import annotations
+
+import pytest
+
+from analysis.study.cause import cause
+
+GOOD = {
+    "visible_rows": 1.0, "no_peak_rows": 0.01, "saturated_rows": 0.0, "wrong_rows": 0.0, "false_rows": 0.0,
+    "unmeasured_rows": 0.01, "line_width": 1.5, "signal": 1000.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({"no_peak_rows": 0.3}, "starved"),
+        ({"saturated_rows": 0.9, "no_peak_rows": 0.1}, "saturated"),
+        ({"wrong_rows": 0.2, "false_rows": 0.2, "saturated_rows": 0.3}, "wrong peak"),
+        ({"visible_rows": 0.4}, "occluded"),
+        ({"unmeasured_rows": 0.5}, "not measurable"),
+        ({"line_width": 4.0}, "out of focus or grazing"),
+        ({"signal": 100.0}, "starved"),
+        ({}, "less precise"),
+    ],
+)
+def test_the_largest_symptom_names_the_cause(changed: dict[str, float], expected: str) -> None:
+    assert cause(GOOD, {**GOOD, **changed}) == expected
