@@ -19,6 +19,7 @@ from click.testing import CliRunner, Result
 import main
 from render.base.errors import Cancelled, InputError
 from studio.project.templates import DESCRIPTIONS, template_folder
+from studio.runtime import command_line
 
 ROOT = Path(__file__).resolve().parents[1]
 PATIENCE = 600.0
@@ -43,7 +44,7 @@ class TestHelp:
         imported = {line.rsplit("|", 1)[1].strip() for line in errors.splitlines() if line.startswith("import time:")}
         own = {name for name in imported if name.split(".")[0] in ("render", "analysis", "studio")}
         assert {name.split(".")[0] for name in imported} & HEAVY == set()
-        runtime = {"studio.runtime", "studio.runtime.streams", "studio.runtime.system"}
+        runtime = {"studio.runtime", *(f"studio.runtime.{name}" for name in ("command_line", "streams", "system"))}
         assert "click" in imported and own == {"studio", *runtime}
 
     def test_help_with_json_is_json(self) -> None:
@@ -103,7 +104,9 @@ class TestExitCodes:
     @pytest.mark.parametrize("arguments", [["render", "x/" * 5000], ["reconstruct", "scan", "--laser", "x" * 10_000]])
     def test_what_is_wrong_is_told_on_one_screen_however_long_it_is(self, arguments: list[str]) -> None:
         done = call(*arguments, "--json")
-        assert done.exit_code == 2 and len(json.loads(done.stdout)["error"]["message"]) <= main.LONGEST_MESSAGE + 5
+        assert (
+            done.exit_code == 2 and len(json.loads(done.stdout)["error"]["message"]) <= command_line.LONGEST_MESSAGE + 5
+        )
 
     def test_every_option_of_every_command_that_is_wrong_is_told_as_json(self) -> None:
         for name, command in main.cli.commands.items():
@@ -226,7 +229,9 @@ class TestProcess:
         process.stdout.close()
         errors = process.stderr.read()
         process.wait(timeout=PATIENCE)
-        assert "Traceback" not in errors and "BrokenPipe" not in errors and process.returncode == main.BROKEN_PIPE
+        assert (
+            "Traceback" not in errors and "BrokenPipe" not in errors and process.returncode == command_line.BROKEN_PIPE
+        )
 
     @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device of Linux")
     @pytest.mark.parametrize(
@@ -238,8 +243,8 @@ class TestProcess:
             ("{} nope 2> /dev/full", 2),
             ("{} new 2> /dev/full", 0),
             ("{} new >&- 2>&- <&-", 0),
-            ("set -o pipefail; {} --help | true", main.BROKEN_PIPE),
-            ("set -o pipefail; {} new | true", main.BROKEN_PIPE),
+            ("set -o pipefail; {} --help | true", command_line.BROKEN_PIPE),
+            ("set -o pipefail; {} new | true", command_line.BROKEN_PIPE),
             ("set -o pipefail; {} nope --json 2>&1 | true", 2),
         ],
     )
@@ -283,7 +288,7 @@ class TestProcess:
                 break
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=PATIENCE)
-        assert process.returncode == main.INTERRUPTED and "interrupted" in errors and "Traceback" not in errors
+        assert process.returncode == command_line.INTERRUPTED and "interrupted" in errors and "Traceback" not in errors
         left = [path for path in (tmp_path / "out").rglob("*") if path.is_file()] if (tmp_path / "out").exists() else []
         assert [path for path in left if path.name.startswith(".")] == [] and not (
             tmp_path / "out" / "scan.json"

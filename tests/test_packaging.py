@@ -116,7 +116,7 @@ def test_the_entry_imports_nothing_but_click_at_its_top() -> None:
     modules = {alias.name for node in statements if isinstance(node, ast.Import) for alias in node.names}
     modules |= {node.module or "" for node in statements if isinstance(node, ast.ImportFrom)}
     standard = {name for name in modules if name.split(".")[0] in sys.stdlib_module_names}
-    assert modules - standard == {"click", "studio.runtime.streams", "studio.runtime.system"}
+    assert modules - standard == {"click", "studio.runtime.command_line", "studio.runtime.system"}
 
 
 def test_only_the_desktop_knows_qt_and_only_one_file_embree() -> None:

@@ -92,14 +92,6 @@ def test_vertices_that_are_not_finite_are_told(tmp_path: Path, value: str) -> No
     assert "not finite; found NaN or infinity in 1 of 3 vertices" in text
 
 
-@pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("size", ["1e200", "1e308"])
-def test_a_polygon_beyond_all_bounds_is_told_without_a_word_of_the_reader(tmp_path: Path, size: str) -> None:
-    corners = f"0 0 0\n{size} 0 0\n{size} {size} 1\n0 {size} 0\n"
-    (tmp_path / "a.off").write_text(f"OFF\n4 1 0\n{corners}4 0 1 2 3\n")
-    message(tmp_path, "a.off")
-
-
 @pytest.mark.parametrize(
     ("name", "content"),
     [

@@ -111,6 +111,14 @@ def test_uv_stays_with_the_corners_of_a_concave_polygon(tmp_path: Path) -> None:
     assert area(mesh.vertices[mesh.triangles]) == pytest.approx(0.12, rel=1e-12)
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("size", ["1e200", "1e308"])
+def test_a_polygon_beyond_all_bounds_is_told_without_a_word_of_the_reader(tmp_path: Path, size: str) -> None:
+    content = f"OFF\n4 1 0\n0 0 0\n{size} 0 0\n{size} {size} 1\n0 {size} 0\n4 0 1 2 3\n"
+    with pytest.raises(InputError, match=r"object 'part': a\.off"):
+        read(tmp_path, "a.off", content)
+
+
 def test_a_polygon_that_is_not_flat_is_told(tmp_path: Path) -> None:
     bent = "v 0 0 0\nv 1 0 0.2\nv 1 1 0\nv 0 1 0.2\nf 1 2 3 4\n"
     with pytest.warns(UserWarning, match=r"object 'part': a\.obj: 1 polygons are not flat"):
