@@ -33,7 +33,7 @@ def gather_aperture(  # noqa: PLR0913
     mean: Float,
     error: Float,
 ) -> None:
-    """As `render.laser_direct.integrator.gather`, of rays (n, ...) through points (a, b) of an aperture; planes as its
+    """As `render.laser_direct.shading.gather`, of rays (n, ...) through points (a, b) of an aperture; planes as its
     `shade` gives.
 
     A ray that was not written to `sample`, or is occluded, has no light and no plane.
@@ -66,16 +66,16 @@ def gather_aperture(  # noqa: PLR0913
         if predicted <= 0.0:
             continue
         whole = mean_over_aperture(plane[0], plane[1] * 0.5, plane[2] * 0.5, reach)
-        pdf_lobes = apart = 0.0
+        pictured = apart = 0.0
         middle = first / n / predicted
         for cell in range(n):
             r = i * n + cell
             u, v = (cell % cells + 0.5) * size - 0.5, (cell // cells + 0.5) * size - 0.5
             q = plane[0] + plane[1] * u + plane[2] * v + plane[3] * lens[r, 0] + plane[4] * lens[r, 1]
             g = mean_over(q, plane[1] * half, plane[2] * half)
-            pdf_lobes += g
+            pictured += g
             apart += ((values[r, 0] if lit[r] else 0.0) - middle * g) ** 2
-        left = total / n - middle * pdf_lobes / n
+        left = total / n - middle * pictured / n
         corrected = left + middle * whole
         spread = max(second / n - (first / n) ** 2, apart / n - left * left, 0.0) * n / (n - 1)
         # between independent samples, 1/2, and an edge through jittered cells of pixel and aperture, 5/8; as measured

@@ -8,7 +8,7 @@ import numba
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def dielectric(cosine: float, eta: float) -> tuple[float, float]:
+def fresnel_dielectric(cosine: float, eta: float) -> tuple[float, float]:
     """Reflectance, and cosine of the refracted ray (0: total reflection), for light that meets a boundary.
 
     cosine >= 0: of the angle of incidence; eta: refractive index beyond the boundary over that before it.
@@ -23,7 +23,7 @@ def dielectric(cosine: float, eta: float) -> tuple[float, float]:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def conductor(cosine: float, n: float, k: float) -> float:
+def fresnel_conductor(cosine: float, n: float, k: float) -> float:
     """Reflectance of a metal of index n + i k in air (Born and Wolf, Principles of Optics, 14.2)."""
     c2 = cosine * cosine
     s2 = 1.0 - c2
@@ -37,11 +37,11 @@ def conductor(cosine: float, n: float, k: float) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def diffuse_reflectance(eta: float) -> float:
-    """Reflectance averaged over a cosine-weighted hemisphere, eta as in `dielectric`."""
+    """Reflectance averaged over a cosine-weighted hemisphere, eta as in `fresnel_dielectric`."""
     total, n = 0.0, 256
     for i in range(n):
         # midpoints of s = sin^2: the weight 2 sin cos d(angle) is d s
         cosine = math.sqrt(1.0 - (i + 0.5) / n)
-        reflected, _ = dielectric(cosine, eta)
+        reflected, _ = fresnel_dielectric(cosine, eta)
         total += reflected
     return total / n

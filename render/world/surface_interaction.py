@@ -18,8 +18,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.material.bsdf import COATED
-from render.material.material import POLISHED
+from render.material.maps import POLISHED
+from render.material.record import ALPHA_X, ALPHA_Y, COATED, KIND
 from render.world.triangles import Surface, bilinear, scattering, to_local, uv_at
 
 Float = NDArray[np.float64]
@@ -55,7 +55,7 @@ def interaction(  # noqa: PLR0913
     """
     slot = scattering(surface, t, p0, p1, p2, choice, rgb)
     row = surface.rows[slot]
-    alpha[0], alpha[1] = row[1], row[2]
+    alpha[0], alpha[1] = row[ALPHA_X], row[ALPHA_Y]
     if surface.detail[slot] == 0:
         to_local(surface, t, row, n0, n1, n2, frame)
     else:
@@ -82,9 +82,9 @@ def mapped_roughness(surface: Surface, slot: int, u: float, v: float, rgb: Float
     map_value(surface, slot, 0, u, v, rgb)
     row = surface.rows[slot]
     value = (rgb[0] + rgb[1] + rgb[2]) / 3.0
-    if row[0] == COATED:
+    if row[KIND] == COATED:
         value = max(value, LEAST_COAT)
-    if row[1] != row[2]:
+    if row[ALPHA_X] != row[ALPHA_Y]:
         alpha[0] = max(value, POLISHED)
     else:
         alpha[0] = alpha[1] = value if value >= POLISHED else 0.0

@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.material.bsdf import EMITTER, LAMBERTIAN, SUBSURFACE
+from render.material.record import ALPHA_X, ALPHA_Y, EMITTER, KIND, LAMBERTIAN, SUBSURFACE
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -37,13 +37,13 @@ class Surface(NamedTuple):
 
 def has_gloss(surface: Surface) -> bool:
     """Some material scatters otherwise than Lambert says, or is shaded on another normal than its facet's."""
-    plain = (surface.rows[:, 0] == LAMBERTIAN) | (surface.rows[:, 0] == EMITTER)
+    plain = (surface.rows[:, KIND] == LAMBERTIAN) | (surface.rows[:, KIND] == EMITTER)
     return not bool(np.all(plain & (surface.detail == 0)))
 
 
 def has_medium(surface: Surface) -> bool:
     """Light scatters within some object."""
-    return bool(np.any(surface.rows[:, 0] == SUBSURFACE))
+    return bool(np.any(surface.rows[:, KIND] == SUBSURFACE))
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
@@ -118,7 +118,7 @@ def slot_reflectance(surface: Surface, slot: int, t: int, p0: float, p1: float, 
 def to_local(surface: Surface, t: int, row: Float, n0: float, n1: float, n2: float, frame: Float) -> None:
     """Orthonormal axes (3, 3), one a row, z the normal n; x follows the texture's u where the material has a grain."""
     x0 = x1 = x2 = 0.0
-    if row[1] != row[2] and surface.uv.shape[0] > 0:
+    if row[ALPHA_X] != row[ALPHA_Y] and surface.uv.shape[0] > 0:
         a, b, c = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
         v, uv = surface.vertices, surface.uv
         # dP/du from the two edges

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.pose import transform_points
-from render.material.material import BAND_CENTRES_NM, BaseMaterial, Blend
-from render.material.parameters import material_row
+from render.material.material import BaseMaterial, Blend
+from render.material.spectrum import BAND_CENTRES_NM
 from render.mesh.mesh import Mesh
 from render.scene.scene import Scene
 from render.world.embree import RayScene
@@ -84,7 +84,7 @@ class World:
         """
         rows = np.zeros((len(self.materials), COLUMNS))
         for i, (material, least) in enumerate(zip(self.materials, self.least_alpha, strict=True)):
-            rows[i, :RANK] = material_row(material, bands_nm, float(least), self.places[i])
+            rows[i, :RANK] = material.pack(bands_nm, float(least), self.places[i])
         for rank, item in enumerate(self.nesting.ranked):
             rows[item, RANK], rows[rank, RANKED] = rank + 1, item
         return Surface(

@@ -61,8 +61,8 @@ def material(m: scenes.Material):
 
 def conductor(m: scenes.Material):
     """A metal of the scene's own index: the table's iron is given it in this process."""
+    from render.material.conductor import metals
     from render.material.material import Conductor
-    from render.material.parameters import metals
 
     metals()["iron"] |= {"wavelength_nm": [200.0, 2000.0], "n": [m.n, m.n], "k": [m.k, m.k]}
     return Conductor(metal="iron", roughness=m.alpha)

@@ -6,8 +6,9 @@ import pytest
 from scipy import stats
 
 from render.material import bsdf
-from render.material.fresnel import conductor, dielectric, diffuse_reflectance
-from render.material.microfacet import density, visible_density
+from render.material.fresnel import diffuse_reflectance, fresnel_conductor, fresnel_dielectric
+from render.material.microfacet import ggx, visible_normal_pdf
+from render.material.scattering import Microsurface
 
 
 def material(kind, alpha=(0.0, 0.0), index=1.5, n=2.87, k=3.25):
@@ -142,36 +143,36 @@ def test_smooth_glass_and_metal_keep_what_fresnel_says():
     numbers = np.random.default_rng(2).random((50_000, 3))
     directions, weights, chance = draw(material(bsdf.DIELECTRIC), WHITE, o, numbers)
     assert (chance == -1).all() and weights == pytest.approx(1.0)
-    reflected, _ = dielectric(0.8, 1.5)
+    reflected, _ = fresnel_dielectric(0.8, 1.5)
     up = directions[:, 2] > 0
     assert abs(up.mean() - reflected) < 4 * np.sqrt(reflected * (1 - reflected) / len(up))
     assert directions[up] == pytest.approx(np.broadcast_to([-0.6, 0, 0.8], (up.sum(), 3)))
     # Snell
     assert directions[~up][:, 0] == pytest.approx(-0.6 / 1.5)
     _, weights, _ = draw(material(bsdf.CONDUCTOR), WHITE, o, numbers[:1])
-    assert weights[0] == pytest.approx(conductor(0.8, 2.87, 3.25))
+    assert weights[0] == pytest.approx(fresnel_conductor(0.8, 2.87, 3.25))
 
 
 def test_fresnel_at_normal_incidence_at_brewster_and_beyond_the_critical_angle():
-    assert dielectric(1.0, 1.5)[0] == pytest.approx(0.04)
+    assert fresnel_dielectric(1.0, 1.5)[0] == pytest.approx(0.04)
     brewster = np.cos(np.arctan(1.5))
     beyond = 1.5 * np.sqrt(1 - (1 - brewster**2) / 2.25)
-    assert dielectric(brewster, 1.5)[0] == pytest.approx(((brewster - beyond) / (brewster + beyond)) ** 2 / 2)
-    assert dielectric(0.5, 1 / 1.5) == (1.0, 0.0)
+    assert fresnel_dielectric(brewster, 1.5)[0] == pytest.approx(((brewster - beyond) / (brewster + beyond)) ** 2 / 2)
+    assert fresnel_dielectric(0.5, 1 / 1.5) == (1.0, 0.0)
     n, k = 2.87, 3.25
-    assert conductor(1.0, n, k) == pytest.approx(((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2))
-    assert conductor(0.3, 1.5, 0.0) == pytest.approx(dielectric(0.3, 1.5)[0])
+    assert fresnel_conductor(1.0, n, k) == pytest.approx(((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2))
+    assert fresnel_conductor(0.3, 1.5, 0.0) == pytest.approx(fresnel_dielectric(0.3, 1.5)[0])
     # average over the hemisphere from inside glass (Walter et al. 1.0 / 1.5: 0.596)
     assert diffuse_reflectance(1 / 1.5) == pytest.approx(0.5963, abs=5e-4)
 
 
 @numba.njit
 def facet_sums(view, ax, ay, grid, share):
-    projected = seen = 0.0
+    projected, seen, m = 0.0, 0.0, Microsurface(ax, ay, 1.0)
     for j in range(len(grid)):
         x, y, z = grid[j]
-        projected += density(x, y, z, ax, ay) * max(z, 0.0) * share[j]
-        seen += visible_density(view[0], view[1], view[2], x, y, z, ax, ay) * share[j]
+        projected += ggx(m, (x, y, z)) * max(z, 0.0) * share[j]
+        seen += visible_normal_pdf(m, (view[0], view[1], view[2]), (x, y, z)) * share[j]
     return projected, seen
 
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from render.material.material import Blend, Subsurface
-from render.material.parameters import material_row
 from render.sensor.response import laser_response
 from studio.editing.presets import Preset, PresetKind, presets, presets_for, with_preset
 from studio.project.document import Document, replaced, value_at
@@ -48,7 +47,7 @@ def test_every_preset_fits_and_says_where_its_figures_come_from(project: Project
         dumped = json.loads(after.material.model_dump_json())
         assert {name: dumped[name] for name in written} == written
         assert not isinstance(after.material, Blend)
-        assert np.isfinite(material_row(after.material, (660.0, 520.0, 450.0))).all()
+        assert np.isfinite(after.material.pack((660.0, 520.0, 450.0))).all()
     else:
         assert changed.scene.objects == project.scene.objects
     assert changed.scene.camera.T_rig_camera == project.scene.camera.T_rig_camera
