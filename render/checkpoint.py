@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,31 +20,19 @@ from numpy.typing import NDArray
 from render.base.errors import InputError
 from render.base.files import atomic_write, check_regular
 from render.base.kernel_cache import source_key
+from render.run import Arrays, Sums
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from render.world.world import World
 
-Arrays = dict[str, NDArray[Any]]
 T = TypeVar("T")
-
-AMBIENT = "ambient"
-"""The part that holds the ambient light."""
 
 TARGETS = {"indirect_error", "light_paths", "ambient_error", "ambient_samples", "truth_images"}
 """Settings that say when to end, which may be others when a render goes on."""
 MAX_BYTES = 2**33
 CURE = "delete it, or render without --resume"
-EVERY = 30.0
+WRITE_INTERVAL = 30.0
 """s between two writings of the file."""
-
-
-class Sums(Protocol):
-    """What can be kept: the sums of a light group under way."""
-
-    consistent: bool
-    """False while it changes."""
-
-    def arrays(self) -> Arrays: ...
 
 
 @dataclass
@@ -56,7 +44,7 @@ class RenderState:
     path: Path | None = None
     """The file that follows; None: in memory only."""
     saved: dict[str, Arrays] = field(default_factory=dict)
-    """By part (AMBIENT, `laser_part`): what to go on from."""
+    """By part (`Run.part`): what to go on from."""
     under_way: dict[str, Sums] = field(default_factory=dict)
     """By part: what is rendered now."""
     written: float = field(default_factory=time.monotonic)
@@ -64,7 +52,7 @@ class RenderState:
     def keep(self, part: str, sums: Sums) -> None:
         """Hold on to the sums of a part, which change from then on; they go to the file every now and then."""
         self.under_way[part] = sums
-        if self.path is not None and time.monotonic() - self.written > EVERY:
+        if self.path is not None and time.monotonic() - self.written > WRITE_INTERVAL:
             self.write()
 
     def restore(self, part: str, load: Callable[[Arrays], T]) -> T | None:
@@ -102,11 +90,6 @@ class RenderState:
         """The frame is finished: no file stays."""
         if self.path is not None:
             self.path.unlink(missing_ok=True)
-
-
-def laser_part(index: int) -> str:
-    """The part that holds a laser's indirect light."""
-    return f"laser {index}"
 
 
 def state_of(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.base.counts import Counts
 from render.base.finite import check_finite
+from render.plan import GroupQuality, Plan
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -64,6 +65,16 @@ class Truth:
 
 
 @dataclass(frozen=True)
+class Estimate:
+    """What a light group knows so far."""
+
+    value: tuple[Float32, ...] | Float32 | Truth
+    """For its field of `Frame`."""
+    quality: tuple[GroupQuality, ...] = ()
+    """Of each laser whose light has begun, or of the ambient light."""
+
+
+@dataclass(frozen=True)
 class Frame:
     """One step of a scan."""
 
@@ -77,19 +88,56 @@ class Frame:
     curves: tuple[LaserCurve, ...]
     """For each laser."""
     truth: Truth | None
-    plan: str
-    """What was computed, what was left out, and why; one line each."""
+    plan: Plan = field(default_factory=Plan)
+    """What was computed, what was left out, and why."""
+    quality: tuple[GroupQuality, ...] = field(default=(), kw_only=True)
+    """How well each light group is known that has begun: of each laser, then ambient light."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage."""
     warnings: tuple[str, ...] = field(default=(), kw_only=True)
     """What may make a sensible picture of the wrong thing (`render.world.material_checks`)."""
     counts: Counts = field(default_factory=dict)
-    """Rays, samples, lit pixels, seconds inside embree, estimated relative error."""
+    """Of all light together: rays, seconds inside embree."""
 
     def laser(self, index: int) -> Float32:
         """(h, w) radiance of one laser's group: direct and indirect."""
         direct = self.laser_direct[index]
         return direct + self.laser_indirect[index] if self.laser_indirect else direct
+
+    def quality_of(self, group: str, laser: str | None = None) -> GroupQuality | None:
+        """How well a light group is known, of the laser of that name; None: it has not begun."""
+        return next((one for one in self.quality if (one.group, one.laser) == (group, laser)), None)
+
+    @property
+    def unfinished(self) -> bool:
+        """Some light group of the plan has reached neither its target error nor the most work that it may take."""
+        ambient = self.plan.step("ambient", "ambient")
+        begun = {one.group for one in self.quality}
+        if ambient is not None and ambient.computed and "ambient" not in begun:
+            return True
+        reflected = [one for one in self.quality if one.group == "indirect"]
+        if len(reflected) < len(self.laser_indirect):
+            return True
+        return any(one.reason == "unfinished" for one in self.quality)
+
+    def with_estimate(self, field: str, estimate: Estimate) -> Frame:
+        """The frame with what a light group now knows, as its field."""
+        groups = {one.group for one in estimate.quality}
+        quality = (*(one for one in self.quality if one.group not in groups), *estimate.quality)
+        changes: dict[str, Any] = {field: estimate.value, "quality": quality}
+        return replace(self, **changes)
+
+    def carrying(self, before: Frame) -> Frame:
+        """The frame, with what it has not come to yet as it was in a frame that it goes on from."""
+        begun = {one.group for one in self.quality}
+        return replace(
+            self,
+            laser_direct=self.laser_direct or before.laser_direct,
+            laser_indirect=self.laser_indirect or before.laser_indirect,
+            ambient=before.ambient if self.ambient is None else self.ambient,
+            truth=before.truth if self.truth is None else self.truth,
+            quality=(*(one for one in before.quality if one.group not in begun), *self.quality),
+        )
 
     def check(self) -> None:
         """InputError: the light or the exact lines hold a number that is none. Truth has NaN where nothing is hit."""

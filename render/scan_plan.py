@@ -5,98 +5,88 @@ Frames that decide alone would differ where a share is about the negligible one,
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from render.ambient.transport_plan import AmbientPlan, ambient_plan_of, has_ambient, onward_share
-from render.base.threads import Cancel, Progress
-from render.laser_direct.integrator import direct_image
-from render.laser_indirect.transport_plan import TRANSPORT_STEPS, Plan, direct_plan, pilot_shares, plan_of
+from render.frame import Frame
+from render.light_group import LightGroup, Shares
+from render.plan import GroupPlan
+from render.products import PRODUCTS, QUICK
+from render.run import Run, ignore
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
+from render.world.placed import PlacedScene
 from render.world.world import World
 
 FRAMES = 5
-"""Frames that are looked at."""
-DIRECT_ERROR = 0.05
-"""Relative error of the direct light that shares are told of: far below their own."""
+"""Frames on which pilots run."""
 
 
 @dataclass(frozen=True)
 class ScanPlan:
     """What every frame of a scan computes."""
 
-    light: Plan
-    ambient: AmbientPlan
+    plans: Mapping[str, GroupPlan]
+    """By light group."""
+    pilot_steps: tuple[int, ...] = ()
+    """Steps of the scan on which pilots decided."""
+    frame_count: int = 1
 
     @property
     def mark(self) -> str:
         """What of it decides a frame's numbers."""
-        return f"laser light {self.light.kinds}, ambient light {self.ambient.surfaces}"
+        marks = (product.mark(self.plans[product.group]) for product in PRODUCTS)
+        return ", ".join(mark for mark in marks if mark)
 
 
-def looked_at(frame_count: int) -> tuple[int, ...]:
+def pilot_steps(frame_count: int) -> tuple[int, ...]:
     """The steps on which a plan is decided: the first, the last, and some evenly between."""
     return tuple(np.linspace(0, frame_count - 1, min(frame_count, FRAMES)).astype(int).tolist())
 
 
 def plan_scan(
-    scene: Scene,
-    settings: RenderSettings,
-    world: Callable[[int], World],
-    *,
-    seed: int = 0,
-    threads: int | None = None,
-    cancelled: Cancel | None = None,
-    progress: Progress = lambda done: None,
+    scene: Scene, settings: RenderSettings, world: Callable[[int], World], run: Run = Run()
 ) -> ScanPlan | None:
     """The plan for all steps of a scan, however many of them are rendered; None: one frame decides for itself.
 
     world: that of a step. Of each kind of light the largest share counts that a pilot finds on any of the steps. The
     same on any number of threads. Raises Cancelled.
     """
-    steps = looked_at(scene.frame_count)
+    steps = pilot_steps(scene.frame_count)
     if len(steps) == 1:
         return None
-    if settings.transport == "direct":
-        return ScanPlan(direct_plan(scene), ambient_plan_of(None, world(0), scene, settings))
-    shares, onward = [], []
-    for i, step in enumerate(steps):
-        here = world(step)
-        direct = tuple(
-            direct_image(
-                here,
-                scene.camera,
-                laser,
-                scene.T_world_camera(step),
-                scene.T_world_laser(k, step),
-                target=DIRECT_ERROR,
-                seed=seed + k,
-                threads=threads,
-                cancelled=cancelled,
-            ).radiance
-            for k, laser in enumerate(scene.lasers)
-        )
-        progress((i + 0.5) / len(steps))
-        shares.append(pilot_shares(here, scene, direct, step=step, seed=seed, cancelled=cancelled))
-        if has_ambient(scene):
-            found = onward_share(here, scene, settings.max_bounces, step=step, seed=seed, cancelled=cancelled)
-            onward.append(found)
-        progress((i + 1.0) / len(steps))
-    largest = {
-        transport.share: max((one[transport.share] for one in shares), key=_at_most) for transport in TRANSPORT_STEPS
+    deciding = [product for product in PRODUCTS if product.measures(scene, settings)]
+    found: dict[str, list[Shares]] = {product.group: [] for product in deciding}
+    for i, step in enumerate(steps if deciding else ()):
+        part = run.between(i / len(steps), (i + 1) / len(steps))
+        for group, shares in _pilots(deciding, PlacedScene(world(step), scene, step), settings, part).items():
+            found[group].append(shares)
+    plans = {
+        product.group: product.plan(_largest(found.get(product.group, [])), world(0), scene, settings)
+        for product in PRODUCTS
     }
-    light = plan_of(largest, scene, settings)
-    said = (
-        f"the same for all {scene.frame_count} frames: pilots on the steps {', '.join(map(str, steps))}, of which the "
-        "largest share counts"
-    )
-    ambient = ambient_plan_of(max(onward, key=_at_most, default=None), world(0), scene, settings)
-    return ScanPlan(replace(light, lines=(*light.lines, said)), ambient)
+    return ScanPlan(plans, steps if deciding else (), scene.frame_count)
 
 
-def _at_most(share: tuple[float, float]) -> float:
-    """As `plan_of` judges it."""
-    return share[0] + 2.0 * share[1]
+def _pilots(
+    deciding: list[LightGroup[Any]], placed: PlacedScene, settings: RenderSettings, run: Run
+) -> dict[str, Shares]:
+    """What the pilots find on one step."""
+    quiet = replace(run, progress=ignore)
+    frame = Frame(placed.step, (), None, (), None)
+    for estimate in QUICK.estimates(placed, settings, GroupPlan(()), frame, quiet):
+        frame = frame.with_estimate(QUICK.field, estimate)
+    run.progress(0.5)
+    found = {product.group: product.measured(placed, settings, frame, quiet) for product in deciding}
+    run.progress(1.0)
+    return found
+
+
+def _largest(found: list[Shares]) -> Shares | None:
+    """Of each kind the largest that it may well be, by its standard error; None: nothing was measured."""
+    if not found:
+        return None
+    return {kind: max((shares[kind] for shares in found), key=lambda one: one[0] + 2.0 * one[1]) for kind in found[0]}

@@ -39,6 +39,9 @@ if TYPE_CHECKING:
     from render.material.material import Lambertian as Lambertian
     from render.material.material import Subsurface as Subsurface
     from render.material.material import Texture as Texture
+    from render.plan import GroupQuality as GroupQuality
+    from render.plan import Plan as Plan
+    from render.plan import TransportStep as TransportStep
     from render.scene.lights import Environment as Environment
     from render.scene.lights import PointLight as PointLight
     from render.scene.lights import RectangleLight as RectangleLight
@@ -72,7 +75,6 @@ if TYPE_CHECKING:
     from studio.notebook.measuring import triangulate as triangulate
     from studio.notebook.report import write_report as write_report
     from studio.project.project import Project as Project
-    from studio.scan.light_group_status import GroupQuality as GroupQuality
 
 _HOMES = {
     "analysis.line.result": "Flag",
@@ -82,6 +84,7 @@ _HOMES = {
     "render.camera.camera": "Camera Lens",
     "render.laser.laser": "Divergence LineLaser Waist",
     "render.material.material": "Blend Coated Conductor Emitter Glass Lambertian Subsurface Texture",
+    "render.plan": "GroupQuality Plan TransportStep",
     "render.scene.lights": "Environment PointLight RectangleLight",
     "render.scene.motion": "LinearStage PoseList Turntable",
     "render.scene.scene": "Rig Scene SceneObject",
@@ -93,7 +96,6 @@ _HOMES = {
     "compare develop extract triangulate",
     "studio.notebook.report": "write_report",
     "studio.project.project": "Project",
-    "studio.scan.light_group_status": "GroupQuality",
 }
 """Where each name is made; the imports above are the same for type checkers."""
 _HOME = {name: module for module, names in _HOMES.items() for name in names.split()}

@@ -13,6 +13,7 @@ from analysis.line.result import Line
 from analysis.triangulate import Points
 from render.base.counts import Counts
 from render.frame import LaserCurve
+from render.plan import GroupQuality, Plan
 from render.scene.scene import Scene
 from render.sensor.sensor import Sensor
 
@@ -54,8 +55,10 @@ class FrameResult:
     step: int
     lasers: tuple[LaserResult, ...]
     """One for each of `scene.lasers`, in that order."""
-    plan: str = ""
-    """`Frame.plan`: what was computed, what was left out and why, one line each."""
+    plan: Plan = field(default_factory=Plan)
+    """`Frame.plan`: what was computed, what was left out and why."""
+    quality: tuple[GroupQuality, ...] = field(default=(), kw_only=True)
+    """`Frame.quality`; over the frames errors are averaged, work and losses summed."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage, s, of this frame: those of `Frame.seconds` and those after it. Summed over the frames."""
     counts: Counts = field(default_factory=dict)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from analysis.report.sample import IMAGE, MOST_LINES, ROW, Rows, Sample, rows_of
 from analysis.report.sums import Sums
 from analysis.report.total import Chosen, depth_measures
 from analysis.spool import Spool
-from render.base.counts import Quantity
+from render.base.counts import OF_GROUPS, Quantity
 from render.scene.scene import Scene
 
 
@@ -75,9 +75,19 @@ class ScanRecord:
         self.steps.append(_step(frame, firsts))
         for stage, spent in frame.seconds.items():
             self.seconds[stage] = self.seconds.get(stage, 0.0) + spent
-        for quantity, value in frame.counts.items():
+        for quantity, value in (*frame.counts.items(), *self._group_counts(frame)):
             so_far, frames = self.counts.get(quantity, (0.0, 0))
             self.counts[quantity] = so_far + value, frames + 1
+
+    @staticmethod
+    def _group_counts(frame: FrameResult) -> Iterator[tuple[Quantity, float]]:
+        """What is counted of the light groups; lasers by their order, since a project measured anew may name others."""
+        for group, quantities in OF_GROUPS.items():
+            for i, one in enumerate(one for one in frame.quality if one.group == group):
+                for name, quantity in quantities.items():
+                    value = getattr(one, name)
+                    if value is not None and value == value:  # an error may not be known
+                        yield quantity if one.laser is None else quantity.of(i), float(value)
 
     def close(self) -> None:
         self._spool.close()

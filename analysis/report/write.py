@@ -12,6 +12,7 @@ from analysis.report import picture, plain_picture
 from analysis.report.colour import method_colour, method_name
 from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
 from analysis.report.glossary import GLOSSARY
+from analysis.report.light_text import sentences
 from analysis.report.line_figures import camera_figure, profile_figure, three_panel_figure, zoom_figure
 from analysis.report.model import FrameResult, ReportInput
 from analysis.report.style import plain
@@ -78,8 +79,7 @@ def _content(report: ReportInput) -> dict[str, Any]:
     scene = scene_view(report, frame)
     vertices = placed_vertices(report, frame.step)
     header, rows, cut = step_table(report)
-    plan = [line.strip() for line in frame.plan.splitlines() if line.strip()]
-    left_out = "left out:"
+    computed, left_out = sentences(frame.plan)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         drawing = (vertices, report.triangles, scene, cloud, error, view, limit)
@@ -127,8 +127,8 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "cloud_points": count(len(cloud)),
         "point_count": count(found.points),
         "cloud_is_part": len(cloud) < found.points,
-        "plan_done": [line for line in plan if not line.startswith(left_out)],
-        "plan_left_out": [line.removeprefix(left_out).strip() for line in plan if line.startswith(left_out)],
+        "plan_done": computed,
+        "plan_left_out": left_out,
         "settings": scene_tables(report),
         "timing": spent,
         "time_total": spent_in_all,

@@ -17,7 +17,8 @@ SCALE = 0.2
 # %%
 project = blazer.Project.load("weld_seam")
 frame = blazer.render(project, error=0.01, image_scale=SCALE)
-print(frame.plan)
+for step in frame.plan.steps:
+    print(step.group, step.name, "computed" if step.computed else "left out", step.reason)
 for group in frame.quality:
     print(f"{group.laser or 'all'}, {group.group}: error {group.error:.2%}, target {group.target:.2%}")
 frame.show()

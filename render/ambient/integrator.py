@@ -8,9 +8,8 @@ so that how often a place is sampled never depends on the values that are averag
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
@@ -19,15 +18,16 @@ from numpy.typing import NDArray
 from render.ambient.path_state import CLAMPED, CUT, DROPPED
 from render.ambient.path_tracer import WAVE, CameraPaths, camera_paths
 from render.base.errors import Cancelled, InputError
-from render.base.threads import Cancel, Progress, map_chunks
+from render.base.threads import Cancel, map_chunks
 from render.camera.camera import Camera
+from render.run import Arrays, Run
 from render.scene.scene import Scene
+from render.world.placed import PlacedScene
 from render.world.world import World
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
-Arrays = dict[str, NDArray[Any]]
 
 TILE = 16
 """Pixels a side of what gets samples together."""
@@ -54,78 +54,59 @@ class AmbientImage:
     radiance: Float32
     """(h, w, 3) W/(m^2 sr) in R, G, B."""
     error: float
-    """Estimated relative RMS error of the image; NaN after a single sample, which cannot tell."""
+    """Estimated relative RMS error of the image; NaN after a single sample, which has no spread."""
     samples: float
     """On a pixel, on average."""
     dropped: int
-    """Contributions that were no number, infinite or negative."""
+    """Contributions that were NaN, infinite or negative, and were dropped."""
     clamped: int
-    """Contributions that the clamp has cut."""
+    """Contributions that the clamp lowered."""
     cut: float
     """Radiance that the clamp took away, mean over the image."""
 
 
-def ambient_images(  # noqa: PLR0913
-    world: World,
-    scene: Scene,
-    camera: Camera,
-    T_world_camera: Float,
+def ambient_images(
+    placed: PlacedScene,
     *,
     target: float = 0.01,
     most: int = 16,
     surfaces: int | None = 1,
     clamp: float | None = None,
-    seed: int = 0,
-    threads: int | None = None,
-    cancelled: Cancel | None = None,
-    progress: Progress | None = None,
-    keeps: Cancel | None = None,
-    before: Arrays | None = None,
-    keep: Callable[[Film], None] | None = None,
+    run: Run = Run(),
 ) -> Iterator[AmbientImage]:
     """Ever better images, until the relative error is at most `target` or `most` samples a pixel are spent.
 
     surfaces: the most that light may meet, None for no bound; clamp, W/(m^2 sr): see `CameraPaths`. Raises Cancelled;
-    where keeps() then says so, after one more image, of all tiles that are done. keep: given what to go on from, which
-    changes from then on; before: its arrays, to go on to the same image bit for bit as without interruption.
+    where what is unfinished is wanted, after one more image, of all tiles that are done. What it goes on from gives
+    the same image bit for bit as without interruption.
     """
-    paths = camera_paths(world, scene, camera.view(T_world_camera), surfaces=surfaces, clamp=clamp, seed=seed)
+    camera, view = placed.camera, placed.camera.view(placed.T_world_camera)
+    paths = camera_paths(placed.world, placed.scene, view, surfaces=surfaces, clamp=clamp, seed=run.seed)
     film = Film(camera.width, camera.height)
-    if before is not None:
-        film.load(before)
-    film.keep = keep
+    run.restore(film.load)
     try:
-        yield from _passes(film, paths, target, most, threads, cancelled, progress)
+        yield from _passes(film, paths, target, most, run)
     except Cancelled:
-        if keeps is not None and keeps() and np.all(film.done.sum(axis=1) > 0):
-            yield film.image(threads)
+        if run.keep_partial() and np.all(film.done.sum(axis=1) > 0):
+            yield film.image(run.threads)
         raise
 
 
-def _passes(
-    film: Film,
-    paths: CameraPaths,
-    target: float,
-    most: int,
-    threads: int | None,
-    cancelled: Cancel | None,
-    progress: Progress | None,
-) -> Iterator[AmbientImage]:
+def _passes(film: Film, paths: CameraPaths, target: float, most: int, run: Run) -> Iterator[AmbientImage]:
     even = np.ones((film.tiles, 2))
     wanted, error = 1.0, math.nan
     # passes that are done already are gone through again, with their errors, to where the next one begins
     known = iter(tuple(film.errors))
     if most == 1:
-        yield film.add_samples(paths, np.broadcast_to([1, 0], (film.tiles, 2)), threads, cancelled, progress)
+        yield film.add_samples(paths, np.broadcast_to([1, 0], (film.tiles, 2)), run)
         return
     if film.errors:
-        yield film.image(threads, cancelled)
+        yield film.image(run.threads, run.cancelled)
     for level in range(1, min(PILOT, most // 2) + 1):
         wanted, done = float(level), next(known, None)
         if done is None:
-            report = _part(progress, 0.0, min(1.0, 2.0 * level / most))
-            image = film.add_samples(paths, (level * even).astype(np.int64), threads, cancelled, report)
-            yield image
+            part = run.between(0.0, min(1.0, 2.0 * level / most))
+            yield film.add_samples(paths, (level * even).astype(np.int64), part)
         error = film.errors[level - 1]
     share = film.shares()
     while error > target and 2.0 * wanted < most:
@@ -135,15 +116,12 @@ def _passes(
         done = next(known, None)
         if done is None:
             count = np.maximum(PILOT, np.rint(wanted * share)).astype(np.int64)
-            report = _part(progress, spent, 2.0 * wanted / most)
-            image = film.add_samples(paths, count, threads, cancelled, report)
-            yield image
+            yield film.add_samples(paths, count, run.between(spent, 2.0 * wanted / most))
         error = film.errors[-1] if done is None else done
-    if progress is not None:
-        progress(1.0)
+    run.progress(1.0)
 
 
-def ambient_image(  # noqa: PLR0913
+def ambient_image(
     world: World,
     scene: Scene,
     camera: Camera,
@@ -151,16 +129,13 @@ def ambient_image(  # noqa: PLR0913
     *,
     samples: int = 16,
     surfaces: int | None = 1,
-    seed: int = 0,
-    threads: int | None = None,
-    cancelled: Cancel | None = None,
-    progress: Progress | None = None,
+    run: Run = Run(),
 ) -> Float32:
     """(h, w, 3) float32 radiance, W/(m^2 sr) in R, G, B, with as many samples everywhere. Raises Cancelled."""
-    paths = camera_paths(world, scene, camera.view(T_world_camera), surfaces=surfaces, seed=seed)
+    paths = camera_paths(world, scene, camera.view(T_world_camera), surfaces=surfaces, seed=run.seed)
     film = Film(camera.width, camera.height)
     count = np.broadcast_to([samples - samples // 2, samples // 2], (film.tiles, 2))
-    return film.add_samples(paths, count, threads, cancelled, progress).radiance
+    return film.add_samples(paths, count, run).radiance
 
 
 class Film:
@@ -182,8 +157,6 @@ class Film:
         self.invalid_counts = np.zeros(2)
         self.errors: list[float] = []
         """After each pass."""
-        self.keep: Callable[[Film], None] | None = None
-        """Told after every group of chunks."""
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
@@ -199,15 +172,8 @@ class Film:
             setattr(self, name, found)
         self.errors = [float(error) for error in arrays.get("errors", ())]
 
-    def add_samples(
-        self,
-        paths: CameraPaths,
-        count: NDArray[np.int64],
-        threads: int | None,
-        cancelled: Cancel | None,
-        progress: Progress | None,
-    ) -> AmbientImage:
-        """Add samples until each tile has count (tiles, 2) of both halves."""
+    def add_samples(self, paths: CameraPaths, count: NDArray[np.int64], run: Run) -> AmbientImage:
+        """Add samples until each tile has count (tiles, 2) of both halves. Raises Cancelled."""
         more = np.maximum(count - self.done, 0).astype(np.int32)
         pixels_of = self._size_of(np.arange(self.tiles))
         chunks = _chunks(more.sum(axis=1) * pixels_of, WAVE)
@@ -215,23 +181,21 @@ class Film:
 
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
-                self._expose_tiles(paths, chunks[number], more, counts[number], cancelled)
+                self._trace_tiles(paths, chunks[number], more, counts[number], run.cancelled)
 
-        group = max(1, len(chunks)) if self.keep is None else GROUP
+        group = max(1, len(chunks)) if run.checkpoint is None else GROUP
         try:
             for start in range(0, len(chunks), group):
                 stop = min(start + group, len(chunks))
-                report = _part(progress, start / len(chunks), stop / len(chunks))
-                map_chunks(lambda a, b, s=start: work(s + a, s + b), stop - start, 1, threads, cancelled, report)  # type: ignore[misc]
-                if self.keep is not None:
-                    self.keep(self)
+                part = run.between(start / len(chunks), stop / len(chunks))
+                part.map(lambda a, b, s=start: work(s + a, s + b), stop - start, 1)  # type: ignore[misc]
+                run.keep(self)
         finally:
             # in the order of the chunks, whichever thread was first
             self.invalid_counts = self.invalid_counts + counts.sum(axis=0)
-        image = self.image(threads, cancelled)
+        image = self.image(run.threads, run.cancelled)
         self.errors.append(image.error)
-        if self.keep is not None:
-            self.keep(self)
+        run.keep(self)
         return image
 
     def image(self, threads: int | None = None, cancelled: Cancel | None = None) -> AmbientImage:
@@ -266,7 +230,7 @@ class Film:
         relative = np.where(mean > 0.0, deviation / np.where(mean > 0.0, mean, 1.0), 1.0)
         return np.asarray(EVEN_SHARE + (1.0 - EVEN_SHARE) * np.minimum(relative, MOST_SHARE))
 
-    def _expose_tiles(
+    def _trace_tiles(
         self, paths: CameraPaths, tiles: Int, more: Int, invalid_counts: Float, cancelled: Cancel | None
     ) -> None:
         pixels, place = self._pixels_of(tiles)
@@ -342,11 +306,3 @@ def average_halves(sums: Float32, done: Int, across: int, image: Float32, start:
                 difference += (a - b) * (a - b)
                 power += value * value
     return difference, power
-
-
-def _part(progress: Progress | None, start: float, stop: float) -> Progress | None:
-    """Progress of a part, from start to stop of the whole."""
-    if progress is None:
-        return None
-    told = progress
-    return lambda done: told(start + done * (stop - start))

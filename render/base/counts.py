@@ -52,26 +52,26 @@ AMBIENT_DROPPED = Quantity("dropped contributions, ambient")
 AMBIENT_CLAMPED = Quantity("clamped contributions, ambient")
 AMBIENT_CUT = Quantity("mean radiance taken by the clamp, ambient", "mean")
 
-OF_A_LASER = (
-    DIRECT_ERROR,
-    LIT_PIXELS,
-    DIRECT_SAMPLES,
-    DIRECT_DROPPED,
-    INDIRECT_ERROR,
-    LIGHT_PATHS,
-    INDIRECT_DROPPED,
-    INDIRECT_CLAMPED,
-    INDIRECT_CUT,
-)
-OF_A_FRAME = (
-    RAYS,
-    EMBREE_SECONDS,
-    AMBIENT_ERROR,
-    AMBIENT_SAMPLES,
-    AMBIENT_DROPPED,
-    AMBIENT_CLAMPED,
-    AMBIENT_CUT,
-)
+OF_GROUPS = {
+    "direct": {"error": DIRECT_ERROR, "lit_pixels": LIT_PIXELS, "work": DIRECT_SAMPLES, "invalid": DIRECT_DROPPED},
+    "indirect": {
+        "error": INDIRECT_ERROR,
+        "work": LIGHT_PATHS,
+        "invalid": INDIRECT_DROPPED,
+        "clamped": INDIRECT_CLAMPED,
+        "clamped_radiance": INDIRECT_CUT,
+    },
+    "ambient": {
+        "error": AMBIENT_ERROR,
+        "work": AMBIENT_SAMPLES,
+        "invalid": AMBIENT_DROPPED,
+        "clamped": AMBIENT_CLAMPED,
+        "clamped_radiance": AMBIENT_CUT,
+    },
+}
+"""By light group: which number of `render.plan.GroupQuality` is counted, over several frames, as what."""
+OF_A_FRAME = (RAYS, EMBREE_SECONDS, *OF_GROUPS["ambient"].values())
+OF_A_LASER = (*OF_GROUPS["direct"].values(), *OF_GROUPS["indirect"].values())
 
 
 def counts_record(counts: Counts, plain: Any) -> list[dict[str, Any]]:

@@ -1,13 +1,13 @@
-"""Seconds by stage of a render, and how far it is: told of the whole, or of each stage on its own."""
+"""Seconds by stage of a render, and how far it is: of the whole, or of each stage on its own."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 
-Progress = Callable[[str, float], None]
+StageProgress = Callable[[str, float], None]
 """progress(what is being done, share 0..1)."""
 
 
@@ -15,7 +15,7 @@ Progress = Callable[[str, float], None]
 class Clock:
     """Times stages, and tells each one's own progress."""
 
-    progress: Progress | None
+    progress: StageProgress | None
     seconds: dict[str, float] = field(default_factory=dict)
     running: tuple[str, float] | None = None
 
@@ -26,6 +26,15 @@ class Clock:
             name, start = self.running
             seconds[name] = seconds.get(name, 0.0) + time.perf_counter() - start
         return seconds
+
+    @contextmanager
+    def shown(self) -> Iterator[None]:
+        """The time of whoever looks at a frame is no stage's."""
+        start = time.perf_counter()
+        yield
+        if self.running is not None:
+            name, began = self.running
+            self.running = name, began + time.perf_counter() - start
 
     @contextmanager
     def stage(self, name: str, work: float) -> Iterator[Callable[[float], None]]:
@@ -49,13 +58,17 @@ class WholeClock:
 
     total: float
     """Sum of the work of all stages."""
-    progress: Progress | None
+    progress: StageProgress | None
     finished: float = 0.0
     clock: Clock = field(default_factory=lambda: Clock(None))
 
     def so_far(self) -> dict[str, float]:
         """Seconds by stage, with those of the one under way."""
         return self.clock.so_far()
+
+    def shown(self) -> AbstractContextManager[None]:
+        """As `Clock.shown`."""
+        return self.clock.shown()
 
     @contextmanager
     def stage(self, name: str, work: float) -> Iterator[Callable[[float], None]]:

@@ -1,4 +1,4 @@
-"""What a render does with the lens, told before it starts, and a tilt that leaves nothing in focus."""
+"""What a render does with the lens, known before it starts, and a tilt that leaves nothing in focus."""
 
 from __future__ import annotations
 
@@ -8,30 +8,29 @@ import numpy as np
 
 from render.base.errors import InputError
 from render.camera.camera import Camera
+from render.plan import ThinLens, TransportStep
 
 GRID = 9
 
 
-def lens_lines(camera: Camera) -> tuple[str, ...]:
-    """The plan's lines about the lens; "left out:" begins what is not done. A blur is never done twice."""
+def thin_lens(camera: Camera) -> ThinLens | None:
+    """What the plan of a render knows of the lens; None: a pinhole."""
+    lens = camera.lens
+    if lens.model == "pinhole":
+        return None
+    return ThinLens(
+        lens.f_number, lens.focus_distance, 2.0 * camera.aperture_radius, focus_tilt(camera), 1.0 - sharp_share(camera)
+    )
+
+
+def lens_steps(camera: Camera) -> tuple[TransportStep, ...]:
+    """Which blur of the lens is rendered, and which is not. A blur is never done twice."""
     if camera.lens.model == "pinhole":
         return (
-            "left out: the lens's blur (defocus, diffraction) - rendered as a pinhole, every depth is in focus; the "
-            "sensor's defocus, where it is on, blurs by depth when the image is developed",
+            TransportStep("lens", "defocus", False, "pinhole"),
+            TransportStep("lens", "diffraction", False, "pinhole"),
         )
-    lens = camera.lens
-    focus = "far away" if lens.focus_distance is None else f"at {lens.focus_distance:.4g} m"
-    line = f"lens: f/{lens.f_number:g} focused {focus}, {2e3 * camera.aperture_radius:.3g} mm of aperture sampled"
-    tilt = focus_tilt(camera)
-    if tilt > 0.0:
-        line += f", plane of focus tilted by {math.degrees(tilt):.3g} deg"
-    blind = 1.0 - sharp_share(camera)
-    if blind > 0.0:
-        line += f"; in {blind:.0%} of the image no depth is in focus"
-    return (
-        f"{line}; the sensor's defocus is not applied again",
-        "left out: diffraction - the sensor's lens blur stands for it",
-    )
+    return (TransportStep("lens", "defocus", True, "always"), TransportStep("lens", "diffraction", False, "sensor"))
 
 
 def focus_tilt(camera: Camera) -> float:

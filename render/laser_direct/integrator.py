@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.pose import invert
-from render.base.threads import Cancel, Progress, map_chunks
+from render.base.threads import map_chunks
 from render.camera.camera import Camera
 from render.camera.rays import camera_rays, lens_rays
 from render.laser.laser import LineLaser
@@ -36,6 +36,7 @@ from render.laser_direct.shading import (
     shade_glossy_lens,
 )
 from render.material.material import reflectance_weights
+from render.run import Run
 from render.sampling.low_discrepancy import pair_table
 from render.world.triangles import Surface, has_gloss
 from render.world.world import World
@@ -47,19 +48,19 @@ Places = NDArray[np.int64]
 
 RAYS_A_JOB = 1 << 13
 """Enough to hide Python's share, few enough to share work evenly and to keep what is known of them near."""
-AIM = 0.9
-"""Of the target: what an estimate promises does not always come."""
+SAFETY = 0.9
+"""Fraction of the target that is aimed at, since an estimated error may turn out larger."""
 LEAST = 0.25
-"""Of its equal share of the target: a pixel below cannot keep the image from it."""
+"""Fraction of its equal share of the target below which a pixel cannot keep the image from it."""
 GROWTH = 4
-"""Times the cells a side that a pixel may get at once."""
+"""Factor by which the cells a side of a pixel may grow at once."""
 EDGE_ORDER, APERTURE_ORDER = 3.0, 2.25
 """Powers of the cells a side with which the variance falls: of an edge, and of one seen through an aperture."""
-MISSED, MISSED_ORDER = 0.3, 5.0
+EDGE_ERROR, EDGE_ERROR_ORDER = 0.3, 5.0
 """Of the jump at an edge: the error of a pixel beside, a corner of which may be beyond it between its rays."""
-BETWEEN = 0.35
+BORDER_ERROR = 0.35
 """Of the radiance, over the square of the cells: the RMS area beyond an edge along a pixel's border that no ray met."""
-SAME_BLUR = 0.2
+APERTURE_ERROR = 0.2
 """Of the error of a pixel seen through an aperture: its neighbours', whose few rays may agree by chance, is no less."""
 
 
@@ -67,7 +68,7 @@ SAME_BLUR = 0.2
 class DirectImage:
     """(h, w) float32 radiance W/(m^2 sr); the estimated relative RMS error over the lit pixels; what it took.
 
-    dropped: contributions that were no number, infinite or negative, and were left out.
+    dropped: contributions that were NaN, infinite or negative.
     """
 
     radiance: Float32
@@ -77,7 +78,7 @@ class DirectImage:
     dropped: int
 
 
-def direct_image(  # noqa: PLR0913
+def direct_image(
     world: World,
     camera: Camera,
     laser: LineLaser,
@@ -85,13 +86,10 @@ def direct_image(  # noqa: PLR0913
     T_world_laser: Float,
     *,
     target: float = 0.01,
-    seed: int = 0,
-    threads: int | None = None,
-    cancelled: Cancel | None = None,
-    progress: Progress | None = None,
+    run: Run = Run(),
 ) -> DirectImage:
     """Direct radiance of one laser to a target relative RMS error over the lit pixels. Raises Cancelled."""
-    pixels = reachable_pixels(world, camera, laser, T_world_camera, T_world_laser, threads)
+    pixels = reachable_pixels(world, camera, laser, T_world_camera, T_world_laser, run.threads)
     image = np.zeros(camera.height * camera.width, dtype=np.float32)
     # through an aperture one ray knows but one point of it
     aperture = bool(camera.view(T_world_camera).lens[0] > 0.0)
@@ -106,7 +104,7 @@ def direct_image(  # noqa: PLR0913
         laser,
         T_world_camera,
         T_world_laser,
-        seed,
+        run.seed,
         pixels,
         np.zeros(n),
         np.zeros(n),
@@ -116,27 +114,25 @@ def direct_image(  # noqa: PLR0913
     )
     samples, left = 0, 1.0
 
-    def part(done: float) -> None:
-        # how many levels there will be is not known: each takes half of what is left
-        if progress is not None:
-            progress(1.0 - left * (1.0 - 0.5 * done))
-
     while True:
-        jobs, rays = share_out(cells, wanted)
-        map_chunks(partial(task.run, jobs), len(jobs), 1, threads, cancelled, part)
+        jobs, rays = schedule(cells, wanted)
+        # how many levels there will be is not known: each takes half of what is left
+        run.between(1.0 - left, 1.0 - 0.5 * left).map(partial(task.run, jobs), len(jobs), 1)
         if samples == 0 and not aperture:
-            map_chunks(task.look, n, max(1024, math.ceil(n / 4)), threads)
+            map_chunks(task.predict_errors, n, max(1024, math.ceil(n / 4)), run.threads)
         samples += rays
         cells = wanted
         doubts = (
-            (task.doubt, APERTURE_ORDER, task.mean, 0.0) if aperture else (task.doubt, MISSED_ORDER, task.mean, BETWEEN)
+            (task.doubt, APERTURE_ORDER, task.mean, 0.0)
+            if aperture
+            else (task.doubt, EDGE_ERROR_ORDER, task.mean, BORDER_ERROR)
         )
         doubt_beside(task.error, *doubts, cells, pixels, camera.width)
-        count, power, variance = tally(task.mean, task.error)
+        count, power, variance = sum_squares(task.mean, task.error)
         signal = math.sqrt(power / max(count, 1))
         relative = math.sqrt(variance / count) / signal if count else 0.0
         if relative > target:
-            allowed, least = (AIM * target * signal) ** 2 * count, LEAST * target * signal
+            allowed, least = (SAFETY * target * signal) ** 2 * count, LEAST * target * signal
             wanted = cells_needed(task.error, cells, allowed, least, order, GROWTH)
             wanted = graded(wanted, cells, pixels, camera.width)
         if relative <= target or np.array_equal(wanted, cells):
@@ -145,7 +141,7 @@ def direct_image(  # noqa: PLR0913
         left *= 0.5
 
 
-def share_out(cells: Int, wanted: Int) -> tuple[list[tuple[int, Places]], int]:
+def schedule(cells: Int, wanted: Int) -> tuple[list[tuple[int, Places]], int]:
     """Jobs of about RAYS_A_JOB rays for the pixels that want more cells than they have, the finest first.
 
     A job is the cells a side and which of the (n,) pixels. Also the number of rays.
@@ -162,7 +158,7 @@ def share_out(cells: Int, wanted: Int) -> tuple[list[tuple[int, Places]], int]:
 
 
 @numba.njit(nogil=True, cache=True)
-def tally(radiance: Float, error: Float) -> tuple[int, float, float]:
+def sum_squares(radiance: Float, error: Float) -> tuple[int, float, float]:
     """Of (n,) pixels: how many are lit, the sum of their squares, and the sum of all squared errors."""
     count, power, variance = 0, 0.0, 0.0
     for i in range(radiance.shape[0]):
@@ -190,13 +186,13 @@ class _Task:
     doubt: Float
     """What a pixel with several rays says of its neighbours: `render.laser_direct.adaptive_sampling.doubt_beside`."""
     planes: Float
-    """(n, 4) where there is a first look, or (0, 4)."""
+    """(n, 4) where centre rays are traced first, or (0, 4)."""
     middle: Float
-    """(n,) where there is a first look, or (0,)."""
+    """(n,) where centre rays are traced first, or (0,)."""
     dropped: list[int] = field(default_factory=list)
 
-    def look(self, start: int, stop: int) -> None:
-        """After the first look has run: the errors it leaves."""
+    def predict_errors(self, start: int, stop: int) -> None:
+        """After every pixel has had its centre ray: the errors that this leaves."""
         around = self.planes, self.middle, self.mean, self.error
         look_around(start, stop, self.pixels, self.camera.width, *around)
 
@@ -215,8 +211,8 @@ class _Task:
         if aperture:
             planes = np.empty((count, 5))
             origins = np.empty((count, 3), np.float32)
-            look = (rays.centre, normalised, offsets, lens, origins, directions)
-            lens_rays(view, pair_table(), pixels, cells, self.seed, *look)
+            buffers = (normalised, offsets, lens, origins, directions)
+            lens_rays(view, pair_table(), pixels, cells, self.seed, rays.centre, *buffers)
             triangle, _ = rays.intersect(origins, directions, coherent=True)
         else:
             if cells == 1:
@@ -256,12 +252,12 @@ class _Task:
         mean, error, jump = (np.empty(len(pixels)) for _ in range(3))
         if aperture:
             gather_aperture(values, planes, lens, view.lens[0], blocked, sample, shadows, cells, mean, error)
-            self.doubt[chosen] = SAME_BLUR * error * cells ** (0.5 * APERTURE_ORDER)
+            self.doubt[chosen] = APERTURE_ERROR * error * cells ** (0.5 * APERTURE_ORDER)
         elif cells == 1:
             gather_first(values, blocked, sample, shadows, planes, mean)
             self.planes[chosen], self.middle[chosen] = planes, mean
             return
         else:
             gather(values, blocked, sample, shadows, cells, mean, error, jump)
-            self.doubt[chosen] = MISSED * jump
+            self.doubt[chosen] = EDGE_ERROR * jump
         self.mean[chosen], self.error[chosen] = mean, error

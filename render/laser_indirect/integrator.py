@@ -9,7 +9,7 @@ What no connection can make, light through clear glass on both sides, is found b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.errors import Cancelled
-from render.base.threads import Cancel, Progress, map_chunks, thread_count
+from render.base.threads import map_chunks, thread_count
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser
 from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, Accumulator, sum_passes
@@ -36,6 +36,8 @@ from render.laser_indirect.guiding import (
 )
 from render.laser_indirect.path_vertex import CAUSTIC, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
+from render.run import Run
+from render.world.placed import PlacedLaser
 from render.world.world import World
 
 Float = NDArray[np.float64]
@@ -62,9 +64,9 @@ class IndirectImage:
     paths: int
     """From the laser."""
     dropped: int = 0
-    """Contributions that were no number, infinite or negative."""
+    """Contributions that were NaN, infinite or negative, and were dropped."""
     clamped: int = 0
-    """Pixels of passes that the clamp has cut."""
+    """Pixels of passes that the clamp lowered."""
     cut: float = 0.0
     """Radiance that the clamp took away, mean over the image."""
 
@@ -87,69 +89,38 @@ def indirect_image(
     world: World, camera: Camera, laser: LineLaser, T_world_camera: Float, T_world_laser: Float, **options: Any
 ) -> IndirectImage:
     """The last of `indirect_images`, whose options it takes. Raises Cancelled."""
-    *_, last = indirect_images(world, camera, laser, T_world_camera, T_world_laser, **options)
+    *_, last = indirect_images(PlacedLaser(world, camera, laser, T_world_camera, T_world_laser), **options)
     return last
 
 
-def indirect_images(  # noqa: PLR0913
-    world: World,
-    camera: Camera,
-    laser: LineLaser,
-    T_world_camera: Float,
-    T_world_laser: Float,
+def indirect_images(
+    placed: PlacedLaser,
     *,
     target: float = 0.1,
     most_paths: int = 1 << 23,
     kinds: int = ALL_KINDS,
     clamp: float | None = None,
-    seed: int = 0,
-    threads: int | None = None,
-    cancelled: Cancel | None = None,
-    progress: Progress | None = None,
-    enough: Cancel | None = None,
-    keeps: Cancel | None = None,
-    resume_from: Accumulator | None = None,
-    keep: Callable[[Accumulator], None] | None = None,
+    left: int = 1,
+    run: Run = Run(),
 ) -> Iterator[IndirectImage]:
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
     An image at every doubling of the paths, and the final one. The error is that of the whole image: sqrt(sum of
-    variances / sum of squares); `most_paths`, or `enough` (the time is over), ends it in any case. kinds: of light,
-    besides plain interreflection (`render.laser_indirect.path_vertex`). clamp: most radiance of one pass in one pixel,
-    W/(m^2 sr); biased. resume_from: go on from there, to the same image bit for bit as without interruption. keep: is
-    given what to go on from after every wave; it stays consistent when this raises Cancelled, after one more image
-    where keeps() says so.
+    variances / sum of squares); `most_paths`, or the end of the time, ends it in any case. kinds: of light, besides
+    plain interreflection (`render.laser_indirect.path_vertex`). clamp: most radiance of one pass in one pixel,
+    W/(m^2 sr); biased. left: lasers that have their share of the time, with this one. What it goes on from gives the
+    same image bit for bit as without interruption; what it keeps stays consistent when Cancelled is raised.
     """
+    world, camera, laser, _, T_world_laser = placed
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     shape = (camera.height, camera.width)
     if high <= low:
         yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0)
         return
-    task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, kinds)
-    buffers = [empty_buffer(camera.width * camera.height) for _ in range(WAVE)]
-
-    def wave(first: int, sampling: Sampling, reachable_pixels: Bool | None = None) -> None:
-        def work(start: int, stop: int) -> None:
-            for number in range(start, stop):
-                task.run(first + number, sampling, buffers[number], cancelled, reachable_pixels)
-
-        map_chunks(work, WAVE, 1, min(WAVE, thread_count(threads)), cancelled)
-
-    if resume_from is None:
-        # two looks only say where laser and camera should look: the first, by light, where it arrives at all (what is
-        # behind glass only the camera finds), the second, from there, which light matters
-        fan = uniform_fan(low, high)
-        specular = specular_pixels(world, task.surface, camera, T_world_camera) if task.specular else NO_PIXELS
-        reachable_pixels = specular if task.specular else None
-        camera_paths = first_camera_paths(specular, camera, 8 * LOOK_PATHS)
-        first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
-        wave(0, first_look, reachable_pixels)
-        resume_from = initialise_guiding(buffers, fan, camera, kinds, specular)
-        wave_moments = attach_wave_moments(buffers, resume_from)
-        wave(WAVE, sampling_of(resume_from, LOOK_PATHS), reachable_pixels)
-        refine_guiding(resume_from, buffers, wave_moments, camera)
-    so_far = resume_from
-    wave_moments = attach_wave_moments(buffers, so_far)
+    waves = Waves(BdptPass.of(*placed, reach, run.seed, kinds), camera, run)
+    time_is_over = run.time_is_over(left)
+    so_far = run.restore(Accumulator.of_arrays) or waves.first_looks(placed, uniform_fan(low, high), kinds)
+    wave_moments = attach_wave_moments(waves.buffers, so_far)
 
     def image() -> IndirectImage:
         counts = so_far.paths, round(so_far.dropped), round(so_far.clamped)
@@ -162,25 +133,58 @@ def indirect_images(  # noqa: PLR0913
     shown = so_far.paths
     while unfinished():
         try:
-            first = WAVE * (2 + so_far.waves)
-            wave(first, sampling_of(so_far, so_far.next_paths))
+            waves.trace(WAVE * (2 + so_far.waves), sampling_of(so_far, so_far.next_paths))
         except Cancelled:
-            if so_far.passes and keeps is not None and keeps():
+            if so_far.passes and run.keep_partial():
                 yield image()
             raise
-        so_far.add(buffers, wave_moments, clamp, threads)
-        if keep is not None:
-            keep(so_far)
-        if progress is not None:
-            # the error falls with the root of the paths, at least
-            done = max((target / so_far.error) ** 2, so_far.paths / most_paths) if so_far.error > 0.0 else 1.0
-            progress(min(0.99, done))
-        if enough is not None and enough():
+        so_far.add(waves.buffers, wave_moments, clamp, run.threads)
+        run.keep(so_far)
+        # the error falls with the root of the paths, at least
+        done = max((target / so_far.error) ** 2, so_far.paths / most_paths) if so_far.error > 0.0 else 1.0
+        run.progress(min(0.99, done))
+        if time_is_over():
             break
         if so_far.paths >= 2 * shown and unfinished():
             shown = so_far.paths
             yield image()
     yield image()
+
+
+class Waves:
+    """Waves of passes, each pass into a buffer of its own, of which there are as many as a wave has passes."""
+
+    def __init__(self, task: BdptPass, camera: Camera, run: Run) -> None:
+        self.task, self.camera, self.run = task, camera, run
+        self.buffers = [empty_buffer(camera.width * camera.height) for _ in range(WAVE)]
+
+    def trace(self, first: int, sampling: Sampling, reachable_pixels: Bool | None = None) -> None:
+        """Passes first .. first + WAVE. Raises Cancelled."""
+        run = self.run
+
+        def work(start: int, stop: int) -> None:
+            for number in range(start, stop):
+                self.task.run(first + number, sampling, self.buffers[number], run.cancelled, reachable_pixels)
+
+        map_chunks(work, WAVE, 1, min(WAVE, thread_count(run.threads)), run.cancelled)
+
+    def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int) -> Accumulator:
+        """An empty accumulator that knows where laser and camera should look; the light of two looks is thrown away.
+
+        The first finds, by light, where it arrives at all (what is behind glass only the camera finds), the second,
+        from there, which light matters.
+        """
+        task, camera = self.task, self.camera
+        specular = seen_specular(task, placed.world, camera, placed.T_world_camera)
+        reachable_pixels = specular if task.specular else None
+        camera_paths = first_camera_paths(specular, camera, 8 * LOOK_PATHS)
+        first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
+        self.trace(0, first_look, reachable_pixels)
+        found = initialise_guiding(self.buffers, fan, camera, kinds, specular)
+        wave_moments = attach_wave_moments(self.buffers, found)
+        self.trace(WAVE, sampling_of(found, LOOK_PATHS), reachable_pixels)
+        refine_guiding(found, self.buffers, wave_moments, camera)
+        return found
 
 
 def initialise_guiding(
@@ -249,22 +253,21 @@ def indirect_shares(
     T_world_laser: Float,
     *,
     passes: int = 4,
-    seed: int = 0,
-    cancelled: Cancel | None = None,
+    run: Run = Run(),
 ) -> Shares:
     """A pilot of a few short passes: what each kind of indirect light brings. Raises Cancelled."""
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     if high <= low:
         return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
-    task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, seed, ALL_KINDS)
-    specular = specular_pixels(world, task.surface, camera, T_world_camera) if task.specular else NO_PIXELS
+    task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, run.seed, ALL_KINDS)
+    specular = seen_specular(task, world, camera, T_world_camera)
     fan, guide, sums = uniform_fan(low, high), no_guide(camera), []
     buffer = empty_buffer(camera.width * camera.height)
     camera_paths = first_camera_paths(specular, camera, PILOT_PATHS)
     if task.specular:
         # what is seen through glass may be small, and is worth a look of its own
         first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
-        task.run(passes, first_look, buffer, cancelled, specular)
+        task.run(passes, first_look, buffer, run.cancelled, specular)
         _, camera_radiance = camera_reachable_share([buffer])
         camera_paths = allocate_camera_paths(
             camera_radiance, camera.width, PILOT_PATHS, arrived_paths(camera_radiance), 1.0
@@ -273,11 +276,16 @@ def indirect_shares(
     sampling = Sampling(PILOT_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
     for number in range(passes):
         buffer = empty_buffer(camera.width * camera.height)
-        task.run(number, sampling, buffer, cancelled)
+        task.run(number, sampling, buffer, run.cancelled)
         interreflection, caustic, subsurface, both, specular_chain = buffer.sums
         sums.append((interreflection, caustic, specular_chain, subsurface + both))
     mean, error = np.mean(sums, axis=0), np.std(sums, axis=0, ddof=1) / math.sqrt(passes)
     return Shares(*((float(m), float(e)) for m, e in zip(mean, error, strict=True)))
+
+
+def seen_specular(task: BdptPass, world: World, camera: Camera, T_world_camera: Float) -> Bool:
+    """(pixels,) where the camera sees a mirror or clear glass whose light is wanted; (0,): there is none."""
+    return specular_pixels(world, task.surface, camera, T_world_camera) if task.specular else NO_PIXELS
 
 
 def empty_buffer(pixels: int) -> PassBuffer:

@@ -19,11 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.base.counts import counts_from
+from render.base.counts import OF_GROUPS, counts_from
 from render.base.errors import InputError
 from render.base.files import atomic_write, check_regular, read_bytes, sha256
 from render.frame import Frame, Truth
 from render.output.exr import decode_exr
+from render.output.light_record import plan_from, quality_from, quality_of_counts
 from render.output.sidecar import (
     AGAIN,
     Record,
@@ -37,6 +38,7 @@ from render.output.sidecar import (
     sidecar_record,
     to_text,
 )
+from render.plan import Plan
 from render.scene.scene import Scene
 from render.sensor.develop import Image
 from render.sensor.sensor import Sensor
@@ -51,6 +53,10 @@ TRUTH_LAYERS = {
 }
 AMBIENT_LAYERS = ("ambient.R", "ambient.G", "ambient.B")
 OBJECT_LAYER = "object_id.Y"
+AS_FIELDS = 3
+"""The first version of the sidecar that holds plan and quality as fields, not as sentences and counts."""
+COUNTED_BY_GROUPS = {quantity.what for quantities in OF_GROUPS.values() for quantity in quantities.values()}
+"""What versions before that held as counts, and quality has now."""
 MAX_SIDECAR_BYTES, MAX_EXR_BYTES = 2**28, 2**32
 
 
@@ -107,7 +113,7 @@ def read_frame(path: Path | str) -> Frame:
     try:
         return _frame(record, layers)
     except (AttributeError, KeyError, OverflowError, TypeError, ValueError):
-        allowed = "step, plan, seconds, counts, and lasers with layer, curve and axis"
+        allowed = "step, plan, quality, seconds, counts, and lasers with layer, curve and axis"
         where = str(sidecar)
         raise InputError("the frame's description is damaged", where=where, allowed=allowed, cure=AGAIN) from None
 
@@ -143,6 +149,14 @@ def _frame(record: Record, layers: Layers) -> Frame:
         parts = {name: [layers[layer] for layer in names] for name, names in TRUTH_LAYERS.items()}
         arrays = {name: np.stack(found, axis=-1) if len(found) > 1 else found[0] for name, found in parts.items()}
         truth = Truth(**arrays, object_id=layers[OBJECT_LAYER].view(np.int32))
+    lasers = [str(laser["name"]) for laser in record["lasers"]]
+    counts = counts_from(record["counts"], lasers)
+    if record["format_version"] < AS_FIELDS:
+        plan = Plan(text=tuple(record["plan"].splitlines()))
+        quality = quality_of_counts(counts, lasers, (record.get("made_of") or {}).get("targets", {}))
+        counts = {quantity: value for quantity, value in counts.items() if quantity.what not in COUNTED_BY_GROUPS}
+    else:
+        plan, quality = plan_from(record["plan"]), quality_from(record["quality"])
     return Frame(
         step=int(record["step"]),
         laser_direct=tuple(layers[name] for name in names),
@@ -150,9 +164,10 @@ def _frame(record: Record, layers: Layers) -> Frame:
         ambient=np.stack([layers[layer] for layer in AMBIENT_LAYERS], axis=-1) if record["ambient"] else None,
         curves=curves_from(record),
         truth=truth,
-        plan=str(record["plan"]),
+        plan=plan,
+        quality=quality,
         seconds=numbers_from(record["seconds"]),
-        counts=counts_from(record["counts"], [str(laser["name"]) for laser in record["lasers"]]),
+        counts=counts,
     )
 
 

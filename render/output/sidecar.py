@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 from render.base.counts import counts_record
 from render.base.errors import InputError
 from render.frame import Frame, LaserCurve
+from render.output.light_record import plan_record, quality_record
 from render.scene.scene import Scene
 from render.sensor.develop import Image
 from render.sensor.sensor import Sensor
 
 Record = dict[str, Any]
 
-FORMAT, FORMAT_VERSION = "blazer-frame", 2
-READABLE = (1, FORMAT_VERSION)
-"""Version 1 told the kind of a count by its name alone."""
+FORMAT, FORMAT_VERSION = "blazer-frame", 3
+READABLE = (1, 2, FORMAT_VERSION)
+"""Version 1 had the kind of a count in its name alone; version 2 the plan in sentences, and quality as counts."""
 CURVE_SHAPES: dict[str, tuple[int, ...]] = {
     "index": (-1,),
     "position": (-1,),
@@ -74,7 +75,8 @@ def sidecar_record(frame: Frame, image: Image | None, scene: Scene, sensor: Sens
         "format_version": FORMAT_VERSION,
         "versions": _versions(),
         "step": step,
-        "plan": frame.plan,
+        "plan": plan_record(frame.plan),
+        "quality": quality_record(frame.quality),
         "seconds": {name: _plain(value) for name, value in frame.seconds.items()},
         "counts": counts_record(frame.counts, _plain),
         "camera": {

@@ -8,10 +8,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.base.threads import Cancel, Progress, map_chunks
 from render.camera.camera import Camera
 from render.camera.rays import camera_rays
 from render.frame import Truth
+from render.run import Run
 from render.world.embree import CHUNK
 from render.world.triangles import Surface, facet_of
 from render.world.world import World
@@ -64,10 +64,7 @@ def truth_images(
     world: World,
     camera: Camera,
     T_world_camera: Float,
-    *,
-    threads: int | None = None,
-    cancelled: Cancel | None = None,
-    progress: Progress | None = None,
+    run: Run = Run(),
 ) -> Truth:
     """One exact ray through each pixel's centre. Raises Cancelled."""
     n = camera.width * camera.height
@@ -85,7 +82,7 @@ def truth_images(
         images = (depth_z, depth_range, position, normal, item)
         fill_truth(surface, T_world_camera, start, triangle, normalised, *images)
 
-    map_chunks(work, n, CHUNK, threads, cancelled, progress)
+    run.map(work, n, CHUNK)
     shape = (camera.height, camera.width)
     return Truth(
         depth_z=depth_z.reshape(shape),

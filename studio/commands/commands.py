@@ -16,10 +16,21 @@ from studio.runtime.streams import print_json
 
 if TYPE_CHECKING:
     from render.frame import Frame
+    from render.plan import GroupQuality
     from studio.preview.inspection import Inspection, LaserView
 
 SAMPLE = "weld_seam"
 OUTPUT = "scan-output"
+SCAN_OPTIONS = {
+    "steps": "steps",
+    "scale": "image_scale",
+    "seed": "seed",
+    "threads": "threads",
+    "time_limit": "seconds",
+    "report": "report",
+    "resume": "resume",
+}
+"""Option of the command line -> field of `studio.scan.options.ScanOptions`."""
 
 
 def chosen_file(path: Path | None) -> Path:
@@ -50,6 +61,7 @@ def start_project(template: str | None, folder: Path | None, *, force: bool, qui
 
 def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
     """`inspect`: tables of what is there and what will be seen."""
+    from analysis.report.light_text import plan_lines
     from studio.preview.inspection import inspect
 
     project, root = load_project(path)
@@ -62,7 +74,7 @@ def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
         return
     print_table(f"Project {found.name}", _project_rows(project, found))
     print()
-    print_plan(found.plan)
+    print_plan(plan_lines(found.plan))
     for view in found.lasers:
         print()
         print_table(f"Laser {view.name}", _laser_rows(view, found.full_well))
@@ -70,56 +82,37 @@ def inspect_project(path: Path | None, *, quiet: bool, as_json: bool) -> None:
         print(f"\nwarning: {warning}")
 
 
-def run_project(  # noqa: PLR0913
-    path: Path | None,
-    *,
-    out: Path | None,
-    threads: int | None,
-    seed: int | None,
-    scale: float,
-    steps: int | None,
-    quiet: bool,
-    as_json: bool,
-    measure: bool = True,
-    report: bool = True,
-    resume: bool = False,
-    time_limit: float | None = None,
-    **extraction: Any,
+def run_project(
+    path: Path | None, *, out: Path | None, quiet: bool, as_json: bool, measure: bool = True, **given: Any
 ) -> None:
-    """`run`, and `render` with `measure` off. extraction: settings in place of the project's, None: the project's."""
-    file = chosen_file(path)
-    project, root = with_extraction(Project.load(file), extraction), file.parent
-    folder = out if out is not None else Path(OUTPUT) / folder_name(project.name)
-    check_output(folder)
-    from render.progressive import plan
-    from studio.scan.light_group_status import note
+    """`run`, and `render` with `measure` off.
+
+    given: options of the scan, by the names of the command line, and extraction settings; None: the project's.
+    """
+    from studio.scan.options import Listener, ScanOptions
     from studio.scan.scan import run_scan
 
-    shown: list[Frame] = []
+    named = {name: given.pop(option) for option, name in SCAN_OPTIONS.items() if option in given}
+    options, file = ScanOptions(measure=measure, **named), chosen_file(path)
+    project, root = with_extraction(Project.load(file), given), file.parent
+    folder = out if out is not None else Path(OUTPUT) / folder_name(project.name)
+    check_output(folder)
+    from analysis.report.light_text import plan_lines, stage_note
+    from render.products import expected_plan
 
-    def so_far(stage: str) -> str:
-        return note(stage, shown[-1], project.scene, project.render) if shown else ""
+    quality: tuple[GroupQuality, ...] = ()
+
+    def refined(frame: Frame) -> None:
+        nonlocal quality
+        quality = frame.quality
 
     if not quiet:
-        print_plan(plan(project.scene.scaled(scale), project.render), to_errors=True)
-    frames = min(steps or project.scene.frame_count, project.scene.frame_count)
-    with stage_progress(quiet, so_far, frames=frames) as progress:
-        done = run_scan(
-            project,
-            root,
-            out=folder,
-            steps=steps,
-            threads=threads,
-            seed=seed,
-            image_scale=scale,
-            measure=measure,
-            report=report,
-            resume=resume,
-            seconds=time_limit,
-            refined=lambda frame: shown.__setitem__(slice(None), [frame]),
-            progress=progress,
-            source=file,
-        )
+        plan = expected_plan(project.scene.scaled(options.image_scale), project.render)
+        print_plan(plan_lines(plan), to_errors=True)
+    frames = min(options.steps or project.scene.frame_count, project.scene.frame_count)
+    with stage_progress(quiet, lambda stage: stage_note(stage, quality), frames=frames) as progress:
+        listener = Listener(progress, refined=refined)
+        done = run_scan(project, root, out=folder, options=options, listener=listener, source=file)
     if as_json:
         print_json({"ok": True, "folder": str(folder), "files": [str(file) for file in done.files], **done.manifest})
         return
@@ -239,8 +232,8 @@ def _print_reconstruction(result: dict[str, Any], as_json: bool) -> None:
         print_json({"ok": True, **result})
         return
     _print_results(result)
-    for told in result["extraction"]:
-        print(told)
+    for note in result["extraction"]:
+        print(note)
     if "flags" in result:
         print(f"{result['points']} points on {result['scan_lines']} scan lines")
     for file in result["files"]:
@@ -248,9 +241,13 @@ def _print_reconstruction(result: dict[str, Any], as_json: bool) -> None:
 
 
 def _print_light(light: list[dict[str, Any]]) -> None:
-    """Plan and light groups of the first frame; of others only what differs from it in kind."""
-    print_plan(light[0]["plan"])
-    print_table("Light" + (", first frame" if len(light) > 1 else ""), list(light[0]["groups"].items()))
+    """Plan and light groups of the first frame."""
+    from analysis.report.light_text import plan_lines, quality_lines
+    from render.output.light_record import plan_from, quality_from
+
+    print_plan(plan_lines(plan_from(light[0]["plan"])))
+    rows = quality_lines(quality_from(light[0]["groups"]))
+    print_table("Light" + (", first frame" if len(light) > 1 else ""), rows)
 
 
 def _print_results(result: dict[str, Any]) -> None:

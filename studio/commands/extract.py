@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is to be done with the images."""
+class Prepared:
+    """The options, read and checked against each other."""
 
     settings: ExtractionSettings
     volume: WorkingVolume | None
@@ -35,48 +35,59 @@ class Asked:
         return self.offs[number if len(self.offs) > 1 else 0]
 
 
-def extract_images(  # noqa: PLR0913
-    images: tuple[Path, ...],
-    *,
-    off: tuple[Path, ...],
-    hdr: str | None,
-    project: Path | None,
-    laser_number: int,
-    spacetime: bool,
-    ridges: bool,
-    out: Path | None,
-    threads: int | None,
-    quiet: bool,
-    as_json: bool,
-    **settings: Any,
+@dataclass(frozen=True)
+class ImageOptions:
+    """What is to be done with the images, as the command line has it."""
+
+    off: tuple[Path, ...]
+    """Images with the laser off."""
+    hdr: str | None
+    """Exposure times: all images are of one scene."""
+    project: Path | None
+    laser_number: int
+    spacetime: bool
+    """The images are a sweep over a scene at rest."""
+    ridges: bool
+
+
+def extract_images(
+    images: tuple[Path, ...], *, out: Path | None, threads: int | None, quiet: bool, as_json: bool, **given: Any
 ) -> int:
-    """`extract`: a bad image is told and left out; returns how many there were."""
+    """`extract`: a bad image is reported and left out; returns how many there were.
+
+    given: fields of `ImageOptions`, and extraction settings.
+    """
     from studio.commands.commands import check_output
     from studio.photographs.photographs import extract_photograph, extract_series, summary, table_path, write_line
     from studio.photographs.ridge_files import ridges_of_file
 
-    asked = _asked(images, settings, off, hdr, project, laser_number)
+    options = ImageOptions(**{field.name: given.pop(field.name) for field in fields(ImageOptions)})
+    prepared = _prepared(images, options, given)
     if out is not None:
         check_output(out)
-    if spacetime + ridges + (hdr is not None) > 1:
+    if options.spacetime + options.ridges + (options.hdr is not None) > 1:
         raise InputError("only one of these at a time", where="--hdr, --spacetime, --ridges")
-    if spacetime:
-        return _extract_sweep(images, asked, out, threads, as_json)
+    if options.spacetime:
+        return _extract_sweep(images, prepared, out, threads, as_json)
     done: list[dict[str, Any]] = []
     failed: list[dict[str, Any]] = []
     taken: set[Path] = set()
-    groups = [images] if asked.times else [(path,) for path in images]
+    groups = [images] if prepared.times else [(path,) for path in images]
     with stage_progress(quiet or as_json or len(groups) < 2) as progress:
         for number, group in enumerate(groups):
             progress("images", number / len(groups))
             try:
-                if ridges:
-                    done.append(ridges_of_file(group[0], asked.settings, asked.off(number), out, taken, threads))
+                if options.ridges:
+                    done.append(ridges_of_file(group[0], prepared.settings, prepared.off(number), out, taken, threads))
                     continue
-                if asked.times:
-                    line = extract_series(group, asked.times, asked.settings, asked.offs, asked.volume, threads)
+                if prepared.times:
+                    line = extract_series(
+                        group, prepared.times, prepared.settings, prepared.offs, prepared.volume, threads
+                    )
                 else:
-                    line = extract_photograph(group[0], asked.settings, asked.off(number), threads, asked.volume)
+                    line = extract_photograph(
+                        group[0], prepared.settings, prepared.off(number), threads, prepared.volume
+                    )
                 table = table_path(group[0], out, taken)
                 write_line(table, line)
                 done.append(summary(group[0], line, table))
@@ -92,28 +103,22 @@ def extract_images(  # noqa: PLR0913
     return len(failed)
 
 
-def _asked(
-    images: tuple[Path, ...],
-    options: dict[str, Any],
-    off: tuple[Path, ...],
-    hdr: str | None,
-    project: Path | None,
-    laser: int,
-) -> Asked:
-    """The options, checked against each other. InputError names the option."""
+def _prepared(images: tuple[Path, ...], options: ImageOptions, given: dict[str, Any]) -> Prepared:
+    """Raises InputError, which names the option."""
     from analysis.line.extract import settings_of
     from studio.commands.commands import load_project
     from studio.photographs.image_files import load_photograph
     from studio.scan.line_extraction import working_volume
 
-    options["channel"] = options.pop("laser")
-    settings, volume = settings_of(None, **options), None
+    off, laser = options.off, options.laser_number
+    given["channel"] = given.pop("laser")
+    settings, volume = settings_of(None, **given), None
     if settings.geometry:
-        if project is None:
+        if options.project is None:
             raise InputError(
                 "the geometric check needs to know camera and laser", where="--geometry", cure="give --project"
             )
-        chosen, _ = load_project(project)
+        chosen, _ = load_project(options.project)
         if laser >= len(chosen.scene.lasers):
             allowed = f"0 to {len(chosen.scene.lasers) - 1}"
             raise InputError(
@@ -123,7 +128,7 @@ def _asked(
     if len(off) not in (0, 1, len(images)):
         found, allowed = f"{len(off)} for {len(images)} images", "one for all, or one for each"
         raise InputError("the laser-off images do not go with the images", where="--off", found=found, allowed=allowed)
-    return Asked(settings, volume, [load_photograph(path) for path in off], exposure_times(hdr, len(images)))
+    return Prepared(settings, volume, [load_photograph(path) for path in off], exposure_times(options.hdr, len(images)))
 
 
 def exposure_times(text: str | None, count: int) -> tuple[float, ...]:
@@ -140,11 +145,13 @@ def exposure_times(text: str | None, count: int) -> tuple[float, ...]:
     return times
 
 
-def _extract_sweep(images: tuple[Path, ...], asked: Asked, out: Path | None, threads: int | None, as_json: bool) -> int:
+def _extract_sweep(
+    images: tuple[Path, ...], prepared: Prepared, out: Path | None, threads: int | None, as_json: bool
+) -> int:
     """The images as the frames of one sweep of the sheet over a scene at rest."""
     from studio.photographs.sweep_files import passage_of_files
 
-    result = passage_of_files(images, asked.settings, out, threads)
+    result = passage_of_files(images, prepared.settings, out, threads)
     if as_json:
         print_json({"ok": True, **result})
     else:

@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from render.base.threads import Cancel
 from render.frame import Frame
+from render.run import Run
 from render.world.world import World, build_world
 from studio.notebook.checks import check_number, check_threads, check_whole, expect, extended
 from studio.project.project import MAX_SEED, Project
-from studio.scan.light_group_status import GroupQuality, group_qualities
-from studio.scan.stages import Cancel, Clock, StageProgress, render_step, scaled, validated
+from studio.runtime.console import StageProgress
+from studio.scan.stages import Clock, render_step, scaled, validated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +27,16 @@ class RenderedFrame(Frame):
     """A `Frame` (radiance of each light group as arrays, truth, plan) that knows what it was rendered from.
 
     `laser_direct[i]`, `laser_indirect[i]` (h, w) and `ambient` (h, w, 3) are W/(m^2 sr); `laser(i)` is the sum of one
-    laser; `curves[i]` is the exact line, `truth` depth, position, normal and object of each pixel.
+    laser; `curves[i]` is the exact line, `truth` depth, position, normal and object of each pixel. `plan.steps` says
+    what was computed and what was left out, `quality` error, target and work of each light group; here the most samples
+    allowed ended the ambient light:
+
+    >>> import studio as blazer
+    >>> frame = blazer.render(blazer.Project.load("plane"), image_scale=0.05)
+    >>> [(one.group, one.laser, one.reason) for one in frame.quality]
+    [('direct', 'laser', 'target'), ('ambient', None, 'work')]
+    >>> [step.name for step in frame.plan.of("indirect") if step.computed]
+    []
     """
 
     project: Project = field(kw_only=True)
@@ -40,17 +51,6 @@ class RenderedFrame(Frame):
     def __getstate__(self) -> dict[str, Any]:
         """Without Embree's own memory, so that what is made of a frame goes to other processes and to files."""
         return {name: value for name, value in vars(self).items() if name != "world"}
-
-    @property
-    def quality(self) -> tuple[GroupQuality, ...]:
-        """Of each light group error, target and work; here the most samples allowed ended the ambient light.
-
-        >>> import studio as blazer
-        >>> frame = blazer.render(blazer.Project.load("plane"), image_scale=0.05)
-        >>> [(one.group, one.laser, one.reached) for one in frame.quality]
-        [('direct', 'laser', True), ('ambient', None, False)]
-        """
-        return group_qualities(self, self.project.scene, self.project.render)
 
     def show(self, kind: str | None = None, laser: int = 0) -> Figure:
         """A figure of the light. kind: "laser", "reflected", "ambient", "light" (all, in colour) or "depth".
@@ -100,8 +100,8 @@ def render(
     >>> frame = blazer.render(project, error=0.01, image_scale=0.1)
     >>> frame.laser(0).shape, frame.curves[0].depth_z.shape == frame.curves[0].position.shape
     ((205, 245), True)
-    >>> print(frame.plan.splitlines()[0])
-    direct: light of each laser that meets one surface, exact across the sheet, sampled across edges and shadows
+    >>> frame.plan.steps[0].name, frame.plan.steps[0].computed
+    ('direct', True)
     """
     expect(project, Project, "render: project", LOAD)
     scale = check_number(image_scale, "render: image_scale", 0.01, 4.0)
@@ -113,7 +113,7 @@ def render(
     with clock.stage("loading meshes"):
         world = build_world(chosen.scene, chosen.folder, step)
 
-    frame = render_step(chosen, world, step, clock, threads)
+    frame = render_step(chosen, world, step, clock, Run(threads=threads))
     made = extended(RenderedFrame, frame, project=chosen, image_scale=scale)
     vars(made)["world"] = world  # it is there already
     return made

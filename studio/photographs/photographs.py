@@ -25,7 +25,7 @@ from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from studio.photographs.image_files import load_photograph
-from studio.scan.line_extraction import tell
+from studio.scan.line_extraction import note_of
 from studio.scan.own_files import LINE_COLUMNS, check_replaceable
 
 SCARCE, PLENTY = 0.25, 0.5
@@ -60,7 +60,7 @@ def extract_photograph(
         check_camera(image, volume)
         line = extract(image, settings=settings, noise=noise, volume=volume, threads=threads)
         _check_axis(image, line, settings, threads)
-    return replace(line, note=tell(line, settings, []))
+    return replace(line, note=note_of(line, settings, []))
 
 
 def extract_series(
@@ -84,7 +84,7 @@ def extract_series(
             threads=threads,
         )
     told = f"{len(paths)} exposures fused"
-    return replace(line, note="; ".join(filter(None, (tell(line, settings, []), told))))
+    return replace(line, note="; ".join(filter(None, (note_of(line, settings, []), told))))
 
 
 def fuse_files(

@@ -19,7 +19,7 @@ from render.base.errors import InputError
 from studio.photographs.image_files import load_photograph
 from studio.photographs.photographs import extract_series, naming
 from studio.project.project import Project
-from studio.scan.line_extraction import tell, working_volume
+from studio.scan.line_extraction import note_of, working_volume
 from studio.scan.own_files import check_replaceable
 from studio.scan.spacetime_window import surface_motion
 from studio.scan.stages import Clock, triangulate_line
@@ -95,7 +95,7 @@ def _lines(paths: Sequence[Path], project: Project, laser: int, threads: int | N
         with naming(path):
             noises.append(estimate_noise(image, settings))
             line = extract(image, settings=settings, noise=noises[-1], volume=volume, threads=threads)
-            lines.append(replace(line, note=tell(line, settings, [])))
+            lines.append(replace(line, note=note_of(line, settings, [])))
     if not settings.spacetime:
         return lines
     if len(images) < 2 * spacetime_moving.FEWEST + 1:

@@ -14,10 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.ambient.transport_plan import expected_ambient
 from render.camera.camera import Camera
 from render.frame import Frame, LaserCurve
+from render.output.light_record import plan_record
+from render.plan import Plan
+from render.products import expected_plan
 from render.render import render_world
+from render.run import Run
 from render.scene.lights import Environment
 from render.scene.motion import NoMotion
 from render.sensor.develop import expected_electrons
@@ -90,11 +93,11 @@ class Inspection:
     full_well: float
     lasers: tuple[LaserView, ...]
     warnings: tuple[str, ...]
-    plan: tuple[str, ...]
+    plan: Plan
     """Of the light: what a render computes and leaves out, by a pilot of the lasers' reflections."""
 
     def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
+        return {**asdict(self), "plan": plan_record(self.plan)}
 
 
 def inspect(project: Project, root: Path, threads: int | None = None) -> Inspection:
@@ -106,7 +109,7 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
     dark = scene.model_copy(update={"lights": (), "environment": Environment(), "motion": NoMotion()})
     probe = {"laser_error": PROBE_ERROR, "indirect_error": PROBE_REFLECTED, "light_paths": 1 << 20}
     settings = project.render.model_copy(update={**probe, "truth_images": False})
-    frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, threads=threads)
+    frame = render_world(world, dark, settings=settings, axis=project.extraction.axis, run=Run(threads=threads))
     views = laser_views(project, frame)
     counts = np.bincount(world.object_id, minlength=len(scene.visible_objects))
     return Inspection(
@@ -119,10 +122,7 @@ def inspect(project: Project, root: Path, threads: int | None = None) -> Inspect
         full_well=project.sensor.full_well,
         lasers=views,
         warnings=(*_warnings(project, views), *scene_warnings(world, scene)),
-        plan=(
-            *(line for line in frame.plan.splitlines() if not line.startswith("ambient: none")),
-            *expected_ambient(scene, project.render),
-        ),
+        plan=expected_plan(scene, project.render).with_steps("indirect", frame.plan.of("indirect")),
     )
 
 

@@ -130,7 +130,7 @@ def at_pixel(scene: Scene, frame: Frame, images: list[Image], row: int, column: 
 def live_picture(project: Project, image: PreviewImage) -> Picture:
     """(h, w) a preview: grey shape for the eye, and each laser's line as bright as the sensor would see it."""
     small, sensor = scaled(project, image.scale), project.sensor
-    frame = Frame(0, image.laser, None, (), None, "")
+    frame = Frame(0, image.laser, None, (), None)
     full = min(sensor.full_well, (2**sensor.bits - 1 - sensor.black_level) / sensor.dn_per_electron)
     total = np.sqrt(image.shade) * np.float32(SHAPE_BRIGHTNESS)
     for i, laser in enumerate(project.scene.lasers):

@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from render.frame import Frame
     from render.sensor.develop import Image
     from render.world.world import World
-    from studio.scan.stages import Clock, StageProgress
+    from studio.runtime.console import StageProgress
+    from studio.scan.stages import Clock
 
 PREPARING = "preparing kernels (compiled on the first run)"
 TEMPLATE, IMAGE_SCALE = "plane", 0.05
@@ -138,7 +139,7 @@ def _drawn(cancelled: Cancel) -> tuple[Project, Frame, World, list[Image], Clock
     project = project.model_copy(update={"scene": line, "render": direct})
     clock = Clock(progress=lambda stage, done: None, cancelled=cancelled)
     world = build_world(project.scene, folder, 0)
-    frame = render_step(project, world, 0, clock, None)
+    frame = render_step(project, world, 0, clock)
     images = develop_step(project, frame, clock, None)
     _show(project.scene, frame, images)
     return project, frame, world, images, clock
@@ -162,6 +163,7 @@ def lens(cancelled: Cancel) -> None:
 def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Material, apart: float = 0.05) -> None:
     """A plate, and blocks of some materials before it, so far apart, under all sorts of lamps, by few paths."""
     from render.render import render_world
+    from render.run import Run
     from render.world.world import build_world
     from studio.scan.exposure import expose
 
@@ -179,7 +181,7 @@ def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Mater
     )
     few = {"transport": transport, "light_paths": 1, "ambient_samples": 2, "laser_error": 0.1}
     settings = RenderSettings().model_copy(update=few)
-    frame = render_world(build_world(scene, Path()), scene, settings=settings, cancelled=cancelled)
+    frame = render_world(build_world(scene, Path()), scene, settings=settings, run=Run(cancelled=cancelled))
     _show(scene, frame, [expose(Project(scene=scene, sensor=SENSOR), frame, [1.0], 0)])
 
 

@@ -26,7 +26,7 @@ def noise_model(image: Image) -> NoiseModel:
 
 
 def working_volume(project: Project, laser: int, settings: ExtractionSettings | None = None) -> WorkingVolume | None:
-    """Where the project's rig measures with one laser; None where no geometric check is asked for."""
+    """Where the project's rig measures with one laser; None where no geometric check is requested."""
     chosen = project.extraction if settings is None else settings
     if not chosen.geometry:
         return None
@@ -61,22 +61,22 @@ def extract_line(
     line = extract(
         pixels, method=method, settings=settings, noise=noise, variance=variance, volume=volume, threads=threads
     )
-    return replace(line, note=tell(line, settings, [one.exposure_time for one in (image, *image.shorter)]))
+    return replace(line, note=note_of(line, settings, [one.exposure_time for one in (image, *image.shorter)]))
 
 
-def tell(line: Line, settings: ExtractionSettings, times: list[float]) -> str:
+def note_of(line: Line, settings: ExtractionSettings, times: list[float]) -> str:
     """What was done beyond the method itself, for a person."""
-    told = [line.note] if line.note else []
+    notes = [line.note] if line.note else []
     if len(times) > 1:
-        told.append(f"{len(times)} exposures fused, " + ", ".join(f"{1e3 * time:.3g}" for time in times) + " ms")
+        notes.append(f"{len(times)} exposures fused, " + ", ".join(f"{1e3 * time:.3g}" for time in times) + " ms")
     if line.candidates is not None:
-        told.append({"continuous": "the smoothest chain of peaks"}.get(settings.select, f"the {settings.select} peak"))
+        notes.append({"continuous": "the smoothest chain of peaks"}.get(settings.select, f"the {settings.select} peak"))
         if settings.geometry:
             near, far = settings.nearest or 0.0, settings.farthest
             end = "" if far is None else f" to {far * 1e3:g} mm"
-            told.append(
+            notes.append(
                 "only peaks on the laser's plane and within its fan" + f", {near * 1e3:g} mm{end} away"
                 if near or far
                 else "only peaks on the laser's plane and within its fan"
             )
-    return "; ".join(told)
+    return "; ".join(notes)

@@ -84,13 +84,13 @@ class Measuring:
 
     def notes(self) -> list[str]:
         """What was done to find each laser's line beyond its method, and in how many frames."""
-        told, frames = [], len(self.record.steps)
-        for laser, notes in zip(self._project.scene.lasers, self._notes, strict=True):
-            for note, times in notes.items():
+        notes, frames = [], len(self.record.steps)
+        for laser, of_laser in zip(self._project.scene.lasers, self._notes, strict=True):
+            for note, times in of_laser.items():
                 if note:
                     where = f" in {times} of {frames} frames" if times < frames else ""
-                    told.append(f"Line of {laser.name}{where}: {note}.")
-        return told[:MOST_NOTES]
+                    notes.append(f"Line of {laser.name}{where}: {note}.")
+        return notes[:MOST_NOTES]
 
     def write_points(self, out: Path) -> list[Path]:
         """points.ply and points.csv of all frames and lasers, by the project's method, at the first step's pose."""

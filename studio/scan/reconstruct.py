@@ -33,7 +33,7 @@ def reconstruct_folder(
 ) -> dict[str, Any]:
     """Develop, extract and triangulate the frames of a scan anew; `project` may have another sensor or extraction.
 
-    Writes points and, where asked for, the report into `out`. InputError: frames missing or damaged, `project` differs
+    Writes points and, where requested, the report into `out`. InputError: frames missing or damaged, `project` differs
     in what the frames fix, or as `scan_folder.measuring`.
     """
     scan_folder.check_measures(found, project)
@@ -43,7 +43,7 @@ def reconstruct_folder(
 
 def _measured(
     found: scan_folder.ScanFolder,
-    asked: Project,
+    requested: Project,
     root: Path,
     out: Path,
     clock: Clock,
@@ -51,7 +51,7 @@ def _measured(
     report: bool,
     threads: int | None,
 ) -> dict[str, Any]:
-    how = development(found.project, asked)
+    how = development(found.project, requested)
     project = how.project
     image_scale = scan_folder.image_scale_of(found)
     cautions = Cautions(project, image_scale, how.laser_power)
@@ -80,15 +80,15 @@ def _measured(
             notes = cautions.notes(figures)
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
             measured["remarks"] = result_remarks(measuring.record)
-            if (asked.sensor, asked.extraction) != (found.project.sensor, found.project.extraction):
-                measured["measured_with"] = asked.model_dump(mode="json", include={"sensor", "extraction"})
+            if (requested.sensor, requested.extraction) != (found.project.sensor, found.project.extraction):
+                measured["measured_with"] = requested.model_dump(mode="json", include={"sensor", "extraction"})
             if report:
                 created = str(found.manifest.get("created", now()))
                 reports = measuring.write_reports(out, first, notes=notes, created=created, image_scale=image_scale)
                 measured["report"] = [path.name for path in reports]
                 files += reports
     return {
-        "name": asked.name,
+        "name": requested.name,
         "files": [str(path) for path in files],
         "image_scale": image_scale,
         "results": measured["results"],

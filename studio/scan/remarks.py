@@ -54,7 +54,9 @@ def frame_result(
         found = [measurements[method][i] for method in order if method in measurements]
         extractions = tuple(Extraction(one.line, one.points, one.errors) for one in found)
         lasers.append(LaserResult(curve, extractions, images[i].pixels if i < len(images) else None))
-    return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=frame.seconds, counts=frame.counts)
+    return FrameResult(
+        frame.step, tuple(lasers), plan=frame.plan, quality=frame.quality, seconds=frame.seconds, counts=frame.counts
+    )
 
 
 def best(measurements: Measurements, project: Project) -> Sequence[Measurement]:

@@ -80,13 +80,13 @@ def check_rendered_from(
     cure: str = "render the project again",
 ) -> None:
     """InputError: a frame with such a record is not of this project and these input files; it names what differs."""
-    told = differences(record, project, resume=resume)
+    found = differences(record, project, resume=resume)
     recorded = record.get("inputs")
-    told += changed_files(recorded if isinstance(recorded, dict) else {}, inputs)
-    if not told:
+    found += changed_files(recorded if isinstance(recorded, dict) else {}, inputs)
+    if not found:
         return
     raise InputError(
-        f"the frames were rendered from something else: {listed(told)}",
+        f"the frames were rendered from something else: {listed(found)}",
         where=where,
         allowed="the same scene and input files"
         if resume

@@ -52,7 +52,9 @@ def measure_frame(  # noqa: PLR0913
         lasers.append(LaserResult(frame.curves[i], extractions, image.pixels if keep else None))
     spent = {name: seconds - before.get(name, 0.0) for name, seconds in clock.seconds.items()}
     seconds = {**frame.seconds, **{name: value for name, value in spent.items() if value > 0.0}}
-    return FrameResult(frame.step, tuple(lasers), plan=frame.plan, seconds=seconds, counts=frame.counts)
+    return FrameResult(
+        frame.step, tuple(lasers), plan=frame.plan, quality=frame.quality, seconds=seconds, counts=frame.counts
+    )
 
 
 def _others(own: list[Measurement]) -> tuple[Method, ...]:

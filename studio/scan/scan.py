@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from contextlib import ExitStack, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from analysis.report.model import FrameResult
 from render.base.errors import InputError
 from render.frame import Frame
 from render.output.frame_files import write_frame
+from render.output.light_record import plan_record, quality_record
 from render.scan_plan import ScanPlan, plan_scan
 from render.sensor.develop import Image, develop
 from render.world.world import World, build_world
@@ -23,12 +22,12 @@ from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
 from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
-from studio.scan.light_group_status import group_lines
 from studio.scan.measuring import Measuring
+from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.remarks import result_remarks
 from studio.scan.rendered_from import made_of
-from studio.scan.resume import Refined, frame_of_step, settle
-from studio.scan.stages import Cancel, Clock, Measurement, StageProgress, develop_step, scaled, step_world, validated
+from studio.scan.resume import frame_of_step, settle
+from studio.scan.stages import Clock, Measurement, develop_step, scaled, step_world, validated
 from studio.scan.summary import summarise
 
 __all__ = ["Measurement", "ScanResult", "run_scan"]
@@ -44,20 +43,6 @@ class ScanResult:
     manifest: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Rendering:
-    """How the frames of a scan come about."""
-
-    project: Project
-    root: Path
-    scan: scan_folder.Begun
-    clock: Clock
-    threads: int | None
-    resume: bool
-    seconds: float | None
-    refined: Refined
-
-
 @dataclass
 class Written:
     """What became of the frames so far, in a few words each."""
@@ -68,58 +53,41 @@ class Written:
     """Of their sidecars."""
     light: list[dict[str, Any]] = field(default_factory=list)
 
-    def tell(self, frame: Frame, project: Project) -> None:
-        """The light of a frame, and what is doubtful about it."""
-        record = light_record(frame, project)
+    def add(self, frame: Frame) -> None:
+        """Plan and quality of a frame, and what is doubtful about it."""
+        record = light_record(frame)
         if self.light and self.light[-1]["plan"] == record["plan"]:
-            record["plan"] = self.light[-1]["plan"]  # the same words, once in memory
+            record["plan"] = self.light[-1]["plan"]  # once in memory
         self.light.append(record)
         self.cautions.look(frame, frame.warnings)
 
 
-def never() -> bool:
-    """A scan that nobody cancels."""
-    return False
-
-
-def run_scan(  # noqa: PLR0913
+def run_scan(
     project: Project,
     root: Path,
     *,
     out: Path,
-    steps: int | None = None,
-    threads: int | None = None,
-    seed: int | None = None,
-    image_scale: float = 1.0,
-    measure: bool = True,
-    report: bool = True,
-    resume: bool = False,
-    seconds: float | None = None,
-    refined: Refined = lambda frame: None,
-    progress: StageProgress = lambda stage, done: None,
-    cancelled: Cancel = never,
-    each: Callable[[FrameResult], None] = lambda frame: None,
+    options: ScanOptions = ScanOptions(),
+    listener: Listener = Listener(),
     source: Path | None = None,
 ) -> ScanResult:
     """Scan `project`, whose files are below `root`, into the folder `out`.
 
-    steps: only the first so many frames; seed: in place of the project's; measure off: stop after the frames;
-    report off: stop after the points; resume: take the frames that an earlier scan left in `out`, and go on with the
-    one it left unfinished; seconds: time for the light of each frame; refined: hears of every frame as it gets better;
-    each: of every frame once it is measured; source: the project's file, which is never written to.
-    InputError: bad project, mesh or texture, nothing to see, or as `scan_folder.begin` and `finish`. Cancelled: files
-    so far stay, whole, and what was rendered of the frame under way.
+    source: the project's file, which is never written to. InputError: bad project, mesh or texture, nothing to see, or
+    as `scan_folder.begin` and `finish`. Cancelled: files so far stay, whole, and what was rendered of the frame under
+    way.
     """
-    began = time.perf_counter()
+    start = time.perf_counter()
+    image_scale = options.image_scale
     project = validated(scaled(project, image_scale), f"at image scale {image_scale:g}")
-    if seed is not None:
-        project = validated(project.model_copy(update={"seed": seed}), "with another seed")
-    if measure and not project.scene.lasers:
+    if options.seed is not None:
+        project = validated(project.model_copy(update={"seed": options.seed}), "with another seed")
+    if options.measure and not project.scene.lasers:
         raise InputError("the rig has no laser, so there is no line to measure", where="scene.rig.lasers", found="none")
     cautions = Cautions(project, image_scale)
-    count = min(steps or project.scene.frame_count, project.scene.frame_count)
-    clock = Clock(progress, cancelled)
-    measuring = Measuring(project, out, clock, threads, count, each) if measure else None
+    count = min(options.steps or project.scene.frame_count, project.scene.frame_count)
+    clock = Clock(listener.progress, listener.cancelled)
+    measuring = Measuring(project, out, clock, options.threads, count, listener.measured) if options.measure else None
     with ExitStack() as held, cautions.listening():
         if measuring:
             held.enter_context(closing(measuring))
@@ -128,13 +96,12 @@ def run_scan(  # noqa: PLR0913
             inputs = input_hashes(project.scene, root)
             first = build_world(project.scene, root, 0)
         reads = [] if source is None else [source]
-        scan = held.enter_context(
-            scan_folder.begin(out, project, root, inputs, count=count, resume=resume, reads=reads)
+        begun = held.enter_context(
+            scan_folder.begin(out, project, root, inputs, count=count, resume=options.resume, reads=reads)
         )
         with clock.stage(PREPARING):
-            warm_up(chain(*needed(project)), progress, cancelled)
-        how = Rendering(project, root, scan, clock, threads, resume, seconds, refined)
-        _take_frames(how, first, count, written, measuring)
+            warm_up(chain(*needed(project)), listener.progress, listener.cancelled)
+        _take_frames(Scan(begun, clock, options, listener.refined), first, count, written, measuring)
         result: dict[str, Any] = {
             "name": project.name,
             "created": now(),
@@ -153,13 +120,13 @@ def run_scan(  # noqa: PLR0913
 
         def finish(reports: list[Path]) -> dict[str, Any]:
             result["report"] = [path.name for path in reports]
-            result["seconds"] = {**clock.seconds, "all": time.perf_counter() - began}
-            return scan_folder.finish(scan, result)
+            result["seconds"] = {**clock.seconds, "all": time.perf_counter() - start}
+            return scan_folder.finish(begun, result)
 
         # whole without its report, so that what fails there costs nothing else
         reports: list[Path] = []
         manifest = finish(reports)
-        if measuring and report:
+        if measuring and options.report:
             reports = measuring.write_reports(
                 out, first, notes=result["notes"], created=result["created"], image_scale=image_scale
             )
@@ -167,74 +134,56 @@ def run_scan(  # noqa: PLR0913
     return ScanResult(out, (*written.files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
 
 
-def _take_frames(how: Rendering, first: World, count: int, written: Written, measuring: Measuring | None) -> None:
+def _take_frames(scan: Scan, first: World, count: int, written: Written, measuring: Measuring | None) -> None:
     """Render, write and measure one frame after the other; `first`: the world of step 0."""
-    plan, world = _plan(how, first), first
-    for step in how.clock.frames(count):
-        world = world if step == 0 else step_world(how.project, how.root, step, world)
-        frame, images = _write_frame(how, world, step, plan, written)
+    scan, world = replace(scan, plan=_plan(scan, first)), first
+    for step in scan.clock.frames(count):
+        world = world if step == 0 else step_world(scan.project, scan.begun.root, step, world)
+        frame, images = _write_frame(scan, world, step, written)
         if measuring is not None:
             measuring.add(frame, world, images)
     if measuring is not None:
         measuring.finish()
 
 
-def _plan(how: Rendering, first: World) -> ScanPlan | None:
+def _plan(scan: Scan, first: World) -> ScanPlan | None:
     """What all frames compute, whichever of them are taken; None: there is only one."""
-    project = how.project
+    project = scan.project
     if project.scene.frame_count == 1:
         return None
-    with how.clock.stage("plan for all frames") as progress:
-        return plan_scan(
-            project.scene,
-            project.render,
-            lambda step: first if step == 0 else step_world(project, how.root, step, first),
-            seed=project.seed,
-            threads=how.threads,
-            cancelled=how.clock.cancelled,
-            progress=progress,
-        )
+
+    def world(step: int) -> World:
+        return first if step == 0 else step_world(project, scan.begun.root, step, first)
+
+    with scan.clock.stage("plan for all frames") as progress:
+        return plan_scan(project.scene, project.render, world, replace(scan.run, progress=progress))
 
 
-def _write_frame(
-    how: Rendering, world: World, step: int, plan: ScanPlan | None, written: Written
-) -> tuple[Frame, list[Image]]:
+def _write_frame(scan: Scan, world: World, step: int, written: Written) -> tuple[Frame, list[Image]]:
     """One frame as files, and its image of each laser."""
-    project, clock, threads = how.project, how.clock, how.threads
-    frame, state = frame_of_step(
-        project,
-        world,
-        step,
-        how.scan,
-        clock,
-        threads,
-        resume=how.resume,
-        seconds=how.seconds,
-        refined=how.refined,
-        plan=plan,
-    )
-    written.tell(frame, project)
-    images = develop_step(project, frame, clock, threads)
+    project, clock = scan.project, scan.clock
+    frame, state = frame_of_step(scan, world, step)
+    written.add(frame)
+    images = develop_step(project, frame, clock, scan.options.threads)
     with clock.stage("writing frames"):
         files = write_frame(
-            how.scan.folder,
+            scan.begun.folder,
             scan_folder.frame_stem(step),
             frame,
             together(project, frame, images),
             project.scene,
             sensor=project.sensor,
-            made_of=made_of(project, state.marks, how.scan.inputs),
+            made_of=made_of(project, state.marks, scan.begun.inputs),
         )
-        settle(project, frame, state)
+        settle(frame, state)
     written.files += files
     written.names.append(files[-1].name)
     return frame, images
 
 
-def light_record(frame: Frame, project: Project) -> dict[str, Any]:
-    """The plan of a frame, and how well each light group is known."""
-    groups = {name: text for _, name, text in group_lines(frame, project.scene, project.render)}
-    return {"plan": frame.plan.splitlines(), "groups": groups}
+def light_record(frame: Frame) -> dict[str, Any]:
+    """The plan of a frame, and how well each light group is known, as the manifest has them."""
+    return {"plan": plan_record(frame.plan), "groups": quality_record(frame.quality)}
 
 
 def together(project: Project, frame: Frame, images: list[Image]) -> Image:

@@ -15,6 +15,7 @@ from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
 from render.output.frame_files import read_frame
+from render.run import never
 from render.scene.settings import RenderSettings
 from render.scene.shape import MeshFile
 from render.world.world import World
@@ -22,7 +23,6 @@ from studio.project.input_files import check_unchanged
 from studio.project.project import Project
 from studio.scan.point_sample import PointSample
 from studio.scan.result_series import MEASURED, ErrorView
-from studio.scan.scan import never
 from studio.scan.scan_folder import MANIFEST, PROJECT, ScanFolder, check_frame, image_scale_of
 from studio.scan.stages import scaled, step_world
 

@@ -1,11 +1,11 @@
-"""The stages of a scan: render, develop, extract, triangulate, compare; each timed and told to whoever watches."""
+"""The stages of a scan: render, develop, extract, triangulate, compare; each timed, its progress reported."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from analysis.error import Errors, compare
@@ -13,22 +13,22 @@ from analysis.line.result import Line
 from analysis.line.settings import Method
 from analysis.triangulate import Points, triangulate
 from render.base.errors import Cancelled
-from render.checkpoint import RenderState
+from render.base.progress import Clock as RenderClock
+from render.base.threads import Cancel
 from render.frame import Frame
-from render.render import render_world
+from render.progressive import frames
+from render.run import Run, never
 from render.scan_plan import ScanPlan
 from render.scene.motion import NoMotion
 from render.sensor.develop import Image
 from render.sensor.sensor import Sensor
+from render.world.placed import PlacedScene
 from render.world.world import World, build_world
 from studio.project.project import Project
-from studio.runtime.console import FRAMES
+from studio.runtime.console import FRAMES, StageProgress
 from studio.scan.exposure import expose
 from studio.scan.line_extraction import extract_line
 from studio.scan.spacetime_window import Passing, along_time
-
-StageProgress = Callable[[str, float], None]
-Cancel = Callable[[], bool]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Clock:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Callable[[float], None]]:
-        """Time a stage under its name. Cancelled: the user asked to stop before it began."""
+        """Time a stage under its name. Cancelled: it was requested before the stage began."""
         if self.cancelled():
             raise Cancelled
         self.progress(name, 0.0)
@@ -63,7 +63,7 @@ class Clock:
         self.progress(name, 1.0)
 
     def frames(self, count: int) -> Iterator[int]:
-        """0..count - 1, told as the progress of FRAMES where there are several."""
+        """0..count - 1, reported as the progress of FRAMES where there are several."""
         for i in range(count):
             if count > 1:
                 self.progress(FRAMES, i / count)
@@ -100,35 +100,25 @@ def step_world(project: Project, root: Path, step: int, before: World | None) ->
     return before if before is not None and not objects_move else build_world(project.scene, root, step)
 
 
-def render_step(  # noqa: PLR0913
+def render_step(
     project: Project,
     world: World,
     step: int,
     clock: Clock,
-    threads: int | None,
+    run: Run = Run(),
     *,
-    cancelled: Cancel | None = None,
-    seconds: float | None = None,
-    state: RenderState | None = None,
     refined: Callable[[Frame], None] = lambda frame: None,
     scan: ScanPlan | None = None,
 ) -> Frame:
-    """Radiance and truth of one step; cancelled: in place of the clock's; the rest as in `render_world`."""
-    frame = render_world(
-        world,
-        project.scene,
-        settings=project.render,
-        step=step,
-        axis=project.extraction.axis,
-        seed=project.seed,
-        threads=threads,
-        progress=clock.progress,
-        cancelled=clock.cancelled if cancelled is None else cancelled,
-        seconds=seconds,
-        state=state,
-        refined=refined,
-        scan=scan,
-    )
+    """Radiance and truth of one step, with the project's seed; stopped by the run, or unless it can be by the clock.
+
+    refined: hears of every frame as it gets better, the last is the result. scan: the plan of a whole scan.
+    """
+    cancelled = clock.cancelled if run.cancelled is never else run.cancelled
+    run = replace(run, seed=project.seed, cancelled=cancelled)
+    placed, watch = PlacedScene(world, project.scene, step), RenderClock(clock.progress)
+    for frame in frames(placed, project.render, run, watch, axis=project.extraction.axis, scan=scan):
+        refined(frame)
     for name, spent in frame.seconds.items():
         clock.seconds[name] = clock.seconds.get(name, 0.0) + spent
     return frame

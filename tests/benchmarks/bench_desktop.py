@@ -15,6 +15,8 @@ from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
 
+from render.run import Run
+
 os.environ.setdefault("QT_API", "pyside6")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -108,7 +110,7 @@ def main() -> None:
     def render(progress, cancelled):  # type: ignore[no-untyped-def]
         world.__dict__.pop("rays", None)
         frames.clear()
-        for frame in refine(world, project.scene, settings=long, progress=progress, cancelled=cancelled):
+        for frame in refine(world, project.scene, settings=long, progress=progress, run=Run(cancelled=cancelled)):
             frames.append(frame)
 
     runner.run(RENDER, "render", render)

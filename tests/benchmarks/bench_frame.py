@@ -17,8 +17,10 @@ import numpy as np
 
 from render.ambient.integrator import ambient_image, ambient_images
 from render.laser_direct.integrator import direct_image
+from render.run import Run
 from render.truth.laser_curve import laser_curve
 from render.truth.pixel_truth import truth_images
+from render.world.placed import PlacedScene
 from render.world.world import build_world
 from studio.project.project import Project
 
@@ -52,10 +54,10 @@ def main() -> None:
     for target in (0.01, 0.001):
         image = direct_image(*parts, target=target)
         before, start = world.rays.seconds, time.perf_counter()
-        direct_image(*parts, target=target, threads=1)
+        direct_image(*parts, target=target, run=Run(threads=1))
         share = (world.rays.seconds - before) / (time.perf_counter() - start)
-        one = best(partial(direct_image, *parts, target=target, threads=1))
-        many = best(partial(direct_image, *parts, target=target, threads=threads))
+        one = best(partial(direct_image, *parts, target=target, run=Run(threads=1)))
+        many = best(partial(direct_image, *parts, target=target, run=Run(threads=threads)))
         row(
             f"laser light to {target:.1%}",
             many,
@@ -63,17 +65,17 @@ def main() -> None:
             f"estimated error {image.error:.2%}, {image.samples} samples, {one / many:.2f} x one thread (bar 1.8), "
             f"{share:.0%} inside embree (bar 60 %)",
         )
-    reference = direct_image(*parts, target=1e-4, seed=99).radiance.astype(np.float64)
-    rough = direct_image(*parts, target=0.01, seed=1).radiance
+    reference = direct_image(*parts, target=1e-4, run=Run(seed=99)).radiance.astype(np.float64)
+    rough = direct_image(*parts, target=0.01, run=Run(seed=1)).radiance
     lit = reference > 0
     error = np.sqrt(np.mean((rough - reference)[lit] ** 2) / np.mean(reference[lit] ** 2))
     print(f"{'  measured error of the first':<38}{error:>9.2%}")
-    pinhole = best(partial(direct_image, *parts, target=0.01, threads=threads))
+    pinhole = best(partial(direct_image, *parts, target=0.01, run=Run(threads=threads)))
     for f_number, focus in ((5.6, 0.8), (1.4, 0.8), (1.4, 1.0)):
         lens = camera.lens.model_copy(update={"model": "thin-lens", "f_number": f_number, "focus_distance": focus})
         through = (world, camera.model_copy(update={"lens": lens}), *parts[2:])
         image = direct_image(*through, target=0.01)
-        seconds = best(partial(direct_image, *through, target=0.01, threads=threads), 3)
+        seconds = best(partial(direct_image, *through, target=0.01, run=Run(threads=threads)), 3)
         name = f"  through f/{f_number:g} focused at {focus:g} m"
         row(name, seconds, "-", f"{seconds / pinhole:.1f} x the pinhole, {image.samples} samples")
     row("exact line", best(lambda: laser_curve(*parts)), "0.1 s")
@@ -93,7 +95,9 @@ def main() -> None:
     )
     for name, surfaces in (("one surface", 1), ("any number of surfaces", None)):
         before, start = world.rays.seconds, time.perf_counter()
-        *_, image = ambient_images(world, scene, camera, pose, target=0.01, most=64, surfaces=surfaces, threads=threads)
+        *_, image = ambient_images(
+            PlacedScene(world, scene), target=0.01, most=64, surfaces=surfaces, run=Run(threads=threads)
+        )
         spent = time.perf_counter() - start
         share = (world.rays.seconds - before) / threads / spent
         note = f"error {image.error:.2%}, {image.samples:.0f} samples a pixel, {share:.0%} inside embree (bar 60 %)"

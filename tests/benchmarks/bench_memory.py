@@ -63,7 +63,7 @@ def main() -> int:
     project = narrow(frames)
     clock = Clock(lambda stage, done: None, lambda: False)
     world = build_world(project.scene, Path(), 0)
-    frame = render_step(project, world, 0, clock, None)
+    frame = render_step(project, world, 0, clock)
     noisy = [project.model_copy(update={"seed": seed}) for seed in range(NOISES)]
     images = [develop_step(one, frame, clock, None) for one in noisy]
     began, held = time.perf_counter(), {}

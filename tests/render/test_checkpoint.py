@@ -7,12 +7,13 @@ import zipfile
 import numpy as np
 import pytest
 
-from render.base.counts import AMBIENT_SAMPLES, INDIRECT_CLAMPED, INDIRECT_CUT, INDIRECT_ERROR
+from analysis.report.light_text import plan_lines, quality_text
 from render.base.errors import Cancelled, InputError
 from render.checkpoint import RenderState, read_state, state_of
 from render.material.material import Conductor
 from render.progressive import refine
 from render.render import render_world
+from render.run import Run
 from render.scene.lights import Environment
 from render.scene.settings import RenderSettings
 from tests.render.laser_indirect.test_integrator import turned_groove
@@ -39,7 +40,7 @@ def groove():
 
 @pytest.fixture(scope="module")
 def whole(groove):
-    return render_world(*groove, settings=SETTINGS, threads=1)
+    return render_world(*groove, settings=SETTINGS, run=Run(threads=1))
 
 
 class Stopper:
@@ -59,7 +60,9 @@ def test_a_render_that_is_interrupted_again_and_again_ends_in_the_same_bits(groo
     while True:
         state = read_state(state_of(*groove, SETTINGS, path=path))
         try:
-            frame = render_world(*groove, settings=SETTINGS, threads=2, cancelled=Stopper(questions), state=state)
+            frame = render_world(
+                *groove, settings=SETTINGS, run=Run(threads=2, cancelled=Stopper(questions), checkpoint=state)
+            )
             break
         except Cancelled:
             interrupted += 1
@@ -69,17 +72,16 @@ def test_a_render_that_is_interrupted_again_and_again_ends_in_the_same_bits(groo
     assert np.array_equal(frame.laser_indirect[0], whole.laser_indirect[0]) and frame.laser_indirect[0].max() > 0
     assert np.array_equal(frame.ambient, whole.ambient)
     assert frame.plan == whole.plan
-    assert frame.counts[INDIRECT_ERROR.of(0)] == whole.counts[INDIRECT_ERROR.of(0)]
-    assert frame.counts[AMBIENT_SAMPLES] == whole.counts[AMBIENT_SAMPLES]
+    assert frame.quality == whole.quality and {one.reason for one in frame.quality} == {"target", "work"}
 
 
 def test_a_finished_render_goes_on_to_a_smaller_error_without_beginning_anew(groove, whole):
     coarse = SETTINGS.model_copy(update={"indirect_error": 0.02})
     state = state_of(*groove, coarse)
-    render_world(*groove, settings=coarse, state=state)
+    render_world(*groove, settings=coarse, run=Run(checkpoint=state))
     passes = state.under_way["laser 0"].passes
     state.pause()
-    frames = list(refine(*groove, settings=SETTINGS, state=state))
+    frames = list(refine(*groove, settings=SETTINGS, run=Run(checkpoint=state)))
     assert state.under_way["laser 0"].passes > passes > 0
     assert np.array_equal(frames[-1].laser_indirect[0], whole.laser_indirect[0])
 
@@ -88,7 +90,7 @@ def test_a_saved_render_of_something_else_is_refused_with_what_differs(groove, t
     world, scene = groove
     path = tmp_path / "state.npz"
     state = state_of(world, scene, SETTINGS, path=path)
-    render_world(world, scene, settings=SETTINGS, state=state)
+    render_world(world, scene, settings=SETTINGS, run=Run(checkpoint=state))
     assert state.write()
     assert read_state(state_of(world, scene, SETTINGS, path=path)).saved
     for settings, changes, difference in (
@@ -131,8 +133,7 @@ def test_a_state_without_a_file_is_new():
 def test_every_refinement_of_reflected_light_is_a_frame_and_nearer_the_last(groove):
     frames = [frame for frame in refine(*groove, settings=SETTINGS) if frame.laser_indirect and frame.ambient is None]
     assert len(frames) >= 3
-    key = INDIRECT_ERROR.of(0)
-    told = [frame.counts[key] for frame in frames]
+    told = [frame.quality_of("indirect", "laser").error for frame in frames]
     assert told == sorted(told, reverse=True) and told[-1] <= SETTINGS.indirect_error
     last = frames[-1].laser_indirect[0].astype(np.float64)
     distance = [np.sqrt(np.sum((frame.laser_indirect[0] - last) ** 2) / np.sum(last**2)) for frame in frames[:-1]]
@@ -141,16 +142,18 @@ def test_every_refinement_of_reflected_light_is_a_frame_and_nearer_the_last(groo
 
 def test_a_time_limit_ends_the_render_with_every_light_group(groove):
     endless = SETTINGS.model_copy(update={"indirect_error": 1e-3, "light_paths": 1 << 40, "ambient_samples": 65536})
-    frame = render_world(*groove, settings=endless, seconds=2.0)
+    frame = render_world(*groove, settings=endless, run=Run(seconds=2.0))
     assert frame.laser_indirect[0].max() > 0 and frame.ambient.mean() > 0
-    assert frame.counts[INDIRECT_ERROR.of(0)] > 1e-3
+    assert frame.quality_of("indirect", "laser").error > 1e-3 and frame.unfinished
 
 
 def test_the_clamp_is_named_and_told(groove, whole):
     clamped = SETTINGS.model_copy(update={"laser_clamp": float(whole.laser_indirect[0].max()) / 100})
     frame = render_world(*groove, settings=clamped)
-    assert "clamp: no pass" in frame.plan and "biased" in frame.plan and "clamp" not in whole.plan
-    assert frame.counts[INDIRECT_CLAMPED.of(0)] > 0
-    lost = frame.counts[INDIRECT_CUT.of(0)]
+    quality = frame.quality_of("indirect", "laser")
+    assert frame.plan.laser_clamp == clamped.laser_clamp and whole.plan.laser_clamp is None
+    assert "clamp: no pass" in "\n".join(plan_lines(frame.plan)) and "(biased)" in quality_text(quality)
+    assert quality.clamped > 0 and whole.quality_of("indirect", "laser").clamped is None
+    lost = quality.clamped_radiance
     kept, full = (one.laser_indirect[0].mean(dtype=np.float64) for one in (frame, whole))
     assert kept + lost == pytest.approx(full, rel=0.1) and lost > 0

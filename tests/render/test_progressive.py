@@ -7,12 +7,15 @@ import itertools
 import numpy as np
 import pytest
 
-from render.base.counts import AMBIENT_SAMPLES, DIRECT_ERROR, RAYS
+from analysis.report.light_text import plan_lines
+from render.base.counts import RAYS
 from render.base.errors import Cancelled
 from render.base.pose import Pose
 from render.mesh.primitives import primitive_mesh
-from render.progressive import plan, refine
+from render.products import expected_plan
+from render.progressive import refine
 from render.render import render_world
+from render.run import Run
 from render.scene.lights import Environment, PointLight
 from render.scene.settings import RenderSettings
 from render.scene.shape import Box
@@ -40,8 +43,8 @@ def arrays(frame):
 
 def test_the_last_frame_is_the_render_bit_for_bit():
     world, scene = box_on_a_wall()
-    *_, last = refine(world, scene, settings=SETTINGS, seed=3, threads=2)
-    whole = render_world(world, scene, settings=SETTINGS, seed=3, threads=1)
+    *_, last = refine(world, scene, settings=SETTINGS, run=Run(seed=3, threads=2))
+    whole = render_world(world, scene, settings=SETTINGS, run=Run(seed=3, threads=1))
     assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(arrays(last), arrays(whole), strict=True))
     assert last.plan == whole.plan
     assert whole.counts.keys() <= last.counts.keys() and whole.seconds.keys() <= last.seconds.keys()
@@ -57,7 +60,7 @@ def test_every_frame_can_be_developed_and_knows_more_than_the_one_before():
         assert len(frame.curves[0].index) > 0
     assert [frame.truth is not None for frame in frames] == [False, False, True, True, True, True]
     assert [frame.ambient is not None for frame in frames] == [False] * 3 + [True] * 3
-    assert frames[1].counts[DIRECT_ERROR.of(0)] <= 0.01
+    assert frames[1].quality_of("direct", "laser").error <= 0.01
     rays = [frame.counts[RAYS] for frame in frames]
     assert rays == sorted(rays) and rays[0] > 0
 
@@ -82,7 +85,7 @@ def test_cancelling_keeps_the_frames_so_far():
     world, scene = box_on_a_wall()
     frames = []
     with pytest.raises(Cancelled):
-        for frame in refine(world, scene, settings=SETTINGS, cancelled=lambda: len(frames) == 4):
+        for frame in refine(world, scene, settings=SETTINGS, run=Run(cancelled=lambda: len(frames) == 4)):
             frames.append(frame)
     assert len(frames) == 4 and frames[-1].ambient is not None
 
@@ -91,9 +94,8 @@ def test_cancelling_keeps_the_frames_so_far():
 def test_the_samples_asked_for_end_the_ambient_light(samples):
     world, scene = box_on_a_wall()
     settings = SETTINGS.model_copy(update={"ambient_samples": samples, "truth_images": False})
-    found = [
-        frame.counts[AMBIENT_SAMPLES] for frame in refine(world, scene, settings=settings) if frame.ambient is not None
-    ]
+    frames = [frame for frame in refine(world, scene, settings=settings) if frame.ambient is not None]
+    found = [frame.quality_of("ambient").work for frame in frames]
     assert found == sorted(set(found))
     # whole samples on every tile: half of one in the mean at most
     assert found[-1] == pytest.approx(samples, abs=1.0)
@@ -109,7 +111,12 @@ def test_a_dark_scene_ends_with_the_truth_and_one_without_truth_with_the_lasers(
 
 def test_the_plan_says_what_is_computed_and_what_is_not():
     _, scene = box_on_a_wall()
-    text = "\n".join(plan(scene, SETTINGS))
+    plan = expected_plan(scene, SETTINGS)
+    computed = {(step.group, step.name): step.computed for step in plan.steps}
+    assert computed["direct", "direct"] and computed["ambient", "ambient"] and computed["truth", "pixels"]
+    assert computed["indirect", "indirect"] is False and computed["ambient", "interreflection"] is False
+    text = "\n".join(plan_lines(plan))
     assert "16 samples" in text and "interreflection" in text and "depth" in text
     _, dark = box_on_a_wall(environment=Environment(), lights=())
-    assert "none" in "\n".join(plan(dark, SETTINGS))
+    assert expected_plan(dark, SETTINGS).step("ambient", "ambient").reason == "absent"
+    assert "ambient: none" in "\n".join(plan_lines(expected_plan(dark, SETTINGS)))

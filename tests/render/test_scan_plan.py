@@ -6,11 +6,12 @@ import math
 
 import pytest
 
-from render import scan_plan
+from render.laser_indirect.light_group import IndirectLight
 from render.laser_indirect.path_vertex import INTERREFLECTION
-from render.laser_indirect.transport_plan import TRANSPORT_STEPS, pilot_shares
+from render.laser_indirect.transport_plan import LADDER
 from render.material.material import Conductor
-from render.scan_plan import looked_at, plan_scan
+from render.run import Run
+from render.scan_plan import pilot_steps, plan_scan
 from render.scene.motion import LinearStage
 from render.scene.settings import RenderSettings
 from tests.render.laser_indirect.test_integrator import setting, turned_groove
@@ -27,10 +28,10 @@ def groove():
     return scene.model_copy(update={"motion": motion}), parts[0]
 
 
-def test_the_frames_looked_at_are_spread_over_the_scan():
-    assert looked_at(1) == (0,)
-    assert looked_at(3) == (0, 1, 2)
-    assert looked_at(20) == (0, 4, 9, 14, 19)
+def test_pilots_run_on_frames_that_are_spread_over_the_scan():
+    assert pilot_steps(1) == (0,)
+    assert pilot_steps(3) == (0, 1, 2)
+    assert pilot_steps(20) == (0, 4, 9, 14, 19)
 
 
 def test_a_single_frame_decides_for_itself(groove):
@@ -47,10 +48,10 @@ def test_the_plan_is_the_same_on_any_number_of_threads_and_says_what_it_is(groov
         asked.append(step)
         return world
 
-    one, two = (plan_scan(scene, RenderSettings(), at, seed=3, threads=threads) for threads in (1, 2))
-    assert one == two and set(asked) == set(looked_at(12))
-    assert one.light.kinds == INTERREFLECTION
-    assert "the same for all 12 frames: pilots on the steps 0, 2, 5, 8, 11" in one.light.text
+    one, two = (plan_scan(scene, RenderSettings(), at, run=Run(seed=3, threads=threads)) for threads in (1, 2))
+    assert one == two and set(asked) == set(pilot_steps(12))
+    assert one.plans["indirect"].kinds == INTERREFLECTION
+    assert one.pilot_steps == (0, 2, 5, 8, 11) and one.frame_count == 12
     assert one.mark == f"laser light {INTERREFLECTION}, ambient light 1"
 
 
@@ -58,19 +59,23 @@ def test_the_plan_is_the_same_on_any_number_of_threads_and_says_what_it_is(groov
 def test_what_one_frame_needs_is_computed_in_all(groove, monkeypatch, share, computed):
     """A share that only the last frame has, of one that is negligible below 2 %."""
     scene, world = groove
-    nothing = {step.share: (0.0, 0.0) for step in TRANSPORT_STEPS}
+    nothing = {kind.share: (0.0, 0.0) for kind in LADDER}
 
-    def pilot(*args, step, **options):
-        assert set(pilot_shares(*args, step=step, **options)) == set(nothing)
-        return {**nothing, "interreflection": (share, 0.001)} if step == 11 else nothing
+    measured = IndirectLight.measured
 
-    monkeypatch.setattr(scan_plan, "pilot_shares", pilot)
+    def pilot(light, placed, *args):
+        assert set(measured(light, placed, *args)) == set(nothing)
+        return {**nothing, "interreflection": (share, 0.001)} if placed.step == 11 else nothing
+
+    monkeypatch.setattr(IndirectLight, "measured", pilot)
     plan = plan_scan(scene, RenderSettings(), lambda step: world)
-    assert plan.light.indirect == computed
+    light = plan.plans["indirect"]
+    assert (light.kinds is not None) == computed and light.steps[0].computed == computed
 
 
 def test_nothing_is_measured_where_only_direct_light_is_asked_for(groove, monkeypatch):
     scene, world = groove
-    monkeypatch.delattr(scan_plan, "pilot_shares")
+    monkeypatch.delattr(IndirectLight, "measured")
     plan = plan_scan(scene, RenderSettings(transport="direct"), lambda step: world)
-    assert plan.light.kinds is None and "switched off" in plan.light.text
+    assert plan.plans["indirect"].kinds is None and plan.plans["indirect"].steps[0].reason == "switched off"
+    assert plan.pilot_steps == ()

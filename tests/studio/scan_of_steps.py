@@ -8,6 +8,7 @@ from render.scene.motion import LinearStage
 from studio.project.document import replaced
 from studio.project.project import Project
 from studio.project.templates import template_folder
+from studio.scan.options import ScanOptions
 from studio.scan.scan import run_scan
 from studio.scan.stages import scaled
 
@@ -26,5 +27,5 @@ def small_scan(folder: Path) -> tuple[Path, Path]:
     """Writes and scans the project at half its size: its file, and the folder of the results."""
     file = folder / "project" / "steps.json"
     project = small_project().save(file)
-    run_scan(project, file.parent, out=folder / "scan", image_scale=SCALE, report=False)
+    run_scan(project, file.parent, out=folder / "scan", options=ScanOptions(image_scale=SCALE, report=False))
     return file, folder / "scan"

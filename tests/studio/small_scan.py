@@ -13,6 +13,7 @@ from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile
 from studio.project.project import Project
 from studio.project.templates import template_folder
+from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan import ScanResult, run_scan
 
 SCALE = 0.05
@@ -43,10 +44,11 @@ def small_project(folder: Path) -> Path:
     return folder / "project.json"
 
 
-def scan(file: Path, out: Path, **options) -> ScanResult:
+def scan(file: Path, out: Path, listener: Listener = Listener(), **options) -> ScanResult:
     """The project's scan without its report, unless asked for."""
-    options = {"report": False, "image_scale": SCALE, "threads": 1, "source": file} | options
-    return run_scan(options.pop("project", None) or Project.load(file), file.parent, out=out, **options)
+    project, source = options.pop("project", None) or Project.load(file), options.pop("source", file)
+    given = ScanOptions(**{"report": False, "image_scale": SCALE, "threads": 1} | options)
+    return run_scan(project, file.parent, out=out, options=given, listener=listener, source=source)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -11,6 +11,7 @@ from render.ambient.integrator import ambient_image
 from render.base.pose import Pose
 from render.material.material import Conductor, Glass, Lambertian
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.lights import Environment, RectangleLight
 from render.scene.shape import Box, Sphere
 from tests.render.ambient.test_path_kernels import scene_with
@@ -102,7 +103,7 @@ def test_pixels_and_total_agree(parts, tmp_path):
     pose = scene.T_world_camera()
     options = {"samples": SAMPLES, "surfaces": None}
     ours = np.stack(
-        [ambient_image(world, scene, scene.camera, pose, seed=i, **options)[..., BAND] for i in range(RUNS)]
+        [ambient_image(world, scene, scene.camera, pose, **options, run=Run(seed=i))[..., BAND] for i in range(RUNS)]
     )
     other = theirs(scene, world, parts, tmp_path)
     a, b = ours.astype(np.float64).mean(axis=0), other.mean(axis=0)

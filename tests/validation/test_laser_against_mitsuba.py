@@ -19,6 +19,7 @@ from render.laser_indirect.integrator import ALL_KINDS, indirect_image
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION
 from render.material.material import Conductor, Glass, Lambertian
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.shape import Box, Sphere
 from tests.render.ambient.test_path_kernels import patch
 from tests.render.laser_indirect.test_integrator import setting
@@ -148,11 +149,11 @@ def ours_of(parts, kinds, first, paths=1 << 18):
     """(RUNS, h, w) of indirect light."""
     # as many paths each: to stop at an error would let the runs that met little end first
     options = {"target": 0.0, "most_paths": paths, "kinds": kinds}
-    return runs(lambda seed: indirect_image(*parts, seed=first + seed, **options).radiance)
+    return runs(lambda seed: indirect_image(*parts, **options, run=Run(seed=first + seed)).radiance)
 
 
 def direct_of(parts):
-    return runs(lambda seed: direct_image(*parts, target=2e-3, seed=seed).radiance)
+    return runs(lambda seed: direct_image(*parts, target=2e-3, run=Run(seed=seed)).radiance)
 
 
 def test_reflections_in_a_glossy_tee(tmp_path):

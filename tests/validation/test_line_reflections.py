@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from render.material.material import Conductor
+from render.run import Run
 from render.world.world import build_world
 from studio.project.project import Project
 from studio.project.templates import template_folder
@@ -46,7 +47,7 @@ def photograph(template, part):
     render = project.render.model_copy(update=update)
     project = project.model_copy(update={"scene": scene, "render": render})
     clock = Clock(lambda stage, done: None, lambda: False)
-    frame = render_step(project, build_world(scene, folder, 0), 0, clock, 2)
+    frame = render_step(project, build_world(scene, folder, 0), 0, clock, Run(threads=2))
     return project, frame.curves[0], develop_step(project, frame, clock, 2)[0]
 
 

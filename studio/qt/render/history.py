@@ -19,7 +19,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from render.base.counts import AMBIENT_SAMPLES, DIRECT_ERROR
 from render.output.tone_mapping import Picture, grey
 from studio.qt.core.session import Render, Session
 from studio.qt.image.compare_view import CompareView
@@ -50,13 +49,12 @@ def describe(render: Render) -> str:
     parts = [f"{width} x {height}" + (f", {small}" if small else "")]
     if render.scan is not None:
         parts.insert(0, f"step {render.frame.step + 1} of {render.scan.count}")
-    counts = render.frame.counts
-    errors = [counts.get(DIRECT_ERROR.of(i)) for i in range(len(render.project.scene.lasers))]
-    known = [error for error in errors if error is not None]
-    if known:
-        parts.append(f"laser {max(known):.2%}")
-    if AMBIENT_SAMPLES in counts:
-        parts.append(f"ambient {counts[AMBIENT_SAMPLES]:.0f}")
+    errors = [one.error for one in render.frame.quality if one.group == "direct"]
+    if errors:
+        parts.append(f"laser {max(errors):.2%}")
+    ambient = render.frame.quality_of("ambient")
+    if ambient is not None:
+        parts.append(f"ambient {ambient.work:.0f}")
     parts.append(f"{sum(render.frame.seconds.values()):.1f} s")
     return ", ".join(parts) + ("" if render.final else ", not finished")
 

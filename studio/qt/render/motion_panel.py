@@ -33,6 +33,7 @@ from studio.qt.core.session import Session
 from studio.qt.core.step_bar import StepBar
 from studio.runtime.console import FRAMES, frame_of
 from studio.runtime.jobs import Job, Progress
+from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan import ScanResult, run_scan
 from studio.scan.scan_folder import open_folder
 from studio.scan.scan_results import is_unfinished
@@ -151,12 +152,8 @@ class MotionPanel(QWidget):
                 order.project,
                 order.root,
                 out=order.folder,
-                image_scale=order.image_scale,
-                progress=tell,
-                cancelled=cancelled,
-                each=each,
-                report=order.report,
-                resume=resume,
+                options=ScanOptions(image_scale=order.image_scale, report=order.report, resume=resume),
+                listener=Listener(tell, cancelled, measured=each),
                 source=source,
             )
 

@@ -22,18 +22,20 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from analysis.report.light_text import plan_lines, quality_lines
 from render.base.threads import Cancel
 from render.checkpoint import RenderState
 from render.frame import Frame
-from render.progressive import plan
+from render.plan import Plan
+from render.products import expected_plan
+from render.run import Run
 from render.world.world import World
 from studio.project.project import Project
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Render, Session
 from studio.qt.render.history import History
-from studio.qt.render.render_job import can_go_on, carried, render_frames
+from studio.qt.render.render_job import can_go_on, render_frames
 from studio.runtime.jobs import Job, Progress, State
-from studio.scan.light_group_status import group_lines, unfinished
 from studio.scan.redevelop import is_stale
 from studio.scan.stages import scaled
 
@@ -152,9 +154,8 @@ class RenderPanel(QWidget):
         refined, limit, self._state = self._refined, self.limit.value() or None, state
 
         def work(progress: Progress, cancelled: Cancel) -> None:
-            render_frames(
-                project, root, step, world, progress, cancelled, refined.emit, lambda: self._keep, limit, state
-            )
+            run = Run(cancelled=cancelled, keep_partial=lambda: self._keep, seconds=limit, checkpoint=state)
+            render_frames(project, root, step, world, run, progress, refined.emit)
 
         self._job = self.runner.run(RENDER, "render", work)
         self._show_state()
@@ -278,7 +279,8 @@ class RenderPanel(QWidget):
     def _show_plan(self) -> None:
         project = self.session.project
         scale = self.scale.currentData()
-        self.plan.setText(plan_text(plan(project.scene.scaled(scale if scale is not None else 1.0), project.render)))
+        scene = project.scene.scaled(scale if scale is not None else 1.0)
+        self.plan.setText(plan_text(expected_plan(scene, project.render)))
 
     def _tell_render(self) -> None:
         """What was computed of the running render, else of the shown one, and how well it is known."""
@@ -286,7 +288,7 @@ class RenderPanel(QWidget):
         self.errors.setText("" if render is None else error_text(render))
         self.errors.setVisible(bool(self.errors.text()))
         if render is not None and not is_stale(render.source or render.project, self.session.project):
-            self.plan.setText(plan_text(tuple(render.frame.plan.splitlines())))
+            self.plan.setText(plan_text(render.frame.plan))
 
     def _document_replaced(self) -> None:
         self._render, self._before = None, None
@@ -317,7 +319,7 @@ class RenderPanel(QWidget):
             )
             self.session.add_render(self._render)
         else:
-            self._render.frame = carried(frame, self._render.frame)
+            self._render.frame = frame.carrying(self._render.frame)
             self.session.renders_changed.emit()
         for text in frame.warnings:
             if text not in self._warned:
@@ -337,7 +339,7 @@ class RenderPanel(QWidget):
         session = self.session
         if render is not None:
             self._state.pause()
-            early = unfinished(render.frame, render.project.scene, render.project.render)
+            early = render.frame.unfinished
             render.state = self._state if early or job.state is not State.DONE else None
         if job.state is State.DONE and render is not None:
             render.final = render.state is None
@@ -368,10 +370,10 @@ class RenderPanel(QWidget):
             self.stage.clear()
 
 
-def plan_text(lines: tuple[str, ...]) -> str:
+def plan_text(plan: Plan) -> str:
     """Rich text: what a line is about stands out."""
     shown = []
-    for line in lines:
+    for line in plan_lines(plan):
         head, colon, rest = line.partition(":")
         bold = f"<b>{escape(head)}</b>" if len(head) <= LONGEST_HEAD else escape(head)
         shown.append(f"<p style='margin: 3px 0'>{bold}{colon}{escape(rest)}</p>")
@@ -380,5 +382,4 @@ def plan_text(lines: tuple[str, ...]) -> str:
 
 def error_text(render: Render) -> str:
     """Error so far of every light group, and what it is to become."""
-    groups = group_lines(render.frame, render.project.scene, render.project.render)
-    return "<br>".join(f"{escape(name)}: {escape(text)}" for _, name, text in groups)
+    return "<br>".join(f"{escape(name)}: {escape(text)}" for name, text in quality_lines(render.frame.quality))

@@ -12,11 +12,14 @@ from analysis.measures import measure
 from analysis.report.record import ScanRecord
 from analysis.report.sample import RUN, Sample
 from analysis.report.summary import headline, sample_note
+from analysis.report.tables import counts
 from analysis.report.total import Total, total
 from analysis.report.write import render_page
 from analysis.spool import Spool
+from render.base.counts import EMBREE_SECONDS
 from render.base.errors import InputError
-from tests.analysis.report.test_report import extraction, make_frames, make_report, wall_curve
+from render.plan import GroupQuality
+from tests.analysis.report.test_report import extraction, make_frames, make_report, report_of, wall_curve
 
 FRAMES, ROWS, SMALL = 60, 100, 1200
 
@@ -120,3 +123,28 @@ def test_a_disk_that_takes_no_more_is_named(tmp_path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be kept"):
         Spool(tmp_path / "file").append(b"x")
+
+
+@pytest.mark.parametrize("name", ["error probe", "mean", "seconds", "fraction a pixel"])
+def test_a_laser_may_be_called_like_a_kind_of_number(name):
+    scene, made = make_frames(steps=2, name=name)
+    quality = (
+        GroupQuality("direct", f"{name}a", 0.004, 0.003, 4e6, "samples", lit_pixels=1e5),
+        GroupQuality("indirect", f"{name}a", 0.05, 0.1, 1e6, "light paths", clamped=3, clamped_radiance=0.25),
+        GroupQuality("ambient", None, float("nan"), 0.01, 15.5, "samples a pixel", invalid=2),
+    )
+    frames = [dataclasses.replace(frame, quality=quality, counts={EMBREE_SECONDS: 0.5}) for frame in made]
+    assert counts(report_of(scene, frames)) == [
+        ("seconds in embree, all threads", "1.00\u00a0s"),
+        (f"relative error, {name}a", "0.40\u00a0%"),
+        (f"lit pixels, {name}a", "200\u2009000"),
+        (f"samples, {name}a", "8\u2009000\u2009000"),
+        (f"dropped contributions of direct light, {name}a", "0"),
+        (f"relative error of reflections, {name}a", "5.00\u00a0%"),
+        (f"light paths, {name}a", "2\u2009000\u2009000"),
+        (f"dropped contributions, {name}a", "0"),
+        (f"clamped contributions, {name}a", "6"),
+        (f"mean radiance taken by the clamp, {name}a", "0.25"),
+        ("samples a pixel, ambient", "15.5"),
+        ("dropped contributions, ambient", "4"),
+    ]

@@ -16,6 +16,9 @@ from peers.clock import THREADS, cpu_seconds
 from peers.ours import BALL_SEGMENTS, our_scene
 from peers.references import FOLDER
 
+from render.run import Run
+from render.world.placed import PlacedLaser
+
 DIRECT, SEED = 0.0005, 990_000
 
 
@@ -26,9 +29,10 @@ def main() -> None:
     name, seconds = sys.argv[1], float(sys.argv[2])
     scene, world = our_scene(scenes.setting(name, BALL_SEGMENTS))
     parts = (world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0))
-    direct = direct_image(*parts, target=DIRECT, seed=SEED, threads=THREADS)
+    direct = direct_image(*parts, target=DIRECT, run=Run(seed=SEED, threads=THREADS))
     start = cpu_seconds()
-    for indirect in indirect_images(*parts, target=0.0, most_paths=1 << 40, seed=SEED, threads=THREADS):
+    run = Run(seed=SEED, threads=THREADS)
+    for indirect in indirect_images(PlacedLaser(*parts), target=0.0, most_paths=1 << 40, run=run):
         print(f"{cpu_seconds() - start:.0f} s: error of the indirect light {indirect.error:.2%}", flush=True)
         if cpu_seconds() - start >= seconds:
             break

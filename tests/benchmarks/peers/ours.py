@@ -16,6 +16,9 @@ import numpy as np
 from peers import scenes
 from peers.clock import THREADS, cpu_seconds, keep_to, leave
 
+from render.run import Run
+from render.world.placed import PlacedLaser
+
 BALL_SEGMENTS = 512
 """As ours cuts its own spheres finely: 0.75 um off the exact one, shaded with its normals as the peers' ball is."""
 
@@ -82,10 +85,11 @@ def images(scene, world, name: str, seed: int) -> Iterator[np.ndarray]:
     parts = (world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0))
     if name == "s1":
         for target in DIRECT_ERRORS:
-            yield direct_image(*parts, target=target, seed=seed, threads=THREADS).radiance
+            yield direct_image(*parts, target=target, run=Run(seed=seed, threads=THREADS)).radiance
         return
-    direct = direct_image(*parts, target=DIRECT_BELOW, seed=seed, threads=THREADS).radiance
-    for indirect in indirect_images(*parts, target=0.0, most_paths=1 << 40, seed=seed, threads=THREADS):
+    direct = direct_image(*parts, target=DIRECT_BELOW, run=Run(seed=seed, threads=THREADS)).radiance
+    run = Run(seed=seed, threads=THREADS)
+    for indirect in indirect_images(PlacedLaser(*parts), target=0.0, most_paths=1 << 40, run=run):
         yield direct + indirect.radiance
 
 

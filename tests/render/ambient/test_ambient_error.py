@@ -8,17 +8,23 @@ import numpy as np
 import pytest
 
 from render.ambient.integrator import ambient_image, ambient_images
-from render.ambient.transport_plan import choose_ambient, has_ambient, onward_share
-from render.base.counts import AMBIENT_CLAMPED, AMBIENT_SAMPLES
+from render.ambient.light_group import AmbientLight
+from render.ambient.transport_plan import ONWARD, UNREACHABLE, has_ambient
+from render.ambient.transport_plan import onward_share as share_of
 from render.base.errors import Cancelled
 from render.base.pose import Pose
+from render.frame import Frame
+from render.light_group import chosen_plan
 from render.material.material import Conductor, Emitter, Glass, Lambertian
 from render.mesh.primitives import primitive_mesh
+from render.plan import TransportStep
 from render.progressive import refine
 from render.render import render_world
+from render.run import Run
 from render.scene.lights import Environment, PointLight, RectangleLight
 from render.scene.settings import RenderSettings
 from render.scene.shape import Box, Sphere
+from render.world.placed import PlacedScene
 from tests.render.ambient.test_path_kernels import inside_out, scene_with
 from tests.render.scenes import moved, paper_camera, plane_mesh
 
@@ -39,7 +45,7 @@ def box_on_a_wall(scale=0.05, **parts):
 
 
 def images_of(scene, world, **options):
-    return list(ambient_images(world, scene, scene.camera, scene.T_world_camera(), **options))
+    return list(ambient_images(PlacedScene(world, scene), **options))
 
 
 def true_error(image, reference):
@@ -49,7 +55,9 @@ def true_error(image, reference):
 def test_the_error_told_is_the_true_one_at_every_refinement():
     scene, world = box_on_a_wall()
     pose = scene.T_world_camera()
-    reference = ambient_image(world, scene, scene.camera, pose, samples=1024, surfaces=None, seed=99).astype(np.float64)
+    reference = ambient_image(world, scene, scene.camera, pose, samples=1024, surfaces=None, run=Run(seed=99)).astype(
+        np.float64
+    )
     told, true = [], []
     for image in images_of(scene, world, target=1e-4, most=64, surfaces=None):
         told.append(image.error)
@@ -71,7 +79,7 @@ def test_samples_where_the_variance_is_beat_the_same_number_everywhere():
     # the lamp's light on the wall is smooth; the edges of the box and of its shadow are not
     scene, world = box_on_a_wall(0.1, lights=(LAMP,), environment=Environment())
     pose = scene.T_world_camera()
-    reference = ambient_image(world, scene, scene.camera, pose, samples=512, seed=99).astype(np.float64)
+    reference = ambient_image(world, scene, scene.camera, pose, samples=512, run=Run(seed=99)).astype(np.float64)
     led = images_of(scene, world, target=1e-5, most=32)[-1]
     even = ambient_image(world, scene, scene.camera, pose, samples=32)
     assert led.samples == pytest.approx(32, rel=0.05)
@@ -82,15 +90,15 @@ def test_the_image_is_unbiased_however_the_samples_are_led():
     # many short renders, each of which decided for itself
     scene, world = box_on_a_wall(0.01)
     pose = scene.T_world_camera()
-    sums = [images_of(scene, world, target=1e-5, most=8, seed=seed)[-1].radiance.sum() for seed in range(40)]
-    reference = ambient_image(world, scene, scene.camera, pose, samples=16384, seed=99).sum()
+    sums = [images_of(scene, world, target=1e-5, most=8, run=Run(seed=seed))[-1].radiance.sum() for seed in range(40)]
+    reference = ambient_image(world, scene, scene.camera, pose, samples=16384, run=Run(seed=99)).sum()
     error = np.std(sums, ddof=1) / np.sqrt(len(sums))
     assert abs(np.mean(sums) - reference) < 4.0 * error
 
 
 def test_threads_do_not_change_a_bit_of_any_refinement():
     scene, world = box_on_a_wall()
-    one, three = (images_of(scene, world, target=1e-5, most=40, threads=n, surfaces=None) for n in (1, 3))
+    one, three = (images_of(scene, world, target=1e-5, most=40, surfaces=None, run=Run(threads=n)) for n in (1, 3))
     assert len(one) == len(three)
     assert all(np.array_equal(a.radiance, b.radiance) and a.error == b.error for a, b in zip(one, three, strict=True))
 
@@ -99,7 +107,7 @@ def test_a_pass_is_cancelled_within_a_wave():
     scene, world = box_on_a_wall(0.1)
     asked = []
     with pytest.raises(Cancelled):
-        images_of(scene, world, target=1e-5, most=4096, cancelled=lambda: len(asked) > 20 or asked.append(1))
+        images_of(scene, world, target=1e-5, most=4096, run=Run(cancelled=lambda: len(asked) > 20 or asked.append(1)))
 
 
 def test_a_clamp_makes_darker_and_says_so():
@@ -111,28 +119,33 @@ def test_a_clamp_makes_darker_and_says_so():
     assert free.radiance.mean() - cut.radiance.mean() == pytest.approx(cut.cut, rel=0.1)
     settings = RenderSettings(ambient_samples=4, clamp=0.02, transport="interreflection", truth_images=False)
     frame = render_world(world, scene, settings=settings)
-    assert "biased" in frame.plan and frame.counts[AMBIENT_CLAMPED] > 0
+    assert frame.plan.clamp == 0.02 and frame.quality_of("ambient").clamped > 0
 
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_refined_frame_and_a_rendered_one_are_the_same(threads):
     scene, world = box_on_a_wall()
     settings = RenderSettings(ambient_error=0.01, ambient_samples=64, truth_images=False)
-    *_, last = refine(world, scene, settings=settings, threads=threads)
-    whole = render_world(world, scene, settings=settings, threads=3 - threads)
+    *_, last = refine(world, scene, settings=settings, run=Run(threads=threads))
+    whole = render_world(world, scene, settings=settings, run=Run(threads=3 - threads))
     assert np.array_equal(last.ambient, whole.ambient) and last.plan == whole.plan
-    assert last.counts[AMBIENT_SAMPLES] == whole.counts[AMBIENT_SAMPLES]
+    assert last.quality == whole.quality
 
 
 def plan_of(scene, world, **settings):
-    return choose_ambient(world, scene, RenderSettings(**settings))
+    dark = Frame(0, (), None, (), None)
+    return chosen_plan(AmbientLight(), PlacedScene(world, scene), RenderSettings(**settings), dark)
+
+
+def onward_share(world, scene):
+    return share_of(PlacedScene(world, scene))
 
 
 def test_a_single_wall_reflects_nothing_on_and_is_left_at_one_surface():
     scene, world = scene_with(paper_camera(0.05), (plane_mesh((0.2, 0.1, 1), 0.9), Lambertian()), environment=SKY)
     assert onward_share(world, scene) == (0.0, 0.0)
     chosen = plan_of(scene, world)
-    assert chosen.surfaces == 1 and "left out" in chosen.lines[1] and "0.00%" in chosen.lines[1]
+    assert chosen.surfaces == 1 and chosen.steps[1] == TransportStep("ambient", ONWARD, False, "negligible", 0.0, 0.0)
 
 
 def test_a_room_is_followed_and_the_pilot_knows_its_share():
@@ -142,7 +155,8 @@ def test_a_room_is_followed_and_the_pilot_knows_its_share():
     # a + a^2 + ... over a
     assert share == pytest.approx(1.0, abs=4 * error + 0.01) and error < 0.05
     chosen = plan_of(scene, world)
-    assert chosen.surfaces is None and "interreflection" in chosen.lines[1]
+    assert chosen.surfaces is None
+    assert chosen.steps[1] == TransportStep("ambient", ONWARD, True, "pilot", share, error)
     assert plan_of(scene, world, max_bounces=3).surfaces == 3
     assert plan_of(scene, world, transport="direct").surfaces == 1
 
@@ -155,7 +169,7 @@ def test_what_is_seen_through_glass_only_is_not_left_out():
     )
     chosen = plan_of(scene, world)
     assert chosen.surfaces is None
-    assert any("point lamps by way of polished glass" in line for line in chosen.lines)
+    assert UNREACHABLE in chosen.steps
 
 
 def test_metal_is_lit_by_what_it_mirrors():
@@ -186,15 +200,10 @@ def test_an_unfinished_pass_is_kept_where_that_is_wanted(wanted):
 
     with pytest.raises(Cancelled):
         for image in ambient_images(
-            world,
-            scene,
-            scene.camera,
-            scene.T_world_camera(0),
+            PlacedScene(world, scene),
             target=1e-6,
             most=4096,
-            threads=1,
-            cancelled=cancelled,
-            keeps=lambda: wanted,
+            run=Run(threads=1, cancelled=cancelled, keep_partial=lambda: wanted),
         ):
             images.append(image)
             if len(images) == 3:

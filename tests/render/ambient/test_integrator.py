@@ -4,6 +4,7 @@ import pytest
 from render.ambient.integrator import ambient_image
 from render.base.pose import Pose
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.lights import Environment, PointLight, RectangleLight
 from render.scene.shape import Box
 from tests.render.scenes import moved, paper_camera, plane_mesh, scene_of, world_of
@@ -79,5 +80,7 @@ def test_a_box_throws_a_shadow():
 def test_ambient_light_does_not_depend_on_threads():
     scene = scene_of(paper_camera(0.05), lights=(RectangleLight(),), environment=Environment(radiance=(0.1, 0.1, 0.1)))
     world = world_of(scene, moved(primitive_mesh(Box()), (0, 0, 0.9), (0.5, 0.5, 0)))
-    one, three = (ambient_image(world, scene, scene.camera, scene.T_world_camera(), threads=n, seed=4) for n in (1, 3))
+    one, three = (
+        ambient_image(world, scene, scene.camera, scene.T_world_camera(), run=Run(threads=n, seed=4)) for n in (1, 3)
+    )
     assert np.array_equal(one, three)

@@ -17,6 +17,7 @@ from render.material.bsdf import evaluate
 from render.material.material import Coated, Conductor, Emitter, Glass, Lambertian
 from render.mesh.mesh import Mesh
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.lights import Environment, PointLight, RectangleLight
 from render.scene.scene import SceneObject
 from render.scene.shape import Box, Plane, Sphere
@@ -35,9 +36,9 @@ def scene_with(camera, *pairs, **parts):
     return scene, world_of(scene, *(mesh for mesh, _ in pairs))
 
 
-def picture(scene, world, samples=16, surfaces=None, **options):
+def picture(scene, world, samples=16, surfaces=None, **how):
     pose = scene.T_world_camera()
-    image = ambient_image(world, scene, scene.camera, pose, samples=samples, surfaces=surfaces, **options)
+    image = ambient_image(world, scene, scene.camera, pose, samples=samples, surfaces=surfaces, run=Run(**how))
     return image.astype(np.float64)
 
 
@@ -166,7 +167,7 @@ def test_a_shining_disk_has_its_form_factor(radius, connected):
         rows[:, 17] = 0.0
         paths = replace(paths, lights=paths.lights._replace(rows=rows))
     film = render.ambient.integrator.Film(scene.camera.width, scene.camera.height)
-    image = film.add_samples(paths, np.full((film.tiles, 2), 8192), None, None, None).radiance
+    image = film.add_samples(paths, np.full((film.tiles, 2), 8192), Run()).radiance
     expected = 0.5 * 4.0 * radius**2 / (radius**2 + 1.0)
     found = image[4:6, 5:7, 0].mean()
     assert found == pytest.approx(expected, rel=4e-3 if connected else 0.02)

@@ -11,10 +11,8 @@ from pydantic import ValidationError
 
 from render.base.errors import InputError
 from render.camera.camera import Camera, Lens
-from render.camera.focus import check_lens, focus_tilt, lens_lines
+from render.camera.focus import check_lens, focus_tilt, lens_steps, thin_lens
 from render.frame import Truth
-from render.laser_indirect.transport_plan import choose_plan
-from render.scene.settings import RenderSettings
 from render.sensor.develop import expected_electrons
 from render.world.placement_checks import check_placement
 from tests.render.camera.test_lens import thin_camera
@@ -28,15 +26,19 @@ def tilted(tau_x, tau_y, **changes):
 
 
 def test_the_plan_says_which_blur_is_done_and_which_is_left_out():
-    for camera, said, unsaid in (
-        (thin_camera().model_copy(update={"lens": Lens()}), "left out: the lens's blur", "not applied again"),
-        (thin_camera(f_number=2.8), "lens: f/2.8 focused at 0.8 m", "left out: the lens's blur"),
-    ):
-        scene = scene_of(camera, paper_laser())
-        world = world_of(scene, plane_mesh((0, 0, 1), 0.9))
-        direct = (np.ones((camera.height, camera.width), np.float32),)
-        text = choose_plan(world, scene, RenderSettings(transport="direct"), direct).text
-        assert said in text and unsaid not in text
+    pinhole, thin = thin_camera().model_copy(update={"lens": Lens()}), thin_camera(f_number=2.8)
+    assert thin_lens(pinhole) is None
+    assert [(step.name, step.computed, step.reason) for step in lens_steps(pinhole)] == [
+        ("defocus", False, "pinhole"),
+        ("diffraction", False, "pinhole"),
+    ]
+    lens = thin_lens(thin)
+    assert (lens.f_number, lens.focus_distance, lens.tilt, lens.blind) == (2.8, 0.8, 0.0, 0.0)
+    assert lens.aperture == pytest.approx(2.0 * thin.aperture_radius, rel=1e-12)
+    assert [(step.name, step.computed, step.reason) for step in lens_steps(thin)] == [
+        ("defocus", True, "always"),
+        ("diffraction", False, "sensor"),
+    ]
 
 
 def test_developing_never_blurs_a_thin_lens_again():
@@ -66,7 +68,7 @@ def test_scheimpflug_tilts_the_plane_of_focus_by_the_rule():
     camera = tilted(0.0, 2.0, focus=0.8)
     ratio = 0.8 / (camera.fx * camera.pixel_pitch)
     assert math.tan(focus_tilt(camera)) == pytest.approx(math.tan(math.radians(2.0)) * ratio)
-    assert "plane of focus tilted by" in lens_lines(camera)[0]
+    assert thin_lens(camera).tilt == focus_tilt(camera) > 0.0
     assert focus_tilt(thin_camera()) == 0.0
 
 
@@ -97,4 +99,4 @@ def test_a_tilt_that_leaves_nothing_in_focus_is_refused_before_rendering():
         check_placement(world_of(scene, plane_mesh((0, 0, 1), 0.9)), scene)
     half = tilted(0.0, 3.0, focus=None)
     check_lens(half)
-    assert "in 5" in lens_lines(half)[0] and "no depth is in focus" in lens_lines(half)[0]
+    assert 0.5 <= thin_lens(half).blind < 0.6

@@ -12,6 +12,7 @@ from render.laser_direct.integrator import direct_image
 from render.laser_direct.rasterise import reachable_pixels
 from render.material.material import Conductor
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.shape import Box, Sphere
 from render.truth.laser_curve import laser_curve
 from tests.render.camera.test_lens import DISTORTIONS, thin_camera
@@ -141,9 +142,11 @@ def test_the_error_estimate_is_honest_where_shadows_cut_a_blurred_line():
         for y in np.linspace(-0.15, 0.15, 12)
     ]
     _, parts = setting([plane_mesh((0.2, 0, 1), 0.9), *comb], thin_camera(focus=0.7, scale=0.15))
-    reference = np.mean([direct_image(*parts, target=1e-3, seed=s).radiance for s in range(3)], axis=0, dtype=float)
+    reference = np.mean(
+        [direct_image(*parts, target=1e-3, run=Run(seed=s)).radiance for s in range(3)], axis=0, dtype=float
+    )
     for target in (0.1, 0.05):
-        result = direct_image(*parts, target=target, seed=9)
+        result = direct_image(*parts, target=target, run=Run(seed=9))
         lit = reference > 0
         error = math.sqrt(np.mean((result.radiance - reference)[lit] ** 2) / np.mean(reference[lit] ** 2))
         # some hundred pixels on shadows' edges make the error: its estimate has a spread of its own
@@ -155,11 +158,11 @@ def test_threads_do_not_change_a_bit_and_the_blur_is_all_within_reach(monkeypatc
     camera = thin_camera(DISTORTIONS["tilted"], focus=0.6, scale=0.15)
     sphere = moved(primitive_mesh(Sphere(radius=0.1, segments=400)), (0.0, 0.0, 0.95), (0.4, 0.3, 0.2))
     _, parts = setting([sphere], camera)
-    image = direct_image(*parts, threads=1, seed=3).radiance
-    assert np.array_equal(direct_image(*parts, threads=5, seed=3).radiance, image)
+    image = direct_image(*parts, run=Run(threads=1, seed=3)).radiance
+    assert np.array_equal(direct_image(*parts, run=Run(threads=5, seed=3)).radiance, image)
     reach = reachable_pixels(*parts)
     monkeypatch.setattr(integrator, "reachable_pixels", lambda *a: np.arange(image.size, dtype=np.int32))
-    everywhere = direct_image(*parts, seed=3).radiance
+    everywhere = direct_image(*parts, run=Run(seed=3)).radiance
     # beyond it are a few silhouettes, whose facets are prolonged through the sheet
     beyond = np.delete(everywhere.ravel(), reach)
     assert beyond.sum() < 1e-4 * everywhere.sum() and np.count_nonzero(everywhere) > 500

@@ -10,6 +10,7 @@ from render.laser_direct.centre_ray import BEYOND, EDGE_SHARE, look_around
 from render.laser_direct.integrator import direct_image
 from render.laser_direct.rasterise import reachable_pixels
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.shape import Box
 from tests.render.scenes import moved, paper_camera, paper_laser, plane_mesh, scene_of, world_of
 
@@ -75,8 +76,8 @@ def test_thin_wires_before_the_line_are_not_overlooked():
     scene = scene_of(paper_camera(0.5), paper_laser(), objects=1 + len(wires))
     world = world_of(scene, plane_mesh((0.0, 0.0, 1.0), 0.9), *wires)
     parts = (world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0))
-    reference = direct_image(*parts, target=1e-3, seed=7).radiance.astype(float)
-    image = direct_image(*parts, target=0.02, seed=1)
+    reference = direct_image(*parts, target=1e-3, run=Run(seed=7)).radiance.astype(float)
+    image = direct_image(*parts, target=0.02, run=Run(seed=1))
     lit = reference > 0
     error = math.sqrt(np.mean((image.radiance - reference)[lit] ** 2) / np.mean(reference[lit] ** 2))
     assert error <= 0.02

@@ -11,6 +11,7 @@ from render.laser_direct.rasterise import reachable_pixels
 from render.laser_direct.shading import place
 from render.material.material import Lambertian
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.scene import SceneObject
 from render.scene.shape import Box, Cylinder, Plane, Sphere
 from render.truth.laser_curve import laser_curve
@@ -110,9 +111,11 @@ def test_the_error_estimate_is_honest_where_shadows_cut_the_line():
         for y in np.linspace(-0.15, 0.15, 12)
     ]
     _, parts = setting([plane_mesh((0.2, 0, 1), 0.9), *comb])
-    reference = np.mean([direct_image(*parts, target=5e-4, seed=s).radiance for s in range(3)], axis=0, dtype=float)
+    reference = np.mean(
+        [direct_image(*parts, target=5e-4, run=Run(seed=s)).radiance for s in range(3)], axis=0, dtype=float
+    )
     for target in (0.03, 0.01):
-        result = direct_image(*parts, target=target, seed=9)
+        result = direct_image(*parts, target=target, run=Run(seed=9))
         lit = reference > 0
         error = math.sqrt(np.mean((result.radiance - reference)[lit] ** 2) / np.mean(reference[lit] ** 2))
         assert result.error <= target
@@ -121,9 +124,9 @@ def test_the_error_estimate_is_honest_where_shadows_cut_the_line():
 
 def test_the_image_is_the_same_for_any_number_of_threads():
     _, parts = setting([SPHERE, plane_mesh((0, 0, 1), 1.1)])
-    one = direct_image(*parts, threads=1, seed=3).radiance
+    one = direct_image(*parts, run=Run(threads=1, seed=3)).radiance
     for threads in (2, 5):
-        assert np.array_equal(direct_image(*parts, threads=threads, seed=3).radiance, one)
+        assert np.array_equal(direct_image(*parts, run=Run(threads=threads, seed=3)).radiance, one)
 
 
 def test_reachable_pixels_cover_every_lit_pixel_and_little_else():

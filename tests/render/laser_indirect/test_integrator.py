@@ -3,11 +3,13 @@ import math
 import numpy as np
 import pytest
 
+from render.frame import Frame
 from render.laser.laser import Divergence, LineLaser
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.bdpt_pass import BdptPass, Sampling
 from render.laser_indirect.guiding import no_guide
 from render.laser_indirect.integrator import ALL_KINDS, empty_buffer, indirect_image, indirect_shares
+from render.laser_indirect.light_group import IndirectLight
 from render.laser_indirect.photon_emission import (
     fan_integral,
     fan_quantile,
@@ -15,13 +17,16 @@ from render.laser_indirect.photon_emission import (
     uniform_fan,
     visible_fan_range,
 )
-from render.laser_indirect.transport_plan import choose_plan
+from render.light_group import chosen_plan
 from render.material.material import Coated, Conductor, Glass, Lambertian, Subsurface
 from render.mesh.mesh import Mesh
 from render.mesh.primitives import primitive_mesh
+from render.plan import TransportStep
 from render.render import render_world
+from render.run import Run
 from render.scene.settings import RenderSettings
 from render.scene.shape import Box, Sphere, VGroove
+from render.world.placed import PlacedScene
 from tests.render.scenes import moved, paper_camera, paper_laser, plane_mesh, scene_of, world_of
 
 
@@ -135,8 +140,8 @@ def independent_share(albedo, count=3_000_000):
 
 def test_the_error_estimate_is_that_of_the_image():
     _, parts = setting([turned_groove()], [Conductor(roughness=0.2)])
-    reference = indirect_image(*parts, target=1e-4, most_paths=1 << 22, seed=5).radiance.astype(np.float64)
-    found = [indirect_image(*parts, target=0.1, seed=seed) for seed in (1, 2, 3)]
+    reference = indirect_image(*parts, target=1e-4, most_paths=1 << 22, run=Run(seed=5)).radiance.astype(np.float64)
+    found = [indirect_image(*parts, target=0.1, run=Run(seed=seed)) for seed in (1, 2, 3)]
     errors = [math.sqrt(np.sum((image.radiance - reference) ** 2) / np.sum(reference**2)) for image in found]
     assert np.mean(errors) == pytest.approx(np.mean([image.error for image in found]), rel=0.3)
     assert max(errors) < 0.15
@@ -144,25 +149,28 @@ def test_the_error_estimate_is_that_of_the_image():
 
 def test_reflections_are_the_same_for_any_number_of_threads():
     _, parts = setting([turned_groove()], [Coated(albedo=0.6)])
-    one, four = (indirect_image(*parts, target=0.2, threads=threads).radiance for threads in (1, 4))
+    one, four = (indirect_image(*parts, target=0.2, run=Run(threads=threads)).radiance for threads in (1, 4))
     assert np.array_equal(one, four) and one.max() > 0
 
 
 def test_the_plan_follows_what_the_pilot_measures():
     def plan(meshes, materials, **settings):
         scene, parts = setting(meshes, materials)
-        direct = (direct_image(*parts).radiance,)
-        return choose_plan(parts[0], scene, RenderSettings(**settings), direct)
+        frame = Frame(0, (direct_image(*parts).radiance,), None, (), None)
+        return chosen_plan(IndirectLight(), PlacedScene(parts[0], scene), RenderSettings(**settings), frame)
 
     flat = plan([plane_mesh((0, 0, 1), 0.9)], [Conductor()])
-    assert not flat.indirect and "left out: laser light over two or more" in flat.text and "0.00%" in flat.text
+    first = flat.steps[0]
+    assert flat.kinds is None and (first.name, first.computed, first.share) == ("interreflection", False, 0.0)
     deep = plan([turned_groove()], [Conductor()])
-    assert deep.indirect and "a pilot puts it at" in deep.text
+    assert deep.kinds is not None and deep.steps[0].reason == "pilot" and deep.steps[0].share > 0.02
     # a dark groove would look the same, but there is nothing worth computing
     dark = plan([turned_groove()], [Lambertian(albedo=0.01)])
-    assert not dark.indirect
-    assert not plan([turned_groove()], [Conductor()], transport="direct").indirect
-    assert plan([plane_mesh((0, 0, 1), 0.9)], [Lambertian()], transport="interreflection").indirect
+    assert dark.kinds is None and dark.steps[0].reason == "negligible"
+    off = plan([turned_groove()], [Conductor()], transport="direct")
+    assert off.kinds is None and off.steps == (TransportStep("indirect", "indirect", False, "switched off"),)
+    requested = plan([plane_mesh((0, 0, 1), 0.9)], [Lambertian()], transport="interreflection")
+    assert requested.kinds is not None and requested.steps[0].reason == "requested"
 
 
 def test_a_frame_keeps_direct_and_reflected_light_apart():
@@ -292,7 +300,9 @@ def test_an_aperture_blurs_reflected_light_and_keeps_it():
     images = []
     for lensed in (camera, thin):
         _, parts = setting([turned_groove()], [Lambertian(albedo=0.8)], camera=lensed)
-        images.append(indirect_image(*parts, target=0.012, most_paths=1 << 22, seed=3).radiance.astype(np.float64))
+        images.append(
+            indirect_image(*parts, target=0.012, most_paths=1 << 22, run=Run(seed=3)).radiance.astype(np.float64)
+        )
     sharp, blurred = images
     assert blurred.sum() == pytest.approx(sharp.sum(), rel=5e-3)
     # along the groove the light is even; across it the disc's second moment c^2 / 16 is added
@@ -310,7 +320,7 @@ def test_an_integrating_sphere_is_evenly_lit_by_all_light_but_the_first(albedo):
     # the first reflection spreads evenly over a sphere; the rest is the series a^2 + a^3 + ...
     ball = primitive_mesh(Sphere(radius=1.0, segments=128))
     _, parts = setting([ball], [Lambertian(albedo=albedo)])
-    radiance = indirect_image(*parts, target=0.5, most_paths=1 << 16, seed=4).radiance
+    radiance = indirect_image(*parts, target=0.5, most_paths=1 << 16, run=Run(seed=4)).radiance
     expected = albedo / math.pi * albedo * parts[2].power / (4.0 * math.pi) / (1.0 - albedo)
     assert radiance.mean() == pytest.approx(expected, rel=0.015)
     halves = radiance[:, : radiance.shape[1] // 2].mean(), radiance[:, radiance.shape[1] // 2 :].mean()

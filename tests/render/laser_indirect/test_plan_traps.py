@@ -16,11 +16,13 @@ from render.laser_direct.integrator import direct_image
 from render.laser_indirect.guiding import specular_pixels
 from render.laser_indirect.integrator import indirect_image, indirect_shares
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
-from render.laser_indirect.transport_plan import choose_plan, pilot_shares
+from render.laser_indirect.transport_plan import pilot_shares, plan_of
 from render.material.material import Conductor, Glass, Lambertian, Subsurface
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.settings import RenderSettings
 from render.scene.shape import Box, Cylinder, Sphere
+from render.world.placed import PlacedScene
 from tests.render.laser_indirect.test_integrator import setting, turned_groove
 from tests.render.scenes import moved, paper_camera, plane_mesh
 
@@ -69,8 +71,8 @@ def test_a_wrong_choice_would_look_right(case):
     mesh, material, kind, wanted = CHOICES[case]
     scene, parts = setting([WALL, mesh], [GREY, material], camera=CAMERA)
     direct = direct_image(*parts, target=3e-3).radiance
-    plan = choose_plan(parts[0], scene, RenderSettings(), (direct,))
-    shares = pilot_shares(parts[0], scene, (direct,))
+    shares = pilot_shares(PlacedScene(parts[0], scene), (direct,))
+    plan = plan_of(shares, RenderSettings())
     share, error = shares[kind]
     bits = WITHOUT[kind][0]
     assert (plan.kinds is not None and plan.kinds & bits == bits) == wanted
@@ -84,7 +86,9 @@ def share_of(kind, parts, direct):
     fluxes = [
         0.0
         if kinds is None
-        else indirect_image(*parts, target=0.02, most_paths=1 << 18, kinds=kinds, seed=5).radiance.sum(dtype=np.float64)
+        else indirect_image(*parts, target=0.02, most_paths=1 << 18, kinds=kinds, run=Run(seed=5)).radiance.sum(
+            dtype=np.float64
+        )
         for kinds in WITHOUT[kind]
     ]
     return (fluxes[0] - fluxes[1]) / direct.sum(dtype=np.float64)
@@ -110,7 +114,7 @@ KINDS_OF = {
 def test_the_pilots_uncertainty_holds_as_often_as_it_says(case):
     meshes, materials, kind = KINDS_OF[case]
     _, parts = setting(meshes, materials, camera=CAMERA)
-    found = np.array([getattr(indirect_shares(*parts, seed=seed), kind) for seed in range(SEEDS)])
+    found = np.array([getattr(indirect_shares(*parts, run=Run(seed=seed)), kind) for seed in range(SEEDS)])
     mean = found[:, 0].mean()
     assert mean > 0.0
     # of four passes; the mean of all seeds is known to a fifth of one's error

@@ -11,19 +11,22 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
+from analysis.report.light_text import plan_lines
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.integrator import ALL_KINDS, indirect_image
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
-from render.laser_indirect.transport_plan import TRANSPORT_STEPS, choose_plan, pilot_shares
+from render.laser_indirect.transport_plan import pilot_shares, plan_of
 from render.material.material import Conductor, Glass, Lambertian, Subsurface
 from render.mesh.primitives import primitive_mesh
+from render.plan import Plan
+from render.run import Run
 from render.scene.settings import RenderSettings
 from render.scene.shape import Box, Sphere
+from render.world.placed import PlacedScene
 from tests.render.laser_indirect.test_integrator import setting, turned_groove
 from tests.render.scenes import moved, paper_camera, plane_mesh
 
 CAMERA = paper_camera(0.04)
-NAMES = [transport_step.name for transport_step in TRANSPORT_STEPS]
 GREY, GLASS, MIRROR = Lambertian(albedo=0.5), Glass(index=1.5), Conductor(roughness=0.0)
 
 
@@ -48,18 +51,19 @@ class Choice:
         self.scene, parts = setting(meshes, materials, camera=CAMERA)
         self.direct = direct_image(*parts, target=3e-3).radiance
         known = self.direct.sum(dtype=np.float64)
-        self.plan = choose_plan(parts[0], self.scene, RenderSettings(**settings), (self.direct,))
-        self.shares = pilot_shares(parts[0], self.scene, (self.direct,))
-        everything = indirect_image(*parts, target=0.05, most_paths=1 << 20, kinds=ALL_KINDS, seed=77)
+        self.shares = pilot_shares(PlacedScene(parts[0], self.scene), (self.direct,))
+        self.plan = plan_of(self.shares, RenderSettings(**settings))
+        everything = indirect_image(*parts, target=0.05, most_paths=1 << 20, kinds=ALL_KINDS, run=Run(seed=77))
         self.flux = everything.radiance.sum(dtype=np.float64)
         self.full = self.flux / known if known > 0.0 else math.inf
 
     def steps(self):
         """Names of the rungs that are computed."""
-        return [name for name in NAMES if any(line.startswith(f"{name}:") for line in self.plan.lines)]
+        return [step.name for step in self.plan.steps if step.computed]
 
     def left_out(self):
-        return [name for name in NAMES if any(f"({name})" in line for line in self.plan.lines)]
+        """Names of the rungs that are there, and are not."""
+        return [step.name for step in self.plan.steps if not step.computed and step.reason != "absent"]
 
     def pilot_agrees(self):
         """The rungs together bring what the full render finds, within the spread of the pilot's four passes."""
@@ -138,12 +142,17 @@ def test_behind_a_window_before_the_camera_the_left_out_light_would_be_the_whole
     plain = direct_image(*parts, target=3e-3).radiance.sum(dtype=np.float64)
     assert found.direct.sum() < 1e-6 * plain
     assert "caustic" in found.steps() and found.plan.kinds & CAUSTIC
-    assert "no direct light in the image" in found.plan.text and "inf" not in found.plan.text
+    assert [step.share for step in found.plan.steps if step.name == "caustic"] == [math.inf]
+    assert "no direct light in the image" in light_text(found) and "inf" not in light_text(found)
     # dimmed by two faces and what goes to and fro between them, near normal incidence
     reflected = dielectric_reflectance(1.0, 1.5)
     assert found.flux / plain == pytest.approx((1.0 - reflected) / (1.0 + reflected), rel=0.03)
     asked = Choice([wall(), window()], [GREY, GLASS], transport="interreflection")
     assert "caustic" in asked.left_out() and not asked.plan.kinds & CAUSTIC
+
+
+def light_text(found):
+    return "\n".join(plan_lines(Plan(found.plan.steps)))
 
 
 def dielectric_reflectance(cosine, index):

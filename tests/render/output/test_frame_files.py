@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import os
 import struct
 import subprocess
@@ -19,7 +20,11 @@ import OpenEXR
 import pytest
 
 import render.output.frame_files
-from render.base.counts import DIRECT_ERROR, DIRECT_SAMPLES, LIT_PIXELS, RAYS, Quantity, counts_from
+from render.base.counts import (
+    DIRECT_ERROR,
+    RAYS,
+    Quantity,
+)
 from render.base.errors import InputError
 from render.base.files import read_bytes
 from render.base.pose import Pose
@@ -29,6 +34,7 @@ from render.laser.laser import LineLaser
 from render.output.exr import decode_exr
 from render.output.frame_files import read_frame, write_frame
 from render.output.sidecar import curves_from, safe_name, sealed
+from render.plan import GroupQuality, Plan, ThinLens, TransportStep
 from render.scene.motion import LinearStage
 from render.scene.scene import Rig, Scene, SceneObject
 from render.scene.shape import Box
@@ -59,6 +65,29 @@ def curve_of(n: int, axis: str, rng: np.random.Generator) -> LaserCurve:
     return LaserCurve(**values)
 
 
+PLAN = Plan(
+    (
+        TransportStep("direct", "direct", True, "always"),
+        TransportStep("indirect", "caustic", True, "pilot", math.inf, 0.0),
+        TransportStep("indirect", "subsurface", False, "negligible", 0.01, 1e-3),
+        TransportStep("ambient", "interreflection", None, "pilot"),
+    ),
+    negligible=0.02,
+    image_size=(WIDTH, HEIGHT),
+    laser_clamp=1e-3,
+    lens=ThinLens(2.8, None, 0.01, 0.1, 0.5),
+    pilot_steps=(0, 4, 9),
+    frame_count=10,
+)
+
+
+def quality_of(lasers: list[str]) -> tuple[GroupQuality, ...]:
+    """With all that JSON cannot hold as a number."""
+    direct = (GroupQuality("direct", name, math.inf, 0.003, 5e6, "samples", lit_pixels=77.0) for name in lasers)
+    ambient = GroupQuality("ambient", None, math.nan, 0.01, 1.0, "samples a pixel", 16.0, 2.0, 3.0, 1e-4)
+    return (*direct, ambient)
+
+
 def frame_of(scene: Scene, step: int = 3) -> Frame:
     rng = np.random.default_rng(1)
 
@@ -75,7 +104,8 @@ def frame_of(scene: Scene, step: int = 3) -> Frame:
         ambient=image(3),
         curves=tuple(curve_of(5 * i, ("rows", "columns")[i % 2], rng) for i in range(count)),
         truth=truth,
-        plan="direct\nµ-facets left out",
+        plan=PLAN,
+        quality=quality_of([laser.name for laser in scene.lasers]),
         seconds={"laser": 0.1, "curve": 1e-3},
         counts={RAYS: 12345.0, DIRECT_ERROR.of(0): np.inf, Quantity("unknown", "mean"): np.nan},
     )
@@ -216,7 +246,7 @@ def mutilations() -> dict[str, Any]:
     curve = ("lasers", 1, "curve")
     return {
         "a list": lambda record: [record],
-        "newer": at("format_version", value=3),
+        "newer": at("format_version", value=4),
         "another format": at("format", value="project"),
         "no step": at("step", remove=True),
         "step of text": at("step", value="third"),
@@ -230,29 +260,16 @@ def mutilations() -> dict[str, Any]:
         "fractional index": at(*curve, "index", value=[0.5, 1, 2, 3, 4]),
         "huge index": at(*curve, "index", value=[2**40, 1, 2, 3, 4]),
         "wrong axis": at("lasers", 1, "axis", value="diagonal"),
+        "plan without steps": at("plan", "steps", value=7),
+        "step without reason": at("plan", "steps", 0, "reason", value="because"),
+        "plan of sentences": at("plan", value="direct: all of it"),
+        "quality of no group": at("quality", 0, "group", value="laser"),
+        "quality of text": at("quality", 0, "work", value="much"),
+        "no quality": at("quality", remove=True),
         "counts of text": at("counts", value="many"),
         "count of no kind": at("counts", 0, "kind", value="relative error"),
         "count of no laser": at("counts", 0, "laser", value=-1),
     }
-
-
-def test_counts_of_a_first_version_are_read_by_the_names_that_they_had() -> None:
-    old = {
-        "rays": 7.0,
-        "lit pixels, error probe": 1e7,
-        "relative error, error probe": 0.01,
-        "samples, mean, a pixel": 4.0,
-        "else": 2.0,
-    }
-    lasers = ["error probe", "mean, a pixel"]
-    assert counts_from(old, lasers) == {
-        RAYS: 7.0,
-        LIT_PIXELS.of(0): 1e7,
-        DIRECT_ERROR.of(0): 0.01,
-        DIRECT_SAMPLES.of(1): 4.0,
-        Quantity("else"): 2.0,
-    }
-    assert LIT_PIXELS.of(0).kind == "count" and LIT_PIXELS.of(0).label(lasers) == "lit pixels, error probe"
 
 
 def test_a_frame_of_before_does_not_know_what_the_sheet_adds(written: list[Path]) -> None:

@@ -42,7 +42,7 @@ def sensor_of(**values: Any) -> Sensor:
 def flat_frame(*radiance: float, ambient: RGB | None = None, step: int = 0) -> Frame:
     images = tuple(np.full((HEIGHT, WIDTH), value, dtype=np.float32) for value in radiance)
     sky = None if ambient is None else np.full((HEIGHT, WIDTH, 3), ambient, dtype=np.float32)
-    return Frame(step=step, laser_direct=images, ambient=sky, curves=(), truth=None, plan="")
+    return Frame(step=step, laser_direct=images, ambient=sky, curves=(), truth=None)
 
 
 def radiance_for(electrons: float, scene: Scene, sensor: Sensor) -> float:
@@ -220,7 +220,7 @@ def test_the_image_is_the_same_for_any_number_of_threads() -> None:
     rng = np.random.default_rng(5)
     laser = (rng.random((HEIGHT, WIDTH)) * 40).astype(np.float32)
     sky = rng.random((HEIGHT, WIDTH, 3)).astype(np.float32)
-    frame = Frame(step=2, laser_direct=(laser,), ambient=sky, curves=(), truth=None, plan="")
+    frame = Frame(step=2, laser_direct=(laser,), ambient=sky, curves=(), truth=None)
     scene, sensor = scene_of(1.0, lens=Lens()), sensor_of(prnu=0.01, dsnu=1.0)
     images = [develop(frame, scene, sensor, seed=9, threads=threads).pixels for threads in (1, 2, 5)]
     assert np.array_equal(images[0], images[1]) and np.array_equal(images[0], images[2])

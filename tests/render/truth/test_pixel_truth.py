@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from render.mesh.primitives import primitive_mesh
+from render.run import Run
 from render.scene.shape import Sphere
 from render.truth.pixel_truth import truth_images
 from tests.render.scenes import moved, paper_camera, plane_mesh, scene_of, world_of
@@ -45,6 +46,6 @@ def test_pixels_without_a_ray_are_background():
 def test_truth_does_not_depend_on_threads():
     scene = scene_of(paper_camera(0.2))
     world = world_of(scene, moved(primitive_mesh(Sphere(radius=0.1)), (0.0, 0.0, 0.8)))
-    one, three = (truth_images(world, scene.camera, scene.T_world_camera(), threads=n) for n in (1, 3))
+    one, three = (truth_images(world, scene.camera, scene.T_world_camera(), run=Run(threads=n)) for n in (1, 3))
     assert np.array_equal(one.position, three.position, equal_nan=True)
     assert one.depth_z == pytest.approx(three.depth_z, nan_ok=True)

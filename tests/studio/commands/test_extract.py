@@ -119,7 +119,7 @@ def test_photographs_of_a_rig_with_its_geometry_and_exposures_and_along_time(tmp
     project = project.model_copy(update=update)
     project.save(tmp_path / "rig.json")
     world = build_world(project.scene, root, 0)
-    frame = render_step(project, world, 0, CLOCK, None)
+    frame = render_step(project, world, 0, CLOCK)
     names = []
     for step in range(15):  # a plane shifted along itself: every frame shows the same
         shot = project.model_copy(update={"seed": step})

@@ -23,6 +23,7 @@ from studio.notebook import measuring as notebook_measuring
 from studio.notebook import report as notebook_report
 from studio.project import project as project_module
 from studio.project.document import replaced
+from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan import run_scan
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -59,7 +60,13 @@ class TestTheSevenLines:
         project = blazer.Project.load(template)
         scanned: list = []
         out = tmp_path / "out"
-        run_scan(project, project.folder, out=out, image_scale=0.05, seed=7, report=False, each=scanned.append)
+        run_scan(
+            project,
+            project.folder,
+            out=out,
+            options=ScanOptions(image_scale=0.05, seed=7, report=False),
+            listener=Listener(measured=scanned.append),
+        )
         frame = blazer.render(project, image_scale=0.05, seed=7)
         image = blazer.develop(frame)
         line = blazer.extract(image)

@@ -7,6 +7,7 @@ import pytest
 
 from render.base.errors import InputError
 from render.progressive import refine
+from render.run import Run
 from render.scene.shape import Box
 from render.world.world import build_world
 from studio.notebook.frame import render
@@ -14,6 +15,7 @@ from studio.notebook.measuring import develop
 from studio.notebook.python_lines import Work, changes, python_lines, scan_lines
 from studio.project.project import Project
 from studio.project.templates import new_project, template_folder
+from studio.scan.options import ScanOptions
 from studio.scan.redevelop import develop_again, development, measure_again
 from studio.scan.scan import run_scan
 from studio.scan.stages import scaled
@@ -33,7 +35,7 @@ def window(rendered, now, root, scale, methods, noise=True):
     project = scaled(rendered, scale)
     world = build_world(project.scene, root, 0)
     settings, axis = project.render, project.extraction.axis
-    *_, frame = refine(world, project.scene, settings=settings, axis=axis, seed=project.seed)
+    *_, frame = refine(world, project.scene, settings=settings, axis=axis, run=Run(seed=project.seed))
     how = development(project, now, scale)
     images = develop_again(frame, how, noise=noise)
     return measure_again(frame, world, how, images, methods, cancelled=lambda: False)
@@ -115,7 +117,9 @@ def test_any_project_is_made_of_any_other():
 
 def test_lines_of_a_scan_run_it_again(tmp_path):
     root = template_folder("scan")
-    first = run_scan(quick("scan", **{"scene.motion.steps": 2}), root, out=tmp_path / "out", image_scale=SCALE)
+    first = run_scan(
+        quick("scan", **{"scene.motion.steps": 2}), root, out=tmp_path / "out", options=ScanOptions(image_scale=SCALE)
+    )
     again = run(scan_lines(first.folder, root))["scan"]
     assert again.folder == tmp_path / "out again" and first.manifest["results"]
     assert again.manifest["results"] == first.manifest["results"]

@@ -18,6 +18,7 @@ from studio.photographs.image_files import load_photograph
 from studio.preview.inspection import Inspection, inspect
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, template_folder
+from studio.scan.options import ScanOptions
 from studio.scan.scan import run_scan
 
 ROOT = template_folder("plane")
@@ -77,7 +78,7 @@ def test_line_width(facing: Project, found: Inspection) -> None:
 
 def test_peak_electrons_are_those_of_the_image(facing: Project, found: Inspection, tmp_path: Path) -> None:
     """Median of the row maxima; shot noise of the maximum over a few pixels moves it by a few percent."""
-    run_scan(facing, ROOT, out=tmp_path, measure=False)
+    run_scan(facing, ROOT, out=tmp_path, options=ScanOptions(measure=False))
     rows = load_photograph(tmp_path / "frame_0000.png").max(axis=1)
     hit = np.sort(rows)[-found.lasers[0].scan_lines_hit :]
     electrons = np.median(hit) / facing.sensor.dn_per_electron

@@ -29,6 +29,7 @@ from render.scene.shape import Box, Cylinder, Plane, Shape, Sphere, StepBlock, V
 from render.sensor.sensor import BandPass, Sensor, SpectralCurve
 from studio.project.document import FieldPath, replaced
 from studio.project.project import MAX_SEED, Project
+from studio.scan.options import ScanOptions
 from studio.scan.scan import run_scan
 
 SIDE = 40
@@ -164,7 +165,7 @@ def cases() -> list[Any]:
 def check(project: Project, folder: Path) -> None:
     """Measure one frame: finite figures, or a refusal in words."""
     try:
-        done = run_scan(project, ROOT, out=folder, steps=1, threads=1, report=False)
+        done = run_scan(project, ROOT, out=folder, options=ScanOptions(steps=1, threads=1, report=False))
     except InputError as error:
         assert "nan" not in str(error).replace("NaN or infinite", "")
     else:
@@ -205,4 +206,4 @@ def test_the_largest_seeds_work_for_every_light_group(seed: int, tmp_path: Path)
     sensor = lit.sensor.model_copy(update={"speckle": "polarised"})
     extraction = ExtractionSettings(exposures=2)
     project = lit.model_copy(update={"seed": seed, "render": render, "sensor": sensor, "extraction": extraction})
-    assert run_scan(project, ROOT, out=tmp_path, threads=1, report=False).manifest["seed"] == seed
+    assert run_scan(project, ROOT, out=tmp_path, options=ScanOptions(threads=1, report=False)).manifest["seed"] == seed

@@ -12,6 +12,7 @@ import pytest
 
 from render.base.errors import Cancelled, InputError
 from render.base.threads import Cancel, map_chunks
+from render.run import Run
 from studio.project.project import Project
 from studio.runtime.jobs import Job, Progress, State
 
@@ -191,7 +192,7 @@ def test_a_render_in_a_job_is_cancelled_in_the_middle_of_a_pass() -> None:
 
     def work(progress: Progress, cancelled: Cancel) -> None:
         settings = project.render.model_copy(update={"ambient_samples": 4096, "ambient_error": 2e-4})
-        for frame in refine(world, project.scene, settings=settings, progress=progress, cancelled=cancelled):
+        for frame in refine(world, project.scene, settings=settings, progress=progress, run=Run(cancelled=cancelled)):
             frames.append(frame)
 
     job = started(work)

@@ -21,6 +21,7 @@ from studio.project.document import FieldPath, replaced
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan import scan_folder
+from studio.scan.options import ScanOptions
 from studio.scan.reconstruct import reconstruct_folder
 from studio.scan.scan import run_scan
 from studio.scan.stages import Clock, scaled
@@ -75,7 +76,7 @@ def test_what_inspect_warns_of_is_among_the_notes_of_a_scan_and_of_its_report(
     project = change(plane)
     warnings = inspect(project, ROOT).warnings
     assert any(words in text for text in warnings), warnings
-    done = run_scan(project, ROOT, out=tmp_path, report=False)
+    done = run_scan(project, ROOT, out=tmp_path, options=ScanOptions(report=False))
     assert set(warnings) <= set(done.manifest["notes"]), done.manifest["notes"]
     again = scan_folder.open_folder(tmp_path)
     clock = Clock(lambda stage, done: None, lambda: False)
@@ -87,13 +88,13 @@ def test_what_inspect_warns_of_is_among_the_notes_of_a_scan_and_of_its_report(
 
 
 def test_a_scan_that_finds_its_line_has_nothing_to_say(plane: Project, tmp_path: Path) -> None:
-    done = run_scan(plane, ROOT, out=tmp_path, report=False)
+    done = run_scan(plane, ROOT, out=tmp_path, options=ScanOptions(report=False))
     assert done.manifest["notes"] == []
     assert done.manifest["results"][0]["completeness"] > 0.95
 
 
 def test_figures_at_another_image_scale_are_said_not_to_be_the_scanners(plane: Project, tmp_path: Path) -> None:
-    done = run_scan(plane, ROOT, out=tmp_path, image_scale=0.75, report=False)
+    done = run_scan(plane, ROOT, out=tmp_path, options=ScanOptions(image_scale=0.75, report=False))
     assert done.manifest["image_scale"] == 0.75
     first = done.manifest["notes"][0]
     assert "image scale 0.75" in first and "not the scanner's" in first
@@ -102,7 +103,7 @@ def test_figures_at_another_image_scale_are_said_not_to_be_the_scanners(plane: P
 
 def test_frames_in_which_the_sheet_has_left_the_part_are_counted(plane: Project, tmp_path: Path) -> None:
     motion = LinearStage(moves="objects", step=(0.27, 0.0, 0.0), steps=2)
-    done = run_scan(replaced(plane, ("scene", "motion"), motion), ROOT, out=tmp_path, report=False)
+    done = run_scan(replaced(plane, ("scene", "motion"), motion), ROOT, out=tmp_path, options=ScanOptions(report=False))
     assert any("in 1 of 2 frames no part of the line" in text for text in done.manifest["notes"])
 
 

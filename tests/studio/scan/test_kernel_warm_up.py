@@ -44,6 +44,7 @@ def read():
     return {name: set(map(str, kernel.signatures)) for name, kernel in kernels().items()}
 
 from render.material.material import Subsurface
+from studio.scan.options import ScanOptions
 from studio.scan.scan import run_scan
 late = {}
 for folder in map(Path, sys.argv[2:]):
@@ -60,7 +61,8 @@ for folder in map(Path, sys.argv[2:]):
         project = project.model_copy(update={"scene": scene})
     warm_up(sum(needed(project), ()), quietly, never)
     before = read()
-    run_scan(project, folder, out=Path(sys.argv[1], folder.name), steps=1, report=False, seconds=0.5)
+    options = ScanOptions(steps=1, report=False, seconds=0.5)
+    run_scan(project, folder, out=Path(sys.argv[1], folder.name), options=options)
     late[folder.name] = sorted(name for name, there in read().items() if there - before.get(name, set()))
 print(json.dumps({"late": late, "kernels": len(read())}))
 """

@@ -14,6 +14,7 @@ from render.world.world import build_world
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.line_extraction import extract_line, working_volume
+from studio.scan.options import ScanOptions
 from studio.scan.results import compared_methods, measure_frame
 from studio.scan.scan import run_scan
 from studio.scan.stages import Clock, develop_step, measure_step, render_step, scaled
@@ -30,7 +31,7 @@ def with_extraction(project: Project, **changes: object) -> Project:
 def rendered():
     project = scaled(Project.load(ROOT / "project.json"), 0.5)
     world = build_world(project.scene, ROOT, 0)
-    return project, world, render_step(project, world, 0, CLOCK, None)
+    return project, world, render_step(project, world, 0, CLOCK)
 
 
 def bright(project: Project, times: float) -> Project:
@@ -58,7 +59,7 @@ def test_fused_exposures_measure_a_line_that_one_exposure_saturates(rendered):
 def test_the_working_volume_of_the_project_decides_what_is_measured():
     root = template_folder("sphere")
     project = scaled(Project.load(root / "project.json"), 0.25)
-    frame = render_step(project, build_world(project.scene, root, 0), 0, CLOCK, None)
+    frame = render_step(project, build_world(project.scene, root, 0), 0, CLOCK)
     image = develop_step(project, frame, CLOCK, None)[0]
     whole = extract_line(project, image, 0)
     depth = frame.curves[0].depth_z
@@ -80,7 +81,7 @@ def test_a_scan_along_time_takes_the_edges_out_of_the_line(tmp_path: Path):
     scene = project.scene.model_copy(update={"motion": motion, "lights": ()})
     render = project.render.model_copy(update={"transport": "direct", "truth_images": False, "laser_error": 0.01})
     project = with_extraction(project.model_copy(update={"scene": scene, "render": render}), spacetime=True)
-    done = run_scan(project, template_folder("scan"), out=tmp_path, report=False)
+    done = run_scan(project, template_folder("scan"), out=tmp_path, options=ScanOptions(report=False))
     assert any("measured along time" in note for note in done.manifest["extraction"])
     own, other = done.manifest["results"][0], done.manifest["results"][1]
     assert own["points"] > 0 and other["method"] == "gaussian"

@@ -23,6 +23,7 @@ from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.runtime.console import frame_of
 from studio.scan import scan
+from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan import run_scan
 from studio.scan.scan_folder import open_folder
 from studio.scan.stages import Clock, render_step, scaled
@@ -46,9 +47,9 @@ def rendered_once(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every step is the first frame again, with a warning of its own."""
     small = scaled(project, SCALE)
     world = build_world(small.scene, ROOT, 0)
-    frame = render_step(small, world, 0, Clock(lambda stage, done: None, lambda: False), None)
+    frame = render_step(small, world, 0, Clock(lambda stage, done: None, lambda: False))
 
-    def again(project, world, step, *args, **options):
+    def again(scan, world, step):
         warnings.warn("every frame says the same", UserWarning, stacklevel=1)
         return replace(frame, step=step, warnings=(f"doubtful, by {step} %",)), RenderState({})
 
@@ -75,7 +76,13 @@ def test_nothing_held_grows_with_the_frames_but_a_few_numbers(
 
     monkeypatch.setattr(scan, "frame_of_step", traced)
     try:
-        done = run_scan(project, ROOT, out=tmp_path, image_scale=SCALE, each=each, report=False)
+        done = run_scan(
+            project,
+            ROOT,
+            out=tmp_path,
+            options=ScanOptions(image_scale=SCALE, report=False),
+            listener=Listener(measured=each),
+        )
     finally:
         tracemalloc.stop()
     assert (held[1] - held[0]) / (FRAMES - 1 - FRAMES // 3) < 8_000
@@ -100,7 +107,7 @@ def test_a_report_that_fails_costs_neither_points_nor_manifest(
 
     monkeypatch.setattr("analysis.report.write.write_report", fail)
     with pytest.raises(type(failure)):
-        run_scan(project, ROOT, out=tmp_path, image_scale=SCALE, steps=2)
+        run_scan(project, ROOT, out=tmp_path, options=ScanOptions(image_scale=SCALE, steps=2))
     found = open_folder(tmp_path)
     assert len(found.frames) == 2 and found.manifest["report"] == []
     assert json.loads((tmp_path / "scan.json").read_text())["results"][0]["points"] > 0

@@ -29,7 +29,7 @@ def test_the_remarks_are_those_of_the_report() -> None:
     project = scaled(Project.load(folder / "project.json"), 0.1)
     world = build_world(project.scene, folder, 0)
     clock = Clock(lambda *_: None, lambda: False)
-    frame = render_step(project, world, 0, clock, None)
+    frame = render_step(project, world, 0, clock)
     images = develop_step(project, frame, clock, None)
     found = {"gaussian": measure_step(project, frame, world, images, clock, None, "gaussian")}
     result = frame_result(project, frame, found, images)

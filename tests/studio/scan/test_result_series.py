@@ -30,7 +30,7 @@ def measured() -> tuple[Project, Measurement, object]:
     project = scaled(Project.load(folder / "project.json"), 0.1)
     clock = Clock(lambda *_: None, lambda: False)
     world = build_world(project.scene, folder, 0)
-    frame = render_step(project, world, 0, clock, None)
+    frame = render_step(project, world, 0, clock)
     images = develop_step(project, frame, clock, None)
     return project, measure_step(project, frame, world, images, clock, None)[0], frame.curves[0]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from render.base.counts import DIRECT_DROPPED, LIGHT_PATHS
+from analysis.report.light_text import quality_lines
 from render.base.errors import Cancelled, InputError
 from render.checkpoint import state_of
 from render.output.frame_files import read_frame
@@ -17,10 +17,9 @@ from render.world.world import build_world
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.interrupt import stop_on_interrupt
-from studio.scan.light_group_status import group_lines, unfinished
+from studio.scan.options import Listener, ScanOptions
 from studio.scan.resume import made_of, saved_path
 from studio.scan.scan import run_scan
-from studio.scan.stages import scaled
 
 FOLDER = template_folder("v_groove")
 
@@ -32,8 +31,9 @@ def project() -> Project:
     return found.model_copy(update={"render": found.render.model_copy(update=changes)})
 
 
-def scan(project: Project, out: Path, **options):
-    return run_scan(project, FOLDER, out=out, image_scale=0.05, measure=False, **options)
+def scan(project: Project, out: Path, listener: Listener = Listener(), folder: Path = FOLDER, **options):
+    given = ScanOptions(image_scale=0.05, measure=False, **options)
+    return run_scan(project, folder, out=out, options=given, listener=listener)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_a_stopped_scan_goes_on_to_the_same_frame(project: Project, whole: Path,
         return "ambient light" in reached
 
     with pytest.raises(Cancelled, match="--resume"):
-        scan(project, tmp_path, cancelled=stop, progress=lambda stage, done: reached.append(stage))
+        scan(project, tmp_path, Listener(lambda stage, done: reached.append(stage), stop))
     assert saved_path(tmp_path, 0).is_file() and not (tmp_path / "frame_0000.exr").exists()
     scan(project, tmp_path, resume=True)
     assert not saved_path(tmp_path, 0).exists()
@@ -59,7 +59,7 @@ def test_a_stopped_scan_goes_on_to_the_same_frame(project: Project, whole: Path,
 
 def test_a_frame_that_is_there_is_taken_as_it_is(project: Project, whole: Path) -> None:
     before, stages = (whole / "frame_0000.exr").read_bytes(), set()
-    scan(project, whole, resume=True, progress=lambda stage, done: stages.add(stage))
+    scan(project, whole, Listener(lambda stage, done: stages.add(stage)), resume=True)
     assert "reflected laser light" not in stages
     assert (whole / "frame_0000.exr").read_bytes() == before
 
@@ -69,18 +69,16 @@ def test_a_time_limit_leaves_a_frame_and_what_it_takes_to_go_on(project: Project
     slow = project.model_copy(update={"render": endless})
     done = scan(slow, tmp_path, seconds=0.5)
     first = read_frame(tmp_path / "frame_0000.json")
-    small = scaled(slow, 0.05)
-    assert unfinished(first, small.scene, small.render) and saved_path(tmp_path, 0).is_file()
-    assert "error" in done.manifest["light"][0]["groups"]["laser, reflected on"]
+    assert first.unfinished and saved_path(tmp_path, 0).is_file()
+    groups = {one["group"]: one for one in done.manifest["light"][0]["groups"]}
+    assert groups["indirect"]["error"] > groups["indirect"]["target"] == 2e-4
+    assert groups["indirect"]["reason"] == "unfinished" and groups["direct"]["reason"] == "target"
     scan(slow, tmp_path, seconds=0.5, resume=True)
     second = read_frame(tmp_path / "frame_0000.json")
-    assert second.counts[LIGHT_PATHS.of(0)] > first.counts[LIGHT_PATHS.of(0)] > 0
-    names = [name for _, name, _ in group_lines(second, small.scene, small.render)]
+    assert second.quality_of("indirect", "laser").work > first.quality_of("indirect", "laser").work > 0
+    names = [name for name, _ in quality_lines(second.quality)]
     assert names == ["laser, direct", "laser, reflected on", "ambient"]
-    assert second.counts[DIRECT_DROPPED.of(0)] == 0
-    bad = replace(second, counts={**second.counts, DIRECT_DROPPED.of(0): 3})
-    texts = [text for _, _, text in group_lines(bad, small.scene, small.render)]
-    assert "3 contributions were no number" in texts[0] and not any("no number" in text for text in texts[1:])
+    assert all(one.invalid == 0 for one in second.quality)
 
 
 def test_a_moving_scan_keeps_its_one_plan_when_it_goes_on(tmp_path: Path) -> None:
@@ -89,19 +87,17 @@ def test_a_moving_scan_keeps_its_one_plan_when_it_goes_on(tmp_path: Path) -> Non
     render = found.render.model_copy(update={"truth_images": False, "ambient_samples": 1, "laser_error": 0.05})
     moving = found.model_copy(update={"render": render})
 
-    def run(out: Path, **options):
-        return run_scan(moving, template_folder("scan"), out=out, image_scale=0.05, measure=False, **options)
-
-    whole = run(tmp_path / "whole", steps=2, threads=1)
+    run = partial(scan, moving, folder=template_folder("scan"))
+    whole = run(out=tmp_path / "whole", steps=2, threads=1)
     stages: list[str] = []
     with pytest.raises(Cancelled):
-        run(tmp_path / "part", threads=2, progress=lambda stage, done: stages.append(stage),
-            cancelled=lambda: stages.count("writing frames") > 2)  # fmt: skip
+        stop = Listener(lambda stage, done: stages.append(stage), lambda: stages.count("writing frames") > 2)
+        run(out=tmp_path / "part", listener=stop, threads=2)
     assert (tmp_path / "part" / "frame_0000.exr").is_file()
-    gone_on = run(tmp_path / "part", steps=2, threads=2, resume=True)
+    gone_on = run(out=tmp_path / "part", steps=2, threads=2, resume=True)
     plans = [one["plan"] for done in (whole, gone_on) for one in done.manifest["light"]]
     assert len(plans) == 4 and all(plan == plans[0] for plan in plans)
-    assert any("the same for all 20 frames" in line for line in plans[0])
+    assert plans[0]["frame_count"] == 20 and plans[0]["pilot_steps"] == [0, 4, 9, 14, 19]
     for step in range(2):
         name = f"frame_{step:04d}.exr"
         assert (tmp_path / "part" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()

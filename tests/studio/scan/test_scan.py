@@ -20,6 +20,7 @@ from studio.photographs.reconstruct_images import reconstruct_images
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan import scan_folder
+from studio.scan.options import Listener, ScanOptions
 from studio.scan.reconstruct import reconstruct_folder
 from studio.scan.scan import run_scan
 from studio.scan.stages import Clock, scaled
@@ -48,7 +49,7 @@ def quiet() -> Clock:
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The first two frames of the moving template, scanned with its report."""
     out = tmp_path_factory.mktemp("scan") / "out"
-    run_scan(template("scan"), template_folder("scan"), out=out, steps=2, image_scale=SCALE)
+    run_scan(template("scan"), template_folder("scan"), out=out, options=ScanOptions(steps=2, image_scale=SCALE))
     return out
 
 
@@ -84,14 +85,24 @@ class TestRepeating:
     def test_the_same_seed_gives_the_same_points_on_any_number_of_threads(self, tmp_path: Path) -> None:
         project, root = still("plane"), template_folder("plane")
         for name, threads in (("one", 1), ("two", 2)):
-            run_scan(project, root, out=tmp_path / name, image_scale=SCALE, threads=threads, report=False)
+            run_scan(
+                project,
+                root,
+                out=tmp_path / name,
+                options=ScanOptions(image_scale=SCALE, threads=threads, report=False),
+            )
         for file in ("points.ply", "frame_0000.png", "frame_0000.exr"):
             assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
 
     def test_another_seed_gives_other_noise(self, tmp_path: Path) -> None:
         project, root = still("plane"), template_folder("plane")
         for seed in (1, 2):
-            run_scan(project, root, out=tmp_path / str(seed), image_scale=SCALE, seed=seed, measure=False)
+            run_scan(
+                project,
+                root,
+                out=tmp_path / str(seed),
+                options=ScanOptions(image_scale=SCALE, seed=seed, measure=False),
+            )
         images = [load_photograph(tmp_path / str(seed) / "frame_0000.png") for seed in (1, 2)]
         assert np.mean(images[0] != images[1]) > 0.1
 
@@ -112,7 +123,7 @@ class TestRepeating:
     def test_a_photograph_of_the_scene_gives_the_same_surface(self, tmp_path: Path) -> None:
         """Its noise is estimated, so points agree within their sigma, not to the bit."""
         project, root = still("plane"), template_folder("plane")
-        run_scan(project, root, out=tmp_path, image_scale=SCALE, report=False)
+        run_scan(project, root, out=tmp_path, options=ScanOptions(image_scale=SCALE, report=False))
         small = scaled(project, SCALE)
         made = reconstruct_images([tmp_path / "frame_0000.png"], small, 0, tmp_path / "photo", quiet())
         assert made["points"] > 0.95 * small.scene.camera.height
@@ -129,7 +140,9 @@ class TestAccuracy:
         Five rows at either end are left out: there the plane's own edge cuts the line.
         """
         project = still("plane")
-        done = run_scan(project, template_folder("plane"), out=tmp_path, image_scale=0.5, report=False)
+        done = run_scan(
+            project, template_folder("plane"), out=tmp_path, options=ScanOptions(image_scale=0.5, report=False)
+        )
         result = done.manifest["results"][0]
         points = read_ply(tmp_path / "points.ply")
         error, sigma = points["error_depth"][5:-5], points["sigma"][5:-5]
@@ -142,7 +155,7 @@ class TestAccuracy:
         peaks = []
         for scale in (0.25, 0.5):
             out = tmp_path / str(scale)
-            run_scan(project, template_folder("plane"), out=out, image_scale=scale, measure=False)
+            run_scan(project, template_folder("plane"), out=out, options=ScanOptions(image_scale=scale, measure=False))
             peaks.append(np.median(load_photograph(out / "frame_0000.png").max(axis=1)))
         assert 0.4 < peaks[0] / peaks[1] < 1.5
 
@@ -155,7 +168,9 @@ class TestSeveralLasers:
         )
         rig = project.scene.rig.model_copy(update={"lasers": (project.scene.lasers[0], left)})
         project = project.model_copy(update={"scene": project.scene.model_copy(update={"rig": rig})})
-        done = run_scan(project, template_folder("plane"), out=tmp_path, image_scale=SCALE, report=False)
+        done = run_scan(
+            project, template_folder("plane"), out=tmp_path, options=ScanOptions(image_scale=SCALE, report=False)
+        )
         rows = done.manifest["results"]
         assert [row["laser"] for row in rows] == ["laser"] * 3 + ["left"] * 3
         assert all(
@@ -177,9 +192,8 @@ class TestStopping:
                 still("scan").model_copy(update={"scene": project.scene}),
                 template_folder("scan"),
                 out=tmp_path,
-                image_scale=SCALE,
-                progress=progress,
-                cancelled=lambda: len(done) >= 2,
+                options=ScanOptions(image_scale=SCALE),
+                listener=Listener(progress=progress, cancelled=lambda: len(done) >= 2),
             )
         assert not (tmp_path / "scan.json").exists()
         assert [path for path in tmp_path.iterdir() if path.name.startswith(".")] == []
@@ -192,7 +206,7 @@ class TestStopping:
         missing = SceneObject(name="part", shape=MeshFile(path="part.stl"), material=Lambertian())
         bad = project.model_copy(update={"scene": project.scene.model_copy(update={"objects": (missing,)})})
         with pytest.raises(InputError, match=r"part\.stl"):
-            run_scan(bad, tmp_path, out=tmp_path / "out", image_scale=SCALE)
+            run_scan(bad, tmp_path, out=tmp_path / "out", options=ScanOptions(image_scale=SCALE))
         assert list(tmp_path.iterdir()) == []
 
     def test_a_rig_without_a_laser_is_refused(self, tmp_path: Path) -> None:
@@ -200,7 +214,7 @@ class TestStopping:
         rig = project.scene.rig.model_copy(update={"lasers": ()})
         bad = project.model_copy(update={"scene": project.scene.model_copy(update={"rig": rig})})
         with pytest.raises(InputError, match="no laser"):
-            run_scan(bad, tmp_path, out=tmp_path / "out", image_scale=SCALE)
+            run_scan(bad, tmp_path, out=tmp_path / "out", options=ScanOptions(image_scale=SCALE))
         assert list(tmp_path.iterdir()) == []
 
 

@@ -23,6 +23,7 @@ from studio.project.document import replaced
 from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.folder_lock import LOCK, hold
+from studio.scan.options import Listener
 from studio.scan.reconstruct import reconstruct_folder
 from studio.scan.stages import Clock
 from tests.studio.small_scan import SCALE, contents, scan, small_project, write_plate
@@ -302,7 +303,7 @@ class TestInputFiles:
             done.append(frame)
 
         with pytest.raises(InputError, match=r"plate\.obj"):
-            scan(made / "project" / "project.json", made / "out", each=edited)
+            scan(made / "project" / "project.json", made / "out", Listener(measured=edited))
         assert not (made / "out" / "scan.json").exists()
 
     def test_a_manifest_that_points_elsewhere_is_not_followed(self, made: Path, tmp_path: Path) -> None:

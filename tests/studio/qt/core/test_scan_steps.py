@@ -22,7 +22,7 @@ from studio.qt.render.history import describe
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell.window import MainWindow
-from studio.runtime.jobs import Progress
+from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan_folder import open_folder
 from tests.studio.scan_of_steps import SCALE, small_project, small_scan
 
@@ -254,9 +254,9 @@ class TestRun:
     ) -> None:
         told: list[str] = []
 
-        def scan(*args: object, progress: Progress, **options: object) -> object:
+        def scan(*args: object, listener: Listener, **options: object) -> object:
             def tell(stage: str, done: float) -> None:
-                progress(stage, done)
+                listener.progress(stage, done)
                 job = moving.runner.job(RENDER)
                 assert job is not None
                 told.append(job.stage)
@@ -310,8 +310,8 @@ class TestRun:
         (folder / "scan.json").unlink()
         asked: list[object] = []
 
-        def scan(*args: object, **options: object) -> object:
-            asked.append(options["resume"])
+        def scan(*args: object, options: ScanOptions, **others: object) -> object:
+            asked.append(options.resume)
             raise Cancelled
 
         monkeypatch.setattr(motion_panel, "run_scan", scan)

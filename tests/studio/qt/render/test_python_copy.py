@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QMenu
 
 from render.render import render_world
+from render.run import Run
 from render.world.world import build_world
 from studio.project.document import Document
 from studio.qt.core.session import Render, Session
@@ -23,7 +24,7 @@ def session():
     project = small_project().replaced({"render.ambient_samples": 1, "render.transport": "direct"})
     world = build_world(project.scene, FOLDER)
     settings, axis = project.render, project.extraction.axis
-    frame = render_world(world, project.scene, settings=settings, axis=axis, seed=project.seed)
+    frame = render_world(world, project.scene, settings=settings, axis=axis, run=Run(seed=project.seed))
     made = Session(Document(project, root=FOLDER))
     made.add_render(Render(1, project, world, frame))
     return made

@@ -7,8 +7,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLineEdit
 
-from render.base.counts import AMBIENT_SAMPLES
 from render.render import render_world
+from render.run import Run
 from studio.qt.core.jobs import JobRunner
 from studio.qt.image.compare_view import DIFFERENCE
 from studio.qt.render.render_panel import RenderPanel
@@ -58,7 +58,7 @@ def test_the_image_refines_until_it_is_the_final_one(qtbot, panel):
     assert seen[0] == (1, False) and seen[-1] == (1, True) and len(seen) >= 5
     project = small_project()
     world, _ = small_render()
-    whole = render_world(world, project.scene, settings=project.render, seed=project.seed)
+    whole = render_world(world, project.scene, settings=project.render, run=Run(seed=project.seed))
     assert np.array_equal(session.shown.frame.laser_direct[0], whole.laser_direct[0])
     assert "error" in panel.errors.text() and panel.start_button.isVisible()
 
@@ -119,10 +119,10 @@ def test_a_render_that_was_kept_goes_on_from_where_it_was(qtbot, panel):
     press(qtbot, panel.keep_button)
     finish(qtbot, panel)
     (render,) = panel.session.renders
-    samples = render.frame.counts[AMBIENT_SAMPLES]
+    samples = render.frame.quality_of("ambient").work
     assert panel.continue_button.isVisible() and render.state is not None
     press(qtbot, panel.continue_button)
-    qtbot.waitUntil(lambda: render.frame.counts[AMBIENT_SAMPLES] > samples)
+    qtbot.waitUntil(lambda: render.frame.quality_of("ambient").work > samples)
     assert render.frame.ambient is not None
     # to cancel is to stop there: what was kept before is not lost
     press(qtbot, panel.cancel_button)

@@ -32,8 +32,8 @@ def another_document() -> Document:
 
 def another_render(number: int = 2) -> Render:
     world, frame = small_render()
-    counts = {name: 2 * value for name, value in frame.counts.items()}
-    return Render(number, small_project(), world, replace(frame, counts=counts))
+    quality = tuple(replace(one, error=2 * one.error, work=2 * one.work) for one in frame.quality)
+    return Render(number, small_project(), world, replace(frame, quality=quality))
 
 
 @pytest.fixture

@@ -33,7 +33,7 @@ def render(tmp_path_factory: pytest.TempPathFactory) -> Render:
     project = project.model_copy(update={"render": settings})
     clock = Clock(lambda *_: None, lambda: False)
     world = build_world(project.scene, folder, 0)
-    frame = render_step(project, world, 0, clock, None)
+    frame = render_step(project, world, 0, clock)
     images = develop_step(project, frame, clock, None)
     found = {method: measure_step(project, frame, world, images, clock, None, method) for method in METHODS}
     return Render(1, project, world, frame, measurements=found, images=images)

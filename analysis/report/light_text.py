@@ -1,0 +1,187 @@
+"""What a render computed, left out and knows, as sentences: the only place that makes any, for all who show them.
+
+Everything here follows from the fields of `render.plan`; nothing reads a sentence again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from render.plan import GroupQuality, Plan, ThinLens, TransportStep
+
+LIGHT = {
+    ("direct", "direct"): "light of each laser that meets one surface, exact across the sheet, sampled across edges "
+    "and shadows",
+    ("indirect", "indirect"): "light of the lasers that meets two or more surfaces",
+    ("indirect", "interreflection"): "laser light over two or more rough surfaces",
+    ("indirect", "caustic"): "laser light through clear glass or off mirrors, connected from the laser or the camera",
+    (
+        "indirect",
+        "specular-chain",
+    ): "laser light through clear glass or off mirrors both before and after its one rough surface, by photon merging",
+    ("indirect", "subsurface"): "laser light scattered below a surface, by random walk",
+    ("ambient", "ambient"): "light of lamps, surroundings and shining objects",
+    ("ambient", "interreflection"): "ambient light that meets two or more surfaces (interreflection, light through "
+    "glass)",
+}
+"""What each step of a plan is, by its group and name."""
+STAGES = {"direct": "laser light", "indirect": "reflected laser light", "ambient": "ambient light"}
+"""Stage of the render in which each light group is made."""
+
+
+def sentences(plan: Plan) -> tuple[list[str], list[str]]:
+    """What is computed, and what is left out, each with its reason."""
+    found = list(_all(plan))
+    return [*plan.text, *(text for computed, text in found if computed)], [
+        text for computed, text in found if not computed
+    ]
+
+
+def plan_lines(plan: Plan) -> list[str]:
+    """The same in the order of the plan, one line each."""
+    return [*plan.text, *(text if computed else f"left out: {text}" for computed, text in _all(plan))]
+
+
+def quality_lines(quality: tuple[GroupQuality, ...]) -> list[tuple[str, str]]:
+    """Name and quality of every light group that has begun."""
+    return [(group_name(one), quality_text(one)) for one in quality]
+
+
+def stage_note(stage: str, quality: tuple[GroupQuality, ...]) -> str:
+    """The quality of the groups that are made in a stage of the render, on one line; empty: there is none yet."""
+    return "; ".join(quality_text(one) for one in quality if STAGES[one.group] == stage)
+
+
+def group_name(quality: GroupQuality) -> str:
+    """Of a light group, with its laser's."""
+    if quality.laser is None:
+        return "ambient"
+    return f"{quality.laser}, {'direct' if quality.group == 'direct' else 'reflected on'}"
+
+
+def quality_text(quality: GroupQuality) -> str:
+    """Error, target and work of a light group, and what it lost."""
+    places = 1 if quality.group == "indirect" else 2
+    parts = []
+    if not math.isnan(quality.error):
+        parts.append(f"error {quality.error:.{places}%}, target {quality.target:.{places}%}")
+    match quality.unit:
+        case "light paths":
+            parts.append(f"{quality.work / 1e6:.2g} million light paths")
+        case "samples a pixel":
+            parts.append(f"{quality.work:.0f} of {quality.most:.0f} samples")
+    if quality.share is not None:
+        parts.append(f"{quality.share:.2%} of the direct light")
+    if quality.clamped is not None:
+        parts.append(f"clamped {quality.clamped:.0f} {'times' if quality.laser else 'contributions'} (biased)")
+    if quality.invalid:
+        parts.append(f"{quality.invalid:.0f} contributions were no number, and were left out")
+    return ", ".join(parts)
+
+
+def _all(plan: Plan) -> Iterator[tuple[bool, str]]:
+    """Whether it is computed, and the sentence, of every step and every setting that bounds it."""
+    for step in plan.steps:
+        if step.reason == "absent" and step.group == "indirect":
+            continue  # nothing in the scene makes such light, or none that the pilot met
+        yield from _step(step, plan)
+    if plan.pilot_steps:
+        steps = f"pilots on the steps {', '.join(map(str, plan.pilot_steps))}, of which the largest share counts"
+        yield True, f"the same for all {plan.frame_count} frames: {steps}"
+
+
+def _step(step: TransportStep, plan: Plan) -> Iterator[tuple[bool, str]]:
+    match step.group:
+        case "direct":
+            yield True, f"direct: {LIGHT['direct', 'direct']}"
+        case "indirect":
+            yield _indirect(step, plan)
+            last = [one for one in plan.of("indirect") if one.computed is not False][-1:]
+            if plan.laser_clamp is not None and step in last:
+                yield True, _clamp("pass of a laser's indirect light puts", plan.laser_clamp, " into a pixel")
+        case "ambient":
+            yield _ambient(step, plan)
+            if plan.clamp is not None and step.name == "interreflection" and step.computed is not False:
+                yield True, _clamp("sample of ambient light by way of two or more surfaces adds", plan.clamp, "")
+        case "lens":
+            yield from _lens(step, plan.lens)
+        case "truth" if step.computed:
+            yield True, "truth: depth, position, normal and object at every pixel's centre"
+        case "truth":
+            yield False, "truth at every pixel (switched off); the exact line is there"
+
+
+def _indirect(step: TransportStep, plan: Plan) -> tuple[bool, str]:
+    light = LIGHT["indirect", step.name]
+    if step.reason == "switched off":
+        return False, f"{light} - switched off, its share was not measured"
+    if step.computed is None:
+        return True, f"{light}: a pilot decides kind by kind, and leaves out what is below {plan.negligible or 0.0:.2%}"
+    if step.share is None:
+        return True, f"{step.name}: {LIGHT['indirect', 'indirect']} - requested"
+    measured = f"a pilot puts it at {step.share:.2%} +- {step.error or 0.0:.2%} of the direct light in the image"
+    if math.isinf(step.share):
+        measured = "there is no direct light in the image to compare it with"
+    match step.reason:
+        case "requested":
+            return True, f"{step.name}: {light} - requested; {measured}"
+        case "implied":
+            others = [one.name for one in plan.of("indirect") if one.computed and one.reason != "implied"]
+            return True, f"{step.name}: {light} - comes with {others[-1]}; {measured}"
+        case "negligible":
+            measured += f", below the negligible {plan.negligible or 0.0:.2%}"
+        case "not requested":
+            measured += ", not requested"
+    return (
+        (True, f"{step.name}: {light} - {measured}")
+        if step.computed
+        else (False, f"{light} ({step.name}) - {measured}")
+    )
+
+
+def _ambient(step: TransportStep, plan: Plan) -> tuple[bool, str]:
+    if step.reason == "absent":
+        return True, "ambient: none, the scene has no lamp and dark surroundings"
+    if step.reason == "unreachable":
+        return False, "light of point lamps by way of polished glass - no path from the camera meets a point"
+    light = LIGHT["ambient", step.name]
+    if step.name == "ambient":
+        width, height = plan.image_size or (0, 0)
+        effort = f"to {plan.ambient_error or 0.0:.1%} or {plan.ambient_samples} samples a pixel"
+        return True, f"ambient: {light} on {width} x {height} pixels, {effort}"
+    if step.reason == "switched off":
+        return False, f"{light} - switched off, its share was not measured"
+    if step.computed is None:
+        return True, f"{light}: a pilot decides, it is left out below {plan.negligible or 0.0:.2%} of the light"
+    reasons = ["requested"] if step.reason == "requested" else []
+    if step.share is not None and math.isinf(step.share):
+        reasons.append("nothing that is seen is lit otherwise")
+    elif step.share is not None:
+        reasons.append(f"a pilot puts it at {step.share:.2%} +- {step.error or 0.0:.2%} of what one surface reflects")
+    why = "; ".join(reasons)
+    if not step.computed:
+        return False, f"{light} - {why}, below the negligible {plan.negligible or 0.0:.2%}"
+    bound = "" if plan.max_bounces is None else f", {plan.max_bounces} at most"
+    return True, f"interreflection: {light}{bound} - {why}"
+
+
+def _lens(step: TransportStep, lens: ThinLens | None) -> Iterator[tuple[bool, str]]:
+    if step.reason == "pinhole":
+        if step.name == "defocus":
+            blur = "the lens's blur (defocus, diffraction) - rendered as a pinhole, every depth is in focus"
+            yield False, f"{blur}; the sensor's defocus, where it is on, blurs by depth when the image is developed"
+    elif lens is None or step.name == "diffraction":
+        yield False, "diffraction - the sensor's lens blur stands for it"
+    else:
+        focus = "far away" if lens.focus_distance is None else f"at {lens.focus_distance:.4g} m"
+        line = f"lens: f/{lens.f_number:g} focused {focus}, {1e3 * lens.aperture:.3g} mm of aperture sampled"
+        if lens.tilt > 0.0:
+            line += f", plane of focus tilted by {math.degrees(lens.tilt):.3g} deg"
+        if lens.blind > 0.0:
+            line += f"; in {lens.blind:.0%} of the image no depth is in focus"
+        yield True, f"{line}; the sensor's defocus is not applied again"
+
+
+def _clamp(what: str, most: float, where: str) -> str:
+    return f"clamp: no {what} more than {most:g} W/(m^2 sr){where} - biased, too dark where it cuts"

@@ -1,0 +1,100 @@
+"""Ambient light, as one of a frame's light groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from render.ambient.integrator import AmbientImage, ambient_images
+from render.ambient.transport_plan import (
+    DARK,
+    LAMPS,
+    ONWARD,
+    SWITCHED_OFF,
+    AmbientPlan,
+    has_ambient,
+    onward_share,
+    plan_of,
+)
+from render.frame import Estimate, Frame
+from render.light_group import LightGroup, Shares
+from render.plan import GroupQuality, TransportStep
+from render.run import Run
+from render.scene.scene import Scene
+from render.scene.settings import RenderSettings
+from render.world.placed import PlacedScene
+from render.world.world import World
+
+
+class AmbientLight(LightGroup[AmbientPlan]):
+    """Light of lamps, surroundings and shining objects."""
+
+    group = "ambient"
+    field = "ambient"
+    stage = "ambient light"
+
+    def expected(self, scene: Scene, settings: RenderSettings) -> tuple[TransportStep, ...]:
+        if not has_ambient(scene):
+            return (DARK,)
+        match settings.transport:
+            case "direct":
+                return LAMPS, SWITCHED_OFF
+            case "auto":
+                return LAMPS, TransportStep("ambient", ONWARD, None, "pilot")
+            case _:
+                return LAMPS, TransportStep("ambient", ONWARD, True, "requested")
+
+    def work(self, scene: Scene, settings: RenderSettings) -> float:
+        """A camera ray and two more a sample; it ends before that where the error is reached."""
+        return 3.0 * scene.camera.width * scene.camera.height * settings.ambient_samples
+
+    def parts(self, scene: Scene) -> int:
+        return 1
+
+    def measures(self, scene: Scene, settings: RenderSettings) -> bool:
+        return settings.transport != "direct" and has_ambient(scene)
+
+    def measured(self, placed: PlacedScene, settings: RenderSettings, frame: Frame, run: Run) -> Shares:
+        """Light that goes on over that by way of one surface."""
+        return {ONWARD: onward_share(placed, settings.max_bounces, run)}
+
+    def plan(self, shares: Shares | None, world: World, scene: Scene, settings: RenderSettings) -> AmbientPlan:
+        return plan_of(shares, world, scene, settings)
+
+    def mark(self, plan: AmbientPlan) -> str:
+        return f"ambient light {plan.surfaces}"
+
+    def estimates(
+        self, placed: PlacedScene, settings: RenderSettings, plan: AmbientPlan, frame: Frame, run: Run
+    ) -> Iterator[Estimate]:
+        """(h, w, 3) radiance in the bands R, G, B."""
+
+        def images(part: Run) -> Iterator[AmbientImage]:
+            return ambient_images(
+                placed,
+                target=settings.ambient_error,
+                most=settings.ambient_samples,
+                surfaces=plan.surfaces,
+                clamp=settings.clamp,
+                run=part,
+            )
+
+        for image in replace(run, part="ambient").until_over(images):
+            yield Estimate(image.radiance, (quality_of(image, settings),))
+
+
+def quality_of(image: AmbientImage, settings: RenderSettings) -> GroupQuality:
+    """How well the ambient light is known; its error is not, after a single sample."""
+    clamped = settings.clamp is not None
+    return GroupQuality(
+        "ambient",
+        None,
+        image.error,
+        settings.ambient_error,
+        image.samples,
+        "samples a pixel",
+        settings.ambient_samples,
+        invalid=image.dropped,
+        clamped=image.clamped if clamped else None,
+        clamped_radiance=image.cut if clamped else None,
+    )

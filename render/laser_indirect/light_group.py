@@ -1,0 +1,101 @@
+"""The indirect light of all lasers, as one of a frame's light groups."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.frame import Estimate, Frame
+from render.laser_indirect.integrator import IndirectImage, indirect_images
+from render.laser_indirect.path_vertex import INTERREFLECTION
+from render.laser_indirect.transport_plan import SWITCHED_OFF, IndirectPlan, pilot_shares, plan_of
+from render.light_group import LightGroup, Shares
+from render.plan import GroupQuality, TransportStep
+from render.run import Run
+from render.scene.scene import Scene
+from render.scene.settings import RenderSettings
+from render.world.placed import PlacedScene
+from render.world.world import World
+
+Float32 = NDArray[np.float32]
+
+
+class IndirectLight(LightGroup[IndirectPlan]):
+    """Light of the lasers that met two or more surfaces."""
+
+    group = "indirect"
+    field = "laser_indirect"
+    stage = "reflected laser light"
+
+    def expected(self, scene: Scene, settings: RenderSettings) -> tuple[TransportStep, ...]:
+        match settings.transport:
+            case "direct":
+                return (SWITCHED_OFF,)
+            case "auto":
+                return (TransportStep("indirect", "indirect", None, "pilot"),)
+            case name:
+                return (TransportStep("indirect", name, True, "requested"),)
+
+    def work(self, scene: Scene, settings: RenderSettings) -> float:
+        """Next to none where there is nothing to reflect on, dozens of rays a pixel where there is."""
+        return 8.0 * scene.camera.width * scene.camera.height
+
+    def parts(self, scene: Scene) -> int:
+        return len(scene.lasers)
+
+    def measures(self, scene: Scene, settings: RenderSettings) -> bool:
+        return settings.transport != "direct"
+
+    def measured(self, placed: PlacedScene, settings: RenderSettings, frame: Frame, run: Run) -> Shares:
+        """Of each kind, over the direct light of the frame."""
+        return pilot_shares(placed, frame.laser_direct, run)
+
+    def plan(self, shares: Shares | None, world: World, scene: Scene, settings: RenderSettings) -> IndirectPlan:
+        return IndirectPlan((SWITCHED_OFF,)) if shares is None else plan_of(shares, settings)
+
+    def mark(self, plan: IndirectPlan) -> str:
+        return f"laser light {plan.kinds}"
+
+    def estimates(
+        self, placed: PlacedScene, settings: RenderSettings, plan: IndirectPlan, frame: Frame, run: Run
+    ) -> Iterator[Estimate]:
+        """(h, w) radiance of each laser, dark until its turn."""
+        count = len(placed.lasers) if plan.kinds is not None else 0
+        images = [np.zeros((placed.camera.height, placed.camera.width), np.float32)] * count
+        quality: list[GroupQuality] = []
+        for i, laser in enumerate(placed.lasers[:count]):
+            part = replace(run.between(i / count, (i + 1) / count).shifted(i), part=f"laser {i}")
+            for image in indirect_images(
+                laser,
+                target=settings.indirect_error,
+                most_paths=settings.light_paths,
+                kinds=plan.kinds or INTERREFLECTION,
+                clamp=settings.laser_clamp,
+                left=count - i,
+                run=part,
+            ):
+                images[i] = image.radiance
+                quality[i:] = [quality_of(laser.laser.name, image, settings, frame.laser_direct[i])]
+                yield Estimate(tuple(images), tuple(quality))
+
+
+def quality_of(laser: str, image: IndirectImage, settings: RenderSettings, direct: Float32) -> GroupQuality:
+    """How well one laser's indirect light is known, and what share of its direct light it is."""
+    clamped = settings.laser_clamp is not None
+    known = float(direct.sum(dtype=np.float64))
+    return GroupQuality(
+        "indirect",
+        laser,
+        image.error,
+        settings.indirect_error,
+        image.paths,
+        "light paths",
+        settings.light_paths,
+        invalid=image.dropped,
+        clamped=image.clamped if clamped else None,
+        clamped_radiance=image.cut if clamped else None,
+        share=float(image.radiance.sum(dtype=np.float64)) / known if known > 0.0 else None,
+    )

@@ -1,0 +1,74 @@
+"""What is requested of a scan, who hears of it, and the scan under way that goes down to its stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from analysis.report.model import FrameResult
+from render.base.threads import Cancel
+from render.frame import Frame
+from render.run import Run, never
+from render.scan_plan import ScanPlan
+from studio.project.project import Project
+from studio.runtime.console import StageProgress, silent
+from studio.scan.scan_folder import Begun
+from studio.scan.stages import Clock
+
+
+@dataclass(frozen=True)
+class ScanOptions:
+    """How much of a project is scanned, and what it leaves."""
+
+    steps: int | None = None
+    """Only the first so many frames; None: all."""
+    image_scale: float = 1.0
+    """Pixels a side over those of the camera."""
+    seed: int | None = None
+    """In place of the project's."""
+    threads: int | None = None
+    """None: as many as this process may use."""
+    seconds: float | None = None
+    """Time for the light of each frame."""
+    measure: bool = True
+    """Off: stop after the frames."""
+    report: bool = True
+    """Off: stop after the points."""
+    resume: bool = False
+    """Take the frames that an earlier scan left in the folder, and go on with the one that it left unfinished."""
+
+
+@dataclass(frozen=True)
+class Listener:
+    """Who watches a scan, and may stop it."""
+
+    progress: StageProgress = silent
+    cancelled: Cancel = never
+    refined: Callable[[Frame], None] = lambda frame: None
+    """Hears of every frame as it gets better."""
+    measured: Callable[[FrameResult], None] = lambda result: None
+    """Hears of every frame once it is measured."""
+
+
+@dataclass(frozen=True)
+class Scan:
+    """A scan under way."""
+
+    begun: Begun
+    """Its folder, and its project: at the image scale, with the seed."""
+    clock: Clock
+    options: ScanOptions
+    refined: Callable[[Frame], None]
+    plan: ScanPlan | None = None
+    """Of all frames; None: there is only one."""
+
+    @property
+    def project(self) -> Project:
+        return self.begun.project
+
+    @property
+    def run(self) -> Run:
+        """How its work is done."""
+        return Run(
+            self.project.seed, self.options.threads, cancelled=self.clock.cancelled, seconds=self.options.seconds
+        )
