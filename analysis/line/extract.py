@@ -14,10 +14,10 @@ from analysis.line.detection.channel import check_image, scan_lines
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.estimate import estimate_noise
 from analysis.line.measure import measure
-from analysis.line.result import Axis, Line
-from analysis.line.selection.continuity import follow, pick
+from analysis.line.result import Line
+from analysis.line.selection.continuity import pick, select_chain
 from analysis.line.selection.geometry import WorkingVolume, consistent
-from analysis.line.settings import ExtractionSettings, Method, Select
+from analysis.line.settings import ExtractionSettings, Select
 from render.base.errors import InputError
 from render.base.finite import check_finite
 
@@ -25,28 +25,27 @@ CANDIDATES = 5
 """Peaks that one is selected from, unless the settings ask for more."""
 
 
-def extract(  # noqa: PLR0913
+def extract(
     image: NDArray[Any],
     *,
-    method: Method | None = None,
-    axis: Axis | None = None,
-    peaks: int | None = None,
     settings: ExtractionSettings | None = None,
     noise: NoiseModel | None = None,
     variance: NDArray[Any] | None = None,
     volume: WorkingVolume | None = None,
     threads: int | None = None,
+    **changes: Any,
 ) -> Line:
     """Image (h, w) or (h, w, 3), uint8, uint16, float32 or float64 -> Line with arrays (n, peaks).
 
-    method, axis and peaks override `settings`. noise turns DN into electrons; without it, it is estimated from the
-    image (`estimate_noise`). variance (h, w) e-^2 replaces that of the noise model, for images that were combined from
-    others. With a selection other than "strongest", or a working volume, one peak of several candidates is taken:
-    arrays (n, 1), `candidates` holds the rest. Scan lines without a position carry a flag that says why.
+    changes: single settings by their name, such as method="phase", in place of those in `settings`. noise turns DN into
+    electrons; without it, it is estimated from the image (`estimate_noise`). variance (h, w) e-^2 replaces that of the
+    noise model, for images that were combined from others. With a selection other than "strongest", or a working
+    volume, one peak of several candidates is taken: arrays (n, 1), `candidates` holds the rest. Scan lines without a
+    position carry a flag that says why.
     Raises InputError: an image of the wrong type, shape or size, without a finite pixel, a channel it does not have,
     settings out of range.
     """
-    chosen = settings_of(settings, method=method, axis=axis, peaks=peaks)
+    chosen = settings_of(settings, **changes)
     array = check_image(image)
     if noise is None:
         noise = estimate_noise(array, chosen)
@@ -69,7 +68,7 @@ def select(candidates: Line, how: Select, volume: WorkingVolume | None = None) -
     """Peaks (n, k) -> Line (n, 1): one peak of each scan line, of those that the working volume allows, or none."""
     usable = candidates.valid if volume is None else candidates.valid & consistent(candidates, volume)
     if how == "continuous":
-        return follow(candidates, usable)
+        return select_chain(candidates, usable)
     if how == "strongest":
         order = np.broadcast_to(np.arange(usable.shape[1], dtype=np.float64), usable.shape)
     else:

@@ -28,7 +28,7 @@ UNUSED = 24 * 3600.0
 """s; older folders may still be in use by a program that was started before the change."""
 DISPATCHER = "numba.core.dispatcher"
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
-KERNEL = re.compile(rb"^\s*@(?:numba\.)?njit\b", re.MULTILINE)
+KERNEL = re.compile(rb"^\s*@(?:(?:numba\.)?njit|peak_kernel)\b", re.MULTILINE)
 CONSTANT = re.compile(rb"\b(?:[A-Z][A-Z0-9_]+|Flag)\b")
 
 

@@ -109,8 +109,8 @@ def _lines(paths: Sequence[Path], project: Project, laser: int, threads: int | N
     for at, line in enumerate(lines):
         first, last = max(0, at - spacetime_moving.MOST), min(len(images), at + spacetime_moving.MOST + 1)
         moves = np.stack([surface_motion(project.scene, at, step) for step in range(first, last)])
-        timed = spacetime_moving.along_time(
-            line, images[first:last], at - first, moves, plane, project.scene.camera, noises[at], threads=threads
-        )
+        camera = project.scene.camera
+        sweep = spacetime_moving.Sweep(images[first:last], at - first, moves, plane, camera, noises[at])
+        timed = spacetime_moving.along_time(line, sweep, threads)
         found.append(replace(timed, note="; ".join(filter(None, (line.note, "measured along time")))))
     return found

@@ -105,15 +105,7 @@ def along_time(project: Project, line: Line, passing: Passing, laser: int, threa
             fused.append(fuse([one.pixels for one in series], [one.exposure_time for one in series], noise))
         frames, variances, noise = [f.electrons for f in fused], [f.variance for f in fused], fused[0].noise
     moves = np.stack([surface_motion(scene, here, taken.frame.step) for taken in passing.taken])
-    found = spacetime_moving.along_time(
-        line,
-        frames,
-        passing.at,
-        moves,
-        scene.laser_plane(laser),
-        scene.camera,
-        noise,
-        variances=variances,
-        threads=threads,
-    )
+    plane = scene.laser_plane(laser)
+    sweep = spacetime_moving.Sweep(frames, passing.at, moves, plane, scene.camera, noise, variances)
+    found = spacetime_moving.along_time(line, sweep, threads)
     return replace(found, note="; ".join(filter(None, (line.note, "measured along time"))))

@@ -6,6 +6,7 @@ Shared by every method: a seed is a pixel, a width, an amplitude, a background, 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -35,13 +36,25 @@ SEED_COLUMNS = 6
 
 NEIGHBOUR = 0.05
 """Fraction of a peak's response from which another peak limits its window of pixels."""
-HUMP = 2.0
+BROAD = 2.0
 """Filter sigmas; a peak that is wider than this at half its height may be a narrow one on a broad glow."""
 NARROWEST = 0.4
 """px; a narrower line cannot be told from this one before it is fitted."""
 
-_OK, _NO_PEAK, _NO_PIXELS = int(Flag.OK), int(Flag.NO_PEAK), int(Flag.NO_PIXELS)
-_SATURATED, _TOO_WIDE = int(Flag.SATURATED), int(Flag.TOO_WIDE)
+
+class Limits(NamedTuple):
+    """What counts as a line."""
+
+    threshold: float
+    """Response over its noise."""
+    step: float
+    """Of quantisation, e-."""
+    gain: float
+    """Variance of the filter's response over that of a pixel (`response_gain`)."""
+    width: float
+    """Known sigma, px, or 0 to measure it."""
+    max_width: float
+    """px."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -75,11 +88,11 @@ def _plateau(mask: Mask, centre: int) -> tuple[int, int]:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _on_hump(response: Float32, i: int, base: float, spread: float, still: float, rise: float) -> tuple[float, float]:
+def _on_glow(response: Float32, i: int, base: float, spread: float, dark: float, rise: float) -> tuple[float, float]:
     """Spread and background of a narrow line on top of a broad glow, as rough metal reflects it; (0, 0): it is not one.
 
-    A Gaussian's curvature is -height / spread^2. A line on a hump is much more curved than the hump is wide, and stands
-    out of the hump's own noise.
+    A Gaussian's curvature is -height / spread^2. A line on a glow is much more curved than the glow is wide, and stands
+    out of the glow's own noise: `rise`, in standard deviations of a pixel.
     """
     w = response.shape[0]
     if i < 1 or i > w - 2:
@@ -94,28 +107,20 @@ def _on_hump(response: Float32, i: int, base: float, spread: float, still: float
             return 0.0, 0.0
         reach = math.ceil(3.0 * narrow)
         under = max(min(float(response[max(i - reach, 0)]), float(response[min(i + reach, w - 1)])), base)
-        if float(response[i]) - under <= rise * math.sqrt(max(under, 0.0) + max(still, 0.0)):
+        if float(response[i]) - under <= rise * math.sqrt(max(under, 0.0) + max(dark, 0.0)):
             return 0.0, 0.0
     return narrow, under
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _measure(  # noqa: PLR0913
-    row: Float32,
-    response: Float32,
-    mask: Mask,
-    i: int,
-    base: float,
-    still: float,
-    rise: float,
-    width: float,
-    max_width: float,
-    seed: Array,
+def _measure(
+    row: Float32, response: Float32, mask: Mask, i: int, base: float, dark: float, limits: Limits, seed: Array
 ) -> int:
     """Fill a seed from the filter's maximum at pixel i over background `base`; row is the scan line, unpadded.
 
-    still: variance of a pixel without signal. rise: threshold times the filter's gain in standard deviation.
+    dark: variance of a pixel without signal, e-^2.
     """
+    width, max_width = limits.width, limits.max_width
     limit = int(4.0 * max_width) + 8
     w = row.shape[0]
     first, last = _plateau(mask, i)
@@ -132,13 +137,13 @@ def _measure(  # noqa: PLR0913
         seed[CENTRE], seed[PLATEAU] = 0.5 * (first + last), half
         seed[WIDTH] = width if width > 0.0 else sigma
         seed[AMPLITUDE] = top * math.exp(min(0.5 * (half / seed[WIDTH]) ** 2, 12.0))
-        return _SATURATED if seed[WIDTH] <= max_width else _TOO_WIDE
+        return Flag.SATURATED.value if seed[WIDTH] <= max_width else Flag.TOO_WIDE.value
     top = float(response[i]) - base
     right = _crossing(response, i, 1, limit, base + 0.5 * top)
     left = _crossing(response, i, -1, limit, base + 0.5 * top)
     spread = (left + right) / 2.3548
-    if spread > HUMP * FILTER_SIGMA:
-        narrow, under = _on_hump(response, i, base, spread, still, rise)
+    if spread > BROAD * FILTER_SIGMA:
+        narrow, under = _on_glow(response, i, base, spread, dark, limits.threshold * math.sqrt(limits.gain))
         if narrow > 0.0:
             spread, base = narrow, under
             top = float(response[i]) - base
@@ -153,27 +158,14 @@ def _measure(  # noqa: PLR0913
     seed[WIDTH] = width if width > 0.0 else sigma
     # undo what the filter takes off the top of a Gaussian
     seed[AMPLITUDE] = top * math.sqrt(1.0 + (FILTER_SIGMA / seed[WIDTH]) ** 2)
-    return _OK if seed[WIDTH] <= max_width else _TOO_WIDE
+    return Flag.OK.value if seed[WIDTH] <= max_width else Flag.TOO_WIDE.value
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def detect(  # noqa: PLR0913
-    signal: Float32,
-    mask: Mask,
-    floor: Float32,
-    threshold: float,
-    step: float,
-    gain: float,
-    width: float,
-    max_width: float,
-    seeds: Array,
-    flags: Mask,
-) -> None:
+def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: Array, flags: Mask) -> None:
     """Scan lines (n, w) in electrons -> seeds (n, k, 6) and flags (n, k), strongest first.
 
-    floor (n, w) or (n, 1): variance of a pixel without signal. step: of quantisation, e-.
-    gain: variance of the filter's response over that of a pixel (`response_gain`).
-    width: known sigma in px, or 0 to measure it.
+    floor (n, w) or (n, 1): variance of a pixel without signal, e-^2.
     """
     n, w = signal.shape
     wanted = seeds.shape[1]
@@ -182,18 +174,17 @@ def detect(  # noqa: PLR0913
     blocks = max(1, w // block)
     means, level, margin = np.empty(blocks), np.empty(blocks), np.empty(blocks)
     at, height = np.empty(w, np.int32), np.empty(w)
-    rise = threshold * math.sqrt(gain)
     for y in range(n):
         usable = load_row(signal[y], mask[y], row)
         for k in range(wanted):
-            flags[y, k] = _NO_PEAK if usable else _NO_PIXELS
+            flags[y, k] = Flag.NO_PEAK.value if usable else Flag.NO_PIXELS.value
             for j in range(SEED_COLUMNS):
                 seeds[y, k, j] = np.nan
         if not usable:
             continue
         respond(row, response)
         block_background(response, means, level)
-        noise_margin(response, floor[y], gain * w / usable, level, threshold, step, margin)
+        noise_margin(response, floor[y], limits.gain * w / usable, level, limits.threshold, limits.step, margin)
         found = local_maxima(response, level, margin, at)
         for j in range(found):
             pixel = np.int64(at[j])
@@ -210,13 +201,13 @@ def detect(  # noqa: PLR0913
             seed = seeds[y, taken]
             pixel = np.int64(at[best])
             base = background_at(pixel, level, block)
-            still = float(floor[y, min(pixel, floor.shape[1] - 1)])
-            flags[y, taken] = _measure(line, response, mask[y], pixel, base, still, rise, width, max_width, seed)
-            claim = max(3.0 * seed[WIDTH], 3.0) + seed[PLATEAU]
+            dark = float(floor[y, min(pixel, floor.shape[1] - 1)])
+            flags[y, taken] = _measure(line, response, mask[y], pixel, base, dark, limits, seed)
+            covered = max(3.0 * seed[WIDTH], 3.0) + seed[PLATEAU]
             strength, reach = height[best], np.inf
             for j in range(found):
                 distance = abs(at[j] - seed[CENTRE])
-                if distance <= claim:
+                if distance <= covered:
                     height[j] = 0.0
                 elif abs(height[j]) >= NEIGHBOUR * strength:
                     reach = min(reach, 0.5 * distance)

@@ -10,25 +10,21 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, REACH, WIDTH
 from analysis.line.methods.line_profile import linear_variance, profile
+from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
 from analysis.line.result import Flag
 
-Float32 = NDArray[np.float32]
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
-
+LEAST_SQUARES, LIKELIHOOD = range(2)
+"""Variants."""
+POSITION, ELECTRONS, FLOOR, VARIANCE = range(4)
+"""Rows of the pixels (4, n) of a fit: px, e-, e-^2 that does not come from the signal, e-^2."""
 ITERATIONS = 30
 SMALL_STEP, ACCEPTED_STEP = 1e-5, 1e-3
 """Squared standard deviations: stop at the first; out of iterations the second will do (scoring is linear at worst)."""
 NARROWEST = 0.35
 """px; a narrower line falls into one pixel, where its width leaves no trace and drags the centre along."""
-
-_OK, _SATURATED, _AT_BORDER = int(Flag.OK), int(Flag.SATURATED), int(Flag.AT_BORDER)
-_TOO_FEW, _NOT_CONVERGED = int(Flag.TOO_FEW_PIXELS), int(Flag.NOT_CONVERGED)
-_OUT_OF_WINDOW, _TOO_WIDE = int(Flag.OUT_OF_WINDOW), int(Flag.TOO_WIDE)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -117,12 +113,12 @@ def _hold_sigma(hessian: Array, score: Array) -> None:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _optimise(  # noqa: PLR0913
-    x: Array, y: Array, floor: Array, n: int, p: Array, likelihood: bool, integrated: bool, shape: Array, hessian: Array
+def _optimise(
+    pixel: Array, n: int, p: Array, likelihood: bool, integrated: bool, shape: Array, trial_shape: Array, hessian: Array
 ) -> bool:
-    """Refine p in place; on return `shape` and `hessian` belong to p. True if converged."""
+    """Refine p in place on pixels (4, n); on return `shape` and `hessian` belong to p. True if converged."""
+    x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
     score, step, trial, factor = np.zeros(4), np.zeros(4), np.empty(4), np.zeros((4, 4))
-    trial_shape = np.empty_like(shape)
     profile(x, n, p[1], p[2], integrated, shape)
     cost = _cost(y, floor, shape[0], n, p, likelihood)
     damping, decrement, scale = 1e-4, np.inf, 1.0
@@ -165,91 +161,76 @@ def _optimise(  # noqa: PLR0913
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _gather(
-    signal: Float32, mask: Mask, floor: Float32, middle: float, half: float, x: Array, y: Array, base: Array
-) -> int:
-    """Usable pixels within `half` of `middle` -> positions, electrons, variances; returns how many."""
+def _gather(signal: Float32, mask: Mask, floor: Float32, middle: float, half: float, pixel: Array) -> int:
+    """Usable pixels within `half` of `middle` -> positions, electrons and floors (4, n); returns n."""
     count = 0
     for i in range(max(0, math.ceil(middle - half)), min(signal.shape[0] - 1, math.floor(middle + half)) + 1):
         if mask[i] == 0:
-            x[count], y[count], base[count] = i, signal[i], floor[min(i, floor.shape[0] - 1)]
+            pixel[POSITION, count], pixel[ELECTRONS, count] = i, signal[i]
+            pixel[FLOOR, count] = floor[min(i, floor.shape[0] - 1)]
             count += 1
     return count
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def fit_seeds(  # noqa: PLR0913
-    signal: Float32,
-    mask: Mask,
-    floor: Float32,
-    seeds: Array,
-    flags: Mask,
-    likelihood: bool,
-    integrated: bool,
-    correlation: Array,
-    known_width: bool,
-    max_width: float,
-    out: Array,
-) -> None:
-    """Scan lines (n, w) and seeds (n, k, 6) -> out (n, k, 6): u, sigma_u, width, amplitude, background, chi2.
+def _chi2_and_influence(
+    pixel: Array, n: int, p: Array, likelihood: bool, shape: Array, row: Array, weight: Array
+) -> float:
+    """Sum of squared residuals over their variance; fills the variances of pixels (4, n) and weight (n,).
 
-    flags (n, k) is updated: only OK and SATURATED seeds are fitted. floor (n, w) or (n, 1), e-^2.
-    correlation: of neighbouring pixels after smoothing, [1] without; chi2 is then NaN.
+    row (4,): the centre's row of the inverse Hessian. weight: how far the centre moves for one electron more.
     """
-    n, w = signal.shape
-    x, y, variance, weight = np.empty(w), np.empty(w), np.empty(w), np.empty(w)
-    base, shape, p, hessian = np.empty(w), np.empty((3, w)), np.empty(4), np.empty((4, 4))
-    factor, influence, unit = np.zeros((4, 4)), np.empty(4), np.zeros(4)
+    chi2 = 0.0
+    for i in range(n):
+        mu, floor = p[0] * shape[0, i] + p[3], pixel[FLOOR, i]
+        variance = max(mu + floor, 0.1 * abs(floor))
+        weight[i] = row[0] * shape[0, i] + row[3]
+        weight[i] += p[0] * (row[1] * shape[1, i] + row[2] * shape[2, i])
+        if likelihood:
+            weight[i] /= variance
+        chi2 += (pixel[ELECTRONS, i] - mu) ** 2 / variance
+        pixel[VARIANCE, i] = variance
+    return chi2
+
+
+@peak_kernel
+def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
+    """Peak kernel (`seed_loop`). options.variant: LEAST_SQUARES or LIKELIHOOD. chi2 only for independent pixels."""
+    signal, mask, floor, w = pixels.signal[y], pixels.mask[y], pixels.floor[y], pixels.signal.shape[1]
+    likelihood, integrated = options.variant == LIKELIHOOD, options.integrated
+    pixel, weight, shape, trial_shape = pixels.room[:4], pixels.room[4], pixels.room[5:8], pixels.room[8:11]
+    p, hessian = np.empty(4), np.empty((4, 4))
+    p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
+    half, count, converged = 0.0, 0, False
+    for attempt in range(3):
+        # 4 sigma hold the line, the rest its background; a saturated plateau pushes the wings outwards
+        wanted = max(4.0 * p[2] + 1.5, seed[PLATEAU] + 2.5 * p[2] + 1.5)
+        wanted = math.ceil(min(wanted, seed[REACH], 6.0 * options.max_width))
+        if attempt > 0 and (options.known_width or 0.5 * half <= wanted <= 1.15 * half + 1.0):
+            break
+        half = wanted
+        middle = seed[CENTRE] if attempt == 0 else p[1]
+        count = _gather(signal, mask, floor, middle, half, pixel)
+        if count < 5:
+            return Flag.TOO_FEW_PIXELS.value
+        converged = _optimise(pixel, count, p, likelihood, integrated, shape, trial_shape, hessian)
+        if not converged:
+            break
+    if min(p[1], seed[CENTRE]) < 0.5 or max(p[1], seed[CENTRE]) > w - 1.5:
+        return Flag.AT_BORDER.value  # less than half of it is seen: any slope would fit
+    if not converged:
+        return Flag.NOT_CONVERGED.value
+    if p[2] > options.max_width:
+        return Flag.TOO_WIDE.value
+    if abs(p[1] - seed[CENTRE]) > max(half, 1.0):
+        return Flag.OUT_OF_WINDOW.value
+    factor, row, unit = np.zeros((4, 4)), np.empty(4), np.zeros(4)
     unit[1] = 1.0
-    for row in range(n):
-        for k in range(seeds.shape[1]):
-            for j in range(6):
-                out[row, k, j] = np.nan
-            if flags[row, k] > _SATURATED:
-                continue
-            seed = seeds[row, k]
-            p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
-            half, converged = 0.0, False
-            for attempt in range(3):
-                # 4 sigma hold the line, the rest its background; a saturated plateau pushes the wings outwards
-                wanted = max(4.0 * p[2] + 1.5, seed[PLATEAU] + 2.5 * p[2] + 1.5)
-                wanted = math.ceil(min(wanted, seed[REACH], 6.0 * max_width))
-                if attempt > 0 and (known_width or 0.5 * half <= wanted <= 1.15 * half + 1.0):
-                    break
-                half = wanted
-                middle = seed[CENTRE] if attempt == 0 else p[1]
-                count = _gather(signal[row], mask[row], floor[row], middle, half, x, y, base)
-                if count < 5:
-                    break
-                converged = _optimise(x, y, base, count, p, likelihood, integrated, shape, hessian)
-                if not converged:
-                    break
-            if count < 5:
-                flags[row, k] = _TOO_FEW
-            elif min(p[1], seed[CENTRE]) < 0.5 or max(p[1], seed[CENTRE]) > w - 1.5:
-                flags[row, k] = _AT_BORDER  # less than half of it is seen: any slope would fit
-            elif not converged:
-                flags[row, k] = _NOT_CONVERGED
-            elif p[2] > max_width:
-                flags[row, k] = _TOO_WIDE
-            elif abs(p[1] - seed[CENTRE]) > max(half, 1.0):
-                flags[row, k] = _OUT_OF_WINDOW
-            elif not _solve(hessian, 0.0, unit, factor, influence):
-                flags[row, k] = _NOT_CONVERGED
-            if flags[row, k] > _SATURATED:
-                continue
-            chi2 = 0.0
-            for i in range(count):
-                mu = p[0] * shape[0, i] + p[3]
-                variance[i] = max(mu + base[i], 0.1 * abs(base[i]))
-                # how much the centre moves for one electron more in this pixel
-                weight[i] = influence[0] * shape[0, i] + influence[3]
-                weight[i] += p[0] * (influence[1] * shape[1, i] + influence[2] * shape[2, i])
-                if likelihood:
-                    weight[i] /= variance[i]
-                chi2 += (y[i] - mu) ** 2 / variance[i]
-            out[row, k, 0] = p[1]
-            out[row, k, 1] = math.sqrt(linear_variance(weight, variance, x, count, correlation))
-            out[row, k, 2], out[row, k, 3], out[row, k, 4] = p[2], p[0], p[3]
-            if correlation.shape[0] == 1:
-                out[row, k, 5] = chi2 / (count - 4)
+    if not _solve(hessian, 0.0, unit, factor, row):
+        return Flag.NOT_CONVERGED.value
+    chi2 = _chi2_and_influence(pixel, count, p, likelihood, shape, row, weight)
+    out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
+    out[1] = math.sqrt(linear_variance(weight, pixel[VARIANCE], pixel[POSITION], count, pixels.correlation))
+    if pixels.correlation.shape[0] == 1:
+        out[5] = chi2 / (count - 4)
+    return flag

@@ -13,30 +13,24 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, PLATEAU, REACH, WIDTH
 from analysis.line.methods.line_profile import linear_variance
-from analysis.line.methods.window import brightest
+from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
+from analysis.line.methods.window import brightest, pixel_variance
 from analysis.line.result import Flag
 
-Float32 = NDArray[np.float32]
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
-
+CARUANA, GUO = range(2)
+"""Variants."""
 FRACTION = 0.2
 """Caruana takes the pixels above this part of the brightest, and its two neighbours in any case."""
 WINDOW = 3.0
 """Guo takes the pixels within so many sigmas that are above the background."""
 ITERATIONS = 12
 STEADY = 0.3
-"""Relative noise of a pixel at Caruana's level above which its logarithm leans, and no sigma is claimed."""
+"""Relative noise of a pixel at Caruana's level above which its logarithm leans, and no sigma is reported."""
 NARROWEST = 0.55
-"""px; for narrower lines sampled logarithms bend, and no sigma is claimed."""
-
-_SATURATED, _TOO_FEW = int(Flag.SATURATED), int(Flag.TOO_FEW_PIXELS)
-_NOT_CONVERGED, _OUT_OF_WINDOW = int(Flag.NOT_CONVERGED), int(Flag.OUT_OF_WINDOW)
-_AT_BORDER = int(Flag.AT_BORDER)
+"""px; for narrower lines sampled logarithms bend, and no sigma is reported."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -79,71 +73,69 @@ def _run(signal: Float32, mask: Mask, top: int, half: int, level: float) -> tupl
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def fit_logarithms(
-    signal: Float32, mask: Mask, floor: Float32, seeds: Array, flags: Mask, guo: bool, correlation: Array, out: Array
-) -> None:
-    """Scan lines (n, w) and seeds (n, k, 6) -> out (n, k, 6): u, sigma_u, width, amplitude, background, NaN."""
-    w = signal.shape[1]
-    x, y, z, weight, variance = np.empty(w), np.empty(w), np.empty(w), np.empty(w), np.empty(w)
-    p, inverse = np.empty(3), np.empty((3, 3))
-    for row in range(signal.shape[0]):
-        for k in range(seeds.shape[1]):
-            for j in range(6):
-                out[row, k, j] = np.nan
-            if flags[row, k] > _SATURATED:
-                continue
-            seed = seeds[row, k]
-            base = seed[BACKGROUND]
-            top = brightest(signal[row], mask[row], seed)
-            if top < 1 or top > w - 2:
-                flags[row, k] = _AT_BORDER
-                continue
-            half = max(1, math.ceil(min(WINDOW * seed[WIDTH] + seed[PLATEAU], seed[REACH])))
-            level = 0.0 if guo else FRACTION * max(signal[row, top] - base, 0.0)
-            count = 0
-            first, last = _run(signal[row], mask[row], top, half, base + level) if not guo else (top - half, top + half)
-            for i in range(max(0, first), min(w - 1, last) + 1):
-                value = signal[row, i] - base
-                if mask[row, i] == 0 and (value > level or (value > 0.0 and abs(i - top) < 2)):
-                    still = float(floor[row, min(i, floor.shape[1] - 1)])
-                    x[count], y[count], z[count] = i - top, value, math.log(value)
-                    variance[count] = max(signal[row, i] + still, 0.1 * abs(still))
-                    weight[count] = value * value if guo else 1.0
-                    count += 1
-            if count < 3:
-                flags[row, k] = _TOO_FEW
-                continue
-            good = _parabola(x, z, weight, count, p, inverse) and p[2] < 0.0
-            last = np.inf
-            for _ in range(ITERATIONS if guo else 0):
-                if not good:
-                    break
-                u = -0.5 * p[1] / p[2]
-                if abs(u - last) < 1e-5:
-                    break
-                last = u
-                highest = p[0] - 0.25 * p[1] * p[1] / p[2]
-                for i in range(count):
-                    weight[i] = math.exp(2.0 * (p[0] + (p[1] + p[2] * x[i]) * x[i] - highest))
-                good = _parabola(x, z, weight, count, p, inverse) and p[2] < 0.0
-            if not good:
-                flags[row, k] = _NOT_CONVERGED
-                continue
-            u = -0.5 * p[1] / p[2]
-            if abs(u) > half:
-                flags[row, k] = _OUT_OF_WINDOW
-                continue
-            sigma = np.nan
-            weakest = FRACTION * seed[AMPLITUDE]
-            still = max(base + float(floor[row, min(top, floor.shape[1] - 1)]), 0.0)
-            if seed[WIDTH] >= NARROWEST and (guo or math.sqrt(weakest + still) < STEADY * weakest):
-                for i in range(count):
-                    d1 = inverse[1, 0] + (inverse[1, 1] + inverse[1, 2] * x[i]) * x[i]
-                    d2 = inverse[2, 0] + (inverse[2, 1] + inverse[2, 2] * x[i]) * x[i]
-                    # du = -(db + 2 u dc) / 2c, and ln y moves by 1 / y (by 1 / model where the weights are its square)
-                    model = math.exp(p[0] + (p[1] + p[2] * x[i]) * x[i]) if guo else y[i]
-                    weight[i] *= -(d1 + 2.0 * u * d2) / (2.0 * p[2] * model)
-                sigma = math.sqrt(linear_variance(weight, variance, x, count, correlation))
-            out[row, k, 0], out[row, k, 1] = top + u, sigma
-            out[row, k, 2], out[row, k, 3] = math.sqrt(-0.5 / p[2]), math.exp(p[0] - 0.25 * p[1] * p[1] / p[2])
-            out[row, k, 4] = base
+def _reweight(x: Array, z: Array, weight: Array, n: int, p: Array, inverse: Array) -> bool:
+    """Guo's iteration: fit again with the square of the fitted model as weight, until the centre rests."""
+    last = np.inf
+    for _ in range(ITERATIONS):
+        u = -0.5 * p[1] / p[2]
+        if abs(u - last) < 1e-5:
+            break
+        last = u
+        highest = p[0] - 0.25 * p[1] * p[1] / p[2]
+        for i in range(n):
+            weight[i] = math.exp(2.0 * (p[0] + (p[1] + p[2] * x[i]) * x[i] - highest))
+        if not (_parabola(x, z, weight, n, p, inverse) and p[2] < 0.0):
+            return False
+    return True
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _influence(x: Array, y: Array, n: int, p: Array, inverse: Array, guo: bool, weight: Array) -> None:
+    """weight (n,) of the fit -> how far the centre moves for one electron more in each pixel."""
+    u = -0.5 * p[1] / p[2]
+    for i in range(n):
+        d1 = inverse[1, 0] + (inverse[1, 1] + inverse[1, 2] * x[i]) * x[i]
+        d2 = inverse[2, 0] + (inverse[2, 1] + inverse[2, 2] * x[i]) * x[i]
+        # du = -(db + 2 u dc) / 2c, and ln y moves by 1 / y (by 1 / model where the weights are its square)
+        model = math.exp(p[0] + (p[1] + p[2] * x[i]) * x[i]) if guo else y[i]
+        weight[i] *= -(d1 + 2.0 * u * d2) / (2.0 * p[2] * model)
+
+
+@peak_kernel
+def measure_log_parabola(pixels: Pixels, row: int, seed: Array, flag: int, options: Options, out: Array) -> int:
+    """Peak kernel (`seed_loop`). options.variant: CARUANA or GUO."""
+    signal, mask, floor, w = pixels.signal[row], pixels.mask[row], pixels.floor[row], pixels.signal.shape[1]
+    x, y, z, weight, variance = pixels.room[0], pixels.room[1], pixels.room[2], pixels.room[3], pixels.room[4]
+    p, inverse, guo, base = np.empty(3), np.empty((3, 3)), options.variant == GUO, seed[BACKGROUND]
+    top = brightest(signal, mask, seed)
+    if top < 1 or top > w - 2:
+        return Flag.AT_BORDER.value
+    half = max(1, math.ceil(min(WINDOW * seed[WIDTH] + seed[PLATEAU], seed[REACH])))
+    level = 0.0 if guo else FRACTION * max(signal[top] - base, 0.0)
+    first, last = (top - half, top + half) if guo else _run(signal, mask, top, half, base + level)
+    count = 0
+    for i in range(max(0, first), min(w - 1, last) + 1):
+        value = signal[i] - base
+        if mask[i] == 0 and (value > level or (value > 0.0 and abs(i - top) < 2)):
+            x[count], y[count], z[count] = i - top, value, math.log(value)
+            variance[count] = pixel_variance(signal, floor, i)
+            weight[count] = value * value if guo else 1.0
+            count += 1
+    if count < 3:
+        return Flag.TOO_FEW_PIXELS.value
+    if not (_parabola(x, z, weight, count, p, inverse) and p[2] < 0.0):
+        return Flag.NOT_CONVERGED.value
+    if guo and not _reweight(x, z, weight, count, p, inverse):
+        return Flag.NOT_CONVERGED.value
+    u = -0.5 * p[1] / p[2]
+    if abs(u) > half:
+        return Flag.OUT_OF_WINDOW.value
+    sigma = np.nan
+    weakest = FRACTION * seed[AMPLITUDE]
+    dark = max(base + float(floor[min(top, floor.shape[0] - 1)]), 0.0)
+    if seed[WIDTH] >= NARROWEST and (guo or math.sqrt(weakest + dark) < STEADY * weakest):
+        _influence(x, y, count, p, inverse, guo, weight)
+        sigma = math.sqrt(linear_variance(weight, variance, x, count, pixels.correlation))
+    out[0], out[1] = top + u, sigma
+    out[2], out[3], out[4] = math.sqrt(-0.5 / p[2]), math.exp(p[0] - 0.25 * p[1] * p[1] / p[2]), base
+    return flag

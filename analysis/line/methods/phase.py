@@ -11,74 +11,55 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
 from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, REACH, WIDTH
+from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
 from analysis.line.methods.window import any_saturated, brightest, load_window, position_sigma, write_peak
 from analysis.line.result import Flag
 
-Float32 = NDArray[np.float32]
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
-
 NARROWEST = 0.5
-"""px; narrower lines are not band-limited (0.02 px at 0.4), and no sigma is claimed."""
-
-_SATURATED, _AT_BORDER = int(Flag.SATURATED), int(Flag.AT_BORDER)
-_NOT_CONVERGED, _OUT_OF_WINDOW = int(Flag.NOT_CONVERGED), int(Flag.OUT_OF_WINDOW)
+"""px; narrower lines are not band-limited (0.02 px at 0.4), and no sigma is reported."""
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def turn_seeds(
-    signal: Float32, mask: Mask, floor: Float32, seeds: Array, flags: Mask, correlation: Array, out: Array
-) -> None:
-    """Scan lines (n, w) and seeds (n, k, 6) -> out (n, k, 6): u, sigma_u, width, amplitude, background, NaN."""
-    w = signal.shape[1]
-    y, weight, sines, cosines = np.empty(w), np.empty(w), np.empty(w), np.empty(w)
-    known = -1
-    for row in range(signal.shape[0]):
-        for k in range(seeds.shape[1]):
-            for j in range(6):
-                out[row, k, j] = np.nan
-            if flags[row, k] > _SATURATED:
-                continue
-            seed = seeds[row, k]
-            middle = brightest(signal[row], mask[row], seed)
-            half = max(2, math.ceil(min(3.0 * seed[WIDTH] + 1.0 + seed[PLATEAU], seed[REACH])))
-            n = 2 * half + 1
-            step = 2.0 * math.pi / n
-            if half != known and n <= w:
-                for i in range(n):
-                    sines[i], cosines[i] = math.sin(step * (i - half)), math.cos(step * (i - half))
-                known = half
-            reason, u, real, imaginary, previous = _NOT_CONVERGED, np.nan, 0.0, 0.0, -1
-            for _ in range(8):
-                if load_window(signal[row], mask[row], middle - half, middle + half, seed[BACKGROUND], y) < 0:
-                    reason = _AT_BORDER
-                    break
-                real = imaginary = 0.0
-                for i in range(n):
-                    real += y[i] * cosines[i]
-                    imaginary += y[i] * sines[i]
-                if real <= 0.0 and abs(imaginary) <= 0.0:
-                    break
-                u = middle + math.atan2(imaginary, real) / step
-                if abs(u - seed[CENTRE]) > half:
-                    reason = _OUT_OF_WINDOW
-                    break
-                following = round(u)
-                if following in (middle, previous):  # at rest, or astride two pixels
-                    reason = flags[row, k]
-                    break
-                previous, middle = middle, following
-            flags[row, k] = reason
-            if reason > _SATURATED:
-                continue
-            sigma, first = np.nan, middle - half
-            if seed[WIDTH] >= NARROWEST and not any_saturated(mask[row], first, middle + half):
-                power = real * real + imaginary * imaginary
-                for i in range(n):
-                    weight[i] = (sines[i] * real - cosines[i] * imaginary) / (step * power)
-                sigma = position_sigma(signal[row], mask[row], floor[row], first, n, weight, correlation)
-            write_peak(seed, u, sigma, out[row, k])
+@peak_kernel
+def measure_phase(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
+    """Peak kernel (`seed_loop`)."""
+    signal, mask = pixels.signal[y], pixels.mask[y]
+    window, weight, sines, cosines = pixels.room[0], pixels.room[1], pixels.room[2], pixels.room[3]
+    middle = brightest(signal, mask, seed)
+    half = max(2, math.ceil(min(3.0 * seed[WIDTH] + 1.0 + seed[PLATEAU], seed[REACH])))
+    n = 2 * half + 1
+    if n > signal.shape[0]:
+        return Flag.AT_BORDER.value
+    step = 2.0 * math.pi / n
+    for i in range(half + 1):
+        sines[half + i], cosines[half + i] = math.sin(step * i), math.cos(step * i)
+        sines[half - i], cosines[half - i] = -sines[half + i], cosines[half + i]
+    reason, u, real, imaginary, previous = Flag.NOT_CONVERGED.value, np.nan, 0.0, 0.0, -1
+    for _ in range(8):
+        if load_window(signal, mask, middle - half, middle + half, seed[BACKGROUND], window) < 0:
+            return Flag.AT_BORDER.value
+        real = imaginary = 0.0
+        for i in range(n):
+            real += window[i] * cosines[i]
+            imaginary += window[i] * sines[i]
+        if real <= 0.0 and abs(imaginary) <= 0.0:
+            break
+        u = middle + math.atan2(imaginary, real) / step
+        if abs(u - seed[CENTRE]) > half:
+            return Flag.OUT_OF_WINDOW.value
+        following = round(u)
+        if following in (middle, previous):  # at rest, or astride two pixels
+            reason = flag
+            break
+        previous, middle = middle, following
+    if reason > Flag.SATURATED.value:
+        return reason
+    sigma, first = np.nan, middle - half
+    if seed[WIDTH] >= NARROWEST and not any_saturated(mask, first, middle + half):
+        power = real * real + imaginary * imaginary
+        for i in range(n):
+            weight[i] = (sines[i] * real - cosines[i] * imaginary) / (step * power)
+        sigma = position_sigma(signal, mask, pixels.floor[y], first, n, weight, pixels.correlation)
+    write_peak(seed, u, sigma, out)
+    return reason

@@ -13,16 +13,12 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING, SATURATED
 from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, REACH, WIDTH
-from analysis.line.methods.window import write_peak
+from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
+from analysis.line.methods.window import pixel_variance, write_peak
 from analysis.line.result import Flag
-
-Float32 = NDArray[np.float32]
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
 
 WIDEST = 6.0
 """px; the filter's largest sigma, which decides how many scan lines beyond a chunk are read."""
@@ -36,10 +32,8 @@ STEEPEST = 0.17
 WINDOW = 3.0
 """Half window of the centre of mass along the normal, in sigmas across the line."""
 STEPS = 30
-
-_OK, _SATURATED, _AT_BORDER = int(Flag.OK), int(Flag.SATURATED), int(Flag.AT_BORDER)
-_NOT_CONVERGED, _OUT_OF_WINDOW, _NOT_POSITIVE = int(Flag.NOT_CONVERGED), int(Flag.OUT_OF_WINDOW), int(Flag.NOT_POSITIVE)
-_ALONG = int(Flag.ALONG_SCAN_LINE)
+RIDGE, NORMAL_CENTROID = range(2)
+"""Variants."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -120,114 +114,103 @@ def normal(r: Array) -> tuple[float, float, float]:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def ridge_seeds(  # noqa: PLR0913
-    signal: Float32,
-    raw: Float32,
-    mask: Mask,
-    floor: Float32,
-    offset: int,
-    seeds: Array,
-    flags: Mask,
-    scale: float,
-    mass: bool,
-    independent: bool,
-    out: Array,
-) -> None:
-    """Filled scan lines (m, w) with those before smoothing, and seeds (n, k, 6) of lines offset.. -> out (n, k, 6).
+def _refine(
+    pixels: Pixels, y: int, seed: Array, spread: float, across: Array, along: Array
+) -> tuple[float, int, float, float, float, int]:
+    """Newton steps along the normal from the seed to the ridge, under a Gaussian of sigma `spread`.
 
-    scale: sigma_f over the seed's sigma. mass: go on with the centre of mass along the normal. independent: pixels
-    are, in their noise, so that a sigma can be claimed.
+    Returns its crossing with the scan line, the pixel that the taps are about, the derivative of n . grad r along the
+    scan line, n, and NOT_CONVERGED, AT_BORDER, OUT_OF_WINDOW, ALONG_SCAN_LINE or OK.
     """
-    m, w = signal.shape
-    size = 2 * HALO + 1
-    across, along, weight = np.zeros((3, size)), np.zeros((3, size)), np.zeros((size, size))
+    m, w = pixels.signal.shape
+    half = math.ceil(CUT * spread)
+    taps(0.0, half, spread, along)
     r = np.empty(5)
-    for row in range(seeds.shape[0]):
-        y = row + offset
-        for k in range(seeds.shape[1]):
-            for j in range(6):
-                out[row, k, j] = np.nan
-            if flags[row, k] > _SATURATED:
-                continue
-            seed = seeds[row, k]
-            spread = min(max(scale * seed[WIDTH], NARROWEST, 0.5 * seed[PLATEAU]), WIDEST)
-            half = math.ceil(CUT * spread)
-            taps(0.0, half, spread, along)
-            x, reason, slope, nx, ny = seed[CENTRE], _NOT_CONVERGED, -1.0, 1.0, 0.0
-            reach = 2.0 * spread + seed[WIDTH] + seed[PLATEAU] + 1.0
-            middle = round(x)
-            for _ in range(STEPS):
-                middle = round(x)
-                if min(x, w - 1 - x) < 2.0 * spread or min(y, m - 1 - y) < spread:
-                    reason = _AT_BORDER
-                    break
-                taps(x - middle, half, spread, across)
-                hessian(signal, seed[BACKGROUND], y, middle, half, across, along, r)
-                value, nx, ny = normal(r)
-                if value >= 0.0 or nx < STEEPEST:
-                    reason = _ALONG if value < 0.0 else _NOT_CONVERGED
-                    break
-                slope = value * nx
-                move = -(nx * r[0] + ny * r[1]) / slope
-                move = min(max(move, -spread), spread)
-                x += move
-                if abs(x - seed[CENTRE]) > reach:
-                    reason = _OUT_OF_WINDOW
-                    break
-                if abs(move) < 1e-6:
-                    reason = flags[row, k]
-                    break
-            if reason <= _SATURATED:
-                for j in range(-half, half + 1):
-                    for i in range(-half, half + 1):
-                        g = (
-                            nx * across[1, i + half] * along[0, j + half]
-                            + ny * across[0, i + half] * along[1, j + half]
-                        )
-                        weight[j + half, i + half] = g / slope
-                if mass:
-                    x, middle, half, reason = _weigh_normal(signal, seed, y, x, nx, ny, reason, weight)
-            flags[row, k] = reason
-            if reason > _SATURATED:
-                continue
-            sigma = weight_noise(raw, mask, floor, y, middle, half, weight) if independent else np.nan
-            write_peak(seed, x, sigma, out[row, k])
+    x, slope, nx, ny = seed[CENTRE], -1.0, 1.0, 0.0
+    reach = 2.0 * spread + seed[WIDTH] + seed[PLATEAU] + 1.0
+    middle = round(x)
+    for _ in range(STEPS):
+        middle = round(x)
+        if min(x, w - 1 - x) < 2.0 * spread or min(y, m - 1 - y) < spread:
+            return x, middle, slope, nx, ny, Flag.AT_BORDER.value
+        taps(x - middle, half, spread, across)
+        hessian(pixels.signal, seed[BACKGROUND], y, middle, half, across, along, r)
+        value, nx, ny = normal(r)
+        if value >= 0.0 or nx < STEEPEST:
+            reason = Flag.ALONG_SCAN_LINE.value if value < 0.0 else Flag.NOT_CONVERGED.value
+            return x, middle, slope, nx, ny, reason
+        slope = value * nx
+        move = -(nx * r[0] + ny * r[1]) / slope
+        move = min(max(move, -spread), spread)
+        x += move
+        if abs(x - seed[CENTRE]) > reach:
+            return x, middle, slope, nx, ny, Flag.OUT_OF_WINDOW.value
+        if abs(move) < 1e-6:
+            return x, middle, slope, nx, ny, Flag.OK.value
+    return x, middle, slope, nx, ny, Flag.NOT_CONVERGED.value
+
+
+@peak_kernel
+def measure_ridge(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
+    """Peak kernel (`seed_loop`) of scan lines without gaps. options.variant: RIDGE or NORMAL_CENTROID.
+
+    A sigma only where pixels are independent.
+    """
+    scale = 1.0 if options.variant == NORMAL_CENTROID else options.filter_scale
+    spread = min(max(scale * seed[WIDTH], NARROWEST, 0.5 * seed[PLATEAU]), WIDEST)
+    half = math.ceil(CUT * spread)
+    across, along = np.empty((3, 2 * half + 1)), np.empty((3, 2 * half + 1))
+    x, middle, slope, nx, ny, reason = _refine(pixels, y, seed, spread, across, along)
+    if reason > Flag.SATURATED.value:
+        return reason
+    if options.variant == NORMAL_CENTROID:
+        x, middle, weight, reason = _weigh_normal(pixels.signal, seed, y, x, nx, ny)
+        if reason > Flag.SATURATED.value:
+            return reason
+    else:
+        weight = np.empty((2 * half + 1, 2 * half + 1))
+        for j in range(2 * half + 1):
+            for i in range(2 * half + 1):
+                weight[j, i] = (nx * across[1, i] * along[0, j] + ny * across[0, i] * along[1, j]) / slope
+    sigma = np.nan
+    if pixels.correlation.shape[0] == 1:
+        sigma = weight_noise(pixels.signal, pixels.mask, pixels.floor, y, middle, weight)
+    write_peak(seed, x, sigma, out)
+    return flag
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _weigh_normal(
-    signal: Float32, seed: Array, y: int, x: float, nx: float, ny: float, reason: int, weight: Array
-) -> tuple[float, int, int, int]:
+    signal: Float32, seed: Array, y: int, x: float, nx: float, ny: float
+) -> tuple[float, int, Array, int]:
     """Centre of mass of bilinear samples 1 px apart along the normal through (x, y), moved until it rests.
 
-    Returns the crossing with the scan line, the middle and half size of weight (pixels' influence on it), the reason.
+    Returns the crossing with the scan line, the middle of weight (n, n) (pixels' influence on it), the reason.
     """
     m, w = signal.shape
     arm = max(1, math.ceil(min(WINDOW * seed[WIDTH] * nx + seed[PLATEAU], max(seed[REACH] * nx, 1.0), HALO - 2.0)))
     half = arm + 1
+    weight = np.zeros((2 * half + 1, 2 * half + 1))
     total = 0.0
-    outcome = _NOT_CONVERGED
+    reason = Flag.NOT_CONVERGED.value
     for _ in range(2 * STEPS):
         if x - arm * nx < 1.0 or x + arm * nx > w - 2.0 or y - arm * abs(ny) < 0.0 or y + arm * abs(ny) > m - 1.0:
-            return x, round(x), half, _AT_BORDER
+            return x, round(x), weight, Flag.AT_BORDER.value
         total, moment = 0.0, 0.0
         for j in range(-arm, arm + 1):
             value = _bilinear(signal, x + j * nx, y + j * ny) - seed[BACKGROUND]
             total += value
             moment += j * value
         if total <= 0.0:
-            return x, round(x), half, _NOT_POSITIVE
+            return x, round(x), weight, Flag.NOT_POSITIVE.value
         move = moment / total
         if abs(move) > arm or abs(x + move / nx - seed[CENTRE]) > 2.0 * arm + 1.0:
-            return x, round(x), half, _OUT_OF_WINDOW
+            return x, round(x), weight, Flag.OUT_OF_WINDOW.value
         x += move / nx
         if abs(move) < 1e-4:
-            outcome = reason
+            reason = Flag.OK.value
             break
     middle = round(x)
-    for j in range(2 * half + 1):
-        for i in range(2 * half + 1):
-            weight[j, i] = 0.0
     start = x
     for j in range(-arm, arm + 1):
         px, py = start + j * nx, y + j * ny
@@ -240,7 +223,7 @@ def _weigh_normal(
                 part = (ty if dy else 1.0 - ty) * (tx if dx else 1.0 - tx)
                 if 0 <= a + dy < 2 * half + 1 and 0 <= b + dx < 2 * half + 1:
                     weight[a + dy, b + dx] += share * part
-    return x, middle, half, outcome
+    return x, middle, weight, reason
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -255,19 +238,18 @@ def _bilinear(signal: Float32, x: float, y: float) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def weight_noise(raw: Float32, mask: Mask, floor: Float32, y: int, x: int, half: int, weight: Array) -> float:
+def weight_noise(signal: Float32, mask: Mask, floor: Float32, y: int, x: int, weight: Array) -> float:
     """Standard deviation of a position that moves by weight[j, i] for one electron more in pixel (x + i, y + j).
 
     NaN where a pixel is saturated or missing: its noise is not that of a count.
     """
-    m, w = raw.shape
-    total = 0.0
+    m, w = signal.shape
+    total, half = 0.0, weight.shape[0] // 2
     for j in range(-half, half + 1):
         b = min(max(y + j, 0), m - 1)
         for i in range(-half, half + 1):
             a = min(max(x + i, 0), w - 1)
             if mask[b, a] & (SATURATED | MISSING):
                 return np.nan
-            still = float(floor[b, min(a, floor.shape[1] - 1)])
-            total += weight[j + half, i + half] ** 2 * max(raw[b, a] + still, 0.1 * abs(still))
+            total += weight[j + half, i + half] ** 2 * pixel_variance(signal[b], floor[b], a)
     return math.sqrt(total)

@@ -5,7 +5,7 @@
     gauss_3   d = (ln a - ln c) / 2 (ln a - 2 ln b + ln c)
 
 a, b, c are the pixels above the background. All but gauss_3 are locked to the pixels (0.3, 0.1, 0.1 px at s = 0.6), so
-that they claim no sigma. A saturated plateau holds no more than its centre.
+that they report no sigma. A saturated plateau holds no more than its centre.
 """
 
 from __future__ import annotations
@@ -14,24 +14,17 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, WIDTH
+from analysis.line.methods.seed_loop import Array, Float32, Options, Pixels, peak_kernel
 from analysis.line.methods.window import any_saturated, brightest, load_window, position_sigma, write_peak
 from analysis.line.result import Flag
 
-Float32 = NDArray[np.float32]
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
-
 MAXIMUM, LINEAR, PARABOLA, GAUSS = range(4)
 NARROWEST = 0.55
-"""px; gauss_3 claims no sigma for narrower lines, where sampled logarithms bend (0.01 px at 0.4)."""
+"""px; gauss_3 reports no sigma for narrower lines, where sampled logarithms bend (0.01 px at 0.4)."""
 STEADY = 0.05
-"""px; where the sigma to be expected is larger, logarithms are no longer linear in the noise, and none is claimed."""
-
-_SATURATED, _AT_BORDER, _NOT_POSITIVE = int(Flag.SATURATED), int(Flag.AT_BORDER), int(Flag.NOT_POSITIVE)
-_NOT_CONVERGED = int(Flag.NOT_CONVERGED)
+"""px; where the sigma to be expected is larger, logarithms are no longer linear in the noise, and none is reported."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -41,61 +34,44 @@ def _is_steady(seed: Array, floor: Float32) -> bool:
         return False
     square = seed[WIDTH] * seed[WIDTH]
     flank = seed[AMPLITUDE] * math.exp(-0.5 / square)
-    still = seed[BACKGROUND] + floor[min(round(seed[CENTRE]), floor.shape[0] - 1)]
-    return bool(square * math.sqrt(0.5 * (flank + max(still, 0.0))) < STEADY * flank)
+    dark = seed[BACKGROUND] + floor[min(round(seed[CENTRE]), floor.shape[0] - 1)]
+    return bool(square * math.sqrt(0.5 * (flank + max(dark, 0.0))) < STEADY * flank)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def interpolate_seeds(
-    signal: Float32,
-    mask: Mask,
-    floor: Float32,
-    seeds: Array,
-    flags: Mask,
-    kind: int,
-    correlation: Array,
-    out: Array,
-) -> None:
-    """Scan lines (n, w) and seeds (n, k, 6) -> out (n, k, 6): u, sigma_u, width, amplitude, background, NaN."""
-    y, weight = np.empty(3), np.empty(3)
-    for row in range(signal.shape[0]):
-        for k in range(seeds.shape[1]):
-            for j in range(6):
-                out[row, k, j] = np.nan
-            if flags[row, k] > _SATURATED:
-                continue
-            seed = seeds[row, k]
-            top = brightest(signal[row], mask[row], seed)
-            if seed[PLATEAU] > 0.0:
-                write_peak(seed, seed[CENTRE], np.nan, out[row, k])
-                continue
-            if load_window(signal[row], mask[row], top - 1, top + 1, seed[BACKGROUND], y) < 0:
-                flags[row, k] = _AT_BORDER
-                continue
-            if kind == MAXIMUM:
-                write_peak(seed, float(top), np.nan, out[row, k])
-                continue
-            a, b, c = y[0], y[1], y[2]
-            offset, sigma = 0.0, np.nan
-            if kind == LINEAR:
-                rise = b - min(a, c)
-                offset = 0.5 * (c - a) / rise if rise > 0.0 else 0.0
-            elif kind == PARABOLA:
-                bend = a - 2.0 * b + c
-                offset = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
-            else:
-                if min(a, b, c) <= 0.0:
-                    flags[row, k] = _NOT_POSITIVE
-                    continue
-                la, lb, lc = math.log(a), math.log(b), math.log(c)
-                bend = la - 2.0 * lb + lc
-                if bend >= 0.0:
-                    flags[row, k] = _NOT_CONVERGED
-                    continue
-                offset = 0.5 * (la - lc) / bend
-                weight[0] = (0.5 - offset) / (bend * a)
-                weight[1] = 2.0 * offset / (bend * b)
-                weight[2] = (-0.5 - offset) / (bend * c)
-                if _is_steady(seed, floor[row]) and not any_saturated(mask[row], top - 1, top + 1):
-                    sigma = position_sigma(signal[row], mask[row], floor[row], top - 1, 3, weight, correlation)
-            write_peak(seed, top + min(max(offset, -1.0), 1.0), sigma, out[row, k])
+@peak_kernel
+def measure_three_pixels(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
+    """Peak kernel (`seed_loop`). options.variant: MAXIMUM, LINEAR, PARABOLA or GAUSS."""
+    signal, mask, window, kind = pixels.signal[y], pixels.mask[y], pixels.room[0], options.variant
+    top = brightest(signal, mask, seed)
+    if seed[PLATEAU] > 0.0:
+        write_peak(seed, seed[CENTRE], np.nan, out)
+        return flag
+    if load_window(signal, mask, top - 1, top + 1, seed[BACKGROUND], window) < 0:
+        return Flag.AT_BORDER.value
+    if kind == MAXIMUM:
+        write_peak(seed, float(top), np.nan, out)
+        return flag
+    a, b, c = window[0], window[1], window[2]
+    offset, sigma = 0.0, np.nan
+    if kind == LINEAR:
+        rise = b - min(a, c)
+        offset = 0.5 * (c - a) / rise if rise > 0.0 else 0.0
+    elif kind == PARABOLA:
+        bend = a - 2.0 * b + c
+        offset = 0.5 * (a - c) / bend if bend < 0.0 else 0.0
+    else:
+        if min(a, b, c) <= 0.0:
+            return Flag.NOT_POSITIVE.value
+        la, lb, lc = math.log(a), math.log(b), math.log(c)
+        bend = la - 2.0 * lb + lc
+        if bend >= 0.0:
+            return Flag.NOT_CONVERGED.value
+        offset = 0.5 * (la - lc) / bend
+        weight = pixels.room[1]
+        weight[0] = (0.5 - offset) / (bend * a)
+        weight[1] = 2.0 * offset / (bend * b)
+        weight[2] = (-0.5 - offset) / (bend * c)
+        if _is_steady(seed, pixels.floor[y]) and not any_saturated(mask, top - 1, top + 1):
+            sigma = position_sigma(signal, mask, pixels.floor[y], top - 1, 3, weight, pixels.correlation)
+    write_peak(seed, top + min(max(offset, -1.0), 1.0), sigma, out)
+    return flag

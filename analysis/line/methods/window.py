@@ -6,15 +6,11 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING, SATURATED
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, WIDTH
 from analysis.line.methods.line_profile import linear_variance
-
-Float32 = NDArray[np.float32]
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
+from analysis.line.methods.seed_loop import Array, Float32, Mask
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -71,6 +67,13 @@ def _neighbours(mask: Mask, i: int) -> tuple[int, int, float]:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def pixel_variance(signal: Float32, floor: Float32, i: int) -> float:
+    """Variance of a pixel of a scan line (w,), e-^2: its count and the floor (w,) or (1,)."""
+    noise_variance = float(floor[min(i, floor.shape[0] - 1)])
+    return float(max(signal[i] + noise_variance, 0.1 * abs(noise_variance)))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def any_saturated(mask: Mask, first: int, last: int) -> bool:
     """Whether a pixel of first..last only says "at least this much"."""
     found = np.uint8(0)
@@ -99,9 +102,7 @@ def position_sigma(
             weight[i] = 0.0
     for i in range(n):
         pixel = first + i
-        still = float(floor[min(pixel, floor.shape[0] - 1)])
-        x[i] = pixel
-        variance[i] = max(signal[pixel] + still, 0.1 * abs(still))
+        x[i], variance[i] = pixel, pixel_variance(signal, floor, pixel)
     return math.sqrt(linear_variance(weight, variance, x, n, correlation))
 
 

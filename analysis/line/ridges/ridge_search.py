@@ -9,17 +9,16 @@ which make a line      from the strongest on, to the neighbour whose distance an
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING, SATURATED
+from analysis.line.methods.seed_loop import Array, Float32, Mask
 from analysis.line.methods.steger_2d import CUT, hessian, normal, taps, weight_noise
 
-Float32 = NDArray[np.float32]
-Array = NDArray[np.float64]
-Mask = NDArray[np.uint8]
 Int = NDArray[np.int32]
 
 TILE, EVERY = 32, 4
@@ -29,10 +28,32 @@ SMOOTH, RADIUS = 1.5, 4
 COLUMNS = 9
 """Of a point: u, v, sigma along the normal, normal_x, normal_y, width, amplitude, background, significance."""
 STEPS = 12
-STILL = 1e-4
+REST = 1e-4
 """px."""
 EIGENVALUE_GAIN = 3.0 / (16.0 * math.pi)
 """Variance of r_nn for white noise of unit variance, times sigma_f^6."""
+
+
+class RidgeSearch(NamedTuple):
+    """An image that is searched for ridges, and how."""
+
+    signal: Float32
+    """(h, w) electrons, without gaps."""
+    mask: Mask
+    floor: Float32
+    """(h, w) or (h, 1) variance that does not come from the signal itself, e-^2."""
+    level: Array
+    """(rows, columns) background of the tiles, e-."""
+    noise: Array
+    """(rows, columns) standard deviation of a pixel in them, e-."""
+    spread: float
+    """sigma_f, px."""
+    threshold: float
+    """Least significance of the eigenvalue, in standard deviations of its noise."""
+    max_width: float
+    """px."""
+    independent: bool
+    """Whether pixels are, in their noise, so that a sigma can be reported."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -46,12 +67,12 @@ def tile_levels(smooth: Float32, mask: Mask, floor: Float32, gain: float, level:
     some = np.empty((TILE // EVERY + 1) ** 2, np.float32)
     for ty in range(level.shape[0]):
         for tx in range(level.shape[1]):
-            count, still = 0, 0.0
+            count, noise_variance = 0, 0.0
             for y in range(ty * TILE, min((ty + 1) * TILE, h), EVERY):
                 for x in range(tx * TILE + (y // EVERY) % EVERY, min((tx + 1) * TILE, w), EVERY):
                     if mask[y, x] & MISSING == 0:
                         some[count] = smooth[y, x]
-                        still += floor[y, min(x, floor.shape[1] - 1)]
+                        noise_variance += floor[y, min(x, floor.shape[1] - 1)]
                         count += 1
             if count == 0:
                 level[ty, tx], noise[ty, tx] = np.nan, np.nan
@@ -61,7 +82,7 @@ def tile_levels(smooth: Float32, mask: Mask, floor: Float32, gain: float, level:
             middle = part[count // 2]
             # half of the values lie within 0.6745 sigma; the lower half alone, since a line only adds
             spread = (middle - part[count // 4]) / (0.6745 * gain)
-            known = max(middle, 0.0) + still / count
+            known = max(middle, 0.0) + noise_variance / count
             level[ty, tx], noise[ty, tx] = middle, math.sqrt(max(known, spread * spread, 1e-2))
 
 
@@ -100,10 +121,10 @@ def smooth_columns(rows: Float32, kernel: Float32, start: int, stop: int, out: F
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def candidates(smooth: Float32, first: int, level: Array, noise: Array, rise: float, found: Int) -> int:
+def candidates(smooth: Float32, first: int, level: Array, noise: Array, threshold_sigma: float, found: Int) -> int:
     """Rows first.. of the smoothed image (m + 2, w), one more on either side -> (n, 2) pixels that may be on a ridge.
 
-    rise: above the background, in standard deviations of a pixel. Returns n, at most len(found).
+    threshold_sigma: above the background, in standard deviations of a pixel. Returns n, at most len(found).
     """
     m, w = smooth.shape
     count, tiles = 0, level.shape[1]
@@ -111,7 +132,7 @@ def candidates(smooth: Float32, first: int, level: Array, noise: Array, rise: fl
         ty = min((first + j - 1) // TILE, level.shape[0] - 1)
         row, above, below = smooth[j], smooth[j - 1], smooth[j + 1]
         for tx in range(tiles):
-            bound = np.float32(level[ty, tx] + rise * noise[ty, tx])
+            bound = np.float32(level[ty, tx] + threshold_sigma * noise[ty, tx])
             start, stop = max(tx * TILE, 1), min((tx + 1) * TILE, w - 1)
             if tx == tiles - 1:
                 stop = w - 1
@@ -150,76 +171,73 @@ def between(table: Array, u: float, v: float) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def settle(  # noqa: PLR0913
-    signal: Float32,
-    mask: Mask,
-    floor: Float32,
-    offset: int,
-    found: Int,
-    level: Array,
-    noise: Array,
-    spread: float,
-    threshold: float,
-    max_width: float,
-    claim: bool,
-    out: Array,
-    flags: Mask,
-) -> int:
-    """Candidates (n, 2) -> points (m, 9) on ridges; returns m. `signal` begins at row `offset` of the image.
+def _newton(
+    search: RidgeSearch, u0: int, v0: int, base: float, least: float, across: Array, along: Array
+) -> tuple[float, float, int, int, float, float, float]:
+    """Newton steps along the normal from a pixel -> u, v on the ridge, pixel of the taps, eigenvalue, normal.
 
-    spread: sigma_f. threshold: least significance of the eigenvalue. claim: pixels are independent, so that a sigma can
-    be told. Points further than a pixel from their candidate belong to another one.
+    The eigenvalue is 0 where there is no such point: it is above -least, or the steps do not rest within a pixel.
+    across, along (3, n): the taps at the point.
     """
-    h, w = signal.shape
+    h, w = search.signal.shape
+    half, edge = across.shape[1] // 2, 2.0 * search.spread
+    r, u, v, x, y = np.empty(5), float(u0), float(v0), u0, v0
+    for _ in range(STEPS):
+        if min(u, w - 1 - u) < edge or min(v, h - 1 - v) < edge:
+            break
+        x, y = round(u), round(v)
+        taps(u - x, half, search.spread, across)
+        taps(v - y, half, search.spread, along)
+        hessian(search.signal, base, y, x, half, across, along, r)
+        value, nx, ny = normal(r)
+        if not value < -least:
+            break
+        move = -(nx * r[0] + ny * r[1]) / value
+        move = min(max(move, -1.0), 1.0)
+        u += move * nx
+        v += move * ny
+        if max(abs(u - u0), abs(v - v0)) > 1.0:
+            break
+        if abs(move) < REST:
+            return u, v, x, y, value, nx, ny
+    return u, v, x, y, 0.0, 1.0, 0.0
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def refine_ridges(search: RidgeSearch, found: Int, out: Array, flags: Mask) -> int:
+    """Candidates (n, 2) -> points (m, 9) on ridges, and whether they are saturated; returns m.
+
+    A point further than a pixel from its candidate belongs to another one.
+    """
+    spread = search.spread
     half = math.ceil(CUT * spread)
     across, along = np.zeros((3, 2 * half + 1)), np.zeros((3, 2 * half + 1))
-    weight, r = np.zeros((2 * half + 1, 2 * half + 1)), np.empty(5)
+    weight = np.zeros((2 * half + 1, 2 * half + 1))
     eigen_noise = math.sqrt(EIGENVALUE_GAIN) / spread**3
-    edge = 2.0 * spread
     count = 0
     for k in range(found.shape[0]):
-        u, v = float(found[k, 0]), float(found[k, 1] - offset)
-        base = between(level, u, v + offset)
-        sigma = between(noise, u, v + offset)
-        value, nx, ny, rested = 0.0, 1.0, 0.0, False
-        x, y = found[k, 0], found[k, 1] - offset
-        for _ in range(STEPS):
-            if min(u, w - 1 - u) < edge or min(v, h - 1 - v) < edge:
-                break
-            x, y = round(u), round(v)
-            taps(u - x, half, spread, across)
-            taps(v - y, half, spread, along)
-            hessian(signal, base, y, x, half, across, along, r)
-            value, nx, ny = normal(r)
-            if not value < -threshold * eigen_noise * sigma:
-                break
-            move = -(nx * r[0] + ny * r[1]) / value
-            move = min(max(move, -1.0), 1.0)
-            u += move * nx
-            v += move * ny
-            if max(abs(u - found[k, 0]), abs(v + offset - found[k, 1])) > 1.0:
-                break
-            if abs(move) < STILL:
-                rested = True
-                break
-        if not rested:
+        u0, v0 = int(found[k, 0]), int(found[k, 1])
+        base, sigma = between(search.level, u0, v0), between(search.noise, u0, v0)
+        least = search.threshold * eigen_noise * sigma
+        u, v, x, y, value, nx, ny = _newton(search, u0, v0, base, least, across, along)
+        if value == 0.0:
             continue
-        total = height(signal, base, y, x, half, across, along)
+        total = height(search.signal, base, y, x, half, across, along)
         wide = -total / value  # of a Gaussian line: sigma^2 + sigma_f^2
         square = wide - spread * spread
-        if total <= 0.0 or square > max_width * max_width:
+        if total <= 0.0 or square > search.max_width * search.max_width:
             continue
         width = math.sqrt(max(square, 0.09))
         point = out[count]
-        point[0], point[1], point[2], point[3], point[4] = u, v + offset, np.nan, nx, ny
+        point[0], point[1], point[2], point[3], point[4] = u, v, np.nan, nx, ny
         point[5], point[6], point[7] = width, total * math.sqrt(wide) / width, base
         point[8] = -value / (eigen_noise * sigma)
-        flags[count] = mask[y, x] & SATURATED
-        if claim:
+        flags[count] = search.mask[y, x] & SATURATED
+        if search.independent:
             for j in range(2 * half + 1):
                 for i in range(2 * half + 1):
                     weight[j, i] = (nx * across[1, i] * along[0, j] + ny * across[0, i] * along[1, j]) / value
-            point[2] = weight_noise(signal, mask, floor, y, x, half, weight)
+            point[2] = weight_noise(search.signal, search.mask, search.floor, y, x, weight)
         count += 1
     return count
 
@@ -238,7 +256,7 @@ def height(signal: Float32, base: float, y: int, x: int, half: int, across: Arra
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def link(points: Array, place: Int, low: float, high: float, chain: Int, order: Int) -> int:
+def chain_points(points: Array, place: Int, low: float, high: float, chain: Int, order: Int) -> int:
     """Points (n, 9) in raster order -> chain (n,) of each, -1 for none, and its place in it; returns their number.
 
     place (h, w) is filled with -1. A chain begins at a significance of `high` and goes on while it is above `low`.

@@ -22,9 +22,10 @@ from analysis.line.ridges.ridge_search import (
     RADIUS,
     SMOOTH,
     TILE,
+    RidgeSearch,
     candidates,
-    link,
-    settle,
+    chain_points,
+    refine_ridges,
     smooth_columns,
     smooth_rows,
     tile_levels,
@@ -98,8 +99,12 @@ def find_ridges(
 
     found = _candidates(signal, mask, floor, level, spread, threads)
 
+    independent = chosen.smoothing == 0.0
+
     def points(pixels: NDArray[np.int32], sigma: float) -> tuple[Float, NDArray[np.uint8]]:
-        return _settle(signal, mask, floor, pixels, level, spread, sigma, chosen, threads)
+        least = LOW * chosen.threshold
+        search = RidgeSearch(signal, mask, floor, level, spread, sigma, least, chosen.max_width, independent)
+        return _refined(search, pixels, threads)
 
     width = chosen.width
     if width is None:
@@ -109,7 +114,7 @@ def find_ridges(
     table, flags = points(found, sigma)
     chain, order = np.full(len(table), -1, np.int32), np.zeros(len(table), np.int32)
     if len(table):
-        link(table, np.full((h, w), -1, np.int32), LOW * chosen.threshold, chosen.threshold, chain, order)
+        chain_points(table, np.full((h, w), -1, np.int32), LOW * chosen.threshold, chosen.threshold, chain, order)
     return _strung(table, flags, chain, order, chosen.threshold)
 
 
@@ -151,25 +156,14 @@ def _candidates(
     return np.concatenate([parts[start] for start in sorted(parts)])
 
 
-def _settle(  # noqa: PLR0913
-    signal: NDArray[np.float32],
-    mask: NDArray[np.uint8],
-    floor: NDArray[np.float32],
-    pixels: NDArray[np.int32],
-    level: Float,
-    spread: Float,
-    sigma: float,
-    settings: ExtractionSettings,
-    threads: int | None,
-) -> tuple[Float, NDArray[np.uint8]]:
+def _refined(search: RidgeSearch, pixels: NDArray[np.int32], threads: int | None) -> tuple[Float, NDArray[np.uint8]]:
     """Candidates (n, 2) -> points (m, 9) and flags (m,), one a pixel, in raster order."""
     out, flags = np.empty((len(pixels), COLUMNS)), np.empty(len(pixels), np.uint8)
     counts: dict[int, int] = {}
-    limits = (sigma, LOW * settings.threshold, settings.max_width, settings.smoothing == 0.0)
 
     def work(start: int, stop: int) -> None:
         part = slice(start, stop)
-        counts[start] = settle(signal, mask, floor, 0, pixels[part], level, spread, *limits, out[part], flags[part])
+        counts[start] = refine_ridges(search, pixels[part], out[part], flags[part])
 
     chunk = 256
     map_chunks(work, len(pixels), chunk, threads)

@@ -34,7 +34,7 @@ MEMORY = 0.2
 """Weight of the newest link in a chain's slope."""
 
 
-def follow(candidates: Line, allowed: Mask | None = None) -> Line:
+def select_chain(candidates: Line, allowed: Mask | None = None) -> Line:
     """Peaks (n, k) -> Line (n, 1) of the cheapest chains; `allowed` (n, k) leaves candidates out.
 
     Scan lines without a peak on a chain are flagged NO_PEAK, or REJECTED where there were candidates.

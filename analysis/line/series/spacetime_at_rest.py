@@ -66,7 +66,7 @@ def passage(
         raise InputError("the frames are not of one shape and type", where="frames", found=found, allowed="all (h, w)")
     height, width = stack[0].shape
     if motion != (0.0, 0.0):
-        stack = [_follow(frame, motion, t - 0.5 * (len(stack) - 1), noise) for t, frame in enumerate(stack)]
+        stack = [_align(frame, motion, t - 0.5 * (len(stack) - 1), noise) for t, frame in enumerate(stack)]
     chosen = (settings or ExtractionSettings()).model_copy(update={"peaks": 1, "smoothing": 0.0, "axis": "rows"})
     series = np.ascontiguousarray(np.stack(stack, axis=2)).reshape(height * width, len(stack))
     line = measure(Lines(series, "mono", None, noise), chosen, threads)
@@ -75,7 +75,7 @@ def passage(
     return Passage(u, sigma_u, spread, amplitude, line.flag.reshape(shape))
 
 
-def _follow(frame: NDArray[Any], motion: tuple[float, float], time: float, noise: NoiseModel) -> NDArray[np.float32]:
+def _align(frame: NDArray[Any], motion: tuple[float, float], time: float, noise: NoiseModel) -> NDArray[np.float32]:
     """The frame shifted so that a moving surface stands still; NaN where it would look beyond the image."""
     from scipy.ndimage import shift
 

@@ -9,7 +9,7 @@ frame k, that edges, textures and occlusion do not pull.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from analysis.line.detection.channel import MISSING, SATURATED, Lines
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, SEED_COLUMNS, WIDTH
 from analysis.line.detection.noise import NoiseModel
-from analysis.line.methods.gaussian_fit import fit_seeds
+from analysis.line.methods.gaussian_fit import LIKELIHOOD, measure_gaussian
+from analysis.line.methods.seed_loop import ROOM, Options, Pixels, seed_kernel
 from analysis.line.result import Flag, Line
 from render.base.errors import InputError
 from render.base.threads import map_chunks
@@ -36,56 +37,74 @@ SETTLED = 0.005
 """px; of the last step, or a tenth of sigma_u."""
 
 
-def along_time(  # noqa: PLR0913
-    line: Line,
-    frames: Sequence[NDArray[Any]],
-    at: int,
-    moves: Float,
-    plane: Float,
-    camera: Camera,
-    noise: NoiseModel,
-    *,
-    variances: Sequence[NDArray[Any]] | None = None,
-    threads: int | None = None,
-) -> Line:
-    """The line of frame `at` -> the same peaks measured along time, where they settle; others carry a reason.
+@dataclass(frozen=True)
+class Sweep:
+    """Frames of a moving scan around the one that is measured, frame `at`."""
 
-    frames (t) of (h, w) mono DN; moves (t, 4, 4) takes a point of the surface from the camera's frame at `at` to that
-    at t; plane (4,) of the laser in the camera's frame. variances (t) of (h, w) e-^2 for fused images.
-    InputError: colour, a motion that leaves the surface under the sheet, or one too fast for its width.
-    """
-    if any(frame.ndim != 2 for frame in frames):
-        raise InputError("along time only mono images can be followed", where="extraction.spacetime", found="colour")
-    found = line.valid
-    index, rank = np.nonzero(found)
-    u, scan = line.u[index, rank], index.astype(np.float64)
-    normal = plane[:3] / np.linalg.norm(plane[:3])
-    offset = float(plane[3] / np.linalg.norm(plane[:3]))
+    frames: Sequence[NDArray[Any]]
+    """(t) of (h, w) mono DN."""
+    at: int
+    moves: Float
+    """(t, 4, 4): takes a point of the surface from the camera's frame at `at` to that at t."""
+    plane: Float
+    """(4,) of the laser in the camera's frame."""
+    camera: Camera
+    noise: NoiseModel
+    variances: Sequence[NDArray[Any]] | None = None
+    """(t) of (h, w) e-^2, for fused images."""
 
-    def path(along: Float, which: Float, first: int, last: int) -> Float:
-        """(m,) positions -> (m, t, 2) pixels of their surface points in frames first..last - 1."""
-        pixel = np.column_stack((along, which) if line.axis == "rows" else (which, along))
+
+class _Paths:
+    """Where the surface points at positions (m,) of a line are seen in the frames first..last - 1."""
+
+    def __init__(self, sweep: Sweep, line: Line) -> None:
+        self.sweep, self.along_rows = sweep, line.axis == "rows"
+        self.index, self.rank = np.nonzero(line.valid)
+        self.scan = self.index.astype(np.float64)
+
+    def pixels(self, u: Float, first: int, last: int) -> Float:
+        """(m,) px -> (m, t, 2) px."""
+        plane, camera = self.sweep.plane, self.sweep.camera
+        scale = np.linalg.norm(plane[:3])
+        pixel = np.column_stack((u, self.scan) if self.along_rows else (self.scan, u))
         rays = np.column_stack([camera.normalise(pixel)[0], np.ones(len(pixel))])
         with np.errstate(divide="ignore", invalid="ignore"):
-            points = rays * (-offset / (rays @ normal))[:, None]
-        part = moves[first:last]
+            points = rays * (-float(plane[3] / scale) / (rays @ (plane[:3] / scale)))[:, None]
+        part = self.sweep.moves[first:last]
         moved = np.einsum("tij,mj->mti", part[:, :3, :3], points) + part[:, :3, 3]
         return camera.project(np.nan_to_num(moved, nan=-1.0))[0]
 
+    def speed(self, u: Float) -> Float:
+        """(m,) px per frame that the surface moves along the scan line."""
+        before, after = max(0, self.sweep.at - 1), min(len(self.sweep.frames) - 1, self.sweep.at + 1)
+        seen = self.pixels(u, before, after + 1)[:, :, 0 if self.along_rows else 1]
+        return np.asarray((seen[:, -1] - seen[:, 0]) / max(after - before, 1))
+
+
+def along_time(line: Line, sweep: Sweep, threads: int | None = None) -> Line:
+    """The line of frame `sweep.at` -> the same peaks measured along time, where they settle; others carry a reason.
+
+    InputError: colour, a motion that leaves the surface under the sheet, or one too fast for its width.
+    """
+    frames, at = sweep.frames, sweep.at
+    if any(frame.ndim != 2 for frame in frames):
+        raise InputError("along time only mono images can be followed", where="extraction.spacetime", found="colour")
+    paths = _Paths(sweep, line)
+    u, width = line.u[paths.index, paths.rank], line.width[paths.index, paths.rank]
     if len(u) == 0:
         return line
-    speed = _speed(path, u, scan, at, len(frames), line.axis)
-    spread = _spread(line.width[index, rank], speed)
+    speed = paths.speed(u)
+    spread = _spread(width, speed)
     half = int(min(max(np.ceil(5.0 * spread) + 2, FEWEST), MOST))
     first, last = max(0, at - half), min(len(frames), at + half + 1)
 
-    def passage(along: Float, which: Float) -> Line:
-        series, variance, share = _sample(frames, variances, first, path(along, which, first, last), noise)
-        return _fit(Lines(series, "mono", None, noise, variance=variance), share, at - first, spread, threads)
+    def passage(along: Float) -> Line:
+        series, variance, share = _sample(sweep, first, paths.pixels(along, first, last))
+        return _fit(Lines(series, "mono", None, sweep.noise, variance=variance), share, at - first, spread, threads)
 
     slope = -speed  # px that the position moves for each frame that the passage comes late
     last_u, last_late = u, np.full(len(u), np.nan)
-    move, result = np.full(len(u), np.nan), passage(u, scan)
+    move, result = np.full(len(u), np.nan), passage(u)
     for _ in range(STEPS):
         late = result.u[:, 0] - (at - first)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -93,22 +112,15 @@ def along_time(  # noqa: PLR0913
         # a surface seen at a slant turns the slope by some, never round
         sane = np.isfinite(secant) & (secant / -speed > 0.2) & (secant / -speed < 5.0)
         slope = np.where(sane & (np.abs(late - last_late) > 1e-3), secant, slope)
-        limit = 2.0 * line.width[index, rank] + 1.0
+        limit = 2.0 * width + 1.0
         move = np.clip(-slope * late, -limit, limit)
         open_ = np.abs(move) > np.maximum(SETTLED, 0.1 * np.abs(slope) * result.sigma_u[:, 0])
         if not open_.any():
             break
         last_u, last_late = np.where(open_, u, last_u), np.where(open_, late, last_late)
         u = np.where(open_, u + move, u)
-        result = passage(u, scan)
-    return _settled(line, index, rank, u + np.nan_to_num(move), move, slope, result)
-
-
-def _speed(path: Any, u: Float, scan: Float, at: int, count: int, axis: str) -> Float:
-    """(m,) px per frame that the surface moves along the scan line."""
-    before, after = max(0, at - 1), min(count - 1, at + 1)
-    seen = path(u, scan, before, after + 1)[:, :, 0 if axis == "rows" else 1]
-    return np.asarray((seen[:, -1] - seen[:, 0]) / max(after - before, 1))
+        result = passage(u)
+    return _settled(line, paths.index, paths.rank, u + np.nan_to_num(move), move, slope, result)
 
 
 def _spread(width: Float, speed: Float) -> float:
@@ -132,17 +144,12 @@ def _spread(width: Float, speed: Float) -> float:
     return spread
 
 
-def _sample(
-    frames: Sequence[NDArray[Any]],
-    variances: Sequence[NDArray[Any]] | None,
-    first: int,
-    pixels: Float,
-    noise: NoiseModel,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], Float]:
+def _sample(sweep: Sweep, first: int, pixels: Float) -> tuple[NDArray[np.float32], NDArray[np.float32], Float]:
     """(m, t, 2) pixels -> (m, t) DN and variance of a pixel there in e-^2, bilinear, NaN off the image.
 
     Third (m,): how much of that variance is left in a mean of four pixels, typically.
     """
+    frames, variances, noise = sweep.frames, sweep.variances, sweep.noise
     m, count = pixels.shape[:2]
     series, spread = np.full((m, count), np.nan, np.float32), np.ones((m, count), np.float32)
     share, seen = np.zeros(m), np.zeros(m)
@@ -183,6 +190,8 @@ def _fit(lines: Lines, share: Float, at: int, spread: float, threads: int | None
     """
     out = np.empty((lines.count, 1, 6))
     flags = np.empty((lines.count, 1), np.uint8)
+    longest = lines.image.shape[1] / 4.0
+    options = Options(LIKELIHOOD, integrated=False, known_width=False, max_width=longest, filter_scale=1.0)
 
     def work(start: int, stop: int) -> None:
         signal, mask, floor = lines.read(start, stop)
@@ -203,9 +212,8 @@ def _fit(lines: Lines, share: Float, at: int, spread: float, threads: int | None
         full = (mask & SATURATED).any(axis=1)
         edge = (top <= 0) | (top >= count - 1) | ~np.isfinite(near.max(axis=1))
         flags[start:stop, 0] = np.where(edge, Flag.AT_BORDER, np.where(full, Flag.SATURATED, Flag.OK))
-        fit_seeds(
-            signal, mask, floor, seeds, flags[start:stop], True, False, np.ones(1), False, count / 4.0, out[start:stop]
-        )
+        pixels = Pixels(signal, mask, floor, np.ones(1), 0, np.empty((ROOM, count)))
+        seed_kernel(measure_gaussian)(pixels, seeds, flags[start:stop], options, out[start:stop])
 
     map_chunks(work, lines.count, 256, threads)
     u, sigma_u, width, amplitude, background, chi2 = (np.ascontiguousarray(out[..., j]) for j in range(6))

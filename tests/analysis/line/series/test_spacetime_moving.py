@@ -5,7 +5,7 @@ import pytest
 
 from analysis.line.extract import extract
 from analysis.line.result import Flag
-from analysis.line.series.spacetime_moving import along_time
+from analysis.line.series.spacetime_moving import Sweep, along_time
 from render.base.errors import InputError
 from render.camera.camera import Camera
 from tests.analysis.line.line_images import electrons
@@ -45,7 +45,7 @@ def sweep(ratio=1.0, amplitude=4000.0, noise=None, sheet=SHEET):
 def refined(frames, **other):
     line = extract(frames[AT], noise=electrons(2.5))
     arguments = {"moves": moves(), "plane": PLANE, "camera": CAMERA, "noise": electrons(2.5)} | other
-    return line, along_time(line, frames, AT, **arguments)
+    return line, along_time(line, Sweep(frames, AT, **arguments))
 
 
 def test_edges_of_albedo_pull_the_line_of_one_frame_and_not_that_along_time():
@@ -76,7 +76,7 @@ def test_the_ends_of_a_sweep_say_that_the_passage_is_cut():
     line = extract(frames[0], noise=electrons(2.5))
     cut = moves()
     cut[:, :3, 3] = np.outer(np.arange(FRAMES), (STEP, 0.0, 0.0))
-    found = along_time(line, frames, 0, cut, PLANE, CAMERA, electrons(2.5))
+    found = along_time(line, Sweep(frames, 0, cut, PLANE, CAMERA, electrons(2.5)))
     assert (~found.valid).mean() > 0.9
     assert set(found.flag[~found.valid].tolist()) <= {Flag.AT_BORDER, Flag.NO_PEAK, Flag.NOT_CONVERGED}
 

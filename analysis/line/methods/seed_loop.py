@@ -1,0 +1,81 @@
+"""The loop over scan lines and seeds, written once: a method is a kernel that measures the peak at one seed.
+
+    measure(pixels, y, seed, flag, options, out) -> flag
+
+pixels holds the scan line y and those around it, seed (6,) where `detect` saw a peak and how wide and high it is, flag
+what it said of it (OK or SATURATED). The kernel writes out (6,): u, sigma_u, width, amplitude, background, chi2, NaN
+where it has none, and returns the flag that the peak keeps. An out without a position stays NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+
+from analysis.line.result import Flag
+
+Float32 = NDArray[np.float32]
+Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+
+ROOM = 11
+"""Scan lines of scratch that a method may use."""
+
+
+class Pixels(NamedTuple):
+    """Scan lines as the kernels read them, and scratch that they may write to."""
+
+    signal: Float32
+    """(m, w) electrons; without gaps for methods that look at neighbouring scan lines."""
+    mask: Mask
+    """(m, w) bits SATURATED and MISSING of `detection.channel`."""
+    floor: Float32
+    """(m, w) or (m, 1) variance that does not come from the signal itself, e-^2."""
+    correlation: Array
+    """(c,) of the noise of pixels that are 0, 1, .. apart; [1] where they are independent."""
+    first: int
+    """The scan line of the first row of seeds."""
+    room: Array
+    """(ROOM, w)."""
+
+
+class Options(NamedTuple):
+    """What a method may be told."""
+
+    variant: int
+    """Which of the methods that share a kernel."""
+    integrated: bool
+    """Whether the profile is that of a Gaussian integrated over each pixel, else taken at its centre."""
+    known_width: bool
+    """Whether the seeds' width is given and not measured."""
+    max_width: float
+    """px; wider is no line."""
+    filter_scale: float
+    """Sigma of a filter over that of the line."""
+
+
+peak_kernel = register_jitable(error_model="numpy", forceinline=True)
+"""Of a kernel that measures one peak: known by its name, so that the loop around it is found in the kernel cache."""
+
+
+@cache
+def seed_kernel(measure: Callable[..., int]) -> Callable[[Pixels, Array, Mask, Options, Array], None]:
+    """The kernel of one peak -> that of all seeds (n, k, 6): flags (n, k) are updated, out (n, k, 6) is written."""
+
+    @njit(nogil=True, cache=True, error_model="numpy")
+    def run(pixels: Pixels, seeds: Array, flags: Mask, options: Options, out: Array) -> None:
+        for row in range(seeds.shape[0]):
+            for k in range(seeds.shape[1]):
+                for j in range(out.shape[2]):
+                    out[row, k, j] = np.nan
+                if flags[row, k] <= Flag.SATURATED.value:
+                    y = pixels.first + row
+                    flags[row, k] = measure(pixels, y, seeds[row, k], flags[row, k], options, out[row, k])
+
+    return run
