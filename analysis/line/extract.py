@@ -59,7 +59,7 @@ def extract(
     lines = replace(lines, smoothing=chosen.smoothing)
     alone = chosen.select == "strongest" and volume is None
     wanted = chosen if alone else chosen.model_copy(update={"peaks": max(chosen.peaks, CANDIDATES)})
-    line = replace(measure(lines, wanted, threads), note=note)
+    line = replace(measure(lines, wanted, threads, judge=True), note=note)
     check_finite("line", positions=line.u[line.valid])
     return line if alone else select(line, chosen.select, volume)
 

@@ -65,8 +65,11 @@ METHODS = {
 }
 
 
-def measure(lines: Lines, settings: ExtractionSettings, threads: int | None) -> Line:
-    """Scan lines -> Line with arrays (n, peaks); a chunk writes its own rows, so threads change nothing."""
+def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, judge: bool = False) -> Line:
+    """Scan lines -> Line with arrays (n, peaks); a chunk writes its own rows, so threads change nothing.
+
+    judge: what is no single Gaussian line is measured as two, or flagged; not for who asks how well a line fits.
+    """
     estimator = METHODS[settings.method]
     run, halo = seed_kernel(estimator.measure), estimator.halo
     correlation = smoothing_correlation(settings.smoothing)
@@ -85,6 +88,7 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None) -> 
         known_width=settings.width is not None,
         max_width=settings.max_width,
         filter_scale=settings.filter_scale,
+        judge=judge,
     )
 
     def work(start: int, stop: int) -> None:

@@ -14,7 +14,7 @@ Axis = Literal["rows", "columns"]
 
 
 class Flag(IntEnum):
-    """Why a peak is as it is. OK and SATURATED carry a position, every other flag a reason for there being none."""
+    """Why a peak is as it is. OK and those of `CAUTIOUS` carry a position, others a reason for there being none."""
 
     OK = 0
     SATURATED = 1
@@ -38,6 +38,21 @@ class Flag(IntEnum):
     """The line runs along the scan line, so that it has no crossing with it."""
     REJECTED = 11
     """There are peaks, but none that continuity and geometry allow."""
+    UNRESOLVED = 12
+    """The line is too narrow for its pixels: the position is a mean over where in the pixel it may be."""
+    BLENDED = 13
+    """Two lines closer than they can be told apart; the position is that of the brighter one."""
+    MISFIT = 14
+    """The profile is not that of a line, nor of two; sigma_u holds what that may cost."""
+
+
+CAUTIOUS = (Flag.SATURATED, Flag.UNRESOLVED, Flag.BLENDED, Flag.MISFIT)
+"""Flags of positions that the model of a line on level ground does not hold for; sigma_u says what that costs."""
+
+
+def positioned(flag: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Which flags carry a position."""
+    return np.isin(flag, (Flag.OK, *CAUTIOUS))
 
 
 @dataclass(frozen=True)
@@ -70,7 +85,7 @@ class Line:
     @property
     def valid(self) -> NDArray[np.bool_]:
         """(n, k): has a position."""
-        return self.flag <= Flag.SATURATED
+        return positioned(self.flag)
 
     def pixels(self) -> tuple[Float, NDArray[np.intp], NDArray[np.intp]]:
         """Valid peaks as (m, 2) pixels (u, v) in the image, with their scan line (m,) and rank (m,)."""

@@ -76,7 +76,7 @@ class ExtractedLine(Line):
 
     @property
     def flags(self) -> NDArray[np.uint8]:
-        """(n, k) codes of `blazer.Flag`: why a peak is as it is, OK and SATURATED have a position."""
+        """(n, k) codes of `blazer.Flag`: why a peak has no position, or what is to be minded of one."""
         return self.flag
 
     def __repr__(self) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from analysis.line.detection.background_slope import background_slope
 from analysis.line.detection.channel import SATURATED
 from analysis.line.detection.matched_filter import (
     FILTER_SIGMA,
@@ -30,9 +31,10 @@ Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-CENTRE, WIDTH, AMPLITUDE, BACKGROUND, REACH, PLATEAU = range(6)
-"""Columns of a seed: px, px, e-, e-, px half-way to the nearest other peak, half width in px of a saturated plateau."""
-SEED_COLUMNS = 6
+CENTRE, WIDTH, AMPLITUDE, BACKGROUND, REACH, PLATEAU, SLOPE, SLOPE_SIGMA = range(8)
+"""Columns of a seed: px, px, e-, e-, px half-way to the nearest other peak, half width in px of a saturated plateau;
+slope of the background along the scan line and its standard deviation, e-/px."""
+SEED_COLUMNS = 8
 
 NEIGHBOUR = 0.05
 """Fraction of a peak's response from which another peak limits its window of pixels."""
@@ -163,7 +165,7 @@ def _measure(
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: Array, flags: Mask) -> None:
-    """Scan lines (n, w) in electrons -> seeds (n, k, 6) and flags (n, k), strongest first.
+    """Scan lines (n, w) in electrons -> seeds (n, k, 8) and flags (n, k), strongest first.
 
     floor (n, w) or (n, 1): variance of a pixel without signal, e-^2.
     """
@@ -213,4 +215,11 @@ def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: A
                     reach = min(reach, 0.5 * distance)
             height[best] = -strength  # taken: no longer a candidate, still a neighbour
             seed[REACH] = reach
+            inner, outer = 4.0 * seed[WIDTH] + 1.5 + seed[PLATEAU], 8.0 * seed[WIDTH] + 6.5 + seed[PLATEAU]
+            beside, slope, slope_sigma = background_slope(
+                signal[y], mask[y], dark, seed[CENTRE], inner, min(outer, reach)
+            )
+            if slope != 0.0:  # on it the blocks' median is the level beside the line
+                flags[y, taken] = _measure(line, response, mask[y], pixel, beside, dark, limits, seed)
+            seed[SLOPE], seed[SLOPE_SIGMA] = slope, slope_sigma
             taken += 1

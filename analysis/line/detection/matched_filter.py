@@ -253,10 +253,15 @@ def local_maxima(response: Float32, level: Array, margin: Array, at: NDArray[np.
         bound[b] = level[b] + margin[b]
     found = 0
     for b in range(-1, blocks):
-        # from the centre of one block to the next the bound is a straight line, beyond the outermost it is level
+        # from the centre of one block to the next the bound is a straight line, and goes on beyond the outermost
         start = 0 if b < 0 else b * block + block // 2
         stop = w if b == blocks - 1 else (b + 1) * block + block // 2
         low, high = bound[max(b, 0)], bound[min(b + 1, blocks - 1)]
+        if blocks > 1 and b < 0:
+            low -= np.float32(0.5) * (bound[1] - bound[0])
+            high = low + (bound[1] - bound[0])
+        elif blocks > 1 and b == blocks - 1:
+            high += bound[b] - bound[b - 1]
         # without a branch, and most often over a length known beforehand: most stretches hold nothing
         lowest, above, origin = min(low, high), np.int32(0), np.uint64(start)
         if stop - start == BLOCK:

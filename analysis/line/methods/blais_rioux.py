@@ -41,7 +41,7 @@ def measure_zero_crossing(pixels: Pixels, y: int, seed: Array, flag: int, option
     while search > 1 and (top - search - arm < 0 or top + search + arm > signal.shape[0] - 1):
         search -= 1
     half = search + arm
-    if load_window(signal, mask, top - half, top + half, 0.0, window) < 0:
+    if load_window(signal, mask, top - half, top + half, seed, window) < 0:
         return Flag.AT_BORDER.value
     for distance in range(search):
         for side in (-1, 1):

@@ -11,10 +11,10 @@ import math
 import numpy as np
 
 from analysis.line.detection.channel import MISSING
-from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, REACH, WIDTH
+from analysis.line.detection.detect import CENTRE, PLATEAU, REACH, WIDTH
 from analysis.line.methods.line_profile import linear_variance
 from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
-from analysis.line.methods.window import pixel_variance, write_peak
+from analysis.line.methods.window import ground, pixel_variance, slope_variance, write_peak
 from analysis.line.result import Flag
 
 WINDOW = 3.0
@@ -30,7 +30,6 @@ LOCKED = 0.5
 def measure_centroid(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
     """Peak kernel (`seed_loop`). The width is that of the seed."""
     signal, mask, floor, w = pixels.signal[y], pixels.mask[y], pixels.floor[y], pixels.signal.shape[1]
-    base = seed[BACKGROUND]
     half = max(1, math.ceil(min(max(WINDOW * seed[WIDTH], seed[PLATEAU] + 2.5 * seed[WIDTH]), seed[REACH])))
     middle = round(seed[CENTRE])
     u, mass, previous = np.nan, 0.0, -1
@@ -41,7 +40,7 @@ def measure_centroid(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         count, mass, moment = 0, 0.0, 0.0
         for i in range(middle - half, middle + half + 1):
             if mask[i] & MISSING == 0:
-                value = signal[i] - base
+                value = signal[i] - ground(seed, i)
                 mass += value
                 moment += value * (i - middle)
                 count += 1
@@ -65,7 +64,8 @@ def measure_centroid(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
             x[count], weight[count], variance[count] = i, (i - u) / mass, pixel_variance(signal, floor, i)
             count += 1
     clipped = CLIPPED / seed[WIDTH] if reason == Flag.SATURATED.value else 0.0
-    sigma = math.sqrt(linear_variance(weight, variance, x, count, pixels.correlation) + clipped * clipped)
+    unknown = clipped * clipped + slope_variance(seed, weight, x, count)
+    sigma = math.sqrt(linear_variance(weight, variance, x, count, pixels.correlation) + unknown)
     # sampling locks narrow lines to the pixels by exp(-2 pi^2 s^2) / pi px at most
     locked = math.exp(-2.0 * (math.pi * seed[WIDTH]) ** 2) / math.pi
     write_peak(seed, u, sigma if seed[WIDTH] > NARROWEST and locked < LOCKED * sigma else np.nan, out)

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import njit
 
-from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, WIDTH
+from analysis.line.detection.detect import CENTRE, PLATEAU, WIDTH
 from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
 from analysis.line.methods.window import any_saturated, brightest, load_window, position_sigma, write_peak
 from analysis.line.result import Flag
@@ -90,7 +90,7 @@ def measure_derivative_zero(pixels: Pixels, y: int, seed: Array, flag: int, opti
     if min(top - first, last - top) < 2.0 * spread:
         return Flag.AT_BORDER.value
     n = last - first + 1
-    load_window(signal, mask, first, last, seed[BACKGROUND], window)
+    load_window(signal, mask, first, last, seed, window)
     x, slope, found = _cross(window, n, float(top - first), reach, spread, weight)
     if found and steps > 0:
         x, slope, found = _iterate(window, n, float(round(x)), spread, steps, weight)
@@ -102,6 +102,6 @@ def measure_derivative_zero(pixels: Pixels, y: int, seed: Array, flag: int, opti
     if steps > 1 and seed[WIDTH] >= HONEST and not any_saturated(mask, first, last):
         for i in range(n):
             weight[i] /= -slope
-        sigma = position_sigma(signal, mask, pixels.floor[y], first, n, weight, pixels.correlation)
+        sigma = position_sigma(pixels, y, seed, first, n, weight)
     write_peak(seed, first + x, sigma, out)
     return flag

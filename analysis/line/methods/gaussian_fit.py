@@ -11,20 +11,23 @@ import math
 import numpy as np
 from numba import njit
 
-from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, REACH, WIDTH
-from analysis.line.methods.line_profile import linear_variance, profile
-from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
+from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, REACH, SLOPE, WIDTH
+from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE, linear_variance, profile
+from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
+from analysis.line.methods.narrow_line import NARROWEST, posterior
+from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
+from analysis.line.methods.two_lines import UNKNOWNS
+from analysis.line.methods.window import slope_variance
 from analysis.line.result import Flag
 
 LEAST_SQUARES, LIKELIHOOD = range(2)
 """Variants."""
-POSITION, ELECTRONS, FLOOR, VARIANCE = range(4)
-"""Rows of the pixels (4, n) of a fit: px, e-, e-^2 that does not come from the signal, e-^2."""
 ITERATIONS = 30
 SMALL_STEP, ACCEPTED_STEP = 1e-5, 1e-3
 """Squared standard deviations: stop at the first; out of iterations the second will do (scoring is linear at worst)."""
-NARROWEST = 0.35
-"""px; a narrower line falls into one pixel, where its width leaves no trace and drags the centre along."""
+COARSE, RESOLVED, FINE = 0.5, 0.3, 0.35
+"""px; a narrower line than the first, whose width may as well be below the second (2 sigma), is not a matter of a fit;
+if it is also narrower than the third on average over what its width may be, it is flagged."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -114,9 +117,13 @@ def _hold_sigma(hessian: Array, score: Array) -> None:
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _optimise(
-    pixel: Array, n: int, p: Array, likelihood: bool, integrated: bool, shape: Array, trial_shape: Array, hessian: Array
+    pixel: Array, n: int, p: Array, options: Options, shape: Array, trial_shape: Array, hessian: Array
 ) -> bool:
-    """Refine p in place on pixels (4, n); on return `shape` and `hessian` belong to p. True if converged."""
+    """Refine p in place on pixels (4, n); on return `shape` and `hessian` belong to p. True if converged.
+
+    A known width is held, and one at the lower bound that would go below it.
+    """
+    likelihood, integrated = options.variant == LIKELIHOOD, options.integrated
     x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
     score, step, trial, factor = np.zeros(4), np.zeros(4), np.empty(4), np.zeros((4, 4))
     profile(x, n, p[1], p[2], integrated, shape)
@@ -125,7 +132,7 @@ def _optimise(
     converged = improved = False
     for _ in range(ITERATIONS):
         _normal(y, floor, shape, n, p, likelihood, hessian, score)
-        if p[2] <= NARROWEST and score[2] < 0.0:
+        if options.known_width or (p[2] <= NARROWEST and score[2] < 0.0):
             _hold_sigma(hessian, score)
         scale = 1.0 if likelihood else max(cost / n, 1e-12 * p[0] * p[0])
         improved = False
@@ -135,7 +142,7 @@ def _optimise(
                 for j in range(4):
                     trial[j] = p[j] + step[j]
                     decrement += step[j] * score[j]
-                trial[2] = max(trial[2], NARROWEST)
+                trial[2] = p[2] if options.known_width else max(trial[2], NARROWEST)
                 if trial[0] > 0.0 and x[0] - 1.0 <= trial[1] <= x[n - 1] + 1.0 and trial[2] < 3.0 * (x[n - 1] - x[0]):
                     profile(x, n, trial[1], trial[2], integrated, trial_shape)
                     trial_cost = _cost(y, floor, trial_shape[0], n, trial, likelihood)
@@ -155,19 +162,23 @@ def _optimise(
         if converged or not improved:
             break
     _normal(y, floor, shape, n, p, likelihood, hessian, score)
-    if p[2] <= NARROWEST and score[2] < 0.0:
+    if options.known_width or (p[2] <= NARROWEST and score[2] < 0.0):
         _hold_sigma(hessian, score)
     return converged or (improved and decrement <= ACCEPTED_STEP * scale)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _gather(signal: Float32, mask: Mask, floor: Float32, middle: float, half: float, pixel: Array) -> int:
-    """Usable pixels within `half` of `middle` -> positions, electrons and floors (4, n); returns n."""
-    count = 0
+def _gather(pixels: Pixels, y: int, seed: Array, middle: float, half: float, pixel: Array) -> int:
+    """Usable pixels of line y within `half` of `middle` -> positions, electrons and floors (4, n); returns n.
+
+    What the background's slope adds is taken off, and still is noise.
+    """
+    signal, mask, floor, count = pixels.signal[y], pixels.mask[y], pixels.floor[y], 0
     for i in range(max(0, math.ceil(middle - half)), min(signal.shape[0] - 1, math.floor(middle + half)) + 1):
         if mask[i] == 0:
-            pixel[POSITION, count], pixel[ELECTRONS, count] = i, signal[i]
-            pixel[FLOOR, count] = floor[min(i, floor.shape[0] - 1)]
+            rise = seed[SLOPE] * (i - seed[CENTRE])
+            pixel[POSITION, count], pixel[ELECTRONS, count] = i, signal[i] - rise
+            pixel[FLOOR, count] = floor[min(i, floor.shape[0] - 1)] + rise
             count += 1
     return count
 
@@ -193,11 +204,66 @@ def _chi2_and_influence(
     return chi2
 
 
+@njit(nogil=True, cache=True, error_model="numpy")
+def _is_coarse(pixel: Array, n: int, p: Array, options: Options, hessian: Array) -> bool:
+    """Whether the pixels (4, n) are too coarse for the line p: its width may be anything below RESOLVED."""
+    if p[2] >= COARSE:
+        return False
+    if options.known_width or p[2] <= NARROWEST:
+        return bool(p[2] < RESOLVED)
+    row, unit = np.empty(4), np.zeros(4)
+    unit[2] = 1.0
+    if not _solve(hessian, 0.0, unit, np.zeros((4, 4)), row):
+        return True
+    # of least squares the Hessian is that of pixels of unit variance
+    variance = 1.0 if options.variant == LIKELIHOOD else 0.5 * p[0] + max(p[3], 0.0) + pixel[FLOOR, n // 2]
+    return bool(p[2] - 2.0 * math.sqrt(row[2] * variance) < RESOLVED)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _measure_narrow(pixel: Array, n: int, p: Array, options: Options, shape: Array, out: Array) -> int:
+    """The posterior of a line that may be too narrow for its pixels (4, n) -> out (6,); returns UNRESOLVED if it is."""
+    x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
+    out[1] = posterior(x, y, floor, n, p, options.known_width, options.integrated, shape)
+    out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
+    chi2 = 0.0
+    for i in range(n):
+        mu = p[0] * shape[0, i] + p[3]
+        chi2 += (y[i] - mu) ** 2 / max(mu + floor[i], 0.1 * abs(floor[i]))
+    out[5] = chi2 / (n - 4)
+    return Flag.UNRESOLVED.value if p[2] < FINE else Flag.OK.value
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _asymmetry(pixel: Array, n: int, p: Array, held: bool, shape: Array, hessian: Array) -> float:
+    """Score test for a third Hermite term in the profile: a normal deviate where the line is a Gaussian.
+
+    A neighbour leans a line to one side long before chi-square, which looks in every direction, sees it. held: the
+    width is known.
+    """
+    cross, projected = np.zeros(4), np.empty(4)
+    moment = square = 0.0
+    for i in range(n):
+        z = (pixel[POSITION, i] - p[1]) / p[2]
+        lean = (z * z - 3.0) * z * shape[0, i]
+        weight = lean / pixel[VARIANCE, i]
+        moment += weight * (pixel[ELECTRONS, i] - p[0] * shape[0, i] - p[3])
+        square += weight * lean
+        cross[0] += weight * shape[0, i]
+        cross[1] += weight * p[0] * shape[1, i]
+        cross[2] += 0.0 if held else weight * p[0] * shape[2, i]
+        cross[3] += weight
+    if not _solve(hessian, 0.0, cross, np.zeros((4, 4)), projected):
+        return 0.0
+    for j in range(4):
+        square -= cross[j] * projected[j]
+    return float(moment / math.sqrt(square)) if square > 0.0 else 0.0
+
+
 @peak_kernel
 def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
     """Peak kernel (`seed_loop`). options.variant: LEAST_SQUARES or LIKELIHOOD. chi2 only for independent pixels."""
-    signal, mask, floor, w = pixels.signal[y], pixels.mask[y], pixels.floor[y], pixels.signal.shape[1]
-    likelihood, integrated = options.variant == LIKELIHOOD, options.integrated
+    w, likelihood = pixels.signal.shape[1], options.variant == LIKELIHOOD
     pixel, weight, shape, trial_shape = pixels.room[:4], pixels.room[4], pixels.room[5:8], pixels.room[8:11]
     p, hessian = np.empty(4), np.empty((4, 4))
     p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
@@ -210,14 +276,27 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
             break
         half = wanted
         middle = seed[CENTRE] if attempt == 0 else p[1]
-        count = _gather(signal, mask, floor, middle, half, pixel)
+        count = _gather(pixels, y, seed, middle, half, pixel)
         if count < 5:
             return Flag.TOO_FEW_PIXELS.value
-        converged = _optimise(pixel, count, p, likelihood, integrated, shape, trial_shape, hessian)
+        converged = _optimise(pixel, count, p, options, shape, trial_shape, hessian)
         if not converged:
             break
     if min(p[1], seed[CENTRE]) < 0.5 or max(p[1], seed[CENTRE]) > w - 1.5:
         return Flag.AT_BORDER.value  # less than half of it is seen: any slope would fit
+    if flag == Flag.OK.value and min(p[2], seed[WIDTH]) < COARSE:
+        if not converged:
+            p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
+        if not converged or _is_coarse(pixel, count, p, options, hessian):
+            return _measure_narrow(pixel, count, p, options, shape, out)
+    independent = pixels.correlation.shape[0] == 1
+    judged = options.judge and independent and flag == Flag.OK.value and count > UNKNOWNS
+    if not converged and judged:
+        p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
+        reason = measure_misfit(pixels, seed, count, p, options, out)
+        if reason != Flag.MISFIT.value:
+            return reason
+        out[:] = np.nan
     if not converged:
         return Flag.NOT_CONVERGED.value
     if p[2] > options.max_width:
@@ -230,7 +309,13 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         return Flag.NOT_CONVERGED.value
     chi2 = _chi2_and_influence(pixel, count, p, likelihood, shape, row, weight)
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
-    out[1] = math.sqrt(linear_variance(weight, pixel[VARIANCE], pixel[POSITION], count, pixels.correlation))
-    if pixels.correlation.shape[0] == 1:
+    noise = linear_variance(weight, pixel[VARIANCE], pixel[POSITION], count, pixels.correlation)
+    out[1] = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], count))
+    if independent:
         out[5] = chi2 / (count - 4)
-    return flag
+    if not judged:
+        return flag
+    asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian) if likelihood else 0.0
+    if max(deviate(chi2, count - 4), abs(asymmetry)) < UNLIKELY:
+        return flag
+    return measure_misfit(pixels, seed, count, p, options, out)

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from analysis.line.detection.detect import BACKGROUND, PLATEAU, REACH, WIDTH
+from analysis.line.detection.detect import PLATEAU, REACH, WIDTH
 from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
 from analysis.line.methods.window import brightest, load_window, write_peak
 from analysis.line.result import Flag
@@ -25,7 +25,7 @@ def measure_half_energy(pixels: Pixels, y: int, seed: Array, flag: int, options:
     signal, mask, window = pixels.signal[y], pixels.mask[y], pixels.room[0]
     top = brightest(signal, mask, seed)
     half = max(1, math.ceil(min(WINDOW * seed[WIDTH] + seed[PLATEAU], seed[REACH])))
-    if load_window(signal, mask, top - half, top + half, seed[BACKGROUND], window) < 0:
+    if load_window(signal, mask, top - half, top + half, seed, window) < 0:
         return Flag.AT_BORDER.value
     total = 0.0
     for i in range(2 * half + 1):

@@ -8,6 +8,8 @@ from numba import njit
 
 from analysis.line.methods.seed_loop import Array
 
+POSITION, ELECTRONS, FLOOR, VARIANCE = range(4)
+"""Rows of the pixels (4, n) of a fit: px, e-, e-^2 that does not come from the signal, e-^2."""
 ROOT_HALF = math.sqrt(0.5)
 ROOT_HALF_PI = math.sqrt(0.5 * math.pi)
 

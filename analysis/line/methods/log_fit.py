@@ -17,7 +17,7 @@ from numba import njit
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, PLATEAU, REACH, WIDTH
 from analysis.line.methods.line_profile import linear_variance
 from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
-from analysis.line.methods.window import brightest, pixel_variance
+from analysis.line.methods.window import brightest, ground, pixel_variance, slope_variance
 from analysis.line.result import Flag
 
 CARUANA, GUO = range(2)
@@ -62,12 +62,12 @@ def _parabola(x: Array, z: Array, weight: Array, n: int, p: Array, inverse: Arra
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _run(signal: Float32, mask: Mask, top: int, half: int, level: float) -> tuple[int, int]:
-    """First and last pixel of the run around `top` that is above a level, at least a pixel on either side."""
-    first = last = top
-    while first > max(0, top - half) and (mask[first - 1] or signal[first - 1] > level):
+def _run(signal: Float32, mask: Mask, top: int, half: int, seed: Array, level: float) -> tuple[int, int]:
+    """First and last pixel of the run around `top` that is a level above the background, one at least either side."""
+    first, last, w = top, top, signal.shape[0]
+    while first > max(0, top - half) and (mask[first - 1] or signal[first - 1] - ground(seed, first - 1) > level):
         first -= 1
-    while last < min(signal.shape[0] - 1, top + half) and (mask[last + 1] or signal[last + 1] > level):
+    while last < min(w - 1, top + half) and (mask[last + 1] or signal[last + 1] - ground(seed, last + 1) > level):
         last += 1
     return min(first, top - 1), max(last, top + 1)
 
@@ -111,11 +111,11 @@ def measure_log_parabola(pixels: Pixels, row: int, seed: Array, flag: int, optio
     if top < 1 or top > w - 2:
         return Flag.AT_BORDER.value
     half = max(1, math.ceil(min(WINDOW * seed[WIDTH] + seed[PLATEAU], seed[REACH])))
-    level = 0.0 if guo else FRACTION * max(signal[top] - base, 0.0)
-    first, last = (top - half, top + half) if guo else _run(signal, mask, top, half, base + level)
+    level = 0.0 if guo else FRACTION * max(signal[top] - ground(seed, top), 0.0)
+    first, last = (top - half, top + half) if guo else _run(signal, mask, top, half, seed, level)
     count = 0
     for i in range(max(0, first), min(w - 1, last) + 1):
-        value = signal[i] - base
+        value = signal[i] - ground(seed, i)
         if mask[i] == 0 and (value > level or (value > 0.0 and abs(i - top) < 2)):
             x[count], y[count], z[count] = i - top, value, math.log(value)
             variance[count] = pixel_variance(signal, floor, i)
@@ -135,7 +135,10 @@ def measure_log_parabola(pixels: Pixels, row: int, seed: Array, flag: int, optio
     dark = max(base + float(floor[min(top, floor.shape[0] - 1)]), 0.0)
     if seed[WIDTH] >= NARROWEST and (guo or math.sqrt(weakest + dark) < STEADY * weakest):
         _influence(x, y, count, p, inverse, guo, weight)
-        sigma = math.sqrt(linear_variance(weight, variance, x, count, pixels.correlation))
+        for i in range(count):
+            x[i] += top
+        noise = linear_variance(weight, variance, x, count, pixels.correlation)
+        sigma = math.sqrt(noise + slope_variance(seed, weight, x, count))
     out[0], out[1] = top + u, sigma
     out[2], out[3], out[4] = math.sqrt(-0.5 / p[2]), math.exp(p[0] - 0.25 * p[1] * p[1] / p[2]), base
     return flag

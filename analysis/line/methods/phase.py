@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, REACH, WIDTH
+from analysis.line.detection.detect import CENTRE, PLATEAU, REACH, WIDTH
 from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
 from analysis.line.methods.window import any_saturated, brightest, load_window, position_sigma, write_peak
 from analysis.line.result import Flag
@@ -37,7 +37,7 @@ def measure_phase(pixels: Pixels, y: int, seed: Array, flag: int, options: Optio
         sines[half - i], cosines[half - i] = -sines[half + i], cosines[half + i]
     reason, u, real, imaginary, previous = Flag.NOT_CONVERGED.value, np.nan, 0.0, 0.0, -1
     for _ in range(8):
-        if load_window(signal, mask, middle - half, middle + half, seed[BACKGROUND], window) < 0:
+        if load_window(signal, mask, middle - half, middle + half, seed, window) < 0:
             return Flag.AT_BORDER.value
         real = imaginary = 0.0
         for i in range(n):
@@ -60,6 +60,6 @@ def measure_phase(pixels: Pixels, y: int, seed: Array, flag: int, options: Optio
         power = real * real + imaginary * imaginary
         for i in range(n):
             weight[i] = (sines[i] * real - cosines[i] * imaginary) / (step * power)
-        sigma = position_sigma(signal, mask, pixels.floor[y], first, n, weight, pixels.correlation)
+        sigma = position_sigma(pixels, y, seed, first, n, weight)
     write_peak(seed, u, sigma, out)
     return reason

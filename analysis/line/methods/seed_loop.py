@@ -2,7 +2,7 @@
 
     measure(pixels, y, seed, flag, options, out) -> flag
 
-pixels holds the scan line y and those around it, seed (6,) where `detect` saw a peak and how wide and high it is, flag
+pixels holds the scan line y and those around it, seed (8,) where `detect` saw a peak and how wide and high it is, flag
 what it said of it (OK or SATURATED). The kernel writes out (6,): u, sigma_u, width, amplitude, background, chi2, NaN
 where it has none, and returns the flag that the peak keeps. An out without a position stays NaN.
 """
@@ -58,6 +58,8 @@ class Options(NamedTuple):
     """px; wider is no line."""
     filter_scale: float
     """Sigma of a filter over that of the line."""
+    judge: bool = False
+    """Whether a fit that leaves too much over is taken for another thing than a line."""
 
 
 peak_kernel = register_jitable(error_model="numpy", forceinline=True)
@@ -66,7 +68,7 @@ peak_kernel = register_jitable(error_model="numpy", forceinline=True)
 
 @cache
 def seed_kernel(measure: Callable[..., int]) -> Callable[[Pixels, Array, Mask, Options, Array], None]:
-    """The kernel of one peak -> that of all seeds (n, k, 6): flags (n, k) are updated, out (n, k, 6) is written."""
+    """The kernel of one peak -> that of all seeds (n, k, 8): flags (n, k) are updated, out (n, k, 6) is written."""
 
     @njit(nogil=True, cache=True, error_model="numpy")
     def run(pixels: Pixels, seeds: Array, flags: Mask, options: Options, out: Array) -> None:

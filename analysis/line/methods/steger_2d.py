@@ -15,9 +15,9 @@ import numpy as np
 from numba import njit
 
 from analysis.line.detection.channel import MISSING, SATURATED
-from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, REACH, WIDTH
+from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, REACH, SLOPE, WIDTH
 from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
-from analysis.line.methods.window import pixel_variance, write_peak
+from analysis.line.methods.window import ground, pixel_variance, write_peak
 from analysis.line.result import Flag
 
 WIDEST = 6.0
@@ -135,6 +135,7 @@ def _refine(
             return x, middle, slope, nx, ny, Flag.AT_BORDER.value
         taps(x - middle, half, spread, across)
         hessian(pixels.signal, seed[BACKGROUND], y, middle, half, across, along, r)
+        r[0] -= seed[SLOPE]  # a slope's derivative is the same under any Gaussian, and it has no other
         value, nx, ny = normal(r)
         if value >= 0.0 or nx < STEEPEST:
             reason = Flag.ALONG_SCAN_LINE.value if value < 0.0 else Flag.NOT_CONVERGED.value
@@ -198,7 +199,7 @@ def _weigh_normal(
             return x, round(x), weight, Flag.AT_BORDER.value
         total, moment = 0.0, 0.0
         for j in range(-arm, arm + 1):
-            value = _bilinear(signal, x + j * nx, y + j * ny) - seed[BACKGROUND]
+            value = _bilinear(signal, x + j * nx, y + j * ny) - ground(seed, x + j * nx)
             total += value
             moment += j * value
         if total <= 0.0:

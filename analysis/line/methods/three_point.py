@@ -46,7 +46,7 @@ def measure_three_pixels(pixels: Pixels, y: int, seed: Array, flag: int, options
     if seed[PLATEAU] > 0.0:
         write_peak(seed, seed[CENTRE], np.nan, out)
         return flag
-    if load_window(signal, mask, top - 1, top + 1, seed[BACKGROUND], window) < 0:
+    if load_window(signal, mask, top - 1, top + 1, seed, window) < 0:
         return Flag.AT_BORDER.value
     if kind == MAXIMUM:
         write_peak(seed, float(top), np.nan, out)
@@ -72,6 +72,6 @@ def measure_three_pixels(pixels: Pixels, y: int, seed: Array, flag: int, options
         weight[1] = 2.0 * offset / (bend * b)
         weight[2] = (-0.5 - offset) / (bend * c)
         if _is_steady(seed, pixels.floor[y]) and not any_saturated(mask, top - 1, top + 1):
-            sigma = position_sigma(signal, mask, pixels.floor[y], top - 1, 3, weight, pixels.correlation)
+            sigma = position_sigma(pixels, y, seed, top - 1, 3, weight)
     write_peak(seed, top + min(max(offset, -1.0), 1.0), sigma, out)
     return flag

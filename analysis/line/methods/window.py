@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 
 from analysis.line.detection.channel import MISSING, SATURATED
-from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, WIDTH
+from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, SLOPE, SLOPE_SIGMA, WIDTH
 from analysis.line.methods.line_profile import linear_variance
-from analysis.line.methods.seed_loop import Array, Float32, Mask
+from analysis.line.methods.seed_loop import Array, Float32, Mask, Pixels
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -29,7 +29,13 @@ def brightest(signal: Float32, mask: Mask, seed: Array) -> int:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def load_window(signal: Float32, mask: Mask, first: int, last: int, base: float, y: Array) -> int:
+def ground(seed: Array, i: float) -> float:
+    """Background under a peak at pixel i of its scan line, e-."""
+    return float(seed[BACKGROUND] + seed[SLOPE] * (i - seed[CENTRE]))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def load_window(signal: Float32, mask: Mask, first: int, last: int, seed: Array, y: Array) -> int:
     """Pixels first..last less the background -> y; gaps filled linearly. Returns how many were there, -1 off the image.
 
     The pixels at either side of a gap that reaches the window's end are looked for outside it.
@@ -40,11 +46,12 @@ def load_window(signal: Float32, mask: Mask, first: int, last: int, base: float,
     usable = 0
     for i in range(first, last + 1):
         if mask[i] & MISSING == 0:
-            y[i - first] = signal[i] - base
+            y[i - first] = signal[i] - ground(seed, i)
             usable += 1
         else:
             left, right, t = _neighbours(mask, i)
-            y[i - first] = (1.0 - t) * signal[left] + t * signal[right] - base if left >= 0 else 0.0
+            filled = (1.0 - t) * signal[left] + t * signal[right]
+            y[i - first] = filled - ground(seed, (1.0 - t) * left + t * right) if left >= 0 else 0.0
     return usable
 
 
@@ -83,13 +90,21 @@ def any_saturated(mask: Mask, first: int, last: int) -> bool:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def position_sigma(
-    signal: Float32, mask: Mask, floor: Float32, first: int, n: int, weight: Array, correlation: Array
-) -> float:
-    """Standard deviation of a position that moves by weight[i] px for one electron more in pixel first + i.
+def slope_variance(seed: Array, weight: Array, x: Array, n: int) -> float:
+    """Variance, by what is unknown of the background's slope, of a position that moves by weight (n,) px/e-."""
+    moment = 0.0
+    for i in range(n):
+        moment += weight[i] * (x[i] - seed[CENTRE])
+    return float((moment * seed[SLOPE_SIGMA]) ** 2)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def position_sigma(pixels: Pixels, y: int, seed: Array, first: int, n: int, weight: Array) -> float:
+    """Standard deviation of a position that moves by weight[i] px for one electron more in pixel first + i of line y.
 
     Gaps hand their weight on to the pixels they were filled from. weight (n,) is changed.
     """
+    signal, mask, floor = pixels.signal[y], pixels.mask[y], pixels.floor[y]
     x, variance = np.empty(n), np.empty(n)
     for i in range(n):
         pixel = first + i
@@ -103,7 +118,8 @@ def position_sigma(
     for i in range(n):
         pixel = first + i
         x[i], variance[i] = pixel, pixel_variance(signal, floor, pixel)
-    return math.sqrt(linear_variance(weight, variance, x, n, correlation))
+    noise = linear_variance(weight, variance, x, n, pixels.correlation)
+    return math.sqrt(noise + slope_variance(seed, weight, x, n))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.line.detection.channel import Lines, check_image
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.measure import measure
-from analysis.line.result import Flag
+from analysis.line.result import positioned
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 
@@ -42,7 +42,7 @@ class Passage:
     @property
     def valid(self) -> NDArray[np.bool_]:
         """(h, w): has a time."""
-        return self.flag <= Flag.SATURATED
+        return positioned(self.flag)
 
 
 def passage(

@@ -16,11 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING, SATURATED, Lines
-from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, SEED_COLUMNS, WIDTH
+from analysis.line.detection.detect import (
+    AMPLITUDE,
+    BACKGROUND,
+    CENTRE,
+    PLATEAU,
+    SEED_COLUMNS,
+    SLOPE,
+    SLOPE_SIGMA,
+    WIDTH,
+)
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.methods.gaussian_fit import LIKELIHOOD, measure_gaussian
 from analysis.line.methods.seed_loop import ROOM, Options, Pixels, seed_kernel
-from analysis.line.result import Flag, Line
+from analysis.line.result import Flag, Line, positioned
 from render.base.errors import InputError
 from render.base.threads import map_chunks
 from render.camera.camera import Camera
@@ -208,7 +217,7 @@ def _fit(lines: Lines, share: Float, at: int, spread: float, threads: int | None
         base = ordered[np.arange(len(top)), (np.isfinite(seen).sum(axis=1) // 5).clip(0, count - 1)]
         seeds[:, 0, CENTRE], seeds[:, 0, WIDTH], seeds[:, 0, BACKGROUND] = top, spread, base
         seeds[:, 0, AMPLITUDE] = np.maximum(signal[np.arange(len(top)), top] - base, 1.0)
-        seeds[:, 0, PLATEAU] = 0.0
+        seeds[:, 0, PLATEAU] = seeds[:, 0, SLOPE] = seeds[:, 0, SLOPE_SIGMA] = 0.0
         full = (mask & SATURATED).any(axis=1)
         edge = (top <= 0) | (top >= count - 1) | ~np.isfinite(near.max(axis=1))
         flags[start:stop, 0] = np.where(edge, Flag.AT_BORDER, np.where(full, Flag.SATURATED, Flag.OK))
@@ -229,9 +238,9 @@ def _settled(
     with np.errstate(invalid="ignore"):
         restless = ~(np.abs(move) <= np.maximum(2.0 * SETTLED, 0.3 * sigma))
         gone = np.abs(u - line.u[index, rank]) > 4.0 * line.width[index, rank] + 2.0
-    flag[(flag <= Flag.SATURATED) & restless] = Flag.NOT_CONVERGED
-    flag[(flag <= Flag.SATURATED) & gone] = Flag.OUT_OF_WINDOW
-    good = flag <= Flag.SATURATED
+    flag[positioned(flag) & restless] = Flag.NOT_CONVERGED
+    flag[positioned(flag) & gone] = Flag.OUT_OF_WINDOW
+    good = positioned(flag)
     flags = line.flag.copy()
     flags[index, rank] = flag
 

@@ -31,6 +31,12 @@ REASONS = {
     Flag.TOO_WIDE: "too wide for a line",
     Flag.NO_PIXELS: "no usable pixel",
 }
+CAUTIONS = {
+    Flag.SATURATED: "saturated",
+    Flag.UNRESOLVED: "narrower than its pixels",
+    Flag.BLENDED: "two lines in one",
+    Flag.MISFIT: "not the profile of a line",
+}
 
 
 def scan_line(image: Image, axis: str, index: int) -> NDArray[Any]:
@@ -196,7 +202,8 @@ class RowProfile(QWidget):
                 self._add(pg.PlotCurveItem(x, y, pen=pg.mkPen(colour, width=1.6)))
                 self._top = max(self._top, float(y.max()))
         error = f" {u - true[np.argmin(np.abs(true - u))]:+.3f} px" if len(true) else ": no line is seen here"
-        return f"<span style='color:{colour}'>{method_name(method)}{error}</span>"
+        caution = CAUTIONS.get(Flag(int(line.flag[index, valid[0]])), "")
+        return f"<span style='color:{colour}'>{method_name(method)}{error}{caution and f', {caution}'}</span>"
 
     def _mark(self, position: float, colour: str, width: float, dashed: bool = False) -> None:
         style = pg.QtCore.Qt.PenStyle.DashLine if dashed else pg.QtCore.Qt.PenStyle.SolidLine

@@ -1,0 +1,63 @@
+"""What is done with a peak that is no single Gaussian: two lines, or one whose sigma holds the misfit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from analysis.line.methods.line_profile import ELECTRONS, POSITION, VARIANCE, linear_variance
+from analysis.line.methods.seed_loop import Array, Options, Pixels
+from analysis.line.methods.two_lines import UNKNOWNS, fit_two_lines
+from analysis.line.methods.window import slope_variance
+from analysis.line.result import Flag
+
+UNLIKELY = 3.7
+"""Standard normal deviates: one good line in 5,000 is measured again, by chi-square or by its asymmetry."""
+PARTED, APART = 0.05, 1.2
+"""Two lines part where sigma is less than this of their distance, so that the fit is linear, and the distance more than
+this of their own sigma: closer ones explain as well what is noise of another kind."""
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def deviate(chi2: float, freedom: int) -> float:
+    """Standard normal deviate of a chi-square (Wilson and Hilferty, PNAS 17, 1931)."""
+    spread = 2.0 / (9.0 * max(freedom, 1))
+    return float(((chi2 / max(freedom, 1)) ** (1.0 / 3.0) - 1.0 + spread) / math.sqrt(spread))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _centroid(pixel: Array, n: int, p: Array) -> float:
+    """Centre of mass of pixels (4, n) above the background of a fit p (4,), within 3 sigmas of its centre."""
+    mass = moment = 0.0
+    for i in range(n):
+        x = pixel[POSITION, i] - p[1]
+        if abs(x) <= 3.0 * p[2] + 0.5:
+            mass += pixel[ELECTRONS, i] - p[3]
+            moment += (pixel[ELECTRONS, i] - p[3]) * x
+    return float(p[1] + moment / mass) if mass > 0.0 else p[1]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Options, out: Array) -> int:
+    """A line that is no single Gaussian -> out (6,): as two, or as it is with a sigma that holds the misfit.
+
+    pixels.room: what the fit of p (4,) left there. Returns OK for two lines that part. BLENDED for two that do not:
+    sigma holds how far the brighter one is from the single line. MISFIT for neither: sigma is that of the fit times
+    the root of chi-square (Birge, Phys. Rev. 40, 1932), and holds the distance to the centre of mass of the same
+    pixels, by which another estimator differs.
+    """
+    pixel, weight, both = pixels.room[:4], pixels.room[4], np.empty(UNKNOWNS)
+    shift = abs(_centroid(pixel, n, p) - p[1])
+    chi2 = fit_two_lines(pixel, n, p, options.known_width, options.integrated, pixels.room[5:11], both, weight)
+    if deviate(chi2, n - UNKNOWNS) < UNLIKELY:
+        noise = linear_variance(weight, pixel[VARIANCE], pixel[POSITION], n, pixels.correlation)
+        sigma = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], n))
+        distance = abs(both[5] - both[1])
+        parted = sigma < PARTED * distance and distance > APART * both[2]
+        out[0], out[2], out[3], out[4], out[5] = both[1], both[2], both[0], both[3], chi2 / max(n - UNKNOWNS, 1)
+        out[1] = sigma if parted else math.hypot(sigma, both[1] - p[1])
+        return Flag.OK.value if parted else Flag.BLENDED.value
+    out[1] = math.sqrt(out[1] * out[1] * max(out[5], 1.0) + shift * shift)
+    return Flag.MISFIT.value

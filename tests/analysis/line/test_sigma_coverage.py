@@ -1,0 +1,151 @@
+"""What sigma says where the model of a Gaussian line on level ground does not hold: a small part of the whole grid.
+
+The whole of it: `tests/validation/test_sigma_coverage.py`.
+"""
+
+import numpy as np
+import pytest
+
+from analysis.line.detection.channel import scan_lines
+from analysis.line.extract import extract
+from analysis.line.measure import measure
+from analysis.line.result import Flag
+from analysis.line.settings import ExtractionSettings
+from tests.analysis.line.line_images import cramer_rao, electrons, expected
+from tests.analysis.line.troubles import (
+    BACKGROUND,
+    PLAIN,
+    READ_NOISE,
+    SIGNALS,
+    TROUBLES,
+    Trouble,
+    coverage,
+    measured,
+    photographed,
+)
+
+ROWS = 400
+MOST = 3.3
+"""Standard deviations of a share among ROWS: one test in a thousand would fail by chance."""
+
+
+def within(share, low, high, rows=ROWS):
+    """Whether a share can be that of a coverage between low and high."""
+    return low - MOST * np.sqrt(low * (1 - low) / rows) < share < high + MOST * np.sqrt(high * (1 - high) / rows)
+
+
+def holds(found):
+    return within(found.one, 0.65, 0.71, found.count) and within(found.two, 0.93, 0.97, found.count)
+
+
+@pytest.mark.parametrize("signal", SIGNALS)
+def test_a_line_of_a_fifth_of_a_pixel_has_a_sigma_that_covers_the_phase(signal):
+    line, centre = measured(PLAIN, signal, 0.2, ROWS, seed=1)
+    found = coverage(line, centre)
+    assert within(found.two, 0.93, 0.97, found.count)
+    assert (line.flag[line.valid] == Flag.UNRESOLVED).mean() > 0.5
+    assert np.median(line.sigma_u[line.valid]) < 1 / np.sqrt(12)  # more than which pixel it is in
+
+
+@pytest.mark.parametrize("sigma", [0.3, 0.4, 0.6])
+@pytest.mark.parametrize("signal", [300.0, 3000.0])
+def test_a_known_width_is_held_and_the_narrow_line_resolved(sigma, signal):
+    line, centre = measured(PLAIN, signal, sigma, ROWS, seed=2, width=sigma)
+    assert (line.width[line.valid] == sigma).all()
+    assert (line.flag == Flag.OK).all()
+    assert holds(coverage(line, centre))
+
+
+def test_a_known_width_is_held_where_the_true_one_is_another():
+    line, _ = measured(PLAIN, 3000.0, 1.0, 50, seed=3, width=0.35)
+    assert (line.width[line.valid] == 0.35).all()
+
+
+def test_narrow_lines_without_noise_are_where_they_are():
+    centre = 60 + np.linspace(-0.5, 0.5, 41)
+    for sigma in (0.3, 0.35, 0.45):
+        line = extract(expected(121, centre, 1e5, sigma, 10.0), noise=electrons(2.5))
+        error = np.abs(line.u[:, 0] - centre)
+        assert (error < 2 * line.sigma_u[:, 0]).all()
+        assert error.max() < 1e-3
+
+
+@pytest.mark.parametrize("name", ["slope 0.3 %", "slope 1 %", "slope 3 %"])
+@pytest.mark.parametrize("sigma", [0.6, 2.0])
+def test_sigma_holds_on_a_background_with_a_slope(name, sigma):
+    line, centre = measured(TROUBLES[name], 3000.0, sigma, ROWS, seed=4)
+    found = coverage(line, centre)
+    assert holds(found)
+    assert found.lost == 0.0 and found.flagged <= 0.02
+
+
+@pytest.mark.parametrize(
+    "method", ["gaussian", "phase", "centre_of_mass", "guo", "steger", "steger_2d", "half_energy", "blais_rioux_4"]
+)
+def test_every_method_takes_the_slope_off(method):
+    """1 % of the peak a pixel moved the centre of mass by 0.3 px, the fit by 0.09 px."""
+    image, centre, noise = photographed(Trouble(slope=0.01), 10000.0, 1.5, 200, seed=5)
+    if method == "steger_2d":  # which ties the rows together
+        centre = np.full_like(centre, centre.mean())
+        x = np.arange(image.shape[1]) - centre[0]
+        image = (expected(image.shape[1], centre, 10000.0, 1.5, 10000.0) + 100.0 * x).astype(np.float32)
+    line = extract(image, method=method, noise=noise)
+    valid = line.valid[:, 0]
+    assert valid.mean() > 0.95  # in two dimensions not the outermost rows
+    assert abs(np.mean((line.u[:, 0] - centre)[valid])) < 0.01
+
+
+@pytest.mark.parametrize("sigma", [0.6, 2.0])
+@pytest.mark.parametrize("signal", [100.0, 1000.0])
+def test_on_level_ground_the_slope_costs_no_efficiency(sigma, signal):
+    rows = 3000
+    image, centre, noise = photographed(PLAIN, signal, sigma, rows, seed=6)
+    error = extract(image, noise=noise).u[:, 0] - centre
+    # the mean square of n normal errors spreads by sqrt(2 / n); 0.97 less three of that
+    bound = cramer_rao(signal, sigma, READ_NOISE, BACKGROUND)
+    assert bound**2 / np.mean(error**2) > 0.97 * (1 - 3 * np.sqrt(2 / rows))
+
+
+@pytest.mark.parametrize("name", ["neighbour at 2 sigma", "neighbour at 3 sigma"])
+@pytest.mark.parametrize("signal", [1000.0, 10000.0])
+def test_two_lines_are_fitted_where_one_does_not_fit(name, signal):
+    line, centre = measured(TROUBLES[name], signal, 2.0, ROWS, seed=7)
+    found = coverage(line, centre)
+    assert holds(found)
+    assert found.lost <= 0.01
+
+
+def test_lines_that_do_not_part_are_flagged_and_their_sigma_holds_the_distance():
+    line, centre = measured(TROUBLES["neighbour at 1.4 sigma"], 1000.0, 2.0, ROWS, seed=8)
+    blended = line.flag[:, 0] == Flag.BLENDED
+    assert blended.mean() > 0.3
+    error = np.abs(line.u[:, 0] - centre)
+    assert within(np.mean(error[blended] < 2 * line.sigma_u[blended, 0]), 0.93, 1.0 - 1e-9, blended.sum())
+
+
+def test_a_line_on_level_ground_is_hardly_ever_taken_for_anything_else():
+    rows = 3000
+    for signal in (100.0, 10000.0):
+        line, _ = measured(PLAIN, signal, 1.5, rows, seed=9)
+        # 2e-4 by chi-square and by asymmetry each, 3e-4 by both sides of the latter
+        assert np.sum(line.flag != Flag.OK) <= 6
+
+
+def test_a_profile_that_is_no_line_widens_sigma_and_is_flagged():
+    """Pixels uneven by 10 %, of which the noise model knows nothing: sigma was that of the counts, 0.003 px."""
+    rng = np.random.default_rng(10)
+    centre = 40 + rng.uniform(-0.5, 0.5, ROWS)
+    mean = expected(80, centre, 3e4, 2.0, 0.0) * (1 + 0.1 * rng.normal(size=(ROWS, 80))) + 10.0
+    line = extract(rng.poisson(mean).astype(np.float32), noise=electrons(0.5))
+    assert (line.flag == Flag.MISFIT).mean() > 0.95
+    assert np.median(line.chi2) > 10
+    found = coverage(line, centre)
+    assert found.two > 0.75 and found.sigma > 10 * 0.003
+
+
+def test_who_asks_how_well_a_line_fits_gets_the_single_line():
+    image, _, noise = photographed(TROUBLES["neighbour at 2 sigma"], 3000.0, 2.0, 50, seed=11)
+    settings = ExtractionSettings()
+    single = measure(scan_lines(image, settings, noise), settings, threads=1)
+    assert (single.flag == Flag.OK).all()
+    assert np.median(single.chi2) > 2.0

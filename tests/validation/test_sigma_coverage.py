@@ -1,0 +1,62 @@
+"""Coverage of sigma over the whole grid: troubles x signals x widths, with the noise known and estimated.
+
+Run: pytest -m validation tests/validation/test_sigma_coverage.py -s, which prints every cell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.line.result import Flag
+from tests.analysis.line.troubles import PLAIN, SIGNALS, TROUBLES, WIDTHS, Trouble, coverage, measured
+
+pytestmark = pytest.mark.validation
+
+ROWS = 1000
+MOST = 3.5
+"""Standard deviations of a share: 160 cells of two shares, one test in ten fails by chance at 3.5."""
+CELLS = [(name, signal, sigma) for name in TROUBLES for signal in SIGNALS for sigma in WIDTHS]
+
+
+def is_beyond(trouble: Trouble, signal: float, sigma: float) -> str:
+    """Why a single scan line cannot know, "" where it can."""
+    if trouble.overexposure:
+        return "the wings alone cannot tell a halo from a line beside the plateau: flagged SATURATED"
+    if trouble.neighbour and signal < 1000:
+        return "a neighbour of 30 % leaves less over than the noise of so faint a line"
+    if trouble.neighbour and trouble.neighbour < 2 and signal < 3000:
+        return "so close a neighbour is mere width: flagged BLENDED where it is seen at all"
+    if trouble.neighbour >= 3 and sigma > 2:
+        return "two peaks that are detected as two share the pixels between them: each window ends half-way"
+    if trouble.slope and sigma < 0.6:
+        return "a narrow line on a steep slope does not rise above the slope's texture"
+    return ""
+
+
+def share_is(share: float, low: float, high: float, count: int) -> bool:
+    return bool(
+        low - MOST * np.sqrt(low * (1 - low) / count) < share < high + MOST * np.sqrt(high * (1 - high) / count)
+    )
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["noise known", "noise estimated"])
+@pytest.mark.parametrize(("name", "signal", "sigma"), CELLS)
+def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: float, known: bool) -> None:
+    trouble = TROUBLES[name]
+    line, centre = measured(trouble, signal, sigma, ROWS, seed=2024, known=known)
+    found = coverage(line, centre)
+    print(
+        f"\n{name:28} A {signal:6g} s {sigma:3} {'known' if known else 'estimated':9}: {found.one:.3f} {found.two:.3f} "
+        f"rms {found.rms:.4f} sigma {found.sigma:.4f} lost {found.lost:.3f} flagged {found.flagged:.3f}",
+        end="",
+    )
+    if (reason := is_beyond(trouble, signal, sigma)) != "":
+        pytest.skip(reason)
+    assert share_is(found.two, 0.93, 0.97, found.count)
+    if sigma >= 0.6:  # narrower ones are flagged: a mean over a pixel is no normal deviate
+        assert share_is(found.one, 0.65, 0.71, found.count)
+    if trouble == PLAIN and sigma >= 0.6:
+        assert found.flagged <= 0.02
+    if trouble == PLAIN and sigma < 0.3 and signal >= 300:
+        assert np.mean(line.flag[line.valid] == Flag.UNRESOLVED) > 0.5
