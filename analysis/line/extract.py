@@ -59,7 +59,8 @@ def extract(
     lines = replace(lines, smoothing=chosen.smoothing)
     alone = chosen.select == "strongest" and volume is None
     wanted = chosen if alone else chosen.model_copy(update={"peaks": max(chosen.peaks, CANDIDATES)})
-    line = replace(measure(lines, wanted, threads, judge=True), note=note)
+    # fused exposures hold so many electrons that no lens draws a line which is a Gaussian to their noise
+    line = replace(measure(lines, wanted, threads, judge=variance is None), note=note)
     check_finite("line", positions=line.u[line.valid])
     return line if alone else select(line, chosen.select, volume)
 

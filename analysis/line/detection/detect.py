@@ -219,6 +219,8 @@ def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: A
             beside, slope, slope_sigma = background_slope(
                 signal[y], mask[y], dark, seed[CENTRE], inner, min(outer, reach)
             )
+            if flags[y, taken] != Flag.OK.value:  # beside a plateau the wings reach farther than the seed knows
+                slope = slope_sigma = 0.0
             if slope != 0.0:  # on it the blocks' median is the level beside the line
                 flags[y, taken] = _measure(line, response, mask[y], pixel, beside, dark, limits, seed)
             seed[SLOPE], seed[SLOPE_SIGMA] = slope, slope_sigma

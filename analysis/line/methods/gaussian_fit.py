@@ -25,6 +25,8 @@ LEAST_SQUARES, LIKELIHOOD = range(2)
 ITERATIONS = 30
 SMALL_STEP, ACCEPTED_STEP = 1e-5, 1e-3
 """Squared standard deviations: stop at the first; out of iterations the second will do (scoring is linear at worst)."""
+NARROWEST_SATURATED = 0.35
+"""px; the wings of a narrower line are within a pixel."""
 COARSE, RESOLVED, FINE = 0.5, 0.3, 0.35
 """px; a narrower line than the first, whose width may as well be below the second (2 sigma), is not a matter of a fit;
 if it is also narrower than the third on average over what its width may be, it is flagged."""
@@ -117,7 +119,7 @@ def _hold_sigma(hessian: Array, score: Array) -> None:
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _optimise(
-    pixel: Array, n: int, p: Array, options: Options, shape: Array, trial_shape: Array, hessian: Array
+    pixel: Array, n: int, p: Array, narrowest: float, options: Options, shape: Array, trial_shape: Array, hessian: Array
 ) -> bool:
     """Refine p in place on pixels (4, n); on return `shape` and `hessian` belong to p. True if converged.
 
@@ -132,7 +134,7 @@ def _optimise(
     converged = improved = False
     for _ in range(ITERATIONS):
         _normal(y, floor, shape, n, p, likelihood, hessian, score)
-        if options.known_width or (p[2] <= NARROWEST and score[2] < 0.0):
+        if options.known_width or (p[2] <= narrowest and score[2] < 0.0):
             _hold_sigma(hessian, score)
         scale = 1.0 if likelihood else max(cost / n, 1e-12 * p[0] * p[0])
         improved = False
@@ -142,7 +144,7 @@ def _optimise(
                 for j in range(4):
                     trial[j] = p[j] + step[j]
                     decrement += step[j] * score[j]
-                trial[2] = p[2] if options.known_width else max(trial[2], NARROWEST)
+                trial[2] = p[2] if options.known_width else max(trial[2], narrowest)
                 if trial[0] > 0.0 and x[0] - 1.0 <= trial[1] <= x[n - 1] + 1.0 and trial[2] < 3.0 * (x[n - 1] - x[0]):
                     profile(x, n, trial[1], trial[2], integrated, trial_shape)
                     trial_cost = _cost(y, floor, trial_shape[0], n, trial, likelihood)
@@ -162,7 +164,7 @@ def _optimise(
         if converged or not improved:
             break
     _normal(y, floor, shape, n, p, likelihood, hessian, score)
-    if options.known_width or (p[2] <= NARROWEST and score[2] < 0.0):
+    if options.known_width or (p[2] <= narrowest and score[2] < 0.0):
         _hold_sigma(hessian, score)
     return converged or (improved and decrement <= ACCEPTED_STEP * scale)
 
@@ -267,6 +269,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     pixel, weight, shape, trial_shape = pixels.room[:4], pixels.room[4], pixels.room[5:8], pixels.room[8:11]
     p, hessian = np.empty(4), np.empty((4, 4))
     p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
+    narrowest = NARROWEST if flag == Flag.OK.value else NARROWEST_SATURATED
     half, count, converged = 0.0, 0, False
     for attempt in range(3):
         # 4 sigma hold the line, the rest its background; a saturated plateau pushes the wings outwards
@@ -279,7 +282,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         count = _gather(pixels, y, seed, middle, half, pixel)
         if count < 5:
             return Flag.TOO_FEW_PIXELS.value
-        converged = _optimise(pixel, count, p, options, shape, trial_shape, hessian)
+        converged = _optimise(pixel, count, p, narrowest, options, shape, trial_shape, hessian)
         if not converged:
             break
     if min(p[1], seed[CENTRE]) < 0.5 or max(p[1], seed[CENTRE]) > w - 1.5:
@@ -290,7 +293,10 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         if not converged or _is_coarse(pixel, count, p, options, hessian):
             return _measure_narrow(pixel, count, p, options, shape, out)
     independent = pixels.correlation.shape[0] == 1
-    judged = options.judge and independent and flag == Flag.OK.value and count > UNKNOWNS
+    # of a line below half a pixel three pixels hold all the light, which two lines would explain as well; and what
+    # least squares leave over is more than chi-square expects, since they do not weigh
+    judged = options.judge and likelihood and independent and flag == Flag.OK.value
+    judged = judged and count > UNKNOWNS and p[2] >= COARSE
     if not converged and judged:
         p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
         reason = measure_misfit(pixels, seed, count, p, options, out)
@@ -315,7 +321,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         out[5] = chi2 / (count - 4)
     if not judged:
         return flag
-    asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian) if likelihood else 0.0
+    asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian)
     if max(deviate(chi2, count - 4), abs(asymmetry)) < UNLIKELY:
         return flag
     return measure_misfit(pixels, seed, count, p, options, out)

@@ -13,8 +13,9 @@ from analysis.line.methods.two_lines import UNKNOWNS, fit_two_lines
 from analysis.line.methods.window import slope_variance
 from analysis.line.result import Flag
 
-UNLIKELY = 3.7
-"""Standard normal deviates: one good line in 5,000 is measured again, by chi-square or by its asymmetry."""
+UNLIKELY = 4.5
+"""Standard normal deviates: one good line in 100,000 is measured again, by chi-square or by its asymmetry. At 3.7 it
+were one in 3,000, and one of those that is taken for two lines costs as much as all the noise."""
 PARTED, APART = 0.05, 1.2
 """Two lines part where sigma is less than this of their distance, so that the fit is linear, and the distance more than
 this of their own sigma: closer ones explain as well what is noise of another kind."""

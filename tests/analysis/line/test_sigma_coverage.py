@@ -118,7 +118,7 @@ def test_two_lines_are_fitted_where_one_does_not_fit(name, signal):
 def test_lines_that_do_not_part_are_flagged_and_their_sigma_holds_the_distance():
     line, centre = measured(TROUBLES["neighbour at 1.4 sigma"], 1000.0, 2.0, ROWS, seed=8)
     blended = line.flag[:, 0] == Flag.BLENDED
-    assert blended.mean() > 0.3
+    assert blended.mean() > 0.1
     error = np.abs(line.u[:, 0] - centre)
     assert within(np.mean(error[blended] < 2 * line.sigma_u[blended, 0]), 0.93, 1.0 - 1e-9, blended.sum())
 
@@ -127,8 +127,8 @@ def test_a_line_on_level_ground_is_hardly_ever_taken_for_anything_else():
     rows = 3000
     for signal in (100.0, 10000.0):
         line, _ = measured(PLAIN, signal, 1.5, rows, seed=9)
-        # 2e-4 by chi-square and by asymmetry each, 3e-4 by both sides of the latter
-        assert np.sum(line.flag != Flag.OK) <= 6
+        # 3.4e-6 by chi-square, 6.8e-6 by either side of the asymmetry: 0.03 of 3,000
+        assert np.sum(line.flag != Flag.OK) <= 1
 
 
 def test_a_profile_that_is_no_line_widens_sigma_and_is_flagged():
