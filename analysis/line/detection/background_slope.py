@@ -28,21 +28,22 @@ SURE = 2.0
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def background_slope(
-    signal: Float32, mask: Mask, dark: float, centre: float, inner: float, outer: float
+    signal: Float32, mask: Mask, floor: Float32, centre: float, inner: float, outer: float
 ) -> tuple[float, float, float]:
     """Background of a scan line (w,) at distances inner..outer px from a peak: level at the peak, e-, slope, e-/px, and
     the slope's standard deviation.
 
-    dark: variance of a pixel without signal, e-^2. The slope is 0 where it is not sure, and with its sigma where a side
-    has no pixels. What scatters more than a count does makes it less sure.
+    floor (w,) or (1,): variance of a pixel without signal, e-^2. The slope is 0 where it is not sure, and so is its
+    sigma where a side has no pixels. What scatters more than a count does makes it less sure.
     """
     count, right, n = 0, 0, signal.shape[0]
-    sx = sy = sxx = sxy = syy = 0.0
+    sx = sy = sxx = sxy = syy = dark = 0.0
     for side in range(2):
         low, high = (centre - outer, centre - inner) if side == 0 else (centre + inner, centre + outer)
         for i in range(max(0, math.ceil(low)), min(n - 1, math.floor(high)) + 1):
             if mask[i] == 0:
                 x, y = i - centre, float(signal[i])
+                dark += floor[min(i, floor.shape[0] - 1)]
                 sx += x
                 sy += y
                 sxx += x * x
@@ -55,6 +56,6 @@ def background_slope(
     spread = sxx - sx * sx / count
     slope = (sxy - sx * sy / count) / spread
     left_over = syy - sy * sy / count - slope * slope * spread
-    variance = max(sy / count + dark, 0.1 * abs(dark), left_over / (count - 2))
+    variance = max((sy + dark) / count, 0.1 * abs(dark) / count, left_over / (count - 2))
     sigma = math.sqrt(variance / spread)
     return (sy - slope * sx) / count, slope if abs(slope) > SURE * sigma else 0.0, sigma

@@ -217,7 +217,7 @@ def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: A
             seed[REACH] = reach
             inner, outer = 4.0 * seed[WIDTH] + 1.5 + seed[PLATEAU], 8.0 * seed[WIDTH] + 6.5 + seed[PLATEAU]
             beside, slope, slope_sigma = background_slope(
-                signal[y], mask[y], dark, seed[CENTRE], inner, min(outer, reach)
+                signal[y], mask[y], floor[y], seed[CENTRE], inner, min(outer, reach)
             )
             if flags[y, taken] != Flag.OK.value:  # beside a plateau the wings reach farther than the seed knows
                 slope = slope_sigma = 0.0
