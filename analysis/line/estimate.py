@@ -1,43 +1,55 @@
-"""The noise of an image whose sensor is not known: read noise from neighbouring pixels, gain from the line itself."""
+"""The noise of an image whose sensor is not known: read noise from neighbouring pixels, the rest from the line itself.
+
+Its fit leaves residuals: as large as chi-square says, and, where they grow faster than a count's would, split into
+what is a count and what multiplies the light (`residuals.py`).
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.line.detection.channel import COLOURS, MISSING, scan_lines
+from analysis.line.detection.channel import COLOURS, MISSING, Lines, scan_lines
 from analysis.line.detection.noise import FULL_SCALES, NoiseModel, image_saturation
 from analysis.line.measure import measure
+from analysis.line.residuals import RUN, scatter
 from analysis.line.result import Line
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 
-LINES = 256
-"""Scan lines looked at."""
-ROUNDS = 6
+RUNS = 16
+"""Runs of neighbouring scan lines looked at."""
+ROUNDS, SPLITS = 6, 6
 CHANCE = 32
 """Fewer pixels may share one number, with no other but the dark's, by chance."""
+FARTHEST = 5.0
+"""Times the gain of `FULL_WELL`, up or down: where little of the noise is a count, nothing else bounds it."""
+STEADY = 0.1
+"""Change of the gain's logarithm at which splitting ends."""
 FULL_WELL = 1e4
 """Electrons taken for the highest number when no line says better."""
 
 
 def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseModel:
-    """Checked image (h, w) or (h, w, 3) -> NoiseModel whose black level is 0 and whose gain is that of the residuals.
+    """Checked image (h, w) or (h, w, 3) -> NoiseModel that explains the noise of its background and its line.
 
     Noise without light is that of the differences of neighbours along the scan line, edges clipped out. The gain is
     the photon transfer of the line's own fit: the one that makes the typical reduced chi-square of likelihood fits 1.
-    What the Gaussian model cannot follow (speckle, a lens with tails) counts as noise, so that sigma_u stays honest.
+    Speckle and other noise that multiplies the light, and how alike neighbouring pixels have it, become the model's
+    scintillation. What the Gaussian model cannot follow (a lens with tails) counts as noise. Of fewer than 32 scan
+    lines all of it is taken for a count.
 
     InputError: the image has two numbers only, which say nothing of noise or of the line's profile.
     """
     _check_levels(image)
-    axis = 0 if settings.axis == "rows" else 1
-    stride = max(1, image.shape[axis] // LINES) | 1  # odd: keeps the rows of a Bayer pattern alternating
-    sample = image[::stride] if axis == 0 else image[:, ::stride]
+    sample = _runs(image if settings.axis == "rows" else image.swapaxes(0, 1))
+    if settings.axis == "columns":
+        sample = sample.swapaxes(0, 1)
     settings = settings.model_copy(update={"method": "likelihood", "peaks": 1, "smoothing": 0.0})
     integer = image.dtype.kind == "u"
     numbers = NoiseModel(step=1.0 if integer else 0.0, saturation=image_saturation(image))
@@ -48,10 +60,17 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
     level = max(float(np.median(sample[np.isfinite(sample)])), 0.0)
 
     def model(gain: float) -> NoiseModel:
-        read_variance = max(dark_variance - gain * level - numbers.step**2 / 12.0, 0.0)
-        return numbers.model_copy(update={"gain": gain, "read_noise": math.sqrt(read_variance) / gain})
+        """The one whose background scatters as it does; what a count of that size would scatter more is black level."""
+        still = max(dark_variance - numbers.step**2 / 12.0, 0.0)
+        read_noise = math.sqrt(max(still - gain * level, 0.0)) / gain
+        black_level = max(level - still / gain, 0.0)
+        return numbers.model_copy(update={"gain": gain, "read_noise": read_noise, "black_level": black_level})
 
-    log_gain, slope, before = math.log(_full_scale(image) / FULL_WELL), -1.0, (0.0, 0.0)
+    start = _full_scale(image) / FULL_WELL
+    split = _split(lines, model, start, settings)
+    if split is not None:
+        return split
+    log_gain, slope, before = math.log(start), -1.0, (0.0, 0.0)
     for number in range(ROUNDS):
         ratio = residual_ratio(measure(replace(lines, noise=model(math.exp(log_gain))), settings, threads=1))
         if ratio is None:
@@ -64,6 +83,32 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
         if abs(before[1]) < 0.01:
             break
     return model(math.exp(log_gain))
+
+
+def _split(
+    lines: Lines, model: Callable[[float], NoiseModel], start: float, settings: ExtractionSettings
+) -> NoiseModel | None:
+    """The noise model whose residuals are in part a count and in part scintillation, None where they are a count."""
+    gain, noise = start, model(start)
+    for _ in range(SPLITS):
+        tried = replace(lines, noise=noise)
+        found = scatter(tried, measure(tried, settings, threads=1))
+        if found is None or not found.scintillation:
+            return None
+        before, gain = gain, min(max(gain * found.gain, start / FARTHEST), start * FARTHEST)
+        settled = noise.scintillation and abs(math.log(gain / before)) < STEADY
+        noise = model(gain).model_copy(update={"scintillation": found.scintillation})
+        if settled:
+            break
+    return noise
+
+
+def _runs(image: NDArray[Any]) -> NDArray[Any]:
+    """(h, ...) -> runs of neighbouring rows, evenly spread; each begins on an even row, as Bayer patterns do."""
+    if len(image) <= RUNS * RUN:
+        return image
+    starts = np.linspace(0, (len(image) - RUN) // 2, RUNS).astype(np.intp) * 2
+    return image[(starts[:, None] + np.arange(RUN)).ravel()]
 
 
 def residual_ratio(line: Line) -> float | None:

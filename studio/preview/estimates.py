@@ -116,8 +116,8 @@ def ambient_electrons(look: Look, lit: Lit, pixels: Float) -> Float:
 
 
 def read_variance(sensor: Sensor) -> float:
-    """Read noise and quantisation, e-^2."""
-    return sensor.read_noise**2 + 1.0 / (12.0 * sensor.dn_per_electron**2)
+    """Read noise, uneven offsets and quantisation, e-^2."""
+    return sensor.read_noise**2 + sensor.dsnu**2 + 1.0 / (12.0 * sensor.dn_per_electron**2)
 
 
 def centre_bound_px(amplitude: Float, sigma: Float, background: Float, variance: float) -> Float:
@@ -140,16 +140,6 @@ def _information() -> tuple[Float, Float]:
     weight = z**2 * np.exp(-(z**2) / 2.0) / math.sqrt(2.0 * math.pi) * (z[1] - z[0])
     knots = np.linspace(-14.0, 18.0, 321)
     return knots, np.log([np.sum(weight / (1.0 + math.exp(t) * np.exp(z**2 / 2.0))) for t in knots])
-
-
-def speckle_px(camera: Camera, wavelength_nm: float, sigma: Float) -> Float:
-    """(n,) standard deviation of the line's centre by speckle of contrast 1, px; sigma px.
-
-    sqrt(A_c s / (4 sqrt(pi) p^2)), A_c = 4 lambda^2 N_w^2 / pi the speckle's correlation area on the sensor (a line's
-    form of Dorsch, Haeusler and Herrmann 1994).
-    """
-    area = 4.0 * (wavelength_nm * 1e-9 * camera.working_f_number) ** 2 / math.pi
-    return np.asarray(np.sqrt(area * sigma / (4.0 * math.sqrt(math.pi))) / camera.pixel_pitch)
 
 
 def blur_px(camera: Camera, points: Float) -> Float:

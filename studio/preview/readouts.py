@@ -13,8 +13,13 @@ from render.camera.camera import Camera
 from studio.preview import estimates
 from studio.preview.inspection import working_range
 from studio.preview.preview import Look
+from studio.preview.scintillation import speckle_px
 
 Float = NDArray[np.float64]
+
+
+SPECKLED = 64
+"""Places along the line at which the effect of speckle is worked out."""
 
 
 class Range(NamedTuple):
@@ -108,9 +113,11 @@ def readouts(look: Look, laser: int) -> Readouts:
     ambient = estimates.ambient_electrons(look, lit, pixels) + sensor.dark_current * sensor.exposure_time
     amplitude = estimates.line_electrons(camera, source, sensor, lit, pixels)
     peak = amplitude * estimates.pixel_share(curve.position, width) + ambient
-    bound = estimates.centre_bound_px(amplitude, width, ambient, estimates.read_variance(sensor))
-    # two independent patterns, of which a depolarising surface makes the sum, vary less by the root of two
-    contrast = math.sqrt(0.5) if sensor.speckle == "depolarised" else 1.0
+    read = estimates.read_variance(sensor)
+    bound = estimates.centre_bound_px(amplitude, width, ambient, read)
+    some = np.unique(np.linspace(0, len(width) - 1, SPECKLED).astype(int))
+    shown = width[some], curve.position[some], amplitude[some], ambient[some]
+    speckle = speckle_px(camera, source.wavelength_nm, *shown, read, sensor.speckle == "depolarised")
     return replace(
         known,
         triangulation_angle=_range(estimates.triangulation_angles(curve.point, T_camera_laser[:3, 3])),
@@ -123,7 +130,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         ambient_electrons=float(np.median(ambient)),
         blur_px=_range(estimates.blur_px(camera, curve.point)),
         photon_sigma=_median(bound * depth),
-        speckle_sigma=_median(contrast * estimates.speckle_px(camera, source.wavelength_nm, width) * depth),
+        speckle_sigma=_median(speckle * depth[some]),
     )
 
 

@@ -15,13 +15,21 @@ from analysis.line.selection.geometry import WorkingVolume
 from analysis.line.series.hdr import fuse
 from analysis.line.settings import ExtractionSettings, Method
 from render.sensor.develop import Image
+from studio.preview.scintillation import scintillation
 from studio.project.project import Project
 
 
-def noise_model(image: Image) -> NoiseModel:
-    """How the image's numbers become electrons."""
+def noise_model(image: Image, project: Project, laser: int) -> NoiseModel:
+    """How the numbers of a laser's image become electrons, and what scatters them: of the project's sensor and lens."""
+    wavelength = project.scene.lasers[laser].wavelength_nm
+    table, fineness = scintillation(project.sensor, project.scene.camera, wavelength)
     return NoiseModel(
-        gain=image.gain, black_level=image.black_level, read_noise=image.read_noise, saturation=image.saturation
+        gain=image.gain,
+        black_level=image.black_level,
+        read_noise=math.hypot(image.read_noise, project.sensor.dsnu),  # new in each pixel, if not in each frame
+        saturation=image.saturation,
+        scintillation=table,
+        fineness=fineness,
     )
 
 
@@ -46,7 +54,7 @@ def extract_line(
 
     InputError: as `extract` and `fuse`.
     """
-    settings, noise = project.extraction, noise_model(image)
+    settings, noise = project.extraction, noise_model(image, project, laser)
     if method == "likelihood" != settings.method:
         settings = settings.model_copy(update={"smoothing": 0.0})  # it needs independent pixels
     if image.pattern is not None and settings.pattern is None:

@@ -96,7 +96,7 @@ def along_time(project: Project, line: Line, passing: Passing, laser: int, threa
         raise InputError(
             "along time only mono images can be followed", where="extraction.spacetime", found="a Bayer sensor"
         )
-    noise, variances = noise_model(images[0]), None
+    noise, variances = noise_model(images[0], project, laser), None
     frames: list[NDArray[Any]] = [image.pixels for image in images]
     if images[0].shorter:
         fused = []

@@ -1,20 +1,30 @@
-"""From digital numbers to electrons and their variance: EMVA 1288's linear model, given or estimated."""
+"""From digital numbers to electrons and their variance: EMVA 1288's linear model, given or estimated.
+
+    Cov(i, j) = (electrons_i + read_noise^2 + (step / gain)^2 / 12) [i = j] + scintillation(i - j) L_i L_j
+
+L is the line's light above its background. The second part multiplies it: speckle, and pixels of uneven gain.
+"""
 
 from __future__ import annotations
 
+import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import field_validator
 
 from render.base.model import Model, quantity
+
+Float = NDArray[np.float64]
 
 FULL_SCALES = (255, 1023, 4095, 16383, 65535, 65472, 65520, 65532)
 """Highest numbers of 8 to 16 bit images, right- and left-justified."""
 
 
 class NoiseModel(Model):
-    """electrons = (DN - black_level) / gain; variance = electrons + read_noise^2 + (step / gain)^2 / 12."""
+    """electrons = (DN - black_level) / gain; their covariance as above."""
 
     gain: float = quantity(1.0, unit="DN/e-", label="Gain", help="EMVA's K.", gt=0, le=1e9)
     black_level: float = quantity(0.0, unit="DN", label="Black level", ge=-1e6, le=1e6)
@@ -23,11 +33,50 @@ class NoiseModel(Model):
         None, unit="DN", label="Saturation", help="Pixels at or above it only say 'at least this much'."
     )
     step: float = quantity(1.0, unit="DN", label="Quantisation step", help="0 for a float image.", ge=0, le=1e6)
+    scintillation: tuple[tuple[float, ...], ...] = quantity(
+        (),
+        label="Scintillation",
+        help="Covariance of the light over its squared mean, [k][d] of pixels k scan lines and d pixels apart, the "
+        "same to either side. Empty: none.",
+    )
+    fineness: float = quantity(
+        0.0,
+        label="Fineness",
+        help="How much uneven light within a pixel adds to its scintillation: 1 for a grain finer than the pixels, 0 "
+        "for a coarser one and for uneven gain.",
+        ge=0,
+        le=1,
+    )
+
+    @field_validator("scintillation")
+    @classmethod
+    def _is_a_covariance(cls, table: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+        if table and (not table[0] or any(len(row) != len(table[0]) for row in table)):
+            raise ValueError("scintillation has rows of different lengths; allowed: a rectangle, or none")
+        if any(abs(value) > table[0][0] for row in table for value in row):
+            raise ValueError("scintillation is largest at other distances than 0; allowed: none above [0][0]")
+        return table
 
     @property
     def floor(self) -> float:
         """Variance in e-^2 of a pixel without light."""
         return max(self.read_noise**2 + (self.step / self.gain) ** 2 / 12.0, 0.01)
+
+    @property
+    def contrast(self) -> float:
+        """Standard deviation over mean of a pixel's light, shot noise aside."""
+        return math.sqrt(self.scintillation[0][0]) if self.scintillation else 0.0
+
+    @cached_property
+    def covariances(self) -> Float:
+        """(2, m) of light d pixels apart over its squared mean: on the same scan line, and summed over all scan lines.
+
+        The second is what is left of it in the mean of many scan lines. (2, 0) without scintillation.
+        """
+        if not self.scintillation:
+            return np.zeros((2, 0))
+        table = np.array(self.scintillation)
+        return np.stack([table[0], 2.0 * table.sum(axis=0) - table[0]])
 
 
 def image_saturation(image: NDArray[Any]) -> float | None:

@@ -86,6 +86,12 @@ def fuse(images: Sequence[NDArray[Any]], exposure_times: Sequence[float], noise:
     variance = np.where(blind, top, together**2 / np.maximum(information, 1e-300))
     electrons = np.where(missing, np.nan, electrons)
     model = NoiseModel(
-        gain=1.0, black_level=0.0, read_noise=noise.read_noise, saturation=float(np.float32(top)), step=0.0
+        gain=1.0,
+        black_level=0.0,
+        read_noise=noise.read_noise,
+        saturation=float(np.float32(top)),
+        step=0.0,
+        scintillation=noise.scintillation,  # the same grains in every exposure
+        fineness=noise.fineness,
     )
     return Fused(electrons.astype(np.float32), variance.astype(np.float32), model)

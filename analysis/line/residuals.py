@@ -1,0 +1,197 @@
+"""What a fit leaves over, taken apart: noise that grows with the light, and noise that multiplies it.
+
+    E[r r'] = R Cov R',  R = 1 - J (J' W J)^-1 J' W          the fit takes four numbers out of every scan line
+    Cov     = B + K diag(L) + c (L L') o rho                 noise of the background, which is known, of the line's
+                                                             light L as a count, and its scintillation
+
+The moments of r are linear in K and in c rho(k, d), k scan lines and d pixels apart. Each is weighted as the score of a
+normal likelihood weighs it (minimum norm quadratic estimation: C. R. Rao, J. Multivariate Analysis 1, 445, 1971), with
+the rows in runs of neighbours, which left out in turn tell how well each number is known (Quenouille's jackknife).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.line.detection.channel import Lines
+from analysis.line.methods.line_profile import profile
+from analysis.line.result import Flag, Line
+
+Float = NDArray[np.float64]
+
+RUN = 16
+"""Neighbouring scan lines in a run."""
+ACROSS, ALONG = 4, 8
+"""Distances told apart, 0 among them: pixels on a scan line, scan lines."""
+WIDEST = 48
+"""px on either side of a line's centre that are looked at."""
+STRAY = 5.0
+"""Times the typical chi-square from which a scan line shows something else than a line."""
+SURE = 3.0
+"""Standard errors from which a number is believed."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Of a line's light, in the electrons that the noise model assumed."""
+
+    gain: float
+    """Variance over mean of the noise that is a count: 1 where the assumed gain is right."""
+    scintillation: tuple[tuple[float, ...], ...]
+    """As `NoiseModel` has it; () where none is sure."""
+
+
+def scatter(lines: Lines, line: Line) -> Scatter | None:
+    """What scatters the light of the lines (n, w), in runs of `RUN` neighbours, with their fit (n, 1).
+
+    None: too few lines that are whole.
+    """
+    rows = _Rows(lines, line)
+    if rows.runs < 2:
+        return None
+    moments, design = rows.moments()
+    if not lines.noise.scintillation:  # with weights as yet wrong, distances cannot be told from one another
+        moments, design = moments[:, :2], design[:, :2, :2]
+    every = _solve(moments.sum(axis=0), design.sum(axis=0))
+    runs = len(moments)
+    others = np.array([_solve(moments.sum(axis=0) - moments[i], design.sum(axis=0) - design[i]) for i in range(runs)])
+    error = np.sqrt((runs - 1.0) * np.mean((others - others.mean(axis=0)) ** 2, axis=0))
+    gain, light = every[0], every[1]
+    if not light > SURE * error[1]:
+        return Scatter(max(float(gain), 0.0), ())
+    known = np.where(np.abs(every) > SURE * error, every, 0.0)
+    across = np.append(1.0, _run(known[2 : 1 + ACROSS] / light))
+    along = np.append(1.0, _run(known[1 + ACROSS :] / light))
+    table = light * np.outer(along, across)
+    return Scatter(max(float(gain), 0.0), tuple(tuple(row) for row in table.tolist()))
+
+
+def _typical(values: Float) -> Float:
+    """(runs, RUN) -> the same, of each run its median; NaN is left out."""
+    return np.array(np.broadcast_to(np.nanmedian(values, axis=1, keepdims=True), values.shape), np.float64)
+
+
+def _run(values: Float) -> Float:
+    """Correlations at distances 1, 2 ... up to the first that is none."""
+    none = np.flatnonzero(values <= 0.0)
+    return np.asarray(np.minimum(values[: none[0] if len(none) else None], 1.0))
+
+
+def _solve(moments: Float, design: Float) -> Float:
+    return np.asarray(np.linalg.lstsq(design, moments, rcond=1e-9)[0], np.float64)
+
+
+class _Rows:
+    """Residuals of whole runs, on pixels that all rows of a run share: arrays (runs, RUN, n) and (runs, RUN, n, n)."""
+
+    def __init__(self, lines: Lines, line: Line) -> None:
+        signal, mask, floor = lines.read(0, lines.count)
+        u, width, height = line.u[:, 0], line.width[:, 0], line.amplitude[:, 0]
+        whole = line.flag[:, 0] == Flag.OK
+        if whole.any():
+            whole &= line.chi2[:, 0] < STRAY * np.median(line.chi2[whole, 0])
+        runs = lines.count // RUN
+        self.half = min(int(np.ceil(4.0 * np.nanmedian(width) + 1.5)), WIDEST) if whole.any() else 1
+        parts = [self._run(slice(i * RUN, (i + 1) * RUN), whole, u) for i in range(runs)]
+        kept = [(i, start, size) for i, (start, size) in enumerate(parts) if size > 0]
+        size = max((size for _, _, size in kept), default=1)
+        kept = [(i, start, size) for i, start, _ in kept if start >= 0 and start + size <= signal.shape[1]]
+        self.runs = len(kept)
+        if self.runs < 2:
+            return
+        index = np.array([i for i, _, _ in kept])[:, None] * RUN + np.arange(RUN)
+        x = np.array([start for _, start, _ in kept])[:, None] + np.arange(size)
+        # scintillation pulls width and height of a fit along: those of the run do not lean towards the residuals
+        width, height = (
+            _typical(np.where(whole, width, np.nan)[index]),
+            _typical(np.where(whole, height, np.nan)[index]),
+        )
+        fitted = line.amplitude[:, 0][index][:, :, None] * self._profiles(x, u[index], line.width[:, 0][index])[..., 0]
+        shape = self._profiles(x, u[index], width)
+        pick = index[:, :, None], x[:, None, :]
+        near = np.abs(x[:, None, :] - u[index][:, :, None]) <= self.half
+        usable = whole[index][:, :, None] & near & (mask[pick] == 0)
+        base = np.broadcast_to(floor, signal.shape)[pick].astype(np.float64)
+        amplitude, background = height[:, :, None], line.background[:, 0][index][:, :, None]
+        self.light = np.where(usable, amplitude * shape[..., 0], 0.0)
+        self.still = np.where(usable, np.maximum(background + base, 0.1 * np.abs(base)), 0.0)
+        self.variance = np.where(usable, self.light + self.still, 1.0)
+        contrast = lines.noise.contrast
+        self.expected = np.where(usable, self.variance + (contrast * self.light) ** 2, 1.0)
+        residual = np.where(usable, signal[pick] - fitted - background, 0.0)
+        jacobian = np.stack(
+            [shape[..., 0], amplitude * shape[..., 1], amplitude * shape[..., 2], np.ones_like(shape[..., 0])], axis=-1
+        )
+        jacobian = np.where(usable[..., None], jacobian, 0.0)
+        weighted = jacobian / self.variance[..., None]
+        # a row without a line has no information, and is zero throughout
+        normal = np.linalg.pinv(np.swapaxes(jacobian, -1, -2) @ weighted, rcond=1e-12, hermitian=True)
+        self.left = np.eye(size) * usable[..., None] - jacobian @ normal @ np.swapaxes(weighted, -1, -2)
+        self.residual = residual
+
+    def _run(self, rows: slice, whole: NDArray[np.bool_], u: Float) -> tuple[int, int]:
+        """First pixel and size of the window of a run, (0, 0) without two whole rows or where they are far apart."""
+        centres = u[rows][whole[rows]]
+        if len(centres) < 2 or np.ptp(centres) > 4 * RUN:
+            return 0, 0
+        start = int(np.floor(centres.min())) - self.half
+        return start, int(np.ceil(centres.max())) + self.half - start + 1
+
+    @staticmethod
+    def _profiles(x: NDArray[np.intp], u: Float, width: Float) -> Float:
+        """(runs, n), (runs, RUN), (runs, RUN) -> (runs, RUN, n, 3): the unit profile and its two derivatives."""
+        out = np.zeros((*u.shape, x.shape[1], 3))
+        shape = np.empty((3, x.shape[1]))
+        for i, j in np.argwhere(np.isfinite(u)):
+            profile(x[i].astype(np.float64), x.shape[1], u[i, j], width[i, j], True, shape)
+            out[i, j] = shape.T
+        return out
+
+    def moments(self) -> tuple[Float, Float]:
+        """(runs, m) moments less what is known, (runs, m, m) by unknown: K, c across, c along without distance 0."""
+        lags = [(0, d) for d in range(ACROSS)] + [(k, 0) for k in range(1, ALONG)]
+        seen = self.light / self.expected
+        z = self.residual * seen
+        by_light = seen[..., None] * self.left * self.light[..., None, :]
+        squares, weights = self.left**2, self.light / self.expected**2
+        moments = np.empty((self.runs, 1 + len(lags)))
+        design = np.zeros((self.runs, 1 + len(lags), 1 + len(lags)))
+        known = np.einsum("rpij,rpj->rpi", squares, self.still)
+        moments[:, 0] = np.sum(weights * (self.residual**2 - known), axis=(1, 2))
+        design[:, 0, 0] = np.einsum("rpi,rpij,rpj->r", weights, squares, self.light)
+        for b, (_, d) in enumerate(lags[:ACROSS]):
+            pair = self._pairs(self.left * self.light[..., None, :], d)
+            design[:, 0, 1 + b] = np.einsum("rpi,rpi->r", weights, pair)
+        for a, (k, d) in enumerate(lags):
+            n = z.shape[2] - d
+            upper, lower = slice(0, RUN - k), slice(k, RUN)
+            moments[:, 1 + a] = np.sum(z[:, upper, :n] * z[:, lower, d:], axis=(1, 2))
+            first, second = by_light[:, upper, :n], by_light[:, lower, d:]
+            if k == 0:
+                ours, theirs = (seen[..., None] * self.left)[:, :, :n], (seen[..., None] * self.left)[:, :, d:]
+                product = ours * theirs
+                moments[:, 1 + a] -= np.einsum("rpij,rpj->r", product, self.still)
+                design[:, 1 + a, 0] = np.einsum("rpij,rpj->r", product, self.light)
+                for b, (_, apart) in enumerate(lags[:ACROSS]):
+                    design[:, 1 + a, 1 + b] = _shared(first, second, apart)
+            else:
+                design[:, 1 + a, 1 + a] = _shared(first, second, 0)
+        return moments, design
+
+    @staticmethod
+    def _pairs(left: Float, apart: int) -> Float:
+        """Sum over pixels j, j' that far apart of left[i, j] left[i, j']."""
+        n = left.shape[-1] - apart
+        return np.asarray((1.0 if apart == 0 else 2.0) * np.sum(left[..., :n] * left[..., apart:], axis=-1))
+
+
+def _shared(first: Float, second: Float, apart: int) -> Float:
+    """(runs,) sum over pixels that far apart, on either side, of first[i, j] second[i, j']."""
+    n = first.shape[-1] - apart
+    total = np.sum(first[..., :n] * second[..., apart:], axis=(1, 2, 3))
+    if apart > 0:
+        total += np.sum(first[..., apart:] * second[..., :n], axis=(1, 2, 3))
+    return np.asarray(total)
