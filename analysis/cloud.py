@@ -29,7 +29,11 @@ UNITS = {
     "x": "m",
     "y": "m",
     "z": "m",
-    "sigma": "m",
+    "sigma_random": "m",
+    "sigma_systematic": "m",
+    "sigma_depth_random": "m",
+    "sigma_depth_systematic": "m",
+    "correlation_length": "rows",
     "error_depth": "m",
     "error_distance": "m",
     "sheet_bias": "px",
@@ -40,6 +44,8 @@ UNITS = {
     "step": "",
 }
 INTEGERS = ("row", "laser", "step")
+FORMER = {"sigma": "sigma_random"}
+"""Columns of older files, by what they are called now."""
 MAX_BYTES = 2**32
 PLY_TYPES = {
     "char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
@@ -65,7 +71,11 @@ def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: S
         "x": xyz[:, 0].copy(),
         "y": xyz[:, 1].copy(),
         "z": xyz[:, 2].copy(),
-        "sigma": points.sigma[here],
+        "sigma_random": points.sigma[here],
+        "sigma_systematic": points.sigma_systematic[here],
+        "sigma_depth_random": points.sigma_depth[here],
+        "sigma_depth_systematic": points.sigma_depth_systematic[here],
+        "correlation_length": points.correlation_length[here],
         "error_depth": nan if errors is None else errors.depth[here],
         "error_distance": nan if errors is None else errors.distance[here],
         "sheet_bias": nan if errors is None else errors.sheet_bias[here],
@@ -161,7 +171,10 @@ def write_ply(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
 
 
 def read_ply(path: Path | str) -> Cloud:
-    """The scalar columns of a binary little-endian PLY's vertices, as float64 or int32. InputError: it is none."""
+    """The scalar columns of a binary little-endian PLY's vertices, as float64 or int32; older names as they are now.
+
+    InputError: it is none.
+    """
     return merge(list(ply_pieces(path)))
 
 
@@ -184,7 +197,7 @@ def ply_pieces(path: Path | str, rows: int = PART) -> Iterator[Cloud]:
 
 def _columns(table: NDArray[Any]) -> Cloud:
     kinds = {name: np.float64 if table[name].dtype.kind == "f" else np.int32 for name in table.dtype.names or ()}
-    return {name: table[name].astype(kind) for name, kind in kinds.items()}
+    return {FORMER.get(name, name): table[name].astype(kind) for name, kind in kinds.items()}
 
 
 def _ply_header(file: BinaryIO, where: str) -> tuple[int, np.dtype[Any]]:
@@ -213,11 +226,16 @@ def _ply_header(file: BinaryIO, where: str) -> tuple[int, np.dtype[Any]]:
     return count, np.dtype(fields)
 
 
+def title(name: str) -> str:
+    """A column's title in a table: its name and unit."""
+    return f"{name}_{UNITS[name]}" if UNITS.get(name) else name
+
+
 def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> None:
     """One row a point, header `x_m, ..., u_px, ..., row`; floats with all digits. InputError: cannot be written."""
     _, parts = _parts(points)
     first = next(parts)
-    header = [f"{name}_{UNITS[name]}" if UNITS.get(name) else name for name in first]
+    header = [title(name) for name in first]
     with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)
@@ -227,7 +245,7 @@ def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
 
 def read_csv(path: Path | str) -> Cloud:
     """Inverse of `write_csv`. InputError: a cell is no number, or a row is short."""
-    names = {f"{name}_{unit}" if unit else name: name for name, unit in UNITS.items()}
+    names = {title(name): name for name in UNITS} | {f"{name}_m": now for name, now in FORMER.items()}
     data = read_bytes(Path(path), MAX_BYTES, "table")
     try:
         header, *rows = list(csv.reader(io.StringIO(data.decode("utf-8"), newline=""))) or [[]]
@@ -235,13 +253,13 @@ def read_csv(path: Path | str) -> Cloud:
         found = "bytes that are not UTF-8, or a cell without end"
         raise InputError("the table cannot be read", where=str(path), found=found) from None
     cells: Cloud = {}
-    for i, title in enumerate(header):
-        name = names.get(title, title)
+    for i, heading in enumerate(header):
+        name = names.get(heading, heading)
         try:
             cells[name] = np.array([row[i] for row in rows], dtype=np.int32 if name in INTEGERS else np.float64)
         except (ValueError, IndexError, OverflowError):
             kind = "whole numbers" if name in INTEGERS else "numbers"
             raise InputError(
-                "the table holds a cell that is no number", where=f"{path}: {title}", allowed=f"{kind} in every row"
+                "the table holds a cell that is no number", where=f"{path}: {heading}", allowed=f"{kind} in every row"
             ) from None
     return cells

@@ -63,7 +63,9 @@ class Points:
     gradient: Float
     """(m, 3) dP/du (dP/dv on axis "columns"), m/px, camera frame."""
     sigma_pixel: Float
-    """Standard deviation of the position along the scan line, px."""
+    """Random standard deviation of the position along the scan line, px."""
+    correlation_length: Float
+    """Scan lines that err alike, as in `Line`; 1 where that is not known."""
     covariance_systematic: Float | None
     """(m, 3, 3) m^2, camera frame, from the calibration; None: the calibration is taken as exact."""
     flag: NDArray[np.uint8]
@@ -84,9 +86,23 @@ class Points:
         return np.asarray(np.linalg.norm(self.gradient, axis=1) * self.sigma_pixel)
 
     @property
+    def sigma_systematic(self) -> Float:
+        """(m,) m, root of the summed variances that the calibration gives the point; 0 where it is taken as exact."""
+        if self.covariance_systematic is None:
+            return np.zeros(len(self.flag))
+        return np.asarray(np.sqrt(np.trace(self.covariance_systematic, axis1=1, axis2=2)))
+
+    @property
     def sigma_depth(self) -> Float:
         """(m,) m, random standard deviation of `depth_z`."""
         return np.asarray(np.abs(self.gradient[:, 2]) * self.sigma_pixel)
+
+    @property
+    def sigma_depth_systematic(self) -> Float:
+        """(m,) m, standard deviation of `depth_z` by the calibration; 0 where it is taken as exact."""
+        if self.covariance_systematic is None:
+            return np.zeros(len(self.flag))
+        return np.asarray(np.sqrt(self.covariance_systematic[:, 2, 2]))
 
     @property
     def covariance(self) -> Float:
@@ -142,6 +158,9 @@ def triangulate(
         world=transform_points(T_world_camera, point),
         gradient=np.ascontiguousarray(dpoint[:, :, 0 if line.axis == "rows" else 1]),
         sigma_pixel=line.sigma_u[index, rank],
+        correlation_length=np.ones(len(pixel))
+        if line.correlation_length is None
+        else line.correlation_length[index, rank],
         covariance_systematic=None
         if calibration_covariance is None
         else _systematic(camera, pixel, q, point, facing, dpoint, calibration_covariance),

@@ -59,15 +59,18 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
     dark_variance = _difference_variance(np.where(mask & MISSING, np.nan, signal), numbers.step) / colours
     level = max(float(np.median(sample[np.isfinite(sample)])), 0.0)
 
+    still = max(dark_variance - numbers.step**2 / 12.0, 0.0)
+
     def model(gain: float) -> NoiseModel:
-        """The one whose background scatters as it does; what a count of that size would scatter more is black level."""
-        still = max(dark_variance - numbers.step**2 / 12.0, 0.0)
         read_noise = math.sqrt(max(still - gain * level, 0.0)) / gain
-        black_level = max(level - still / gain, 0.0)
-        return numbers.model_copy(update={"gain": gain, "read_noise": read_noise, "black_level": black_level})
+        return numbers.model_copy(update={"gain": gain, "read_noise": read_noise})
+
+    def raised(gain: float) -> NoiseModel:
+        """What a count of the background would scatter more than it does is black level: the line alone is a count."""
+        return model(gain).model_copy(update={"black_level": max(level - still / gain, 0.0)})
 
     start = _full_scale(image) / FULL_WELL
-    split = _split(lines, model, start, settings)
+    split = _split(lines, raised, start, settings)
     if split is not None:
         return split
     log_gain, slope, before = math.log(start), -1.0, (0.0, 0.0)

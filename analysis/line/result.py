@@ -62,7 +62,9 @@ class Line:
     `u` is the sub-pixel position along the scan line in px (the column on axis "rows"), NaN where the flag gives a
     reason, `sigma_u` its standard deviation, NaN where a method cannot say, `width` the line's Gaussian sigma, both
     px; `amplitude` and `background` in electrons (DN / gain); `chi2` the reduced chi-square of the fit, NaN for methods
-    without one. `note` tells what "auto" picked and why; `candidates` are the peaks that one was selected from.
+    without one. Neighbouring scan lines may err alike, by speckle or smoothing: the variance of a mean over many, n, is
+    sigma_u^2 `correlation_length` / n; 1 where they do not, None where it is not known. `note` tells what "auto" picked
+    and why; `candidates` are the peaks that one was selected from.
     """
 
     axis: Axis
@@ -75,6 +77,7 @@ class Line:
     chi2: Float
     flag: NDArray[np.uint8]
     note: str = ""
+    correlation_length: Float | None = None
     candidates: Line | None = None
 
     @property

@@ -190,7 +190,8 @@ def write_line(path: Path, line: Line) -> None:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(LINE_COLUMNS)
     along, across = (line.u, line.v) if line.axis == "rows" else (line.v, line.u)
-    numbers = (along, across, line.sigma_u, line.width, line.amplitude, line.background, line.chi2)
+    length = np.ones_like(line.u) if line.correlation_length is None else line.correlation_length
+    numbers = (along, across, line.sigma_u, line.width, line.amplitude, line.background, line.chi2, length)
     for i in range(line.u.shape[0]):
         for k in range(line.u.shape[1]):
             flag = Flag(int(line.flag[i, k]))
@@ -218,6 +219,7 @@ def summary(path: Path, line: Line, table: Path) -> dict[str, Any]:
         "scan_lines": len(found),
         "found": int(found.sum()),
         "sigma_u_px": typical(line.sigma_u),
+        "correlation_length_rows": None if line.correlation_length is None else typical(line.correlation_length),
         "width_px": typical(line.width),
         "amplitude_e": typical(line.amplitude),
         "flags": {Flag(int(flag)).name: int(count) for flag, count in zip(flags, counts, strict=True)},

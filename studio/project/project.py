@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import PrivateAttr, ValidationError
+from pydantic import PrivateAttr, ValidationError, model_validator
 from pydantic_core import to_jsonable_python
 
 from analysis.line.settings import ExtractionSettings
@@ -20,6 +20,7 @@ from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from render.scene.shape import MeshFile
 from render.sensor.sensor import Sensor
+from studio.project.calibration import Calibration
 from studio.project.migrations import migrate
 from studio.project.strict_json import parse_object, pretty, read_object
 from studio.project.templates import DESCRIPTIONS, template_folder
@@ -46,7 +47,15 @@ class Project(Model):
     sensor: Sensor = Sensor()
     render: RenderSettings = RenderSettings()
     extraction: ExtractionSettings = ExtractionSettings()
+    calibration: Calibration = Calibration()
     _folder: Path = PrivateAttr(default_factory=Path)
+
+    @model_validator(mode="after")
+    def _every_laser_is_calibrated(self) -> Self:
+        given, lasers = len(self.calibration.covariances), len(self.scene.lasers)
+        if given not in (0, lasers):
+            raise ValueError(f"calibration has {given} covariances; allowed: none, or {lasers}, one for each laser")
+        return self
 
     @property
     def folder(self) -> Path:

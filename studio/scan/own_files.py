@@ -8,7 +8,7 @@ import stat
 from collections.abc import Iterable
 from pathlib import Path
 
-from analysis.cloud import UNITS
+from analysis.cloud import UNITS, title
 from render.base.errors import InputError
 
 HEAD = 64 * 1024
@@ -16,7 +16,19 @@ HEAD = 64 * 1024
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 EXR_LAYERS = re.compile(rb"laser\.[^\0]*\.direct\.Y\0|object_id\.Y\0|ambient\.B\0.{16}ambient\.G\0|sigma_time\0", re.S)
 JSON_FORMAT = re.compile(rb'\{\s*"format": "blazer-(frame|scan)"')
-LINE_COLUMNS = ("scan_line", "rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "flag")
+LINE_COLUMNS = (
+    "scan_line",
+    "rank",
+    "u",
+    "v",
+    "sigma_u",
+    "width",
+    "amplitude",
+    "background",
+    "chi2",
+    "correlation_length",
+    "flag",
+)
 RIDGE_COLUMNS = (
     "line",
     "u",
@@ -30,8 +42,25 @@ RIDGE_COLUMNS = (
     "significance",
     "flag",
 )
-POINT_COLUMNS = tuple(f"{name}_{unit}" if unit else name for name, unit in UNITS.items())
-TABLES = tuple(",".join(columns).encode() for columns in (LINE_COLUMNS, RIDGE_COLUMNS, POINT_COLUMNS))
+POINT_COLUMNS = tuple(title(name) for name in UNITS)
+FORMER_COLUMNS = (
+    ("scan_line", "rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "flag"),
+    (
+        "x_m",
+        "y_m",
+        "z_m",
+        "sigma_m",
+        "error_depth_m",
+        "error_distance_m",
+        "u_px",
+        "v_px",
+        "row",
+        "laser",
+        "step",
+    ),
+)
+"""Of versions before this one."""
+TABLES = tuple(",".join(columns).encode() for columns in (LINE_COLUMNS, RIDGE_COLUMNS, POINT_COLUMNS, *FORMER_COLUMNS))
 
 
 def is_own(path: Path) -> bool:

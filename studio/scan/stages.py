@@ -80,7 +80,8 @@ def scaled(project: Project, image_scale: float) -> Project:
     if image_scale == 1.0:
         return project
     scene = project.scene.scaled(image_scale)
-    return project.model_copy(update={"scene": scene, "sensor": scaled_sensor(project.sensor, image_scale)})
+    sensor, calibration = scaled_sensor(project.sensor, image_scale), project.calibration.scaled(image_scale)
+    return project.model_copy(update={"scene": scene, "sensor": sensor, "calibration": calibration})
 
 
 def scaled_sensor(sensor: Sensor, image_scale: float) -> Sensor:
@@ -188,6 +189,7 @@ def triangulate_line(project: Project, line: Line, laser: int, step: int) -> Poi
         scene.laser_plane(laser),
         T_rig_camera=scene.camera.T_rig_camera.matrix,
         T_world_camera=scene.T_world_camera(step),
+        calibration_covariance=project.calibration.covariance(laser),
     )
 
 

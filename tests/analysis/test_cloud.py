@@ -34,7 +34,7 @@ def some_points(count: int, seed: int = 0) -> Points:
     xyz = np.where((flag == PointFlag.OK)[:, None], random.standard_normal((count, 3)), np.nan)
     return Points(
         "rows", random.uniform(0, 2000, (count, 2)), np.arange(count), np.zeros(count, np.intp), xyz, xyz, xyz,
-        random.standard_normal((count, 3)), random.random(count), None, flag,
+        random.standard_normal((count, 3)), random.random(count), 1.0 + random.random(count), None, flag,
     )  # fmt: skip
 
 
@@ -55,7 +55,7 @@ def test_a_cloud_is_read_in_pieces_that_are_no_larger_than_asked_for(tmp_path):
     write_ply(tmp_path / "p.ply", columns)
     pieces = list(ply_pieces(tmp_path / "p.ply", rows=100))
     assert [len(piece["x"]) for piece in pieces] == [100, 100, 57]
-    assert np.array_equal(merge(pieces)["sigma"], columns["sigma"])
+    assert np.array_equal(merge(pieces)["sigma_random"], columns["sigma_random"])
 
 
 def test_only_points_with_coordinates_are_kept():
@@ -80,7 +80,8 @@ def test_other_programs_read_the_ply(tmp_path):
 def test_the_table_names_its_units(tmp_path):
     write_csv(tmp_path / "p.csv", cloud(some_points(3), None, 0, 0))
     assert (tmp_path / "p.csv").read_text().splitlines()[0] == (
-        "x_m,y_m,z_m,sigma_m,error_depth_m,error_distance_m,sheet_bias_px,u_px,v_px,row,laser,step"
+        "x_m,y_m,z_m,sigma_random_m,sigma_systematic_m,sigma_depth_random_m,sigma_depth_systematic_m,"
+        "correlation_length_rows,error_depth_m,error_distance_m,sheet_bias_px,u_px,v_px,row,laser,step"
     )
 
 

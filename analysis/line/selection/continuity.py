@@ -62,6 +62,7 @@ def pick(candidates: Line, choice: Int) -> Line:
         amplitude=taken(candidates.amplitude),
         background=taken(candidates.background),
         chi2=taken(candidates.chi2),
+        correlation_length=None if candidates.correlation_length is None else taken(candidates.correlation_length),
         flag=flag,
         candidates=candidates,
     )

@@ -117,7 +117,7 @@ class TestRepeating:
         sensor = found.project.sensor.model_copy(update={"exposure_time": found.project.sensor.exposure_time / 2})
         dimmer = found.project.model_copy(update={"sensor": sensor})
         reconstruct_folder(found, dimmer, found.root, tmp_path, quiet(), report=False)
-        sigma = [np.median(read_ply(path / "points.ply")["sigma"]) for path in (finished, tmp_path)]
+        sigma = [np.median(read_ply(path / "points.ply")["sigma_random"]) for path in (finished, tmp_path)]
         assert 1.1 < sigma[1] / sigma[0] < 2.0
 
     def test_a_photograph_of_the_scene_gives_the_same_surface(self, tmp_path: Path) -> None:
@@ -130,7 +130,7 @@ class TestRepeating:
         photo, scan = read_ply(tmp_path / "photo" / "frame_0000.ply"), read_ply(tmp_path / "points.ply")
         rows = np.intersect1d(photo["row"], scan["row"])
         a, b = (points["z"][np.searchsorted(points["row"], rows)] for points in (photo, scan))
-        assert np.median(np.abs(a - b)) < np.median(scan["sigma"])
+        assert np.median(np.abs(a - b)) < np.median(scan["sigma_random"])
 
 
 class TestAccuracy:
@@ -145,7 +145,7 @@ class TestAccuracy:
         )
         result = done.manifest["results"][0]
         points = read_ply(tmp_path / "points.ply")
-        error, sigma = points["error_depth"][5:-5], points["sigma"][5:-5]
+        error, sigma = points["error_depth"][5:-5], points["sigma_random"][5:-5]
         assert result["completeness"] > 0.99 and result["false_scan_lines"] <= 2
         assert abs(np.mean(error)) < 4 * np.std(error) / np.sqrt(len(error))
         assert 1 / 1.5 < np.std(error) / np.median(sigma) < 1.5

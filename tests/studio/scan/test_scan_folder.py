@@ -214,7 +214,7 @@ class TestMeasuringFrames:
         dim = replaced(project, ("scene", "rig", "lasers", 0, "power"), project.scene.lasers[0].power / 10)
         for name, chosen in (("same", project), ("dim", dim)):
             reconstruct(made, chosen, made / name)
-        sigma = [np.median(read_ply(made / name / "points.ply")["sigma"]) for name in ("same", "dim")]
+        sigma = [np.median(read_ply(made / name / "points.ply")["sigma_random"]) for name in ("same", "dim")]
         assert 2.5 < sigma[1] / sigma[0] < 10.0  # a tenth of the light: by its root, or by all of it with read noise
 
     def test_an_edited_project_in_the_folder_is_refused_by_what_was_edited(self, made: Path) -> None:
