@@ -137,6 +137,22 @@ def smoothing_correlation(smoothing: float) -> NDArray[np.float64]:
     return np.asarray(along * along[0])
 
 
+def smoothed_covariances(noise: NoiseModel, smoothing: float) -> NDArray[np.float64]:
+    """(2, m) as `NoiseModel.covariances`, of an image after the 2-D smoothing."""
+    if smoothing <= 0.0 or not noise.scintillation:
+        return noise.covariances
+    table = np.array(noise.scintillation)
+    radius = kernel_radius(smoothing)
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / smoothing) ** 2)
+    kernel /= kernel.sum()
+    pairs = np.correlate(kernel, kernel, "full")
+    near = np.zeros(len(table))
+    near[: 2 * radius + 1] = pairs[2 * radius :][: len(table)]
+    both = np.where(np.arange(len(table)) > 0, 2.0, 1.0)
+    spread = [np.convolve(np.append(row[:0:-1], row), pairs) for row in (both * near @ table, both @ table)]
+    return np.stack([row[len(row) // 2 :] for row in spread])
+
+
 def scan_lines(
     image: NDArray[Any], settings: ExtractionSettings, noise: NoiseModel, variance: NDArray[Any] | None = None
 ) -> Lines:
