@@ -91,15 +91,15 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
 def _split(
     lines: Lines, model: Callable[[float], NoiseModel], start: float, settings: ExtractionSettings
 ) -> NoiseModel | None:
-    """The noise model whose residuals are in part a count and in part scintillation, None where they are a count."""
+    """The noise model whose residuals are in part a count and in part scintillation; None: too few lines tell."""
     gain, noise = start, model(start)
     for _ in range(SPLITS):
         tried = replace(lines, noise=noise)
         found = scatter(tried, measure(tried, settings, threads=1))
-        if found is None or not found.scintillation:
+        if found is None:
             return None
         before, gain = gain, min(max(gain * found.gain, start / FARTHEST), start * FARTHEST)
-        settled = noise.scintillation and abs(math.log(gain / before)) < STEADY
+        settled = bool(noise.scintillation) == bool(found.scintillation) and abs(math.log(gain / before)) < STEADY
         noise = model(gain).model_copy(update={"scintillation": found.scintillation})
         if settled:
             break

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from analysis.line.detection.channel import MISSING, Lines, smoothing_correlation
+from analysis.line.detection.channel import MISSING, Lines, smoothed_covariances, smoothing_correlation
 from analysis.line.detection.detect import SEED_COLUMNS, Limits, detect
 from analysis.line.detection.matched_filter import response_gain
 from analysis.line.methods.blais_rioux import measure_zero_crossing
@@ -17,7 +18,7 @@ from analysis.line.methods.gaussian_fit import LEAST_SQUARES, LIKELIHOOD, measur
 from analysis.line.methods.half_energy import measure_half_energy
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.phase import measure_phase
-from analysis.line.methods.seed_loop import ROOM, Options, Pixels, seed_kernel
+from analysis.line.methods.seed_loop import COLUMNS, ROOM, Options, Pixels, seed_kernel
 from analysis.line.methods.steger_2d import HALO, NORMAL_CENTROID, RIDGE, fill_gaps, measure_ridge
 from analysis.line.methods.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, measure_three_pixels
 from analysis.line.methods.threshold import SUBTRACTED, WHOLE, measure_above_threshold
@@ -73,7 +74,7 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
     estimator = METHODS[settings.method]
     run, halo = seed_kernel(estimator.measure), estimator.halo
     correlation = smoothing_correlation(settings.smoothing)
-    out = np.empty((lines.count, settings.peaks, 6))
+    out = np.empty((lines.count, settings.peaks, COLUMNS))
     flags = np.empty((lines.count, settings.peaks), np.uint8)
     limits = Limits(
         threshold=settings.threshold,
@@ -91,6 +92,9 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
         judge=judge,
     )
 
+    shared = smoothed_covariances(lines.noise, settings.smoothing)
+    scattering = shared, lines.noise.table, lines.noise.fineness, 1.0 / correlation[0] ** 0.5
+
     def work(start: int, stop: int) -> None:
         first, last = max(0, start - halo), min(lines.count, stop + halo)
         signal, mask, floor = lines.read(first, last)
@@ -99,12 +103,14 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
         detect(signal[own], mask[own], floor[own], limits, seeds, flags[start:stop])
         if halo and (mask & MISSING).any():
             signal = fill_gaps(signal, mask)
-        pixels = Pixels(signal, mask, floor, correlation, own.start, np.empty((ROOM, signal.shape[1])))
+        room = np.empty((ROOM, signal.shape[1]))
+        pixels = Pixels(signal, mask, floor, correlation, own.start, room, *scattering)
         run(pixels, seeds, flags[start:stop], options, out[start:stop])
 
     map_chunks(work, lines.count, TALL_CHUNK if halo else CHUNK, threads)
     # a position that says less than a guess along the whole scan line is none
     lost = out[..., 1] > lines.image.shape[1] / np.sqrt(12.0)
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
-    u, sigma_u, width, amplitude, background, chi2 = (np.ascontiguousarray(out[..., j]) for j in range(6))
-    return Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
+    u, sigma_u, width, amplitude, background, chi2, length = (np.ascontiguousarray(out[..., j]) for j in range(COLUMNS))
+    line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
+    return replace(line, correlation_length=length)

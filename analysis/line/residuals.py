@@ -61,7 +61,8 @@ def scatter(lines: Lines, line: Line) -> Scatter | None:
     error = np.sqrt((runs - 1.0) * np.mean((others - others.mean(axis=0)) ** 2, axis=0))
     gain, light = every[0], every[1]
     if not light > SURE * error[1]:
-        return Scatter(max(float(gain), 0.0), ())
+        alone = moments[:, 0].sum() / design[:, 0, 0].sum()
+        return Scatter(max(float(alone), 0.0), ())
     known = np.where(np.abs(every) > SURE * error, every, 0.0)
     across = np.append(1.0, _run(known[2 : 1 + ACROSS] / light))
     along = np.append(1.0, _run(known[1 + ACROSS :] / light))

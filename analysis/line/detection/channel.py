@@ -141,7 +141,7 @@ def smoothed_covariances(noise: NoiseModel, smoothing: float) -> NDArray[np.floa
     """(2, m) as `NoiseModel.covariances`, of an image after the 2-D smoothing."""
     if smoothing <= 0.0 or not noise.scintillation:
         return noise.covariances
-    table = np.array(noise.scintillation)
+    table = noise.table
     radius = kernel_radius(smoothing)
     kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / smoothing) ** 2)
     kernel /= kernel.sum()

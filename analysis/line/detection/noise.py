@@ -68,6 +68,11 @@ class NoiseModel(Model):
         return math.sqrt(self.scintillation[0][0]) if self.scintillation else 0.0
 
     @cached_property
+    def table(self) -> Float:
+        """(k, m) of `scintillation`, (0, 0) where there is none."""
+        return np.array(self.scintillation) if self.scintillation else np.zeros((0, 0))
+
+    @cached_property
     def covariances(self) -> Float:
         """(2, m) of light d pixels apart over its squared mean: on the same scan line, and summed over all scan lines.
 
@@ -75,8 +80,7 @@ class NoiseModel(Model):
         """
         if not self.scintillation:
             return np.zeros((2, 0))
-        table = np.array(self.scintillation)
-        return np.stack([table[0], 2.0 * table.sum(axis=0) - table[0]])
+        return np.stack([self.table[0], 2.0 * self.table.sum(axis=0) - self.table[0]])
 
 
 def image_saturation(image: NDArray[Any]) -> float | None:

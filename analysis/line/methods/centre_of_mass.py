@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.line.detection.channel import MISSING
 from analysis.line.detection.detect import CENTRE, PLATEAU, REACH, WIDTH
-from analysis.line.methods.line_profile import linear_variance
+from analysis.line.methods.scintillation import write_sigma
 from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
 from analysis.line.methods.window import ground, pixel_variance, slope_variance, write_peak
 from analysis.line.result import Flag
@@ -65,7 +65,7 @@ def measure_centroid(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
             count += 1
     clipped = CLIPPED / seed[WIDTH] if reason == Flag.SATURATED.value else 0.0
     unknown = clipped * clipped + slope_variance(seed, weight, x, count)
-    sigma = math.sqrt(linear_variance(weight, variance, x, count, pixels.correlation) + unknown)
+    sigma = math.hypot(write_sigma(pixels, y, seed, x, weight, variance, count, out), math.sqrt(unknown))
     # sampling locks narrow lines to the pixels by exp(-2 pi^2 s^2) / pi px at most
     locked = math.exp(-2.0 * (math.pi * seed[WIDTH]) ** 2) / math.pi
     write_peak(seed, u, sigma if seed[WIDTH] > NARROWEST and locked < LOCKED * sigma else np.nan, out)

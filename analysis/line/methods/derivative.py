@@ -102,6 +102,6 @@ def measure_derivative_zero(pixels: Pixels, y: int, seed: Array, flag: int, opti
     if steps > 1 and seed[WIDTH] >= HONEST and not any_saturated(mask, first, last):
         for i in range(n):
             weight[i] /= -slope
-        sigma = position_sigma(pixels, y, seed, first, n, weight)
+        sigma = position_sigma(pixels, y, seed, first, n, weight, out)
     write_peak(seed, first + x, sigma, out)
     return flag

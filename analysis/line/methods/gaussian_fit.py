@@ -12,10 +12,11 @@ import numpy as np
 from numba import njit
 
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, REACH, SLOPE, WIDTH
-from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE, linear_variance, profile
+from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE, profile
 from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
 from analysis.line.methods.narrow_line import NARROWEST, posterior
-from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
+from analysis.line.methods.scintillation import position_variance
+from analysis.line.methods.seed_loop import CORRELATION_LENGTH, Array, Options, Pixels, peak_kernel
 from analysis.line.methods.two_lines import UNKNOWNS
 from analysis.line.methods.window import slope_variance
 from analysis.line.result import Flag
@@ -187,9 +188,11 @@ def _gather(pixels: Pixels, y: int, seed: Array, middle: float, half: float, pix
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _chi2_and_influence(
-    pixel: Array, n: int, p: Array, likelihood: bool, shape: Array, row: Array, weight: Array
+    pixel: Array, n: int, p: Array, likelihood: bool, shape: Array, row: Array, scattered: float, weight: Array
 ) -> float:
     """Sum of squared residuals over their variance; fills the variances of pixels (4, n) and weight (n,).
+
+    scattered: variance of the light over its squared mean, which counts for chi2 and not for the pixels' own noise.
 
     row (4,): the centre's row of the inverse Hessian. weight: how far the centre moves for one electron more.
     """
@@ -201,7 +204,7 @@ def _chi2_and_influence(
         weight[i] += p[0] * (row[1] * shape[1, i] + row[2] * shape[2, i])
         if likelihood:
             weight[i] /= variance
-        chi2 += (pixel[ELECTRONS, i] - mu) ** 2 / variance
+        chi2 += (pixel[ELECTRONS, i] - mu) ** 2 / (variance + scattered * (p[0] * shape[0, i]) ** 2)
         pixel[VARIANCE, i] = variance
     return chi2
 
@@ -313,9 +316,15 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     unit[1] = 1.0
     if not _solve(hessian, 0.0, unit, factor, row):
         return Flag.NOT_CONVERGED.value
-    chi2 = _chi2_and_influence(pixel, count, p, likelihood, shape, row, weight)
+    scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
+    chi2 = _chi2_and_influence(pixel, count, p, likelihood, shape, row, scattered, weight)
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
-    noise = linear_variance(weight, pixel[VARIANCE], pixel[POSITION], count, pixels.correlation)
+    light = trial_shape[0]
+    for i in range(count):
+        light[i] = p[0] * shape[0, i]
+    noise, out[CORRELATION_LENGTH] = position_variance(
+        pixels, weight, pixel[VARIANCE], light, pixel[POSITION], count, p[2], False
+    )
     out[1] = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], count))
     if independent:
         out[5] = chi2 / (count - 4)

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, PLATEAU, REACH, WIDTH
-from analysis.line.methods.line_profile import linear_variance
+from analysis.line.methods.scintillation import write_sigma
 from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
 from analysis.line.methods.window import brightest, ground, pixel_variance, slope_variance
 from analysis.line.result import Flag
@@ -137,8 +137,8 @@ def measure_log_parabola(pixels: Pixels, row: int, seed: Array, flag: int, optio
         _influence(x, y, count, p, inverse, guo, weight)
         for i in range(count):
             x[i] += top
-        noise = linear_variance(weight, variance, x, count, pixels.correlation)
-        sigma = math.sqrt(noise + slope_variance(seed, weight, x, count))
+        noise = write_sigma(pixels, row, seed, x, weight, variance, count, out)
+        sigma = math.sqrt(noise * noise + slope_variance(seed, weight, x, count))
     out[0], out[1] = top + u, sigma
     out[2], out[3], out[4] = math.sqrt(-0.5 / p[2]), math.exp(p[0] - 0.25 * p[1] * p[1] / p[2]), base
     return flag

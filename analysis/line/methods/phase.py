@@ -60,6 +60,6 @@ def measure_phase(pixels: Pixels, y: int, seed: Array, flag: int, options: Optio
         power = real * real + imaginary * imaginary
         for i in range(n):
             weight[i] = (sines[i] * real - cosines[i] * imaginary) / (step * power)
-        sigma = position_sigma(pixels, y, seed, first, n, weight)
+        sigma = position_sigma(pixels, y, seed, first, n, weight, out)
     write_peak(seed, u, sigma, out)
     return reason

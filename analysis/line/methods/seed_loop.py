@@ -3,8 +3,9 @@
     measure(pixels, y, seed, flag, options, out) -> flag
 
 pixels holds the scan line y and those around it, seed (8,) where `detect` saw a peak and how wide and high it is, flag
-what it said of it (OK or SATURATED). The kernel writes out (6,): u, sigma_u, width, amplitude, background, chi2, NaN
-where it has none, and returns the flag that the peak keeps. An out without a position stays NaN.
+what it said of it (OK or SATURATED). The kernel writes out (7,): u, sigma_u, width, amplitude, background, chi2,
+correlation length, NaN where it has none, and returns the flag that the peak keeps. An out without a position stays
+NaN.
 """
 
 from __future__ import annotations
@@ -24,6 +25,10 @@ Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
+COLUMNS = 7
+"""Of out."""
+CORRELATION_LENGTH = 6
+"""The last of them: scan lines."""
 ROOM = 11
 """Scan lines of scratch that a method may use."""
 
@@ -43,6 +48,14 @@ class Pixels(NamedTuple):
     """The scan line of the first row of seeds."""
     room: Array
     """(ROOM, w)."""
+    covariances: Array = np.zeros((2, 0))
+    """(2, c) of the light of pixels that are 0, 1, .. apart, as in `NoiseModel`."""
+    scintillation: Array = np.zeros((0, 0))
+    """(k, c) of pixels 0, 1, .. scan lines and 0, 1, .. pixels apart."""
+    fineness: float = 0.0
+    """As in `NoiseModel`."""
+    alike: float = 1.0
+    """Scan lines that noise without scintillation has in common, by smoothing."""
 
 
 class Options(NamedTuple):
@@ -68,7 +81,7 @@ peak_kernel = register_jitable(error_model="numpy", forceinline=True)
 
 @cache
 def seed_kernel(measure: Callable[..., int]) -> Callable[[Pixels, Array, Mask, Options, Array], None]:
-    """The kernel of one peak -> that of all seeds (n, k, 8): flags (n, k) are updated, out (n, k, 6) is written."""
+    """The kernel of one peak -> that of all seeds (n, k, 8): flags (n, k) are updated, out (n, k, 7) is written."""
 
     @njit(nogil=True, cache=True, error_model="numpy")
     def run(pixels: Pixels, seeds: Array, flags: Mask, options: Options, out: Array) -> None:

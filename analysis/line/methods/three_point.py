@@ -72,6 +72,6 @@ def measure_three_pixels(pixels: Pixels, y: int, seed: Array, flag: int, options
         weight[1] = 2.0 * offset / (bend * b)
         weight[2] = (-0.5 - offset) / (bend * c)
         if _is_steady(seed, pixels.floor[y]) and not any_saturated(mask, top - 1, top + 1):
-            sigma = position_sigma(pixels, y, seed, top - 1, 3, weight)
+            sigma = position_sigma(pixels, y, seed, top - 1, 3, weight, out)
     write_peak(seed, top + min(max(offset, -1.0), 1.0), sigma, out)
     return flag

@@ -9,7 +9,7 @@ from numba import njit
 
 from analysis.line.detection.channel import MISSING, SATURATED
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, SLOPE, SLOPE_SIGMA, WIDTH
-from analysis.line.methods.line_profile import linear_variance
+from analysis.line.methods.scintillation import write_sigma
 from analysis.line.methods.seed_loop import Array, Float32, Mask, Pixels
 
 
@@ -99,10 +99,11 @@ def slope_variance(seed: Array, weight: Array, x: Array, n: int) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def position_sigma(pixels: Pixels, y: int, seed: Array, first: int, n: int, weight: Array) -> float:
-    """Standard deviation of a position that moves by weight[i] px for one electron more in pixel first + i of line y.
+def position_sigma(pixels: Pixels, y: int, seed: Array, first: int, n: int, weight: Array, out: Array) -> float:
+    """Standard deviation of a position that moves by weight[i] px for one electron more in pixel first + i.
 
-    Gaps hand their weight on to the pixels they were filled from. weight (n,) is changed.
+    Gaps hand their weight on to the pixels they were filled from. weight (n,) is changed, the correlation length is
+    written to out.
     """
     signal, mask, floor = pixels.signal[y], pixels.mask[y], pixels.floor[y]
     x, variance = np.empty(n), np.empty(n)
@@ -118,8 +119,8 @@ def position_sigma(pixels: Pixels, y: int, seed: Array, first: int, n: int, weig
     for i in range(n):
         pixel = first + i
         x[i], variance[i] = pixel, pixel_variance(signal, floor, pixel)
-    noise = linear_variance(weight, variance, x, n, pixels.correlation)
-    return math.sqrt(noise + slope_variance(seed, weight, x, n))
+    noise = write_sigma(pixels, y, seed, x, weight, variance, n, out)
+    return math.sqrt(noise * noise + slope_variance(seed, weight, x, n))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

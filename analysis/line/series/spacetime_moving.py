@@ -28,7 +28,7 @@ from analysis.line.detection.detect import (
 )
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.methods.gaussian_fit import LIKELIHOOD, measure_gaussian
-from analysis.line.methods.seed_loop import ROOM, Options, Pixels, seed_kernel
+from analysis.line.methods.seed_loop import COLUMNS, ROOM, Options, Pixels, seed_kernel
 from analysis.line.result import Flag, Line, positioned
 from render.base.errors import InputError
 from render.base.threads import map_chunks
@@ -197,7 +197,7 @@ def _fit(lines: Lines, share: Float, at: int, spread: float, threads: int | None
 
     share (m,): of a pixel's variance. A mean of pixels counts as so many more electrons, so that it is Poisson again.
     """
-    out = np.empty((lines.count, 1, 6))
+    out = np.empty((lines.count, 1, COLUMNS))
     flags = np.empty((lines.count, 1), np.uint8)
     longest = lines.image.shape[1] / 4.0
     options = Options(LIKELIHOOD, integrated=False, known_width=False, max_width=longest, filter_scale=1.0)
