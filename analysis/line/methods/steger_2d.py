@@ -16,7 +16,7 @@ from numba import njit
 
 from analysis.line.detection.channel import MISSING, SATURATED
 from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, REACH, SLOPE, WIDTH
-from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
+from analysis.line.methods.seed_loop import CORRELATION_LENGTH, Array, Float32, Mask, Options, Pixels, peak_kernel
 from analysis.line.methods.window import ground, pixel_variance, write_peak
 from analysis.line.result import Flag
 
@@ -176,8 +176,51 @@ def measure_ridge(pixels: Pixels, y: int, seed: Array, flag: int, options: Optio
     sigma = np.nan
     if pixels.correlation.shape[0] == 1:
         sigma = weight_noise(pixels.signal, pixels.mask, pixels.floor, y, middle, weight)
+        if pixels.covariances.shape[1] > 0:
+            sigma = math.hypot(sigma, ridge_scintillation(pixels, seed, y, middle, weight))
+        # rows err alike that see the same pixels: along the ridge, one row is 1 / nx px from the next
+        alike = 2.0 * math.sqrt(math.pi) * spread * nx if options.variant == RIDGE else 1.0
+        grain = pixels.scintillation[:, 0].sum() / pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 1.0
+        out[CORRELATION_LENGTH] = max(alike, 2.0 * grain - 1.0, 1.0)
+        if options.variant == RIDGE:
+            sigma = math.hypot(sigma, _edge_error(min(y, pixels.signal.shape[0] - 1 - y) + 0.5, spread, ny / nx))
     write_peak(seed, x, sigma, out)
     return flag
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _edge_error(distance: float, spread: float, slope: float) -> float:
+    """px that a slanted ridge is off where its filter reaches over the image's edge, whose row is repeated there.
+
+    slope s_f (phi(z) - z Q(z)), z = distance / s_f: the mean of what the line would have gone on beyond the edge.
+    """
+    z = distance / spread
+    beyond = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi) - 0.5 * z * math.erfc(z * math.sqrt(0.5))
+    return abs(slope) * spread * beyond
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def ridge_scintillation(pixels: Pixels, seed: Array, y: int, x: int, weight: Array) -> float:
+    """As `weight_noise`, of the light's scintillation alone."""
+    m, w = pixels.signal.shape
+    table, half = pixels.scintillation, weight.shape[0] // 2
+    moved = np.empty(weight.shape)
+    for j in range(-half, half + 1):
+        for i in range(-half, half + 1):
+            light = pixels.signal[min(max(y + j, 0), m - 1), min(max(x + i, 0), w - 1)] - seed[BACKGROUND]
+            moved[j + half, i + half] = weight[j + half, i + half] * max(light, 0.0)
+    total, size = 0.0, weight.shape[0]
+    for k in range(min(table.shape[0], size)):
+        for d in range(min(table.shape[1], size)):
+            shared = table[k, d] / (1.0 + table[k, d])  # as in `scintillation.shared_variance`
+            pairs = 0.0
+            for j in range(size - k):
+                for i in range(size - d):
+                    pairs += moved[j, i] * moved[j + k, i + d]
+                    if k > 0 and d > 0:
+                        pairs += moved[j + k, i] * moved[j, i + d]
+            total += shared * pairs * (1.0 if k == 0 and d == 0 else 2.0)
+    return math.sqrt(max(total, 0.0))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
