@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from analysis.line.detection.channel import MISSING, SATURATED
-from analysis.line.detection.detect import BACKGROUND, CENTRE, PLATEAU, REACH, SLOPE, WIDTH
+from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, REACH, SLOPE, WIDTH
 from analysis.line.methods.seed_loop import CORRELATION_LENGTH, Array, Float32, Mask, Options, Pixels, peak_kernel
 from analysis.line.methods.window import ground, pixel_variance, write_peak
 from analysis.line.result import Flag
@@ -31,6 +31,8 @@ STEEPEST = 0.17
 """Least |n_x|: a line within 10 degrees of the scan line has no crossing worth the name."""
 WINDOW = 3.0
 """Half window of the centre of mass along the normal, in sigmas across the line."""
+NEXT_TERM = 0.16
+"""px^2 over the line's sigma squared: what the correction for straight lines between pixels leaves of itself."""
 STEPS = 30
 RIDGE, NORMAL_CENTROID = range(2)
 """Variants."""
@@ -164,8 +166,9 @@ def measure_ridge(pixels: Pixels, y: int, seed: Array, flag: int, options: Optio
     x, middle, slope, nx, ny, reason = _refine(pixels, y, seed, spread, across, along)
     if reason > Flag.SATURATED.value:
         return reason
+    coarse = 0.0
     if options.variant == NORMAL_CENTROID:
-        x, middle, weight, reason = _weigh_normal(pixels.signal, seed, y, x, nx, ny)
+        x, middle, weight, reason, coarse = _weigh_normal(pixels.signal, seed, y, x, nx, ny)
         if reason > Flag.SATURATED.value:
             return reason
     else:
@@ -175,7 +178,7 @@ def measure_ridge(pixels: Pixels, y: int, seed: Array, flag: int, options: Optio
                 weight[j, i] = (nx * across[1, i] * along[0, j] + ny * across[0, i] * along[1, j]) / slope
     sigma = np.nan
     if pixels.correlation.shape[0] == 1:
-        sigma = weight_noise(pixels.signal, pixels.mask, pixels.floor, y, middle, weight)
+        sigma = math.hypot(weight_noise(pixels.signal, pixels.mask, pixels.floor, y, middle, weight), coarse)
         if pixels.covariances.shape[1] > 0:
             sigma = math.hypot(sigma, ridge_scintillation(pixels, seed, y, middle, weight))
         # rows err alike that see the same pixels: along the ridge, one row is 1 / nx px from the next
@@ -226,10 +229,11 @@ def ridge_scintillation(pixels: Pixels, seed: Array, y: int, x: int, weight: Arr
 @njit(nogil=True, cache=True, error_model="numpy")
 def _weigh_normal(
     signal: Float32, seed: Array, y: int, x: float, nx: float, ny: float
-) -> tuple[float, int, Array, int]:
+) -> tuple[float, int, Array, int, float]:
     """Centre of mass of bilinear samples 1 px apart along the normal through (x, y), moved until it rests.
 
-    Returns the crossing with the scan line, the middle of weight (n, n) (pixels' influence on it), the reason.
+    Returns the crossing with the scan line, the middle of weight (n, n) (pixels' influence on it), the reason, and how
+    far the coarse grid may still have moved it, px.
     """
     m, w = signal.shape
     arm = max(1, math.ceil(min(WINDOW * seed[WIDTH] * nx + seed[PLATEAU], max(seed[REACH] * nx, 1.0), HALO - 2.0)))
@@ -239,35 +243,38 @@ def _weigh_normal(
     reason = Flag.NOT_CONVERGED.value
     for _ in range(2 * STEPS):
         if x - arm * nx < 1.0 or x + arm * nx > w - 2.0 or y - arm * abs(ny) < 0.0 or y + arm * abs(ny) > m - 1.0:
-            return x, round(x), weight, Flag.AT_BORDER.value
+            return x, round(x), weight, Flag.AT_BORDER.value, 0.0
         total, moment = 0.0, 0.0
         for j in range(-arm, arm + 1):
             value = _bilinear(signal, x + j * nx, y + j * ny) - ground(seed, x + j * nx)
             total += value
             moment += j * value
         if total <= 0.0:
-            return x, round(x), weight, Flag.NOT_POSITIVE.value
+            return x, round(x), weight, Flag.NOT_POSITIVE.value, 0.0
         move = moment / total
         if abs(move) > arm or abs(x + move / nx - seed[CENTRE]) > 2.0 * arm + 1.0:
-            return x, round(x), weight, Flag.OUT_OF_WINDOW.value
+            return x, round(x), weight, Flag.OUT_OF_WINDOW.value, 0.0
         x += move / nx
         if abs(move) < 1e-4:
             reason = Flag.OK.value
             break
     middle = round(x)
-    start = x
+    start, square = x, (seed[WIDTH] * nx) ** 2
     for j in range(-arm, arm + 1):
         px, py = start + j * nx, y + j * ny
         ix, iy = math.floor(px), math.floor(py)
         tx, ty = px - ix, py - iy
         share = j / (total * nx)
+        # a straight line between two pixels t (1 - t) / 2 I'' above the light: more on one side than on the other
+        bend = seed[AMPLITUDE] * math.exp(-0.5 * j * j / square) * (j * j / square - 1.0) / square
+        x -= share * 0.5 * (tx * (1.0 - tx) * nx * nx + ty * (1.0 - ty) * ny * ny) * bend
         a, b = iy - y + half, ix - middle + half
         for dy in range(2):
             for dx in range(2):
                 part = (ty if dy else 1.0 - ty) * (tx if dx else 1.0 - tx)
                 if 0 <= a + dy < 2 * half + 1 and 0 <= b + dx < 2 * half + 1:
                     weight[a + dy, b + dx] += share * part
-    return x, middle, weight, reason
+    return x, middle, weight, reason, abs(start - x) * NEXT_TERM / square
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
