@@ -87,6 +87,34 @@ def measure(
     )
 
 
+def shared_rows(length: Float, count: int) -> Float:
+    """How many of `count` neighbouring scan lines err as one: the variance of their mean is sigma^2 that / count.
+
+    length: of correlation, scan lines, of errors whose correlation falls by one factor r from line to line, so that it
+    is (1 + r) / (1 - r); among few it is less, by those beyond the ends (Bartlett, J. R. Stat. Soc. B 8, 1946).
+    """
+    r = np.clip((length - 1.0) / (length + 1.0), 0.0, 1.0 - 1e-9)
+    return np.asarray(length - 2.0 * r * (1.0 - r**count) / (count * (1.0 - r) ** 2))
+
+
+def means(
+    error: Float, sigma: Float, length: Float, index: NDArray[np.intp], rank: NDArray[np.intp], count: int
+) -> tuple[Float, Float]:
+    """Means of (m,) errors over `count` neighbouring scan lines, and their predicted sigma, from sigma and length (m,).
+
+    Of the strongest peaks, and of runs without a gap; index, rank: as in `measure`.
+    """
+    order = np.lexsort((rank, index))
+    lines, first = np.unique(index[order], return_index=True)
+    at = order[first]
+    e, variance = error[at], sigma[at] ** 2 * shared_rows(length[at], count) / count
+    begins = np.flatnonzero(lines % count == 0)
+    begins = begins[begins + count <= len(lines)]
+    begins = begins[lines[begins + count - 1] - lines[begins] == count - 1]
+    runs = begins[:, None] + np.arange(count)
+    return np.asarray(e[runs].mean(axis=1)), np.asarray(np.sqrt(variance[runs].mean(axis=1)))
+
+
 def _autocorrelation(error: Float, index: NDArray[np.intp], rank: NDArray[np.intp]) -> float:
     """Correlation of errors on scan lines i and i + 1, the strongest peak of each."""
     order = np.lexsort((rank, index))

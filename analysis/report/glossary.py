@@ -21,6 +21,8 @@ GLOSSARY = (
      "Towards 1: they err together, through smoothing, texture or shape."),
     ("Predicted sigma", "What the extraction claims about its own error from the noise of the pixels, carried through "
      "the triangulation. Of honest claims 95.4 % of the errors lie within ±2 sigma."),
+    ("Correlation length", "How many neighbouring scan lines err alike, by speckle, smoothing or a filter of two "
+     "dimensions: the variance of a mean over n lines is that many times the one of independent lines."),
     ("Complete", "Share of the scan lines with a visible line on which it was found, and not as an outlier."),
     ("px, DN, e⁻", "Pixel; digital number, the value in the image; electrons collected by a pixel."),
 )  # fmt: skip

@@ -24,12 +24,12 @@ ROW = np.dtype(
         ("index", "i8"), ("rank", "i4"), ("flag", "u1"), ("valid", "?"), ("width", "f8"), ("world", "f8", 3),
         ("position", "f8"), ("depth", "f8"), ("distance", "f8"), ("sheet_bias", "f8"),
         ("sigma_position", "f8"), ("sigma_depth", "f8"), ("sigma_distance", "f8"),
-        ("pixel_depth", "f8"), ("pixel_distance", "f8"),
+        ("pixel_depth", "f8"), ("pixel_distance", "f8"), ("sigma_systematic", "f8"), ("alike", "f8"),
     ]
 )  # fmt: skip
 """What figures ask of a point: of its peak `index`, `rank`, `flag`, `width` (px); whether it is `valid`, where it is at
-step 0 (`world`, m); its errors with their predicted sigma (px, m), what the sheet adds to the first (px), and the
-errors in m that one pixel makes."""
+step 0 (`world`, m); its errors with their predicted sigma (px, m), what the sheet adds to the first (px), the errors in
+m that one pixel makes, the calibration's part of sigma in depth, m, and the correlation length, scan lines."""
 
 MOST_LINES = 1 << 18
 """Scan lines kept, of all lasers together: 128 frames of 2048."""
@@ -51,6 +51,7 @@ def rows_of(extraction: Extraction, scene: Scene, step: int) -> Rows:
     rows["sheet_bias"] = errors.sheet_bias
     rows["sigma_position"], rows["sigma_depth"] = points.sigma_pixel, points.sigma_depth
     rows["sigma_distance"] = errors.sigma_distance
+    rows["sigma_systematic"], rows["alike"] = points.sigma_depth_systematic, points.correlation_length
     rows["pixel_depth"] = np.abs(points.gradient[:, 2])
     rows["pixel_distance"] = np.linalg.norm(points.gradient, axis=1)
     return rows

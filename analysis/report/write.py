@@ -26,6 +26,7 @@ from analysis.report.tables import (
     step_table,
     timing,
 )
+from analysis.report.terms import TERM_COLUMNS, term_tables
 from analysis.report.total import Total, total
 from analysis.report.units import count, micrometres, percent
 from analysis.report.view import cloud_view, placed_vertices, scene_view
@@ -123,6 +124,8 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "details_left_out": f"{more} more lasers are in the tables below." if more > 0 else "",
         "measure_tables": measure_tables(report),
         "measure_columns": MEASURE_COLUMNS,
+        "term_tables": term_tables(report),
+        "term_columns": TERM_COLUMNS,
         "sample_note": sample_note(found),
         "cloud_points": count(len(cloud)),
         "point_count": count(found.points),

@@ -1,0 +1,57 @@
+"""What the predicted sigma is made of, and how well each part of it holds against the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.measures import means
+from analysis.report.model import ReportInput
+from analysis.report.sample import Rows
+from analysis.report.units import NONE, count, micrometres, percent
+
+TERM_COLUMNS = ("n", "predicted sigma", "true RMSE", "within ±1 sigma", "within ±2 sigma")
+MEANS = (10, 100)
+"""Neighbouring scan lines."""
+
+
+def term_tables(report: ReportInput) -> list[tuple[str, list[tuple[str, list[str]]]]]:
+    """By laser, its name and rows in the order of `TERM_COLUMNS`, of depth_z by the first method."""
+    tables = []
+    for i, laser in enumerate(report.scene.lasers):
+        if report.record.method_count(i):
+            tables.append((laser.name, term_rows(report.record.chosen(i, 0).rows)))
+    return tables
+
+
+def term_rows(rows: Rows) -> list[tuple[str, list[str]]]:
+    """Noise of one point, of means over neighbours, the calibration, and a point's noise and calibration together."""
+    error, random, systematic = rows["depth"], rows["sigma_depth"], rows["sigma_systematic"]
+    where = rows["index"], rows["rank"]
+    told = [("each point: noise", _cells(error, random))]
+    for number in MEANS:
+        told.append(
+            (f"mean of {number} scan lines: noise", _cells(*means(error, random, rows["alike"], *where, number)))
+        )
+    if np.any(systematic > 0.0):
+        known = systematic[np.isfinite(error) & np.isfinite(systematic)]
+        told.append(("calibration, common to all", [count(len(known)), micrometres(_rms(known)), *[NONE] * 3]))
+        told.append(("noise and calibration", _cells(error, np.hypot(random, systematic))))
+    return told
+
+
+def _cells(error: np.ndarray, sigma: np.ndarray) -> list[str]:
+    known = np.isfinite(error) & np.isfinite(sigma)
+    if not known.any():
+        return [count(0), *[NONE] * 4]
+    e, s = np.abs(error[known]), sigma[known]
+    return [
+        count(len(e)),
+        micrometres(_rms(s)),
+        micrometres(_rms(e)),
+        percent(float(np.mean(e <= s))),
+        percent(float(np.mean(e <= 2.0 * s))),
+    ]
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
