@@ -18,7 +18,7 @@ from analysis.line.detection.channel import COLOURS, MISSING, Lines, scan_lines
 from analysis.line.detection.noise import FULL_SCALES, NoiseModel, image_saturation
 from analysis.line.measure import measure
 from analysis.line.residuals import RUN, scatter
-from analysis.line.result import Line
+from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 
@@ -29,6 +29,12 @@ CHANCE = 32
 """Fewer pixels may share one number, with no other but the dark's, by chance."""
 FARTHEST = 5.0
 """Times the gain of `FULL_WELL`, up or down: where little of the noise is a count, nothing else bounds it."""
+NARROW, FEWEST_BENDS, EXCESS = 1.1, 64, 1.3
+"""px; below it a line is told by its neighbours, by so many second differences, from that ratio of variances on."""
+STRAY = 4.0
+"""Robust sigmas of second differences beyond which they are edges."""
+TRIAL = 0.01
+"""Relative variance of the light whose effect is tried."""
 STEADY = 0.1
 """Change of the gain's logarithm at which splitting ends."""
 FULL_WELL = 1e4
@@ -72,7 +78,7 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
     start = _full_scale(image) / FULL_WELL
     split = _split(lines, raised, start, settings)
     if split is not None:
-        return split
+        return _told_by_neighbours(lines, split, settings)
     log_gain, slope, before = math.log(start), -1.0, (0.0, 0.0)
     for number in range(ROUNDS):
         ratio = residual_ratio(measure(replace(lines, noise=model(math.exp(log_gain))), settings, threads=1))
@@ -104,6 +110,42 @@ def _split(
         if settled:
             break
     return noise
+
+
+def _told_by_neighbours(lines: Lines, noise: NoiseModel, settings: ExtractionSettings) -> NoiseModel:
+    """The noise model of a narrow line, whose fit follows what multiplies the light of its three pixels.
+
+    What scatters the position from row to row, beyond what is told, then counts as scintillation: second differences,
+    to which a smooth surface adds nothing, a rough one its roughness.
+    """
+
+    def look(model: NoiseModel) -> tuple[Line, float]:
+        line = measure(replace(lines, noise=model), settings, threads=1)
+        known = line.sigma_u[line.flag == Flag.OK]
+        return line, float(np.median(known**2)) if len(known) else math.nan
+
+    line, told = look(noise)
+    whole = len(line.u) // RUN * RUN
+    u = np.where(line.flag == Flag.OK, line.u, np.nan)[:whole, 0].reshape(-1, RUN)
+    bends = u[:, :-2] - 2.0 * u[:, 1:-1] + u[:, 2:]
+    bends = np.abs(bends[np.isfinite(bends)])
+    if len(bends) < FEWEST_BENDS or np.nanmedian(line.width) > NARROW:
+        return noise
+    usual = bends[bends < STRAY * 1.4826 * np.median(bends)]
+    scattered = float(np.mean(usual**2)) / 6.0  # of independent rows
+    if not scattered > EXCESS * told:
+        return noise
+    table = noise.table if noise.scintillation else np.zeros((1, 1))
+    tried = table.copy()
+    tried[0, 0] += TRIAL
+    _, more = look(noise.model_copy(update={"scintillation": _rows_of(tried)}))
+    table = table.copy()
+    table[0, 0] += min(TRIAL * (scattered - told) / max(more - told, 1e-12), 1.0)
+    return noise.model_copy(update={"scintillation": _rows_of(table)})
+
+
+def _rows_of(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(row) for row in table.tolist())
 
 
 def _runs(image: NDArray[Any]) -> NDArray[Any]:
