@@ -27,8 +27,8 @@ RUNS = 16
 ROUNDS, SPLITS = 6, 6
 CHANCE = 32
 """Fewer pixels may share one number, with no other but the dark's, by chance."""
-FARTHEST = 5.0
-"""Times the gain of `FULL_WELL`, up or down: where little of the noise is a count, nothing else bounds it."""
+FARTHEST, FARTHEST_ALONE = 5.0, 15.0
+"""Times the gain of `FULL_WELL`, up or down, beside scintillation, beside which little may be a count, and without."""
 NARROW, FEWEST_BENDS, EXCESS = 1.1, 64, 1.3
 """px; below it a line is told by its neighbours, by so many second differences, from that ratio of variances on."""
 STRAY = 4.0
@@ -104,7 +104,8 @@ def _split(
         found = scatter(tried, measure(tried, settings, threads=1))
         if found is None:
             return None
-        before, gain = gain, min(max(gain * found.gain, start / FARTHEST), start * FARTHEST)
+        most = FARTHEST if found.scintillation else FARTHEST_ALONE
+        before, gain = gain, min(max(gain * found.gain, start / most), start * most)
         settled = bool(noise.scintillation) == bool(found.scintillation) and abs(math.log(gain / before)) < STEADY
         noise = model(gain).model_copy(update={"scintillation": found.scintillation})
         if settled:
