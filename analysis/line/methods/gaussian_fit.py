@@ -15,7 +15,7 @@ from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEA
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE, profile
 from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
 from analysis.line.methods.narrow_line import NARROWEST, posterior
-from analysis.line.methods.scintillation import position_variance
+from analysis.line.methods.scintillation import position_variance, shared_variance
 from analysis.line.methods.seed_loop import CORRELATION_LENGTH, Array, Options, Pixels, peak_kernel
 from analysis.line.methods.two_lines import UNKNOWNS
 from analysis.line.methods.window import slope_variance
@@ -31,6 +31,8 @@ NARROWEST_SATURATED = 0.35
 COARSE, RESOLVED, FINE = 0.5, 0.3, 0.35
 """px; a narrower line than the first, whose width may as well be below the second (2 sigma), is not a matter of a fit;
 if it is also narrower than the third on average over what its width may be, it is flagged."""
+JUDGED = 0.01
+"""Relative variance of the light from which no fit is judged: what scintillates strongly keeps to no profile."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -226,16 +228,26 @@ def _is_coarse(pixel: Array, n: int, p: Array, options: Options, hessian: Array)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _measure_narrow(pixel: Array, n: int, p: Array, options: Options, shape: Array, out: Array) -> int:
+def _measure_narrow(pixels: Pixels, pixel: Array, n: int, p: Array, options: Options, shape: Array, out: Array) -> int:
     """The posterior of a line that may be too narrow for its pixels (4, n) -> out (6,); returns UNRESOLVED if it is."""
     x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
     out[1] = posterior(x, y, floor, n, p, options.known_width, options.integrated, shape)
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
-    chi2 = 0.0
+    chi2 = mass = 0.0
+    light, weight = np.empty(n), np.empty(n)
     for i in range(n):
-        mu = p[0] * shape[0, i] + p[3]
+        light[i] = p[0] * shape[0, i]
+        mu = light[i] + p[3]
         chi2 += (y[i] - mu) ** 2 / max(mu + floor[i], 0.1 * abs(floor[i]))
-    out[5] = chi2 / (n - 4)
+        mass += light[i]
+    out[5], out[CORRELATION_LENGTH] = chi2 / (n - 4), 1.0
+    if pixels.covariances.shape[1] > 0 and mass > 0.0:
+        for i in range(n):  # of so few pixels the position is hardly more than their centre of mass
+            weight[i] = (x[i] - p[1]) / mass
+        shared, all_lines = shared_variance(weight, light, x, n, pixels.covariances, pixels.fineness, p[2], False)
+        count = out[1] * out[1]
+        out[1] = math.sqrt(count + shared)
+        out[CORRELATION_LENGTH] = (count + all_lines) / max(count + shared, 1e-300)
     return Flag.UNRESOLVED.value if p[2] < FINE else Flag.OK.value
 
 
@@ -294,12 +306,13 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         if not converged:
             p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
         if not converged or _is_coarse(pixel, count, p, options, hessian):
-            return _measure_narrow(pixel, count, p, options, shape, out)
+            return _measure_narrow(pixels, pixel, count, p, options, shape, out)
     independent = pixels.correlation.shape[0] == 1
+    scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
     # of a line below half a pixel three pixels hold all the light, which two lines would explain as well; and what
     # least squares leave over is more than chi-square expects, since they do not weigh
     judged = options.judge and likelihood and independent and flag == Flag.OK.value
-    judged = judged and count > UNKNOWNS and p[2] >= COARSE
+    judged = judged and count > UNKNOWNS and p[2] >= COARSE and scattered < JUDGED
     if not converged and judged:
         p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
         reason = measure_misfit(pixels, seed, count, p, options, out)
@@ -316,7 +329,6 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     unit[1] = 1.0
     if not _solve(hessian, 0.0, unit, factor, row):
         return Flag.NOT_CONVERGED.value
-    scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
     chi2 = _chi2_and_influence(pixel, count, p, likelihood, shape, row, scattered, weight)
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
     light = trial_shape[0]
@@ -330,6 +342,8 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         out[5] = chi2 / (count - 4)
     if not judged:
         return flag
+    for i in range(count):
+        pixel[VARIANCE, i] += scattered * light[i] * light[i]
     asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian)
     if max(deviate(chi2, count - 4), abs(asymmetry)) < UNLIKELY:
         return flag

@@ -42,7 +42,7 @@ def _centroid(pixel: Array, n: int, p: Array) -> float:
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Options, out: Array) -> int:
-    """A line that is no single Gaussian -> out (6,): as two, or as it is with a sigma that holds the misfit.
+    """A line that is no single Gaussian -> out (7,): as two, or as it is with a sigma that holds the misfit.
 
     pixels.room: what the fit of p (4,) left there. Returns OK for two lines that part. BLENDED for two that do not:
     sigma holds how far the brighter one is from the single line. MISFIT for neither: sigma is that of the fit times
