@@ -18,7 +18,7 @@ from analysis.line.detection.channel import COLOURS, MISSING, Lines, scan_lines
 from analysis.line.detection.noise import FULL_SCALES, NoiseModel, image_saturation
 from analysis.line.measure import measure
 from analysis.line.residuals import RUN, scatter
-from analysis.line.result import Flag, Line
+from analysis.line.result import Line
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 
@@ -91,7 +91,7 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
         log_gain -= float(np.clip(before[1] / slope, -5.0, 5.0))
         if abs(before[1]) < 0.01:
             break
-    return model(math.exp(log_gain))
+    return _told_by_neighbours(lines, model(math.exp(log_gain)), settings)
 
 
 def _split(
@@ -122,12 +122,12 @@ def _told_by_neighbours(lines: Lines, noise: NoiseModel, settings: ExtractionSet
 
     def look(model: NoiseModel) -> tuple[Line, float]:
         line = measure(replace(lines, noise=model), settings, threads=1)
-        known = line.sigma_u[line.flag == Flag.OK]
+        known = line.sigma_u[line.valid]
         return line, float(np.median(known**2)) if len(known) else math.nan
 
     line, told = look(noise)
     whole = len(line.u) // RUN * RUN
-    u = np.where(line.flag == Flag.OK, line.u, np.nan)[:whole, 0].reshape(-1, RUN)
+    u = np.where(line.valid, line.u, np.nan)[:whole, 0].reshape(-1, RUN)
     bends = u[:, :-2] - 2.0 * u[:, 1:-1] + u[:, 2:]
     bends = np.abs(bends[np.isfinite(bends)])
     if len(bends) < FEWEST_BENDS or np.nanmedian(line.width) > NARROW:

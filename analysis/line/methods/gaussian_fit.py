@@ -232,6 +232,9 @@ def _measure_narrow(pixels: Pixels, pixel: Array, n: int, p: Array, options: Opt
     """The posterior of a line that may be too narrow for its pixels (4, n) -> out (6,); returns UNRESOLVED if it is."""
     x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
     out[1] = posterior(x, y, floor, n, p, options.known_width, options.integrated, shape)
+    if not math.isfinite(p[1]) or not math.isfinite(out[1]):
+        out[:] = np.nan
+        return Flag.NOT_CONVERGED.value
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
     chi2 = mass = 0.0
     light, weight = np.empty(n), np.empty(n)
