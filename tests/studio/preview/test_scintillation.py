@@ -41,7 +41,9 @@ def test_a_drawn_pattern_moves_the_fitted_line_as_much_as_foretold(f_number: flo
     field = speckle(NM, camera(f_number).working_f_number, PITCH, True)
     light = expected(80, centre, 8000.0, sigma, 0.0).astype(np.float32)
     image = scintillate(light, 0, rows, field, 4, 0, 0) + np.float32(background)
-    line = extract(image, noise=NoiseModel(read_noise=2.5, step=0.0))
+    rough = Sensor(prnu=0.0, speckle="depolarised")
+    table, fineness = scintillation(rough, camera(f_number), NM)
+    line = extract(image, noise=NoiseModel(read_noise=2.5, step=0.0, scintillation=table, fineness=fineness))
     error = (line.u[:, 0] - centre)[line.valid[:, 0]]
     told = speckle_px(
         camera(f_number), NM, np.full(rows, sigma), centre, np.full(rows, 8e3), np.full(rows, background), 6.25, True
