@@ -232,7 +232,10 @@ def title(name: str) -> str:
 
 
 def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> None:
-    """One row a point, header `x_m, ..., u_px, ..., row`; floats with all digits. InputError: cannot be written."""
+    """One row a point, header `x_m, ..., u_px, ..., row`; floats with all digits, NaN as an empty cell.
+
+    InputError: the file cannot be written.
+    """
     _, parts = _parts(points)
     first = next(parts)
     header = [title(name) for name in first]
@@ -240,7 +243,14 @@ def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
         writer = csv.writer(file)
         writer.writerow(header)
         for part in chain([first], parts):
-            writer.writerows(zip(*(column.tolist() for column in part.values()), strict=True))
+            writer.writerows(zip(*map(_text_cells, part.values()), strict=True))
+
+
+def _text_cells(column: Column) -> list[float | str]:
+    values: list[float | str] = column.tolist()
+    if column.dtype.kind == "f" and np.isnan(column).any():
+        return ["" if value != value else value for value in values]
+    return values
 
 
 def read_csv(path: Path | str) -> Cloud:
@@ -256,7 +266,11 @@ def read_csv(path: Path | str) -> Cloud:
     for i, heading in enumerate(header):
         name = names.get(heading, heading)
         try:
-            cells[name] = np.array([row[i] for row in rows], dtype=np.int32 if name in INTEGERS else np.float64)
+            texts = [row[i] for row in rows]
+            if name in INTEGERS:
+                cells[name] = np.array(texts, dtype=np.int32)
+            else:
+                cells[name] = np.array([text or "nan" for text in texts], dtype=np.float64)
         except (ValueError, IndexError, OverflowError):
             kind = "whole numbers" if name in INTEGERS else "numbers"
             raise InputError(

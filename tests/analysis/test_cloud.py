@@ -77,6 +77,14 @@ def test_other_programs_read_the_ply(tmp_path):
     assert np.array_equal(np.asarray(o3d.io.read_point_cloud(str(tmp_path / "p.ply")).points), xyz)
 
 
+def test_what_is_not_known_is_an_empty_cell(tmp_path):
+    """Spreadsheets and databases read one as missing, "nan" as text."""
+    write_csv(tmp_path / "p.csv", cloud(some_points(3), None, 0, 0))
+    text = (tmp_path / "p.csv").read_text()
+    assert ",," in text and "nan" not in text
+    assert np.isnan(read_csv(tmp_path / "p.csv")["error_depth"]).all()
+
+
 def test_the_table_names_its_units(tmp_path):
     write_csv(tmp_path / "p.csv", cloud(some_points(3), None, 0, 0))
     assert (tmp_path / "p.csv").read_text().splitlines()[0] == (
