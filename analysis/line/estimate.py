@@ -41,14 +41,14 @@ FULL_WELL = 1e4
 """Electrons taken for the highest number when no line says better."""
 
 
-def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseModel:
+def estimate_noise(image: NDArray[Any], settings: ExtractionSettings, saturation: float | None = None) -> NoiseModel:
     """Checked image (h, w) or (h, w, 3) -> NoiseModel that explains the noise of its background and its line.
 
     Noise without light is that of the differences of neighbours along the scan line, edges clipped out. The gain is
     the photon transfer of the line's own fit: the one that makes the typical reduced chi-square of likelihood fits 1.
     Speckle and other noise that multiplies the light, and how alike neighbouring pixels have it, become the model's
     scintillation. What the Gaussian model cannot follow (a lens with tails) counts as noise. Of fewer than 32 scan
-    lines all of it is taken for a count.
+    lines all of it is taken for a count. saturation: DN, of an image that does not tell it by its type.
 
     InputError: the image has two numbers only, which say nothing of noise or of the line's profile.
     """
@@ -57,8 +57,12 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings) -> NoiseMo
     if settings.axis == "columns":
         sample = sample.swapaxes(0, 1)
     settings = settings.model_copy(update={"method": "likelihood", "peaks": 1, "smoothing": 0.0})
-    integer = image.dtype.kind == "u"
-    numbers = NoiseModel(step=1.0 if integer else 0.0, saturation=image_saturation(image))
+    integer = image.dtype.kind == "u" or not np.any(
+        image[np.isfinite(image)] % 1.0
+    )  # so is the difference of two integer images
+    numbers = NoiseModel(
+        step=1.0 if integer else 0.0, saturation=image_saturation(image) if saturation is None else saturation
+    )
     lines = scan_lines(sample, settings, numbers)
     signal, mask, _ = lines.read(0, lines.count)
     colours = 1.5 if lines.channel in COLOURS and image.ndim == 3 else 1.0  # variance of a colour difference

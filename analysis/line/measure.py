@@ -103,7 +103,7 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
         detect(signal[own], mask[own], floor[own], limits, seeds, flags[start:stop])
         if halo and (mask & MISSING).any():
             signal = fill_gaps(signal, mask)
-        room = np.empty((ROOM, signal.shape[1]))
+        room = np.full((ROOM, signal.shape[1]), np.nan)  # what is read before it is written shows
         pixels = Pixels(signal, mask, floor, correlation, own.start, room, *scattering)
         run(pixels, seeds, flags[start:stop], options, out[start:stop])
 

@@ -56,7 +56,7 @@ def extract_photograph(
         noise = None
         if off is not None:
             image, saturation = subtract_off(image, off)
-            noise = estimate_noise(image, settings).model_copy(update={"saturation": saturation})
+            noise = estimate_noise(image, settings, saturation)
         check_camera(image, volume)
         line = extract(image, settings=settings, noise=noise, volume=volume, threads=threads)
         _check_axis(image, line, settings, threads)

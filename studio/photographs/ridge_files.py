@@ -37,7 +37,7 @@ def ridges_of_file(
         noise = None
         if off is not None:
             image, saturation = subtract_off(image, off)
-            noise = estimate_noise(image, settings).model_copy(update={"saturation": saturation})
+            noise = estimate_noise(image, settings, saturation)
         found = find_ridges(image, settings=settings, noise=noise, threads=threads)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -65,9 +65,9 @@ class Store:
             )
         if about.get("digest") != digest:
             raise InputError(
-                "the folder holds another study: its base project, fixed fields or image scale differ",
+                "the folder holds another study: its base project, fixed fields, image scale or program differ",
                 where=str(self.path),
-                cure="choose another folder with --out; more values, methods or repeats may be added to this one",
+                cure="choose another folder with --out; only values, methods and repeats may be added to this one",
             )
 
     @contextmanager

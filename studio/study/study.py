@@ -6,6 +6,7 @@ import difflib
 import hashlib
 import json
 import re
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -163,8 +164,9 @@ class Study(Model):
             raise input_error(error, cls, data, str(file)) from None
 
     def digest(self, bases: dict[str, Project]) -> str:
-        """What decides the study's numbers, as SHA-256: two files that differ only in charts have the same."""
+        """What decides a cell's numbers beside its key, as SHA-256: the program, the bases, what is fixed."""
         said = {
+            "program": program_digest(),
             "image_scale": self.image_scale,
             "laser": self.laser,
             "set": self.set,
@@ -176,6 +178,17 @@ class Study(Model):
         """Every base project by its name in the file. InputError: one cannot be read, or lies outside `root`."""
         names = {self.base, *(sweep.base for sweep in self.sweeps if sweep.base is not None)}
         return {name: base_project(name, root) for name in sorted(names)}
+
+
+@lru_cache(maxsize=1)
+def program_digest() -> str:
+    """SHA-256 of the code that measures, so that rows of two versions are never of one table."""
+    root, digest = Path(__file__).resolve().parents[2], hashlib.sha256()
+    for file in sorted(file for room in ("analysis", "render", "studio") for file in (root / room).rglob("*.py")):
+        name = file.relative_to(root).as_posix()
+        if not name.startswith("studio/qt/"):
+            digest.update(f"{name}\0".encode() + file.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
 def study_file(path: Path | str) -> Path:

@@ -318,6 +318,9 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     judged = judged and count > UNKNOWNS and p[2] >= COARSE and scattered < JUDGED
     if not converged and judged:
         p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
+        for i in range(count):  # no model has told the variance yet: it is that of the pixels themselves
+            floor, light = pixel[FLOOR, i], pixel[ELECTRONS, i] - p[3]
+            pixel[VARIANCE, i] = max(pixel[ELECTRONS, i] + floor, 0.1 * abs(floor)) + scattered * light * light
         reason = measure_misfit(pixels, seed, count, p, options, out)
         if reason != Flag.MISFIT.value:
             return reason
