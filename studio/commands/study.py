@@ -73,7 +73,7 @@ def run_file(
 def show_folder(folder: Path, *, quiet: bool, as_json: bool) -> None:
     """`study show`: what a folder's study found so far; tables and charts are written anew."""
     study, bases = described(folder)
-    with hold(folder), Store(folder, study.digest(bases)) as store:
+    with hold(folder), Store(folder, None) as store:
         _write(folder, study, bases, store, as_json=as_json)
 
 

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from analysis.report.colour import INK, MUTED, method_colour, method_name
 from analysis.report.style import figure
@@ -29,8 +29,10 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
         for axis in (axes.xaxis, axes.yaxis):
             if axis.get_scale() == "log":  # matplotlib's own ticks are formulas
                 low, high = axis.get_view_interval()
+                if high < 100.0 * low:
+                    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
                 axis.set_major_formatter(_tick)
-                axis.set_minor_formatter(_tick if high < 10.0 * low else NullFormatter())
+                axis.set_minor_formatter(NullFormatter())
         return made
 
 

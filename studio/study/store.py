@@ -28,8 +28,8 @@ Row = dict[str, Any]
 class Store:
     """The rows of one study. Use as a context; another program with the same folder is told apart by the lock."""
 
-    def __init__(self, folder: Path, digest: str) -> None:
-        """folder: exists. digest: of what the rows belong to.
+    def __init__(self, folder: Path, digest: str | None) -> None:
+        """folder: exists. digest: of what the rows belong to; None: whatever it is, they are only looked at.
 
         InputError: the file is of another study, damaged, or of a newer version.
         """
@@ -51,10 +51,10 @@ class Store:
                 cure="restore it from a copy, or remove the folder and run the study anew",
             ) from None
 
-    def _check(self, digest: str) -> None:
+    def _check(self, digest: str | None) -> None:
         with self._transaction():
             about = dict(self._connection.execute("SELECT name, value FROM about"))
-            if not about:
+            if not about and digest is not None:
                 pairs = {"version": str(VERSION), "digest": digest}
                 self._connection.executemany("INSERT INTO about VALUES (?, ?)", pairs.items())
                 return
@@ -63,7 +63,7 @@ class Store:
             raise InputError(
                 "the study's store is of another version", where=str(self.path), found=found, allowed=allowed
             )
-        if about.get("digest") != digest:
+        if digest is not None and about.get("digest") != digest:
             raise InputError(
                 "the folder holds another study: its base project, fixed fields, image scale or program differ",
                 where=str(self.path),

@@ -177,6 +177,16 @@ def test_the_folder_of_another_study_is_refused_and_stays_as_it_was(whole: tuple
     assert (whole[0] / FILE).read_bytes() == before
 
 
+def test_rows_of_another_version_of_the_program_are_not_added_to_and_can_still_be_looked_at(
+    whole: tuple[Path, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studio.study.study.program_digest", lambda: "another")
+    with pytest.raises(InputError, match="program differ"):
+        run(whole[0])
+    with Store(whole[0], None) as store:
+        assert table(whole[0], store) == whole[1]
+
+
 @pytest.mark.parametrize("content", [b"no database" * 100, b""])
 def test_a_damaged_store_is_told(tmp_path: Path, content: bytes) -> None:
     (tmp_path / FILE).write_bytes(content)
