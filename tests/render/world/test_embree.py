@@ -248,3 +248,5 @@ def test_a_library_that_answers_otherwise_than_embreex_is_not_trusted(monkeypatc
     embree.works.cache_clear()
     assert not embree.works()
     embree.works.cache_clear()
+    with pytest.raises(RuntimeError, match="Invalid operation"):  # else the next tree of this thread is blamed for it
+        opened.check()
