@@ -62,9 +62,9 @@ def check_unchanged(recorded: Mapping[str, str], scene: Scene, root: Path, *, cu
 
 
 def changed_files(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
-    """The files whose hashes differ, each with both."""
+    """The files whose hashes differ, each with both; what a damaged record holds in place of one is shown as text."""
     return [
-        f"{name} (SHA-256 now {now.get(name, 'of no file')[:SHOWN]}, then {then.get(name, 'of no file')[:SHOWN]})"
+        f"{name} (SHA-256 now {now.get(name, 'of no file')[:SHOWN]}, then {str(then.get(name, 'of no file'))[:SHOWN]})"
         for name in sorted({*then, *now})
         if then.get(name) != now.get(name)
     ]
