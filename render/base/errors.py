@@ -13,6 +13,7 @@ class InputError(ValueError):
 
     def __init__(self, what: str, *, where: str = "", found: object = None, allowed: str = "", cure: str = "") -> None:
         self.what, self.where, self.found, self.allowed, self.cure = what, where, found, allowed, cure
+        where = where.replace("\n", "\\n")  # a file may be so named; lines of a message are its own
         parts = [f"{where}: {what}" if where else what]
         if found is not None:
             text = str(found)

@@ -130,7 +130,8 @@ def _import(*argv: str) -> None:
     root = Path("imported")
     root.mkdir(exist_ok=True)
     try:
-        import_mesh(Path(argv[-1]), root, 0.2)
+        with warnings.catch_warnings(record=True):  # the window shows them
+            import_mesh(Path(argv[-1]), root, 0.2)
     except InputError as error:
         if "--debug" in argv:
             traceback.print_exc()
