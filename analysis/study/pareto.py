@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,5 +87,5 @@ def bootstrapped_front(costs: Sequence[Float], errors: Sequence[Float], seed: in
     return Front(front(cost, error), members / RESAMPLES, knee(cost, error), knees / max(knees.sum(), 1.0))
 
 
-def _or_nan(summary: object, values: Float) -> float:
-    return float(summary(values)) if len(values) else float("nan")  # type: ignore[operator]
+def _or_nan(summary: Callable[[Float], np.floating[Any]], values: Float) -> float:
+    return float(summary(values)) if len(values) else float("nan")

@@ -17,6 +17,8 @@ from studio.study.store import Row
 from studio.study.study import Study, Sweep
 from studio.study.tables import grouped, seconds_of, values_of
 
+Groups = dict[tuple[Point, str], list[Row]]
+
 
 @dataclass(frozen=True)
 class Spot:
@@ -66,14 +68,16 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
         for (point, method), error, time in zip(groups, errors, times, strict=True)
     )
     front = bootstrapped_front(times, errors) if sweep.chart == "speed" and spots else None
-    return Answer(sweep, spots, front, _broken(study, number, bases, rows))
+    return Answer(sweep, spots, front, _broken(study, number, bases, rows, groups))
 
 
-def _broken(study: Study, number: int, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> tuple[Broken, ...]:
+def _broken(
+    study: Study, number: int, bases: Mapping[str, Project], rows: Mapping[str, Row], groups: Groups
+) -> tuple[Broken, ...]:
     sweep = study.sweeps[number]
     if sweep.sampling != "bisection":
         return ()
-    search, groups, found = search_of(sweep), grouped(study, bases, rows, number), []
+    search, found = search_of(sweep), []
     for method in methods_of(study, sweep):
         known = measured_along(study, number, method, bases, rows)
         if not {search.good, search.bad} <= known.keys():

@@ -18,8 +18,6 @@ class Measure:
     label: str
     unit: str = ""
     scale: float = 1.0
-    of_repeats: bool = True
-    """Its mean over repeats says something; of a bias also whether it differs from 0."""
 
 
 MEASURES: dict[str, Measure] = {

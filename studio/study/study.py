@@ -229,14 +229,6 @@ def with_fields(project: Project, values: dict[str, Value], where: str) -> Proje
     return Project.from_data(data, where).in_folder(project.folder)
 
 
-def field_value(project: Project, path: str, where: str) -> Any:
-    """What stands at a path. InputError: no such field."""
-    place: Any = project.model_dump(mode="json")
-    for part in parts_of(path):
-        place = _child(place, part, path, where)
-    return place
-
-
 def check_measure(name: str) -> None:
     """ValueError: no such measure."""
     if name not in MEASURES:

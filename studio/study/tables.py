@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +23,23 @@ from studio.study.study import Study
 SECONDS = ("seconds_render", "seconds_develop", "seconds_extract")
 
 
-def measured_cells(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> Iterator[tuple[Cell, Row]]:
-    """Every cell that is measured, with its row: by sweep, point, method and repeat, whatever the order of work."""
-    for number, sweep in enumerate(study.sweeps):
-        wanted: dict[str | None, list[Point]]
-        if sweep.sampling != "bisection":
-            wanted = {None: points(sweep)}
-        else:
-            wanted = {
-                method: [(value,) for value in sorted(measured_along(study, number, method, bases, rows))]
-                for method in methods_of(study, sweep)
-            }
-        for method, found in wanted.items():
-            for cell in cells_at(study, number, bases, found):
-                if cell.key in rows and method in (None, cell.method):
-                    yield cell, rows[cell.key]
+def measured_cells(
+    study: Study, number: int, bases: Mapping[str, Project], rows: Mapping[str, Row]
+) -> Iterator[tuple[Cell, Row]]:
+    """A sweep's cells that are measured, with their rows: by point, method and repeat, whatever the order of work."""
+    sweep = study.sweeps[number]
+    wanted: dict[str | None, list[Point]]
+    if sweep.sampling != "bisection":
+        wanted = {None: points(sweep)}
+    else:
+        wanted = {
+            method: [(value,) for value in sorted(measured_along(study, number, method, bases, rows))]
+            for method in methods_of(study, sweep)
+        }
+    for method, found in wanted.items():
+        for cell in cells_at(study, number, bases, found):
+            if cell.key in rows and method in (None, cell.method):
+                yield cell, rows[cell.key]
 
 
 def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Path]:
@@ -53,7 +56,8 @@ def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows:
         name: [] for name in ("sweep", "key", "method", "repeat", "seed", *fields, *MEASURES, "reason")
     }
     times: dict[str, list[Any]] = {name: [] for name in ("key", *SECONDS)}
-    for cell, row in measured_cells(study, bases, rows):
+    cells = (measured_cells(study, number, bases, rows) for number in range(len(study.sweeps)))
+    for cell, row in chain.from_iterable(cells):
         sweep = study.sweeps[cell.sweep]
         values = {one.field: value for one, value in zip(sweep.vary, cell.point, strict=True)}
         said = {"sweep": sweep.name, "key": cell.key, "method": cell.method, "repeat": cell.repeat}
@@ -92,9 +96,8 @@ def grouped(
 ) -> dict[tuple[Any, str], list[Row]]:
     """Rows of one sweep's repeats by point and method, in order."""
     groups: dict[tuple[Any, str], list[Row]] = {}
-    for cell, row in measured_cells(study, bases, rows):
-        if cell.sweep == number:
-            groups.setdefault((cell.point, cell.method), []).append(row)
+    for cell, row in measured_cells(study, number, bases, rows):
+        groups.setdefault((cell.point, cell.method), []).append(row)
     return groups
 
 
