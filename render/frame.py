@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from render.base.counts import Counts
 from render.base.finite import check_finite
+from render.importance import Importance
 from render.plan import GroupQuality, Plan
 
 Float = NDArray[np.float64]
@@ -98,6 +99,8 @@ class Frame:
     """What may make a sensible picture of the wrong thing (`render.world.material_checks`)."""
     counts: Counts = field(default_factory=dict)
     """Of all light together: rays, seconds inside embree."""
+    importance: Importance | None = field(default=None, kw_only=True)
+    """Where errors of the light matter, once that is known; None: everywhere alike."""
 
     def laser(self, index: int) -> Float32:
         """(h, w) radiance of one laser's group: direct and indirect."""

@@ -1,0 +1,39 @@
+"""What an error of the light in each pixel does to the measured lines: where a render is to spend its work.
+
+The renderer knows nothing of line extraction: whoever measures the image works this out, from the derivative of each
+row's position by its pixels and the sigma that the sensor's own noise gives that row.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Importance:
+    """Weights by which the deviations of a rendered image become deviations of what is measured in it.
+
+    Where `s` is the standard deviation of a pixel's radiance, a scan line (a row on axis "rows") is known well enough
+    once the sum of (weight s)^2 over its pixels is at most 1: its position is then moved by less than the goal's share
+    of its own sigma, and no peak appears or vanishes by the error of the render.
+    """
+
+    laser: tuple[Float32, ...]
+    """For each laser (h, w) weight of its own light, 1 / (W/(m^2 sr)); zero where no error matters."""
+    ambient: Float32
+    """(h, w) weight of ambient light, for each of its bands alike, 1 / (W/(m^2 sr))."""
+    axis: Literal["rows", "columns"] = "rows"
+
+
+def line_errors(weight: Float32, variance: Float32, axis: Literal["rows", "columns"] = "rows") -> Float:
+    """(n,) standard deviation of each scan line's measurement over the allowed one; from (h, w) weight, variance."""
+    along = 1 if axis == "rows" else 0
+    moments = np.sum(weight.astype(np.float64) ** 2 * variance, axis=along)
+    return np.asarray(np.sqrt(moments))
