@@ -49,6 +49,8 @@ def _check_pages(data: bytes, where: str) -> None:
     try:
         with Image.open(io.BytesIO(data)) as image:
             size, pages = image.size, getattr(image, "n_frames", 1)
+            if image.format == "PNG" and size[0] * size[1] <= MAX_PIXELS:
+                image.load()  # what is damaged is refused here, where libpng would print words of its own
     except UnidentifiedImageError:
         return
     except Image.DecompressionBombError:

@@ -100,7 +100,8 @@ def _of_ending(case: Case, ended: Ended) -> Iterator[str]:
         yield f"words of Python: {words[0]}"
     if CONTROL.search(out) or CONTROL.search(err):
         yield "control characters reach the terminal"
-    if "--json" in case.argv and case.argv[0] not in FUNCTIONS:
+    options = case.argv[: case.argv.index("--")] if "--" in case.argv else case.argv
+    if "--json" in options and case.argv[0] not in FUNCTIONS:
         try:
             if json.loads(out, parse_constant=_no_constant)["ok"] != (code == 0):
                 yield "ok and the exit code disagree"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -135,6 +136,19 @@ def bad_images(folder: Path) -> dict[str, str]:
         "sparse.tiff": "too big; found 1073741824 bytes; allowed: 536870912 bytes",
         "layers.exr": "no image of its own; found a, b",
     }
+
+
+def test_a_damaged_image_is_told_in_our_words_alone(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    whole = cv2.imencode(".png", eight_bit(counts()))[1].tobytes()
+    start = whole.index(b"IDAT") + 4
+    size = int.from_bytes(whole[start - 8 : start - 4], "big")
+    data = whole[start : start + 40] + b"\xff" * (size - 40)
+    crc = zlib.crc32(b"IDAT" + data).to_bytes(4, "big")
+    (tmp_path / "bad.png").write_bytes(whole[:start] + data + crc + whole[start + size + 4 :])
+    ended = call(tmp_path / "bad.png")
+    # libpng writes past Python's streams
+    assert (ended.exit_code, capfd.readouterr().err) == (2, "")
+    assert "the image is damaged" in ended.stderr
 
 
 def test_one_bad_image_does_not_stop_the_others_and_is_named(tmp_path: Path) -> None:
