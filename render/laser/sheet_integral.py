@@ -8,6 +8,7 @@ whose disc is seen edge-on along the change of q: the density of a semicircle, f
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -16,40 +17,48 @@ from numpy.typing import NDArray
 from render.laser.irradiance import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2
 
 Float = NDArray[np.float64]
+Vector = tuple[float, float, float]
 
 SMALL = 0.3
 """Half-widths of a cell, together, in sigmas, below which a series does."""
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def sheet_slope(  # noqa: PLR0913
-    xs: float,
-    ys: float,
-    m: Float,
-    w: Float,
-    n0: float,
-    n1: float,
-    n2: float,
-    d0: float,
-    d1: float,
-    d2: float,
-    s: float,
-    cosine: float,
-    q: float,
-    sigma: float,
-    slope: float,
-) -> float:
-    """Change of q = x / sigma(z) with a pixel coordinate along which the ray's (x, y) changes by (xs, ys)."""
+class SheetHit(NamedTuple):
+    """Where a ray o + s d meets a facet in the sheet."""
+
+    normal: Vector
+    """Of the facet, unit, world frame."""
+    direction: Vector
+    """d, of any length, world frame."""
+    s: float
+    cosine: float
+    """n . d."""
+    q: float
+    """x / sigma there."""
+    sigma: float
+    """Of the sheet, m."""
+    slope: float
+    """d sigma / dz."""
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def sheet_slope(xs: float, ys: float, m: Float, w: Float, hit: SheetHit) -> float:
+    """Change of q = x / sigma(z) with a pixel coordinate along which the ray's (x, y) changes by (xs, ys).
+
+    m, w: from camera to world, from world to laser, (4, 4).
+    """
+    n0, n1, n2 = hit.normal
+    d0, d1, d2 = hit.direction
     e0, e1, e2 = (
         m[0, 0] * xs + m[0, 1] * ys,
         m[1, 0] * xs + m[1, 1] * ys,
         m[2, 0] * xs + m[2, 1] * ys,
     )
-    f = (n0 * e0 + n1 * e1 + n2 * e2) / cosine
-    g0, g1, g2 = s * (e0 - f * d0), s * (e1 - f * d1), s * (e2 - f * d2)
+    f = (n0 * e0 + n1 * e1 + n2 * e2) / hit.cosine
+    g0, g1, g2 = hit.s * (e0 - f * d0), hit.s * (e1 - f * d1), hit.s * (e2 - f * d2)
     dx = w[0, 0] * g0 + w[0, 1] * g1 + w[0, 2] * g2
     dz = w[2, 0] * g0 + w[2, 1] * g1 + w[2, 2] * g2
-    return (dx - q * slope * dz) / sigma
+    return (dx - hit.q * hit.slope * dz) / hit.sigma
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

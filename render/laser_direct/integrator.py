@@ -28,6 +28,9 @@ from render.laser_direct.aperture import gather_aperture
 from render.laser_direct.centre_ray import gather_first, look_around
 from render.laser_direct.rasterise import reachable_pixels
 from render.laser_direct.shading import (
+    CellRays,
+    ShadowRays,
+    Sheet,
     gather,
     place,
     shade_diffuse,
@@ -211,8 +214,8 @@ class _Task:
         if aperture:
             planes = np.empty((count, 5))
             origins = np.empty((count, 3), np.float32)
-            buffers = (normalised, offsets, lens, origins, directions)
-            lens_rays(view, pair_table(), pixels, cells, self.seed, rays.centre, *buffers)
+            written = (normalised, offsets, lens, origins, directions)
+            lens_rays(view, pair_table(), pixels, cells, self.seed, rays.centre, *written)
             triangle, _ = rays.intersect(origins, directions, coherent=True)
         else:
             if cells == 1:
@@ -226,27 +229,15 @@ class _Task:
             shade = shade_glossy_lens if has_gloss(surface) else shade_diffuse_lens
         else:
             shade = shade_glossy if has_gloss(surface) else shade_diffuse
-        shadows, dropped = shade(
-            surface,
-            view,
-            triangle,
-            normalised,
-            offsets,
-            lens,
-            cells,
+        sheet = Sheet(
             invert(self.T_world_laser),
             self.T_world_laser[:3, 3].copy(),
             self.laser.packed(),
             np.array(reflectance_weights(self.laser.wavelength_nm)),
-            rays.centre,
-            rays.surface_offset,
-            values,
-            planes,
-            origins,
-            towards,
-            far,
-            sample,
         )
+        buffers = ShadowRays(rays.centre, rays.surface_offset, origins, towards, far, sample)
+        cell_rays = CellRays(triangle, normalised, offsets, lens, cells)
+        shadows, dropped = shade(surface, view, cell_rays, sheet, buffers, values, planes)
         self.dropped.append(dropped)
         blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows], coherent=True)
         mean, error, jump = (np.empty(len(pixels)) for _ in range(3))

@@ -8,7 +8,7 @@ sampled.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -18,15 +18,58 @@ from render.camera.distortion import distort, tilt_matrix
 from render.camera.lens import lens_direction, lens_position
 from render.camera.view import View
 from render.laser.irradiance import fan_density, sheet_sigma
-from render.laser.sheet_integral import about_over, about_over_aperture, mean_over, sheet_slope
+from render.laser.sheet_integral import SheetHit, about_over, about_over_aperture, mean_over, sheet_slope
 from render.laser_direct.centre_ray import BEYOND
 from render.material.bsdf import evaluate, is_diffuse
 from render.world.surface_interaction import detailed, light_side
-from render.world.triangles import Surface, lookup, slot_reflectance, to_local
+from render.world.triangles import Surface, facet_of, lookup, slot_reflectance, to_local
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
+Vector = tuple[float, float, float]
+
+
+class CellRays(NamedTuple):
+    """Camera rays, one through each of cells x cells cells of each pixel, and what they meet."""
+
+    triangle: Int
+    """(n,), -1: nothing."""
+    normalised: Float
+    """(n, 2) coordinates in the camera."""
+    offsets: Float32
+    """(n, 2) px from the middle of the cell."""
+    lens: Float
+    """(n, 2) points of the aperture; (0, 2): a pinhole."""
+    cells: int
+
+
+class Sheet(NamedTuple):
+    """The sheet of one laser in the world."""
+
+    T_laser_world: Float
+    centre: Float
+    """(3,) of the laser, world frame."""
+    beam: Float
+    """`render.laser.laser.LineLaser.packed`."""
+    weights: Float
+    """(3,) of the bands of a reflectance at its wavelength."""
+
+
+class ShadowRays(NamedTuple):
+    """Where shadow rays are written, and from where they are counted."""
+
+    centre: Float
+    """(3,) of the world as embree has it."""
+    surface_offset: float
+    """m between a ray's origin and its surface."""
+    origins: Float32
+    """(n, 3) from `centre`."""
+    directions: Float32
+    far: Float32
+    """(n,) m."""
+    sample: Int
+    """(n,) whose each is: a number of a camera ray."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -76,48 +119,133 @@ def eval_bsdf(
     return total
 
 
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def over(a: Vector, divisor: float) -> Vector:
+    return a[0] / divisor, a[1] / divisor, a[2] / divisor
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def fill(array: Float, a: Vector) -> None:
+    """Write a vector -> array (3,)."""
+    array[0], array[1], array[2] = a
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def turned(matrix: Float, a: Vector) -> Vector:
+    """The direction a by a pose (4, 4)."""
+    x, y, z = a
+    return (
+        matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
+        matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z,
+        matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z,
+    )
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def placed(matrix: Float, a: Vector) -> Vector:
+    """The point a by a pose (4, 4)."""
+    x, y, z = turned(matrix, a)
+    return x + matrix[0, 3], y + matrix[1, 3], z + matrix[2, 3]
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def facet_plane(surface: Surface, t: int) -> tuple[Vector, Vector, float]:
+    """A corner of triangle t, its unit normal by the winding (NaN where it has no area), and twice its area."""
+    a0, a1, a2, n0, n1, n2 = facet_of(surface, t)
+    area = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+    return (a0, a1, a2), (n0 / area, n1 / area, n2 / area), area
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def ray_slopes(view: View, tilt: Any, distorted: bool, x: float, y: float) -> tuple[float, float, float, float]:
+    """dx/du, dx/dv, dy/du, dy/dv of a ray's normalised coordinates."""
+    intrinsics = view.intrinsics
+    xu, xv = 1.0 / intrinsics[0], -intrinsics[4] / (intrinsics[0] * intrinsics[1])
+    yu, yv = 0.0, 1.0 / intrinsics[1]
+    if distorted:
+        _, _, jxx, jxy, jyx, jyy = distort(x, y, view.distortion, tilt)
+        det = jxx * jyy - jxy * jyx
+        xu, xv, yu, yv = jyy * xu / det, (jyy * xv - jxy * yv) / det, -jyx * xu / det, (-jyx * xv + jxx * yv) / det
+    return xu, xv, yu, yv
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def middle_offset(du: float, dv: float, cell: int, cells: int) -> tuple[float, float]:
+    """px from the middle of its pixel to a ray that is (du, dv) from the middle of its cell, of cells x cells."""
+    return (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def irradiance_without_gaussian(
+    T_laser_world: Float, beam: Float, laser: Vector, density: float, normal: Vector, hit: SheetHit
+) -> float:
+    """P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)| at a point in laser coordinates, W/m^2."""
+    n = turned(T_laser_world, normal)
+    tilted = n[0] * hit.q * hit.slope + n[1] * laser[1] / laser[2] + n[2]
+    return beam[0] * density / (laser[2] * hit.sigma) * abs(tilted)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def towards_emitter(T_laser_world: Float, centre: Vector, shift: float, point: Vector) -> tuple[Vector, float]:
+    """Unit direction and distance, m, from a point to its place on the emitting segment, `shift` from its middle."""
+    w = T_laser_world
+    light = minus((centre[0] + w[0, 0] * shift, centre[1] + w[0, 1] * shift, centre[2] + w[0, 2] * shift), point)
+    distance = math.sqrt(dot(light, light))
+    return over(light, distance), distance
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def lens_ray_slopes(
+    view: View, slopes: tuple[float, float, float, float], a: float, b: float
+) -> tuple[float, float, float, float]:
+    """`ray_slopes` of a ray through the point (a, b) of the aperture, m: a tilted sensor's focus differs along it."""
+    xu, xv, yu, yv = slopes
+    gu, gv = view.lens[2] * xu + view.lens[3] * yu, view.lens[2] * xv + view.lens[3] * yv
+    return xu + gu * a, xv + gv * a, yu + gu * b, yv + gv * b
+
+
 def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
     """The shading kernel; compiled apart for diffuse materials alone and for a pinhole, where it is much quicker."""
 
     @numba.njit(nogil=True, cache=True, error_model="numpy")
-    def shade(  # noqa: PLR0913, PLR0915
+    def shade(  # noqa: PLR0915
         surface: Surface,
         view: View,
-        triangle: Int,
-        normalised: Float,
-        offsets: Float32,
-        lens: Float,
-        cells: int,
-        T_laser_world: Float,
-        laser_centre: Float,
-        beam: Float,
-        weights: Float,
-        centre: Float,
-        surface_offset: float,
+        rays: CellRays,
+        sheet: Sheet,
+        shadows: ShadowRays,
         values: Float,
         planes: Float,
-        origins: Float32,
-        directions: Float32,
-        far: Float32,
-        sample: Int,
     ) -> tuple[int, int]:
         """Unoccluded radiance of each ray's cell and whole pixel -> values (n, 2), and the shadow rays that decide.
 
-        Returns how many shadow rays were written; `sample` says whose each is; and how many rays were left out since
-        their radiance is no number, infinite or negative. With an aperture, lens (n, 2) are the
-        rays' points of it, and planes (n, 5) take q in the middle of the pixel and its change with u, v, a and b;
-        without one planes (n, 4), unless empty, take what `render.laser_direct.centre_ray` needs.
+        Returns how many shadow rays were written, and how many rays were left out since their radiance is no number,
+        infinite or negative. With an aperture planes (n, 5) take q in the middle of the pixel and its change with u, v,
+        a and b; without one planes (n, 4), unless empty, take what `render.laser_direct.centre_ray` needs.
         """
-        intrinsics, k, m, w = view.intrinsics, view.distortion, view.T_world_camera, T_laser_world
-        vertices, triangles = surface.vertices, surface.triangles
-        tilt = tilt_matrix(k[12], k[13])
-        distorted = bool(np.any(k))
-        o0, o1, o2 = m[0, 3], m[1, 3], m[2, 3]
+        # to take an array out of a named tuple counts references: not once a ray
+        m, w, beam, weights = view.T_world_camera, sheet.T_laser_world, sheet.beam, sheet.weights
+        triangle, normalised, offsets, lens, cells = rays
+        centre, surface_offset, origins, directions, far, sample = shadows
+        tilt, distorted = tilt_matrix(view.distortion[12], view.distortion[13]), bool(np.any(view.distortion))
         emitter, _ = sheet_sigma(0.0, beam)
-        to_light, to_camera, point, normal, rgb = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+        laser_centre = sheet.centre[0], sheet.centre[1], sheet.centre[2]
+        origin = m[0, 3], m[1, 3], m[2, 3]
+        rgb, at, up, to_camera, towards = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
         count = dropped = 0
         facet = -1
-        a0 = a1 = a2 = n0 = n1 = n2 = area = height_laser = 0.0
+        corner = normal = origin
+        area = height_laser = 0.0
         half = 0.5 / cells
         looking = not aperture and planes.shape[0] > 0
         for r in range(triangle.shape[0]):
@@ -131,122 +259,80 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
             if t != facet:
                 # rays of a pixel mostly meet one triangle
                 facet = t
-                ia, ib, ic = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-                a0, a1, a2 = vertices[ia, 0], vertices[ia, 1], vertices[ia, 2]
-                ab0, ab1, ab2 = vertices[ib, 0] - a0, vertices[ib, 1] - a1, vertices[ib, 2] - a2
-                ac0, ac1, ac2 = vertices[ic, 0] - a0, vertices[ic, 1] - a1, vertices[ic, 2] - a2
-                n0, n1, n2 = ab1 * ac2 - ab2 * ac1, ab2 * ac0 - ab0 * ac2, ab0 * ac1 - ab1 * ac0
-                area = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-                n0, n1, n2 = n0 / area, n1 / area, n2 / area
-                height_laser = n0 * (laser_centre[0] - a0) + n1 * (laser_centre[1] - a1) + n2 * (laser_centre[2] - a2)
+                corner, normal, area = facet_plane(surface, t)
+                height_laser = dot(normal, minus(laser_centre, corner))
             if area == 0.0:
                 continue
             if aperture:
-                o0, o1, o2 = lens_position(view, lens[r, 0], lens[r, 1])
-            height_camera = n0 * (o0 - a0) + n1 * (o1 - a1) + n2 * (o2 - a2)
+                origin = lens_position(view, lens[r, 0], lens[r, 1])
+            height_camera = dot(normal, minus(origin, corner))
             if not height_camera * height_laser > 0.0:
                 continue
             side = 1.0 if height_camera > 0.0 else -1.0
-            # the ray d = R (x, y, 1) meets the facet's plane at P = o + s d
-            d0, d1, d2 = (
-                m[0, 0] * x + m[0, 1] * y + m[0, 2],
-                m[1, 0] * x + m[1, 1] * y + m[1, 2],
-                m[2, 0] * x + m[2, 1] * y + m[2, 2],
-            )
-            if aperture:
-                d0, d1, d2 = lens_direction(view, x, y, lens[r, 0], lens[r, 1])
-            cosine = n0 * d0 + n1 * d1 + n2 * d2
+            # the ray meets the facet's plane at o + s d
+            d = lens_direction(view, x, y, lens[r, 0], lens[r, 1]) if aperture else turned(m, (x, y, 1.0))
+            cosine = dot(normal, d)
             if cosine == 0.0:
                 continue
             s = -height_camera / cosine
-            p0, p1, p2 = o0 + s * d0, o1 + s * d1, o2 + s * d2
-            # laser coordinates of P
-            lx = w[0, 0] * p0 + w[0, 1] * p1 + w[0, 2] * p2 + w[0, 3]
-            ly = w[1, 0] * p0 + w[1, 1] * p1 + w[1, 2] * p2 + w[1, 3]
-            lz = w[2, 0] * p0 + w[2, 1] * p1 + w[2, 2] * p2 + w[2, 3]
-            if lz <= 1e-9:
+            point = origin[0] + s * d[0], origin[1] + s * d[1], origin[2] + s * d[2]
+            laser = placed(w, point)
+            if laser[2] <= 1e-9:
                 continue
-            h = fan_density(ly / lz, beam)
+            h = fan_density(laser[1] / laser[2], beam)
             if h == 0.0:
                 continue
-            sigma, slope = sheet_sigma(lz, beam)
-            # dP/du and dP/dv on the facet
-            xu, xv = 1.0 / intrinsics[0], -intrinsics[4] / (intrinsics[0] * intrinsics[1])
-            yu, yv = 0.0, 1.0 / intrinsics[1]
-            if distorted:
-                _, _, jxx, jxy, jyx, jyy = distort(x, y, k, tilt)
-                det = jxx * jyy - jxy * jyx
-                xu, xv, yu, yv = (
-                    jyy * xu / det,
-                    (jyy * xv - jxy * yv) / det,
-                    -jyx * xu / det,
-                    (-jyx * xv + jxx * yv) / det,
-                )
+            sigma, slope = sheet_sigma(laser[2], beam)
+            hit = SheetHit(normal, d, s, cosine, laser[0] / sigma, sigma, slope)
+            q = hit.q
+            xu, xv, yu, yv = ray_slopes(view, tilt, distorted, x, y)
             if aperture:
-                # the focus differs along a tilted sensor, which turns a ray through the rim
-                gu, gv = view.lens[2] * xu + view.lens[3] * yu, view.lens[2] * xv + view.lens[3] * yv
-                xu, xv = xu + gu * lens[r, 0], xv + gv * lens[r, 0]
-                yu, yv = yu + gu * lens[r, 1], yv + gv * lens[r, 1]
-            q = lx / sigma
-            qu = sheet_slope(xu, yu, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
-            qv = sheet_slope(xv, yv, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
+                a, b = lens[r, 0], lens[r, 1]
+                xu, xv, yu, yv = lens_ray_slopes(view, (xu, xv, yu, yv), a, b)
+            qu, qv = sheet_slope(xu, yu, m, w, hit), sheet_slope(xv, yv, m, w, hit)
             du, dv = offsets[r, 0], offsets[r, 1]
-            cell = r % (cells * cells)
-            pixel_u, pixel_v = (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
+            pixel_u, pixel_v = middle_offset(du, dv, r % (cells * cells), cells)
             in_cell = mean_over(q - qu * du - qv * dv, qu * half, qv * half)
             if aperture:
                 off_focus = 1.0 / s - (view.lens[1] - view.lens[2] * x - view.lens[3] * y)
-                qa = off_focus * sheet_slope(1.0, 0.0, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
-                qb = off_focus * sheet_slope(0.0, 1.0, m, w, n0, n1, n2, d0, d1, d2, s, cosine, q, sigma, slope)
-                middle = q - qu * pixel_u - qv * pixel_v - qa * lens[r, 0] - qb * lens[r, 1]
+                qa = off_focus * sheet_slope(1.0, 0.0, m, w, hit)
+                qb = off_focus * sheet_slope(0.0, 1.0, m, w, hit)
+                middle = q - qu * pixel_u - qv * pixel_v - qa * a - qb * b
                 in_pixel = about_over_aperture(middle, qu * 0.5, qv * 0.5, view.lens[0] * math.hypot(qa, qb))
                 planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3], planes[r, 4] = middle, qu, qv, qa, qb
+            elif looking:
+                in_pixel = in_cell
+                planes[r, 0], planes[r, 1], planes[r, 2] = q, qu, qv
+                planes[r, 3] = BEYOND if in_cell == 0.0 else 0.0
             else:
-                if not looking:
-                    in_pixel = about_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
-                else:
-                    in_pixel = in_cell
-                    planes[r, 0], planes[r, 1], planes[r, 2] = q, qu, qv
-                    planes[r, 3] = BEYOND if in_cell == 0.0 else 0.0
+                in_pixel = about_over(q - qu * pixel_u - qv * pixel_v, qu * 0.5, qv * 0.5)
             if in_cell == 0.0 and in_pixel == 0.0:
                 continue
-            # irradiance without the Gaussian: P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)|
-            ln0 = w[0, 0] * n0 + w[0, 1] * n1 + w[0, 2] * n2
-            ln1 = w[1, 0] * n0 + w[1, 1] * n1 + w[1, 2] * n2
-            ln2 = w[2, 0] * n0 + w[2, 1] * n1 + w[2, 2] * n2
-            power = beam[0] * h / (lz * sigma) * abs(ln0 * q * slope + ln1 * ly / lz + ln2)
-            # the light comes from the emitting segment at z = 0, of half-width `emitter` for a focused sheet
-            shift = q * emitter
-            t0 = laser_centre[0] + w[0, 0] * shift - p0
-            t1 = laser_centre[1] + w[0, 1] * shift - p1
-            t2 = laser_centre[2] + w[0, 2] * shift - p2
-            distance = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+            power = irradiance_without_gaussian(w, beam, laser, h, normal, hit)
+            to_light, distance = towards_emitter(w, laser_centre, q * emitter, point)
             slot = surface.object_id[t]
             plain = is_diffuse(surface.rows[slot]) and surface.second[slot] < 0 and surface.detail[slot] == 0
             if not glossy or plain:
-                slot_reflectance(surface, slot, t, p0, p1, p2, rgb)
+                slot_reflectance(surface, slot, t, point[0], point[1], point[2], rgb)
                 radiance = power / math.pi * (weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2])
             else:
-                length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-                to_camera[0], to_camera[1], to_camera[2] = -d0 / length, -d1 / length, -d2 / length
-                to_light[0], to_light[1], to_light[2] = t0 / distance, t1 / distance, t2 / distance
-                point[0], point[1], point[2] = p0, p1, p2
-                normal[0], normal[1], normal[2] = side * n0, side * n1, side * n2
-                radiance = power * eval_bsdf(surface, t, point, normal, to_camera, to_light, weights)
-            light = radiance * (in_cell + in_pixel)
-            if not 0.0 < light < np.inf:
-                dropped += light != 0.0
+                fill(at, point)
+                fill(up, (side * normal[0], side * normal[1], side * normal[2]))
+                fill(to_camera, over(d, -math.sqrt(dot(d, d))))
+                fill(towards, to_light)
+                radiance = power * eval_bsdf(surface, t, at, up, to_camera, towards, weights)
+            both = radiance * (in_cell + in_pixel)
+            if not 0.0 < both < np.inf:
+                dropped += both != 0.0
                 continue
             values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
             if looking:
                 planes[r, 3] = radiance
-            origins[count, 0] = p0 - centre[0] + side * n0 * surface_offset
-            origins[count, 1] = p1 - centre[1] + side * n1 * surface_offset
-            origins[count, 2] = p2 - centre[2] + side * n2 * surface_offset
-            directions[count, 0] = t0 / distance
-            directions[count, 1], directions[count, 2] = t1 / distance, t2 / distance
-            far[count] = distance
-            sample[count] = r
+            origins[count, 0] = point[0] - centre[0] + side * normal[0] * surface_offset
+            origins[count, 1] = point[1] - centre[1] + side * normal[1] * surface_offset
+            origins[count, 2] = point[2] - centre[2] + side * normal[2] * surface_offset
+            directions[count, 0], directions[count, 1], directions[count, 2] = to_light
+            far[count], sample[count] = distance, r
             count += 1
         return count, dropped
 
