@@ -7,6 +7,7 @@ out; occlusion is not looked at, so the set is a superset. A thin lens spreads e
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numba
 import numpy as np
@@ -51,14 +52,106 @@ def _clip(polygon: Float, count: int, plane: Float, out: Float) -> int:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def triangle_spans(  # noqa: PLR0913, PLR0915
+def _slab(planes: Float, T_camera_laser: Float, tangent: float, slope: float, offset: float) -> None:
+    """Half spaces (6, 4) in laser coordinates: |x| at most slope z + offset, within the fan, before both devices."""
+    planes[:] = 0.0
+    planes[0, 0], planes[1, 0] = -1.0, 1.0
+    planes[0, 2] = planes[1, 2] = slope
+    planes[0, 3] = planes[1, 3] = offset
+    planes[2, 1], planes[3, 1] = -1.0, 1.0
+    planes[2, 2] = planes[3, 2] = tangent
+    planes[4, 2], planes[4, 3] = 1.0, -1e-9
+    planes[5] = T_camera_laser[2]
+    planes[5, 3] -= 1e-6
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _faces_both(corners: Float, camera: Float, aperture: float) -> bool:
+    """Camera and laser are on one side of a triangle, all (.., 3) in laser coordinates; the rim may see past it."""
+    a, b, c = corners[0], corners[1], corners[2]
+    n0 = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
+    n1 = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
+    n2 = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    to_laser = -(n0 * a[0] + n1 * a[1] + n2 * a[2])
+    to_camera = n0 * (camera[0] - a[0]) + n1 * (camera[1] - a[1]) + n2 * (camera[2] - a[2])
+    if to_camera * to_laser > 0.0:
+        return True
+    return abs(to_camera) < aperture * math.sqrt(n0 * n0 + n1 * n1 + n2 * n2) and to_laser != 0.0
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _clip_all(corners: Float, planes: Float, front: Float, back: Float) -> int:
+    """Clip corners (3, 3) by all planes -> front (12, 3), which takes turns with back; returns how many are left."""
+    count = len(corners)
+    front[:count] = corners
+    for plane in range(len(planes)):
+        count = _clip(front, count, planes[plane], back)
+        for i in range(count):
+            front[i] = back[i]
+        if count == 0:
+            break
+    return count
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _draw_outline(
+    polygon: Float, T_camera_laser: Float, view: View, tilt: Any, distorted: bool, blur: float, left: Int, right: Int
+) -> tuple[int, int]:
+    """First and last row of a polygon's outline, (n, 3) in laser coordinates; left, right (h,): its columns there.
+
+    Rows in between that it does not touch are empty: their right is before their left. The polygon is overwritten.
+    """
+    p, margin, height, count = np.empty(3), MARGIN_PX, len(left), len(polygon)
+    for i in range(count):
+        for axis in range(3):
+            m = T_camera_laser[axis]
+            p[axis] = m[0] * polygon[i, 0] + m[1] * polygon[i, 1] + m[2] * polygon[i, 2] + m[3]
+        polygon[i] = p
+    top, bottom = height, -1
+    for i in range(count):
+        e, f = polygon[i], polygon[(i + 1) % count]
+        u0, v0 = project_point(e, view, tilt, False)
+        u1, v1 = project_point(f, view, tilt, False)
+        steps = int(min(1e5, math.ceil(math.hypot(u1 - u0, v1 - v0)))) + 1
+        for s in range(steps + 1):
+            # equal steps in the image: the depth of an image point on a 3D line is harmonic
+            q = s / steps
+            r = q * e[2] / ((1.0 - q) * f[2] + q * e[2])
+            for axis in range(3):
+                p[axis] = e[axis] + r * (f[axis] - e[axis])
+            u, v = project_point(p, view, tilt, distorted)
+            if not (abs(u) < 1e6 and abs(v) < 1e6):
+                continue
+            column = int(math.floor(u + 0.5))
+            row = int(math.floor(v + 0.5))
+            if blur > 0.0:
+                lens = view.lens
+                off_focus = lens[1] - (lens[2] * p[0] + lens[3] * p[1] + 1.0) / p[2]
+                margin = MARGIN_PX + int(min(1e4, math.ceil(blur * abs(off_focus))))
+            for y in range(max(row - margin, 0), min(row + margin, height - 1) + 1):
+                if y < top or y > bottom:
+                    # widen the range of rows, clearing what it takes in
+                    if bottom < 0:
+                        top, bottom = y, y
+                        left[y], right[y] = view.width, -1
+                    while y < top:
+                        top -= 1
+                        left[top], right[top] = view.width, -1
+                    while y > bottom:
+                        bottom += 1
+                        left[bottom], right[bottom] = view.width, -1
+                left[y], right[y] = min(left[y], column - margin), max(right[y], column + margin)
+    return top, bottom
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def triangle_spans(  # noqa: PLR0913
     start: int,
     stop: int,
     surface: Surface,
     view: View,
     T_laser_world: Float,
     T_camera_laser: Float,
-    laser_centre: Float,
     beam: Float,
     blur: float,
     height: int,
@@ -67,17 +160,16 @@ def triangle_spans(  # noqa: PLR0913, PLR0915
 
     blur: px of the blur disc's radius for a difference of 1/m in 1 / depth; 0 for a pinhole.
     """
-    width = view.width
     spans = np.empty((256, 3), dtype=np.int32)
     found = 0
-    vertices, triangles, camera_centre = surface.vertices, surface.triangles, view.T_world_camera[:3, 3]
-    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
-    distorted = bool(np.any(view.distortion))
-    corners, front, back = np.empty((3, 3)), np.empty((12, 3)), np.empty((12, 3))
-    planes = np.zeros((6, 4))
-    left, right = np.empty(height, dtype=np.int64), np.empty(height, dtype=np.int64)
-    p = np.empty(3)
-    margin = MARGIN_PX
+    vertices, triangles, aperture = surface.vertices, surface.triangles, view.lens[0]
+    camera_centre = np.empty(3)
+    for axis in range(3):
+        m, o = T_laser_world[axis], view.T_world_camera
+        camera_centre[axis] = m[0] * o[0, 3] + m[1] * o[1, 3] + m[2] * o[2, 3] + m[3]
+    tilt, distorted = tilt_matrix(view.distortion[12], view.distortion[13]), bool(np.any(view.distortion))
+    corners, front, back, planes = np.empty((3, 3)), np.empty((12, 3)), np.empty((12, 3)), np.empty((6, 4))
+    left, right = np.empty(height, dtype=np.int32), np.empty(height, dtype=np.int32)
     for t in range(start, stop):
         low, high, near, far = np.inf, -np.inf, np.inf, -np.inf
         for c in range(3):
@@ -93,79 +185,16 @@ def triangle_spans(  # noqa: PLR0913, PLR0915
         sigma_near, _ = sheet_sigma(near, beam)
         sigma_far, _ = sheet_sigma(far, beam)
         reach = SHEET_SIGMAS * max(sigma_near, sigma_far)
-        if low > reach or high < -reach:
+        if low > reach or high < -reach or not _faces_both(corners, camera_centre, aperture):
             continue
-        a, b, c3 = vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]
-        nx = (b[1] - a[1]) * (c3[2] - a[2]) - (b[2] - a[2]) * (c3[1] - a[1])
-        ny = (b[2] - a[2]) * (c3[0] - a[0]) - (b[0] - a[0]) * (c3[2] - a[2])
-        nz = (b[0] - a[0]) * (c3[1] - a[1]) - (b[1] - a[1]) * (c3[0] - a[0])
-        to_camera = nx * (camera_centre[0] - a[0]) + ny * (camera_centre[1] - a[1]) + nz * (camera_centre[2] - a[2])
-        to_laser = nx * (laser_centre[0] - a[0]) + ny * (laser_centre[1] - a[1]) + nz * (laser_centre[2] - a[2])
-        if not to_camera * to_laser > 0.0:
-            # the rim of an aperture may see what its centre does not
-            rim = view.lens[0] * math.sqrt(nx * nx + ny * ny + nz * nz)
-            if abs(to_camera) >= rim or to_laser == 0.0:
-                continue
         # sigma(z) is convex, so the chord over the triangle's depths bounds it
         slope = (sigma_far - sigma_near) / (far - near) if far > near else 0.0
         offset = max(sigma_near - slope * near, sigma_far - slope * far)
-        planes[0] = np.array([-1.0, 0.0, SHEET_SIGMAS * slope, SHEET_SIGMAS * offset])
-        planes[1] = np.array([1.0, 0.0, SHEET_SIGMAS * slope, SHEET_SIGMAS * offset])
-        planes[2] = np.array([0.0, -1.0, beam[4], 0.0])
-        planes[3] = np.array([0.0, 1.0, beam[4], 0.0])
-        planes[4] = np.array([0.0, 0.0, 1.0, -1e-9])
-        m = T_camera_laser[2]
-        planes[5] = np.array([m[0], m[1], m[2], m[3] - 1e-6])
-        count = len(corners)
-        front[:count] = corners
-        for plane in range(6):
-            count = _clip(front, count, planes[plane], back)
-            front, back = back, front
-            if count == 0:
-                break
-        if count == 0:
-            continue
-        for i in range(count):
-            for axis in range(3):
-                m = T_camera_laser[axis]
-                p[axis] = m[0] * front[i, 0] + m[1] * front[i, 1] + m[2] * front[i, 2] + m[3]
-            back[i] = p
-        top, bottom = height, -1
-        for i in range(count):
-            e, f = back[i], back[(i + 1) % count]
-            u0, v0 = project_point(e, view, tilt, False)
-            u1, v1 = project_point(f, view, tilt, False)
-            steps = int(min(1e5, math.ceil(math.hypot(u1 - u0, v1 - v0)))) + 1
-            for s in range(steps + 1):
-                # equal steps in the image: the depth of an image point on a 3D line is harmonic
-                q = s / steps
-                r = q * e[2] / ((1.0 - q) * f[2] + q * e[2])
-                for axis in range(3):
-                    p[axis] = e[axis] + r * (f[axis] - e[axis])
-                u, v = project_point(p, view, tilt, distorted)
-                if not (abs(u) < 1e6 and abs(v) < 1e6):
-                    continue
-                column = int(math.floor(u + 0.5))
-                row = int(math.floor(v + 0.5))
-                if blur > 0.0:
-                    lens = view.lens
-                    off_focus = lens[1] - (lens[2] * p[0] + lens[3] * p[1] + 1.0) / p[2]
-                    margin = MARGIN_PX + int(min(1e4, math.ceil(blur * abs(off_focus))))
-                for y in range(max(row - margin, 0), min(row + margin, height - 1) + 1):
-                    if y < top or y > bottom:
-                        # widen the range of rows, clearing what it takes in
-                        if bottom < 0:
-                            top, bottom = y, y
-                            left[y], right[y] = width, -1
-                        while y < top:
-                            top -= 1
-                            left[top], right[top] = width, -1
-                        while y > bottom:
-                            bottom += 1
-                            left[bottom], right[bottom] = width, -1
-                    left[y], right[y] = min(left[y], column - margin), max(right[y], column + margin)
+        _slab(planes, T_camera_laser, beam[4], SHEET_SIGMAS * slope, SHEET_SIGMAS * offset)
+        count = _clip_all(corners, planes, front, back)
+        top, bottom = _draw_outline(front[:count], T_camera_laser, view, tilt, distorted, blur, left, right)
         for y in range(top, bottom + 1):
-            first, last = max(left[y], 0), min(right[y], width - 1)
+            first, last = max(left[y], 0), min(right[y], view.width - 1)
             if first > last:
                 continue
             if found == len(spans):
@@ -247,7 +276,7 @@ def reachable_pixels(
 ) -> NDArray[np.int32]:
     """(n,) flat pixel indices v * width + u, ascending, that may see direct light of the laser."""
     T_laser_world, T_camera_laser = invert(T_world_laser), invert(T_world_camera) @ T_world_laser
-    view, surface, laser_centre, beam = camera.view(T_world_camera), world.surface, T_world_laser[:3, 3], laser.packed()
+    view, surface, beam = camera.view(T_world_camera), world.surface, laser.packed()
     blur = blur_scale(view, camera.height)
 
     height = camera.height
@@ -255,9 +284,7 @@ def reachable_pixels(
     spans = [np.zeros((0, 3), np.int32)] * -(-len(world.triangles) // TRIANGLES_A_CHUNK)
 
     def work(start: int, stop: int) -> None:
-        found = triangle_spans(
-            start, stop, surface, view, T_laser_world, T_camera_laser, laser_centre, beam, blur, height
-        )
+        found = triangle_spans(start, stop, surface, view, T_laser_world, T_camera_laser, beam, blur, height)
         spans[start // TRIANGLES_A_CHUNK] = found
 
     map_chunks(work, len(world.triangles), TRIANGLES_A_CHUNK, threads)
