@@ -27,8 +27,9 @@ RUNS = 16
 ROUNDS, SPLITS = 6, 6
 CHANCE = 32
 """Fewer pixels may share one number, with no other but the dark's, by chance."""
-FARTHEST, FARTHEST_ALONE = 5.0, 15.0
-"""Times the gain of `FULL_WELL`, up or down, beside scintillation, beside which little may be a count, and without."""
+FARTHEST, FARTHEST_SCALED = (5.0, 15.0), (150.0, 150.0)
+"""Times the gain of `FULL_WELL`, up or down, beside scintillation, beside which little may be a count, and without; of
+whole numbers, and of others."""
 NARROW, FEWEST_BENDS, EXCESS = 1.1, 64, 1.3
 """px; below it a line is told by its neighbours, by so many second differences, from that ratio of variances on."""
 STRAY = 4.0
@@ -80,9 +81,14 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings, saturation
         return model(gain).model_copy(update={"black_level": max(level - still / gain, 0.0)})
 
     start = _full_scale(image) / FULL_WELL
-    split = _split(lines, raised, start, settings)
-    if split is not None:
-        return _told_by_neighbours(lines, split, settings)
+    # numbers that are not whole have no full scale, and the line's peak may be far below it
+    split = _split(lines, raised, start, FARTHEST if integer else FARTHEST_SCALED, settings)
+    noise = model(_balanced(lines, model, start, settings)) if split is None else split
+    return _told_by_neighbours(lines, noise, settings)
+
+
+def _balanced(lines: Lines, model: Callable[[float], NoiseModel], start: float, settings: ExtractionSettings) -> float:
+    """The gain at which the reduced chi-square of the fits is 1."""
     log_gain, slope, before = math.log(start), -1.0, (0.0, 0.0)
     for number in range(ROUNDS):
         ratio = residual_ratio(measure(replace(lines, noise=model(math.exp(log_gain))), settings, threads=1))
@@ -95,11 +101,15 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings, saturation
         log_gain -= float(np.clip(before[1] / slope, -5.0, 5.0))
         if abs(before[1]) < 0.01:
             break
-    return _told_by_neighbours(lines, model(math.exp(log_gain)), settings)
+    return math.exp(log_gain)
 
 
 def _split(
-    lines: Lines, model: Callable[[float], NoiseModel], start: float, settings: ExtractionSettings
+    lines: Lines,
+    model: Callable[[float], NoiseModel],
+    start: float,
+    farthest: tuple[float, float],
+    settings: ExtractionSettings,
 ) -> NoiseModel | None:
     """The noise model whose residuals are in part a count and in part scintillation; None: too few lines tell."""
     gain, noise = start, model(start)
@@ -108,7 +118,7 @@ def _split(
         found = scatter(tried, measure(tried, settings, threads=1))
         if found is None:
             return None
-        most = FARTHEST if found.scintillation else FARTHEST_ALONE
+        most = farthest[0] if found.scintillation else farthest[1]
         before, gain = gain, min(max(gain * found.gain, start / most), start * most)
         settled = bool(noise.scintillation) == bool(found.scintillation) and abs(math.log(gain / before)) < STEADY
         noise = model(gain).model_copy(update={"scintillation": found.scintillation})
@@ -120,8 +130,8 @@ def _split(
 def _told_by_neighbours(lines: Lines, noise: NoiseModel, settings: ExtractionSettings) -> NoiseModel:
     """The noise model of a narrow line, whose fit follows what multiplies the light of its three pixels.
 
-    What scatters the position from row to row, beyond what is told, then counts as scintillation: second differences,
-    to which a smooth surface adds nothing, a rough one its roughness.
+    What scatters the position from row to row, beyond what is told, then counts as scintillation, as far as the light
+    itself scatters along the line: second differences, to which a smooth surface adds nothing.
     """
 
     def look(model: NoiseModel) -> tuple[Line, float]:
@@ -130,23 +140,55 @@ def _told_by_neighbours(lines: Lines, noise: NoiseModel, settings: ExtractionSet
         return line, float(np.median(known**2)) if len(known) else math.nan
 
     line, told = look(noise)
-    whole = len(line.u) // RUN * RUN
-    u = np.where(line.valid, line.u, np.nan)[:whole, 0].reshape(-1, RUN)
-    bends = u[:, :-2] - 2.0 * u[:, 1:-1] + u[:, 2:]
-    bends = np.abs(bends[np.isfinite(bends)])
-    if len(bends) < FEWEST_BENDS or np.nanmedian(line.width) > NARROW:
+    scattered, count = _scattered(np.where(line.valid, line.u, np.nan)[:, 0])
+    if count < FEWEST_BENDS or np.nanmedian(line.width) > NARROW or not scattered > EXCESS * told:
         return noise
-    usual = bends[bends < STRAY * 1.4826 * np.median(bends)]
-    scattered = float(np.mean(usual**2)) / 6.0  # of independent rows
-    if not scattered > EXCESS * told:
+    # rounding moves a line as well, and may leave its light as it is
+    coarse = noise.read_noise * noise.gain < noise.step / math.sqrt(12.0)
+    most = 1.0 if coarse else _uneven_light(replace(lines, noise=noise), line)
+    if most <= noise.contrast**2:
         return noise
     table = noise.table if noise.scintillation else np.zeros((1, 1))
     tried = table.copy()
     tried[0, 0] += TRIAL
     _, more = look(noise.model_copy(update={"scintillation": _rows_of(tried)}))
     table = table.copy()
-    table[0, 0] += min(TRIAL * (scattered - told) / max(more - told, 1e-12), 1.0)
+    table[0, 0] = min(table[0, 0] + TRIAL * (scattered - told) / max(more - told, 1e-12), most)
     return noise.model_copy(update={"scintillation": _rows_of(table)})
+
+
+def _scattered(values: NDArray[np.float64]) -> tuple[float, int]:
+    """Variance from row to row of what runs smoothly along the line (n,), NaN where unknown; by so many differences."""
+    runs = values[: len(values) // RUN * RUN].reshape(-1, RUN)
+    bends = runs[:, :-2] - 2.0 * runs[:, 1:-1] + runs[:, 2:]
+    bends = np.abs(bends[np.isfinite(bends)])
+    if len(bends) == 0:
+        return 0.0, 0
+    usual = bends[bends <= STRAY * 1.4826 * np.median(bends)]
+    return float(np.mean(usual**2)) / 6.0, len(bends)
+
+
+def _uneven_light(lines: Lines, line: Line) -> float:
+    """The most that a pixel's light can vary, over its squared mean: what varies the sum of it along the line.
+
+    A rough surface moves the line and leaves its light as it is; what multiplies the light does both.
+    """
+    signal, mask, floor = lines.read(0, lines.count)
+    here = np.where(line.valid[:, 0], line.u[:, 0], np.nan)
+    half = np.ceil(4.0 * np.nanmedian(line.width[:, 0]) + 1.0)
+    x = np.arange(signal.shape[1])
+    near = (np.abs(x - here[:, None]) <= half) & (mask == 0)
+    light = np.where(near, signal - line.background[:, :1], 0.0)
+    total = light.sum(axis=1)
+    total[~(total > 0.0)] = np.nan
+    share = (np.where(near, np.maximum(light, 0.0), 0.0) ** 2).sum(axis=1) / total**2
+    counted = np.where(near, np.maximum(signal + floor, 0.0), 0.0).sum(axis=1)
+    pixels, dark = near.sum(axis=1), np.maximum(line.background[:, 0] + np.median(floor), 0.0)
+    counted += pixels**2 / np.maximum(pixels - 4.0 * line.width[:, 0] - 1.0, 1.0) * dark  # of the level under it all
+    varied, count = _scattered(np.log(total))
+    spare = varied * math.sqrt(4.0 / max(count, 1))  # one standard error: differences overlap
+    most = float((varied + spare - np.nanmedian(counted / total**2)) / np.nanmedian(share))
+    return min(max(most, 0.0), 1.0)
 
 
 def _rows_of(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
@@ -195,7 +237,9 @@ def _full_scale(image: NDArray[Any]) -> float:
 def _difference_variance(values: NDArray[np.float32], step: float) -> float:
     """(n, w), NaN where not usable -> variance of a pixel, from neighbours or, on a Bayer row, next but one."""
     for lag in (1, 2):
-        steps = np.abs(values[:, lag:] - values[:, :-lag], dtype=np.float64)
+        steps = np.subtract(values[:, lag:], values[:, :-lag], dtype=np.float64)
+        known = np.isfinite(steps).any(axis=1)
+        steps = np.abs(steps[known] - np.nanmedian(steps[known], axis=1, keepdims=True))  # a slope is no noise
         steps = steps[np.isfinite(steps)]
         if steps.size:
             # half a step more, since the median of whole numbers may well be 0

@@ -21,6 +21,8 @@ Float = NDArray[np.float64]
 
 FULL_SCALES = (255, 1023, 4095, 16383, 65535, 65472, 65520, 65532)
 """Highest numbers of 8 to 16 bit images, right- and left-justified."""
+PILE, STEEP = 32, 4
+"""Pixels with the highest number, and how many times those of the next lower one, that only clipping piles up."""
 
 
 class NoiseModel(Model):
@@ -84,8 +86,14 @@ class NoiseModel(Model):
 
 
 def image_saturation(image: NDArray[Any]) -> float | None:
-    """The full scale that an integer image touches in DN, None if it touches none."""
-    if not np.issubdtype(image.dtype, np.integer):
+    """The full scale in DN that an image touches, or the number that clips it; None if there is neither."""
+    if image.dtype.kind == "f":
+        image = image[np.isfinite(image)]
+    highest = float(image.max())
+    if np.issubdtype(image.dtype, np.integer) and int(highest) in FULL_SCALES:
+        return highest
+    at_top = np.count_nonzero(image == highest)
+    if at_top < PILE or not (below := image[image < highest]).size:
         return None
-    highest = int(image.max())
-    return float(highest) if highest in FULL_SCALES else None
+    next_lower = np.count_nonzero(below == below.max())
+    return highest if at_top > STEEP * next_lower else None

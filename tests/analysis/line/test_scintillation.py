@@ -11,12 +11,14 @@ from scipy.ndimage import gaussian_filter
 from scipy.signal import fftconvolve
 
 from analysis.line.detection.channel import smoothed_covariances
-from analysis.line.detection.noise import NoiseModel
+from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
 from analysis.line.settings import ExtractionSettings
 from render.sensor.speckle import speckle
+from tests.analysis.line.line_images import expected
 from tests.analysis.line.scintillating_images import NM, PITCH, cover, known_noise, scintillating, variance_of_means
+from tests.analysis.line.troubles import PLAIN, TROUBLES, Trouble, measured, photographed
 
 ROWS = 4000
 CHANCE = 3 * math.sqrt(0.95 * 0.05 / ROWS)
@@ -94,6 +96,35 @@ def test_shot_noise_is_no_scintillation():
         assert noise.scintillation == ()
         assert noise.gain == pytest.approx(0.1, rel=0.15)
         assert 0.93 - CHANCE < cover(extract(image), centre, 2.0) < 0.97 + CHANCE
+
+
+@pytest.mark.parametrize("signal", [300.0, 3000.0])
+def test_a_rough_surface_is_no_scintillation(signal):
+    """Centres that jump by half a pixel from row to row counted as noise that multiplies the light: sigma 20 times."""
+    line, centre = measured(PLAIN, signal, 0.6, ROWS, seed=10, known=False)
+    assert 0.93 - CHANCE < cover(line, centre, 2.0) < 0.97 + CHANCE
+
+
+@pytest.mark.parametrize("signal", [100.0, 10000.0])
+def test_float_images_tell_their_gain_whatever_their_scale(signal):
+    image, centre, _ = photographed(PLAIN, signal, 2.0, ROWS, seed=11)
+    for scale in (1.0, 1e-4):
+        line = extract(image * scale)
+        assert 0.93 - CHANCE < cover(line, centre, 2.0) < 0.97 + CHANCE
+
+
+def test_a_slope_of_the_background_is_no_noise():
+    image, _, _ = photographed(TROUBLES["slope 1 %"], 10000.0, 2.0, 512, seed=12)
+    assert estimate_noise(image, ExtractionSettings()).gain == pytest.approx(1.0, rel=0.1)
+
+
+def test_what_clips_an_image_below_its_full_scale_is_found():
+    image, _, noise = photographed(Trouble(overexposure=3.0), 10000.0, 2.0, 512, seed=13)
+    assert image_saturation(image) == noise.saturation
+    assert image_saturation(image.clip(0).astype(np.uint16)) == noise.saturation
+    whole, _, _ = photographed(PLAIN, 100.0, 2.0, 512, seed=13)
+    for one in (whole, whole.clip(0).astype(np.uint8), expected(64, np.full(512, 32.0), 200.0, 2.0, 3.0)):
+        assert image_saturation(one) is None
 
 
 @pytest.mark.parametrize("table", [((0.1,), (0.1, 0.0)), ((),), ((0.1, 0.2),), ((-0.1,),)])
