@@ -135,6 +135,10 @@ class GroupQuality:
     """Of direct light: the pixels that the laser lights."""
     share: float | None = None
     """Of indirect light: radiance over that of the direct light, both summed over the image; None: there is none."""
+    coarse_error: float | None = None
+    """Of ambient light that is rendered for what is measured: relative RMS error of what is interpolated, where no
+    error matters, found on held-out pixels; `error` is then the deviation that it gives the scan lines (all but 1 in
+    20) over the allowed one. None: the goal is the image."""
 
     @property
     def reached(self) -> bool:

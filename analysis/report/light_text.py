@@ -64,13 +64,18 @@ def quality_text(quality: GroupQuality) -> str:
     """Error, target and work of a light group, and what it lost."""
     places = 1 if quality.group == "indirect" else 2
     parts = []
-    if not math.isnan(quality.error):
+    coarse = quality.coarse_error
+    if coarse is not None:
+        if not math.isnan(quality.error):
+            parts.append(f"adds {quality.error:.0%} of the allowed error to 19 of 20 scan lines at most")
+        parts.append(f"elsewhere interpolated to {coarse:.1%}")
+    elif not math.isnan(quality.error):
         parts.append(f"error {quality.error:.{places}%}, target {quality.target:.{places}%}")
     match quality.unit:
         case "light paths":
             parts.append(f"{quality.work / 1e6:.2g} million light paths")
         case "samples a pixel":
-            parts.append(f"{quality.work:.0f} of {quality.most:.0f} samples")
+            parts.append(f"{quality.work:.{0 if coarse is None else 1}f} of {quality.most:.0f} samples")
     if quality.share is not None:
         parts.append(f"{quality.share:.2%} of the direct light")
     if quality.clamped is not None:

@@ -63,6 +63,9 @@ class AmbientImage:
     """Contributions that the clamp lowered."""
     cut: float
     """Radiance that the clamp took away, mean over the image."""
+    coarse_error: float | None = None
+    """Relative RMS error of what was interpolated where no error matters, on held-out pixels; None: nothing was.
+    `error` is then that of the scan lines over the allowed one (`render.ambient.measured_light`)."""
 
 
 def ambient_images(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 from render.ambient.integrator import AmbientImage, ambient_images
+from render.ambient.measured_light import measured_images
 from render.ambient.transport_plan import (
     DARK,
     LAMPS,
@@ -67,17 +69,14 @@ class AmbientLight(LightGroup[AmbientPlan]):
     def estimates(
         self, placed: PlacedScene, settings: RenderSettings, plan: AmbientPlan, frame: Frame, run: Run
     ) -> Iterator[Estimate]:
-        """(h, w, 3) radiance in the bands R, G, B."""
+        """(h, w, 3) radiance in the bands R, G, B; to the goal of the frame's importance, where it has one."""
+        most, importance = settings.ambient_samples, frame.importance
+        how: dict[str, Any] = {"most": most, "surfaces": plan.surfaces, "clamp": settings.clamp}
 
         def images(part: Run) -> Iterator[AmbientImage]:
-            return ambient_images(
-                placed,
-                target=settings.ambient_error,
-                most=settings.ambient_samples,
-                surfaces=plan.surfaces,
-                clamp=settings.clamp,
-                run=part,
-            )
+            if importance is not None:
+                return measured_images(placed, importance, **how, run=part)
+            return ambient_images(placed, target=settings.ambient_error, **how, run=part)
 
         for image in replace(run, part="ambient").until_over(images):
             yield Estimate(image.radiance, (quality_of(image, settings),))
@@ -90,11 +89,12 @@ def quality_of(image: AmbientImage, settings: RenderSettings) -> GroupQuality:
         "ambient",
         None,
         image.error,
-        settings.ambient_error,
+        settings.ambient_error if image.coarse_error is None else 1.0,
         image.samples,
         "samples a pixel",
         settings.ambient_samples,
         invalid=image.dropped,
         clamped=image.clamped if clamped else None,
         clamped_radiance=image.cut if clamped else None,
+        coarse_error=image.coarse_error,
     )

@@ -13,6 +13,8 @@ from concurrent.futures import Future, wait
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from render.base.errors import Cancelled
 from render.base.pose import Pose
 from render.base.threads import Cancel
@@ -162,8 +164,11 @@ def lens(cancelled: Cancel) -> None:
 
 def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Material, apart: float = 0.05) -> None:
     """A plate, and blocks of some materials before it, so far apart, under all sorts of lamps, by few paths."""
+    from render.ambient.measured_light import measured_images
+    from render.importance import Importance
     from render.render import render_world
     from render.run import Run
+    from render.world.placed import PlacedScene
     from render.world.world import build_world
     from studio.scan.exposure import expose
 
@@ -181,7 +186,10 @@ def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Mater
     )
     few = {"transport": transport, "light_paths": 1, "ambient_samples": 2, "laser_error": 0.1}
     settings = RenderSettings().model_copy(update=few)
-    frame = render_world(build_world(scene, Path()), scene, settings=settings, run=Run(cancelled=cancelled))
+    world, run = build_world(scene, Path()), Run(cancelled=cancelled)
+    frame = render_world(world, scene, settings=settings, run=run)
+    everywhere = Importance((), np.ones((camera.height, camera.width), np.float32))
+    list(measured_images(PlacedScene(world, scene), everywhere, most=2, run=run))
     _show(scene, frame, [expose(Project(scene=scene, sensor=SENSOR), frame, [1.0], 0)])
 
 

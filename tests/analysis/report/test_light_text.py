@@ -107,3 +107,10 @@ def test_quality_says_error_work_and_losses():
     assert names == ["red, direct", "red, reflected on", "ambient"]
     assert stage_note("reflected laser light", (DIRECT, INDIRECT)) == quality_text(INDIRECT)
     assert stage_note("truth images", (DIRECT, INDIRECT)) == ""
+
+
+def test_light_for_what_is_measured_tells_scan_lines_and_what_is_interpolated():
+    measured = replace(AMBIENT, error=0.83, target=1.0, work=0.21, most=16, coarse_error=0.041)
+    told = "adds 83% of the allowed error to 19 of 20 scan lines at most, elsewhere interpolated to 4.1%"
+    assert quality_text(measured) == f"{told}, 0.2 of 16 samples"
+    assert quality_text(replace(measured, error=math.nan)).startswith("elsewhere interpolated to 4.1%")

@@ -1,0 +1,153 @@
+"""The ambient light where nothing is measured: few pixels sampled, the others interpolated, and the error of that.
+
+Some pixels, drawn by chance, are held out: they are sampled as well, but nothing is made of them. Where I is the image
+and a, b the two halves of such a pixel's samples, which know nothing of each other or of I,
+
+    E[(I - a)(I - b)] = (I - L)^2,     E[a b] = L^2
+
+so that the mean over them is the squared error of the image, of noise and of interpolation together, and without the
+noise of the held-out pixels themselves. Where noise is most of it the points of the grid get more samples, otherwise
+the grid gets finer; in the end every pixel is sampled.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.ambient.guided_interpolation import grid_of, interpolate, seen_at, smooth_grid
+from render.ambient.path_tracer import CameraPaths
+from render.ambient.pixel_samples import PixelSamples
+from render.run import Run
+from render.world.embree import CHUNK
+
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+
+COARSE_ERROR = 0.05
+"""Relative RMS error that is enough where no error matters to what is measured: peaks are found there against the noise
+of the sensor, of which a twentieth more or less of the ambient light changes a fortieth."""
+BLOCK = 8
+"""Pixels between two points of the grid, at first."""
+FIRST_SAMPLES, HELD_OUT_SAMPLES = 2, 4
+"""Of each half, of a point of the grid at first and of a held-out pixel."""
+HELD_OUT, HELD_OUT_SHARE = 8192, 16
+"""Most held-out pixels, and pixels of the image for each at least."""
+HELD_OUT_SEED = 32_452_843
+
+
+@dataclass(frozen=True)
+class CoarseImage:
+    """Ambient light that is known as well as it takes to find lines."""
+
+    radiance: Float32
+    """(h, w, 3) W/(m^2 sr) in R, G, B."""
+    error: float
+    """Estimated relative RMS error, over all pixels."""
+    block: int
+    """Pixels between two that were sampled; 1: all were."""
+    samples: int
+    """That it took."""
+    dropped: int
+    clamped: int
+    cut: float
+    """As in `AmbientImage`."""
+
+
+def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> CoarseImage:
+    """Sampled until the error is at most COARSE_ERROR, or `most` samples are spent. Raises Cancelled.
+
+    The image depends on the scene and the seed alone.
+    """
+    width = paths.view.width
+    film, block, count = PixelSamples(width, height), BLOCK, FIRST_SAMPLES
+    held = _held_out(width * height, run)
+    film.add(paths, held, np.full((len(held), 2), HELD_OUT_SAMPLES, np.int32), run.between(0.0, 0.1))
+    while True:
+        grid, _ = grid_of(width, height, block)
+        film.add(paths, grid, np.full((len(grid), 2), count, np.int32), run.between(0.1, 0.5))
+        error, noise = _errors(film, paths, height, grid, block, held)
+        wanted = 2 * len(grid) if 2.0 * noise**2 > error**2 or block == 1 else 8 * len(grid)
+        if error <= COARSE_ERROR or film.total + count * wanted > most:
+            break
+        if 2.0 * noise**2 > error**2 or block == 1:
+            count *= 2
+        else:
+            block //= 2
+    radiance = _image(film, paths, height, grid, block, run.between(0.5, 1.0))
+    dropped, clamped = film.invalid_counts.astype(int).tolist()
+    return CoarseImage(radiance, error, block, film.total, dropped, clamped, film.cut / film.total)
+
+
+def _held_out(pixels: int, run: Run) -> Int:
+    """Some pixels, one by chance of each of equal parts of the image."""
+    count = min(HELD_OUT, -(-pixels // HELD_OUT_SHARE))
+    random = np.random.default_rng(run.shifted(HELD_OUT_SEED).seed)
+    edges = np.linspace(0, pixels, count + 1).astype(np.int64)
+    return random.integers(edges[:-1], edges[1:]).astype(np.int32)
+
+
+def _errors(
+    film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, held: Int
+) -> tuple[float, float]:
+    """Relative RMS error of the image, and what of it is noise."""
+    held = np.setdiff1d(held, grid).astype(np.int32)
+    if not len(held):
+        sampled = film.means(grid).astype(np.float64)
+        power, square = (
+            float(np.sum(sampled[:, 0] * sampled[:, 1])),
+            float(np.sum((sampled[:, 0] - sampled[:, 1]) ** 2)),
+        )
+        noise = math.sqrt(square / 4.0 / power) if power > 0.0 else 0.0
+        return noise, noise
+    truth = film.means(held).astype(np.float64)
+    halves = _interpolated(film, paths, height, grid, block, held, apart=True).reshape(-1, 2, 3)
+    image = halves.mean(axis=1)
+    power = float(np.sum(truth[:, 0] * truth[:, 1]))
+    if power <= 0.0:
+        return 0.0, 0.0
+    square = float(np.sum((image - truth[:, 0]) * (image - truth[:, 1]))) / power
+    variance = float(np.sum((halves[:, 0] - halves[:, 1]) ** 2)) / 4.0 / power
+    return math.sqrt(max(square, 0.0)), math.sqrt(variance)
+
+
+def _grid_light(
+    film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, apart: bool
+) -> tuple[Float32, Int, Float32]:
+    """What is seen at the points of the grid, and their light: the mean of both halves, or both side by side."""
+    seen, item = seen_at(grid, paths.view, paths.surface, paths.lights, paths.rays)
+    halves = film.means(grid)
+    radiance = halves.reshape(-1, 6) if apart else halves.mean(axis=1)
+    light = np.empty_like(radiance)
+    smooth_grid(grid_of(paths.view.width, height, block)[1], seen, item, radiance, light)
+    return seen, item, light
+
+
+def _interpolated(
+    film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, pixels: Int, *, apart: bool
+) -> Float32:
+    """(n, 3) radiance of some pixels as the grid has it; apart: (n, 6), of both halves."""
+    known = _grid_light(film, paths, height, grid, block, apart)
+    out = np.empty((len(pixels), known[2].shape[1]), np.float32)
+    seen, item = seen_at(pixels, paths.view, paths.surface, paths.lights, paths.rays)
+    interpolate(pixels, (height, paths.view.width), block, seen, item, known, out)
+    return out
+
+
+def _image(film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, run: Run) -> Float32:
+    """(h, w, 3) radiance. Raises Cancelled."""
+    width = paths.view.width
+    if block == 1:
+        return film.means(grid).mean(axis=1).reshape(height, width, 3)
+    image, known = np.empty((height * width, 3), np.float32), _grid_light(film, paths, height, grid, block, False)
+
+    def work(start: int, stop: int) -> None:
+        pixels = np.arange(start, stop, dtype=np.int32)
+        seen, item = seen_at(pixels, paths.view, paths.surface, paths.lights, paths.rays)
+        interpolate(pixels, (height, width), block, seen, item, known, image[start:stop])
+
+    run.map(work, height * width, CHUNK)
+    return image.reshape(height, width, 3)

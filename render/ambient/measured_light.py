@@ -1,0 +1,68 @@
+"""Ambient light for an image that is measured: as well as each scan line needs it where a line is, coarse elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from render.ambient.coarse_image import CoarseImage, coarse_image
+from render.ambient.integrator import AmbientImage
+from render.ambient.line_samples import Band, band_of, line_deviations, sample_band
+from render.ambient.path_state import CLAMPED, DROPPED
+from render.ambient.path_tracer import camera_paths
+from render.ambient.pixel_samples import PixelSamples
+from render.importance import Importance
+from render.run import Run
+from render.world.placed import PlacedScene
+
+LINES_KNOWN = 0.95
+"""Share of the scan lines that are known at least as well as is told."""
+
+
+def measured_images(
+    placed: PlacedScene,
+    importance: Importance,
+    *,
+    most: int = 16,
+    surfaces: int | None = 1,
+    clamp: float | None = None,
+    run: Run = Run(),
+) -> Iterator[AmbientImage]:
+    """The coarse image, then the one whose scan lines are known, or on which `most` samples a pixel are spent.
+
+    As `ambient_images`; the error of the second is the deviation of its scan lines over the allowed one, which most of
+    them are below. Raises Cancelled. ValueError: the importance is of another image.
+    """
+    camera, view = placed.camera, placed.camera.view(placed.T_world_camera)
+    if importance.ambient.shape != (camera.height, camera.width):
+        raise ValueError(f"weights {importance.ambient.shape} of an image of {camera.height} x {camera.width}")
+    paths = camera_paths(placed.world, placed.scene, view, surfaces=surfaces, clamp=clamp, seed=run.seed)
+    budget = most * camera.width * camera.height
+    coarse = coarse_image(paths, camera.height, budget, run.between(0.0, 0.5))
+    film, band = PixelSamples(camera.width, camera.height), band_of(importance)
+    if not len(band.pixels):
+        yield _image(coarse, film, band)
+        return
+    yield _image(coarse, film, band, begun=False)
+    sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
+    yield _image(coarse, film, band)
+
+
+def _image(coarse: CoarseImage, film: PixelSamples, band: Band, *, begun: bool = True) -> AmbientImage:
+    """The coarse image with the band in it, once that has been sampled."""
+    radiance, error, total = coarse.radiance, float("nan"), coarse.samples + film.total
+    if begun:
+        radiance = radiance.copy()
+        radiance.reshape(-1, 3)[band.pixels] = film.means(band.pixels).mean(axis=1)
+        deviations = line_deviations(film, band)
+        error = float(np.quantile(deviations, LINES_KNOWN)) if len(deviations) else 0.0
+    return AmbientImage(
+        radiance,
+        error,
+        total / (radiance.shape[0] * radiance.shape[1]),
+        coarse.dropped + int(film.invalid_counts[DROPPED]),
+        coarse.clamped + int(film.invalid_counts[CLAMPED]),
+        (coarse.cut * coarse.samples + film.cut) / total,
+        coarse.error,
+    )

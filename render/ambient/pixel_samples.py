@@ -1,0 +1,79 @@
+"""Samples of single pixels: as many on each as whoever asks for them wants, in two halves that know nothing of each
+other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.ambient.path_state import CUT
+from render.ambient.path_tracer import WAVE, CameraPaths
+from render.run import Run
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int32]
+Long = NDArray[np.int64]
+
+ROUND = 1 << 10
+"""Most samples of a half that a pixel is given at a time, so that no pixel fills a wave."""
+
+
+class PixelSamples:
+    """Sums over the samples of an image's pixels. What no sample was taken of takes no memory."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self.width, self.height = width, height
+        self.sums = np.zeros((height * width, 2, 3), np.float32)
+        self.spread = np.zeros((height * width, 2, 3), np.float32)
+        """Estimate of the variance of a single sample, by each half's last samples beside those before them."""
+        self.done = np.zeros((height * width, 2), np.int32)
+        self.invalid_counts = np.zeros(2)
+        self.cut = 0.0
+        """Sum of what the clamp took of the samples."""
+
+    @property
+    def total(self) -> int:
+        """Samples so far."""
+        return int(self.done.sum(dtype=np.int64))
+
+    def means(self, pixels: Int) -> Float32:
+        """(m, 2, 3) radiance of both halves of some pixels; each half must have samples."""
+        return np.asarray(self.sums[pixels] / self.done[pixels][..., None], dtype=np.float32)
+
+    def add(self, paths: CameraPaths, pixels: Int, count: Int, run: Run) -> None:
+        """Samples until each of the pixels (m,), all different, has count (m, 2) of both halves. Raises Cancelled."""
+        while True:
+            more = np.clip(count - self.done[pixels], 0, ROUND).astype(np.int32)
+            wanting = np.flatnonzero(more.any(axis=1))
+            if not len(wanting):
+                return
+            self._add_round(paths, pixels[wanting], more[wanting], run)
+
+    def _add_round(self, paths: CameraPaths, pixels: Int, more: Int, run: Run) -> None:
+        rays = more.sum(axis=1, dtype=np.int64)
+        chunk = (np.cumsum(rays) - rays) // (WAVE - 2 * ROUND)
+        edges = np.append(np.flatnonzero(np.diff(chunk, prepend=-1)), len(pixels))
+        counts, cut = np.zeros((len(edges) - 1, 2)), np.zeros(len(edges) - 1)
+
+        def work(start: int, stop: int) -> None:
+            for i in range(start, stop):
+                some = slice(edges[i], edges[i + 1])
+                cut[i] = self._trace(paths, pixels[some], more[some], counts[i], run)
+
+        run.map(work, len(edges) - 1, 1)
+        # in the order of the chunks, whichever thread was first
+        self.invalid_counts += counts.sum(axis=0)
+        self.cut += float(cut.sum())
+
+    def _trace(self, paths: CameraPaths, pixels: Int, more: Int, invalid_counts: Float, run: Run) -> float:
+        sums, first = np.zeros((2 * len(pixels), 4)), self.done[pixels]
+        paths.add(pixels, first, more, sums, invalid_counts, run.cancelled)
+        new, old = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32), self.sums[pixels]
+        before, added = np.maximum(first, 1)[..., None], np.maximum(more, 1)[..., None]
+        variance = (old / before - new / added) ** 2 / (1.0 / before + 1.0 / added)
+        both = (first > 0) & (more > 0)
+        self.spread[pixels] = np.where(both[..., None], variance, self.spread[pixels])
+        self.sums[pixels] = old + new
+        self.done[pixels] = first + more
+        return float(sums[:, CUT].sum())

@@ -1,0 +1,192 @@
+"""Ambient light for what is measured: scan lines meet their goal without bias, the rest is as good as is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from render.ambient.coarse_image import COARSE_ERROR, coarse_image
+from render.ambient.guided_interpolation import SEEN, grid_of, interpolate, smooth_grid
+from render.ambient.integrator import ambient_images
+from render.ambient.light_group import AmbientLight
+from render.ambient.line_samples import band_of, sample_band
+from render.ambient.measured_light import measured_images
+from render.ambient.path_tracer import camera_paths
+from render.ambient.pixel_samples import PixelSamples
+from render.ambient.transport_plan import LAMPS, AmbientPlan
+from render.frame import Frame
+from render.importance import Importance
+from render.plan import GroupQuality
+from render.run import Run
+from render.scene.settings import RenderSettings
+from render.world.placed import PlacedScene
+from tests.render.ambient.test_ambient_error import box_on_a_wall
+
+SEEDS = 30
+REFERENCE_SAMPLES = 1024
+"""Of each half."""
+
+
+def band_weights(height, width, size):
+    """Weights like those of a line's flanks, about a curve that crosses the box and its shadow."""
+    line = 0.5 * width + 0.1 * width * np.sin(6.0 * np.arange(height) / height)
+    across = np.arange(width) - line[:, None]
+    weight = np.abs(across) * np.exp(-(across**2) / 18.0)
+    return (size * np.where(np.abs(across) < 9.0, weight, 0.0)).astype(np.float32)
+
+
+def paths_of(placed, seed=0):
+    return camera_paths(placed.world, placed.scene, placed.camera.view(placed.T_world_camera), seed=seed)
+
+
+@cache
+def many_bands():
+    """A band, (SEEDS, m, 3) its pixels as they were rendered, their (m, 2, 3) reference, and the samples of each."""
+    scene, world = box_on_a_wall()
+    placed = PlacedScene(world, scene)
+    width, height = scene.camera.width, scene.camera.height
+    band = band_of(Importance((), band_weights(height, width, 20.0)))
+    images, samples = [], []
+    for seed in range(SEEDS):
+        film = PixelSamples(width, height)
+        sample_band(film, paths_of(placed, seed), band, 10**9, Run())
+        images.append(film.means(band.pixels).mean(axis=1))
+        samples.append(film.done[band.pixels].sum(axis=1))
+    film = PixelSamples(width, height)
+    film.add(paths_of(placed, 99), band.pixels, np.full((len(band.pixels), 2), REFERENCE_SAMPLES, np.int32), Run())
+    return band, np.array(images, np.float64), film.means(band.pixels).astype(np.float64), np.array(samples)
+
+
+def test_scan_lines_meet_their_goal_and_are_not_known_much_better():
+    band, images, reference, samples = many_bands()
+    weighted = band.weight[:, None] ** 2 * np.mean((images - reference.mean(axis=1)) ** 2, axis=0)
+    moments = np.array([np.bincount(band.line, weighted[:, colour]) for colour in range(3)]).max(axis=0)
+    known = np.sqrt(moments)
+    assert np.mean(known <= 1.0) >= 0.95
+    # where more than the first samples were needed at all
+    heavy = (band.weight > 0).astype(float)
+    more = np.bincount(band.line, samples.mean(axis=0) * heavy) > 6.0 * np.bincount(band.line, heavy)
+    assert more.sum() > 20 and np.median(known[more]) > 0.6
+
+
+def test_the_band_is_unbiased():
+    band, images, reference, _ = many_bands()
+    lines = np.array([np.bincount(band.line, image.mean(axis=1)) for image in images])
+    halves = np.array([np.bincount(band.line, half.mean(axis=1)) for half in np.swapaxes(reference, 0, 1)])
+    spread = lines.var(axis=0, ddof=1) / SEEDS + np.mean((halves[0] - halves[1]) ** 2) / 4.0
+    z = (lines.mean(axis=0) - halves.mean(axis=0)) / np.sqrt(spread)
+    # the squares of independent normal numbers, if each line had its own variance known to a quarter
+    assert np.mean(z**2) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / len(z)) + 0.07)
+    assert abs(z.sum()) < 4.0 * np.sqrt(len(z))
+
+
+def test_samples_go_where_weight_and_variance_are():
+    band, _, _, samples = many_bands()
+    mean = samples.mean(axis=0)
+    assert np.all(samples[:, band.weight == 0.0] == 4)
+    heavy = band.weight > 0.5 * band.weight.max()
+    assert mean[heavy].mean() > 2.0 * mean[~heavy].mean()
+
+
+def test_the_error_told_of_the_coarse_image_is_the_true_one():
+    scene, world = box_on_a_wall()
+    placed = PlacedScene(world, scene)
+    width, height = scene.camera.width, scene.camera.height
+    film, every = PixelSamples(width, height), np.arange(width * height, dtype=np.int32)
+    film.add(paths_of(placed, 99), every, np.full((len(every), 2), 128, np.int32), Run())
+    truth = film.means(every).astype(np.float64)
+    told, true = [], []
+    for seed in range(20):
+        coarse = coarse_image(paths_of(placed, seed), height, 10**9, Run(seed=seed))
+        rest = np.setdiff1d(every, grid_of(width, height, coarse.block)[0])
+        image, halves = coarse.radiance.reshape(-1, 3)[rest], truth[rest]
+        square = np.sum((image - halves[:, 0]) * (image - halves[:, 1])) / np.sum(halves[:, 0] * halves[:, 1])
+        told.append(coarse.error**2)
+        true.append(square)
+        assert coarse.error <= COARSE_ERROR and coarse.block > 1
+    difference = np.array(told) - np.array(true)
+    assert abs(difference.mean()) < 4.0 * difference.std(ddof=1) / np.sqrt(len(told))
+    assert np.sqrt(np.mean(true)) < 1.1 * COARSE_ERROR
+
+
+def test_light_over_a_texture_is_interpolated_as_light():
+    # a plane that faces the camera, of any colours, under light that grows along it
+    width, height, block = 61, 43, 8
+    random = np.random.default_rng(5)
+    pixels = np.arange(width * height, dtype=np.int32)
+    column, row = pixels % width, pixels // width
+    seen = np.zeros((len(pixels), SEEN), np.float32)
+    seen[:, :3] = random.uniform(0.3, 0.6, (len(pixels), 3))
+    seen[:, 5] = -1.0
+    seen[:, 6], seen[:, 7] = column, row
+    item = np.zeros(len(pixels), np.int32)
+    radiance = (seen[:, :3] * (2.0 + 0.01 * column + 0.02 * row)[:, None]).astype(np.float32)
+    grid, across = grid_of(width, height, block)
+    assert len(grid) == across * 7 and {0, width - 1, width * height - 1} <= set(grid.tolist())
+    light = np.empty((len(grid), 3), np.float32)
+    smooth_grid(across, seen[grid], item[grid], radiance[grid], light)
+    out = np.empty_like(radiance)
+    interpolate(pixels, (height, width), block, seen, item, (seen[grid], item[grid], light), out)
+    # the neighbours of a point of the grid, of other albedos, count in proportion to these
+    assert np.sqrt(np.mean((out / radiance - 1.0) ** 2)) < 0.03
+    # and no light passes from one object to the next
+    item[column > 30] = 1
+    radiance[column > 30] = 0.0
+    smooth_grid(across, seen[grid], item[grid], radiance[grid], light)
+    interpolate(pixels, (height, width), block, seen, item, (seen[grid], item[grid], light), out)
+    assert np.abs(out[column > 30]).max() < 0.01 * radiance.max()
+
+
+def test_it_takes_a_fraction_of_the_rays_of_an_image_as_good():
+    scene, world = box_on_a_wall(0.25)
+    placed = PlacedScene(world, scene)
+    weight = band_weights(scene.camera.height, scene.camera.width, 20.0)
+    start = world.rays.rays
+    *_, measured = measured_images(placed, Importance((), weight), most=256)
+    between = world.rays.rays
+    *_, image = ambient_images(placed, target=COARSE_ERROR, most=256)
+    assert measured.coarse_error <= COARSE_ERROR >= image.error and measured.error <= 1.0
+    # a ray a pixel tells what is seen there
+    assert between - start < 0.3 * (world.rays.rays - between)
+
+
+@pytest.mark.parametrize("axis", ["rows", "columns"])
+def test_threads_do_not_change_a_bit(axis):
+    scene, world = box_on_a_wall()
+    placed = PlacedScene(world, scene)
+    importance = Importance((), band_weights(scene.camera.height, scene.camera.width, 20.0), axis)
+    one, three = (list(measured_images(placed, importance, run=Run(threads=n))) for n in (1, 3))
+    assert len(one) == len(three) == 2
+    assert all(np.array_equal(a.radiance, b.radiance) for a, b in zip(one, three, strict=True))
+    assert one[1].error == three[1].error and one[1].samples == three[1].samples
+
+
+def test_where_nothing_matters_all_is_coarse_and_weights_of_another_image_are_refused():
+    scene, world = box_on_a_wall()
+    placed, shape = PlacedScene(world, scene), (scene.camera.height, scene.camera.width)
+    (only,) = measured_images(placed, Importance((), np.zeros(shape, np.float32)))
+    assert only.error == 0.0 and only.coarse_error > 0.0
+    with pytest.raises(ValueError, match="weights"):
+        next(measured_images(placed, Importance((), np.zeros((3, 4), np.float32))))
+
+
+def test_no_more_samples_are_spent_than_are_allowed():
+    scene, world = box_on_a_wall()
+    weight = band_weights(scene.camera.height, scene.camera.width, 1e4)
+    *_, image = measured_images(PlacedScene(world, scene), Importance((), weight), most=2)
+    assert image.samples <= 2.0 and image.error > 1.0
+
+
+def test_a_frame_that_knows_what_matters_is_rendered_to_that():
+    scene, world = box_on_a_wall()
+    weight = band_weights(scene.camera.height, scene.camera.width, 20.0)
+    dark = replace(Frame(0, (), None, (), None), importance=Importance((), weight))
+    plan, settings = AmbientPlan((LAMPS,)), RenderSettings(ambient_samples=64)
+    placed = PlacedScene(world, scene)
+    *_, last = AmbientLight().estimates(placed, settings, plan, dark, Run())
+    (quality,) = last.quality
+    assert isinstance(quality, GroupQuality) and quality.reached and quality.target == 1.0
+    assert 0.0 < quality.coarse_error <= COARSE_ERROR
