@@ -87,6 +87,6 @@ def block_means(light: Float32, counted: Mask) -> Float32:
 def told(share: float) -> str:
     """What is to be known of a frame of which this share of the pixels is kept."""
     return (
-        f"the frames are kept as a band about the line, {share:.0%} of the pixels, and elsewhere as means of {BLOCK} px "
-        "blocks: a peak there that other settings would find is not seen"
+        f"the frames are kept as a band about the line, {share:.0%} of the pixels, and elsewhere as means of "
+        f"{BLOCK} px blocks: a peak there that other settings would find is not seen"
     )
