@@ -122,7 +122,9 @@ def run_project(
     _print_results(done.manifest)
     kept = {"all": "frame(s)", "band": "frame(s), a band of each,", "none": "frame(s) measured, none kept,"}
     told = f"{done.manifest['frame_count']} {kept[done.manifest['frames_kept']]}"
-    print(f"{told} in {folder}, {done.manifest['seconds']['all']:.1f} s")
+    rate = done.manifest.get("profiles_per_second")
+    quick = f", {rate:.2g} profiles a second" if rate is not None and done.manifest["frame_count"] > 1 else ""
+    print(f"{told} in {folder}, {done.manifest['seconds']['all']:.1f} s{quick}")
     for file in done.report:
         print(f"report: {file}")
 

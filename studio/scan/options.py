@@ -72,6 +72,15 @@ class Scan:
         return self.begun.project
 
     @property
+    def rendered(self) -> Project:
+        """The project as its frames are rendered: without the truth of pixels where no frame is kept to hold it."""
+        project = self.project
+        depth_is_used = project.sensor.defocus_by(project.scene.camera.lens.model).startswith("developing")
+        if self.options.frames != "none" or depth_is_used:
+            return project
+        return project.model_copy(update={"render": project.render.model_copy(update={"truth_images": False})})
+
+    @property
     def run(self) -> Run:
         """How its work is done."""
         return Run(

@@ -30,7 +30,7 @@ def frame_of_step(scan: Scan, world: World, step: int) -> tuple[Frame, RenderSta
     InputError: what an earlier scan left in the folder, and is to be gone on with, is of something else. Cancelled:
     what was done is kept in a file.
     """
-    project = scan.project
+    project = scan.rendered
     path = None if scan.options.frames == "none" else saved_path(scan.begun.folder, step)
     mark = None if scan.plan is None else scan.plan.mark
     state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path, plan=mark)

@@ -26,7 +26,7 @@ from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.remarks import result_remarks
 from studio.scan.resume import frame_of_step
 from studio.scan.stages import Clock, Measurement, develop_step, scaled, step_world, validated
-from studio.scan.summary import summarise
+from studio.scan.summary import profile_rate, summarise
 
 __all__ = ["Measurement", "ScanResult", "run_scan"]
 
@@ -115,6 +115,7 @@ def run_scan(
         }
         if measuring:
             written.files += measuring.write_points(out)
+            result["profiles_per_second"] = profile_rate(measuring.record, clock.seconds)
             result["results"] = summarise(measuring.record)
             result["remarks"] = result_remarks(measuring.record)
         result["notes"] = cautions.notes(result.get("results", ()))
@@ -171,7 +172,7 @@ def _take_frames(scan: Scan, first: World, count: int, written: Written, measuri
 
 def _plan(scan: Scan, first: World) -> ScanPlan | None:
     """What all frames compute, whichever of them are taken; None: there is only one."""
-    project = scan.project
+    project = scan.rendered
     if project.scene.frame_count == 1:
         return None
 

@@ -12,6 +12,7 @@ import pytest
 from analysis.cloud import read_ply
 from render.base.errors import InputError
 from render.output.frame_files import read_frame
+from studio.project.document import replaced
 from studio.project.project import Project
 from studio.scan import frame_writer, scan_folder
 from studio.scan.options import Listener
@@ -143,3 +144,20 @@ def test_a_frame_that_cannot_be_written_ends_the_scan_with_its_message(
         scan(file, tmp_path)
     assert not (tmp_path / "scan.json").exists()
     assert Project.load(tmp_path / "scan_project.json").name == "small"
+
+
+def test_no_truth_of_pixels_is_rendered_for_frames_that_are_not_kept(file: Path, tmp_path: Path) -> None:
+    """But where the sensor's defocus needs their depth."""
+    project = replaced(Project.load(file), ("render", "truth_images"), True)
+    out_of_focus = replaced(project, ("sensor", "defocus"), True)
+    for chosen, kept, wanted in ((project, "none", False), (out_of_focus, "none", True), (project, "all", True)):
+        seen: list[bool] = []
+        listener = Listener(refined=lambda frame, seen=seen: seen.append(frame.truth is not None))
+        scan(file, tmp_path / f"{kept}{wanted}", listener, project=chosen, frames=kept, steps=1)
+        assert seen[-1] == wanted, (kept, wanted)
+
+
+def test_the_rate_of_profiles_is_told_of_the_work_before_the_report(whole: Path) -> None:
+    manifest = json.loads((whole / "scan.json").read_text())
+    spent = sum(seconds for name, seconds in manifest["seconds"].items() if name != "all")
+    assert manifest["profiles_per_second"] == pytest.approx(2 / spent, rel=1e-6)
