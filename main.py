@@ -53,6 +53,13 @@ def working(command: Callable[..., Any]) -> Callable[..., Any]:
             metavar="SECONDS",
             help="Time for the light of each frame; it ends then, short of its errors. --resume goes on from there.",
         ),
+        click.option(
+            "--frames",
+            type=click.Choice(["all", "band", "none"]),
+            default="all",
+            show_default=True,
+            help="What is kept of each frame: all; a band about the line, coarse elsewhere, without PNG; nothing.",
+        ),
         click.option("--resume", is_flag=True, help="Go on where an earlier scan into the same folder ended."),
         click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Random seed  [default: the project's]."),
         THREADS,

@@ -229,13 +229,16 @@ def laser_chips(report: ReportInput) -> list[tuple[str, str]]:
 
 
 def timing(report: ReportInput) -> tuple[list[tuple[str, str, float]], str]:
-    """Stage, time, share of the longest (0 to 1), longest first; and the total."""
+    """Stage, time, share of the longest (0 to 1), longest first; and the total, of several frames with their rate."""
     spent = dict(report.seconds)
     for stage, value in report.record.seconds.items():
         spent[stage] = spent.get(stage, 0.0) + value
     longest = max(spent.values(), default=0.0) or 1.0
     rows = sorted(spent.items(), key=lambda item: -item[1])
-    return [(stage, seconds(value), value / longest) for stage, value in rows], seconds(sum(spent.values()))
+    total = sum(spent.values())
+    profiles = len(report.record.steps) * len(report.scene.lasers)
+    rate = f", {digits(profiles / total)} profiles a second" if len(report.record.steps) > 1 and total > 0.0 else ""
+    return [(stage, seconds(value), value / longest) for stage, value in rows], f"{seconds(total)} in all{rate}"
 
 
 def counts(report: ReportInput) -> list[tuple[str, str]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from analysis.report import picture, plain_picture
 from analysis.report.colour import method_colour, method_name
+from analysis.report.columns import columns, sentence_height, table_height
 from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
 from analysis.report.glossary import GLOSSARY
 from analysis.report.light_text import sentences
@@ -100,6 +101,7 @@ def _content(report: ReportInput) -> dict[str, Any]:
             if len(cloud)
             else None,
         }
+    settings = [(name, list(rows.items())) for name, rows in scene_tables(report).items()]
     more = len(frame.lasers) - MOST_DETAILS
     spent, spent_in_all = timing(report)
     return pictures | {
@@ -132,12 +134,12 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "cloud_is_part": len(cloud) < found.points,
         "plan_done": computed,
         "plan_left_out": left_out,
-        "settings": scene_tables(report),
+        "settings": columns(settings, [table_height(rows) for _, rows in settings]),
         "timing": spent,
         "time_total": spent_in_all,
         "counts": counts(report),
         "repeat": _repeat(report),
-        "glossary": GLOSSARY,
+        "glossary": columns(GLOSSARY, [sentence_height(*entry) for entry in GLOSSARY]),
     }
 
 

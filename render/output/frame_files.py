@@ -23,6 +23,7 @@ from render.base.counts import OF_GROUPS, counts_from
 from render.base.errors import InputError
 from render.base.files import atomic_write, check_regular, read_bytes, sha256
 from render.frame import Frame, Truth
+from render.output.band import BLOCK, coarse_outside, told
 from render.output.exr import decode_exr
 from render.output.light_record import plan_from, quality_from, quality_of_counts
 from render.output.sidecar import (
@@ -69,15 +70,17 @@ def write_frame(
     *,
     sensor: Sensor | None = None,
     made_of: dict[str, Any] | None = None,
+    band: NDArray[np.bool_] | None = None,
 ) -> list[Path]:
     """Write stem.exr, stem.png (with an image) and stem.json into the folder; the paths, in that order.
 
-    made_of: what decides the frame's numbers, for the sidecar. Characters of the stem and of the lasers' names that do
-    not suit a file or a layer are percent-encoded.
+    made_of: what decides the frame's numbers, for the sidecar. band (h, w): all that is kept of its pixels; elsewhere
+    it is coarse (`render.output.band`), which the sidecar says and `read_frame` warns of. Characters of the stem and of
+    the lasers' names that do not suit a file or a layer are percent-encoded.
     Raises InputError: a file cannot be written, the frame is empty or not of this scene.
     """
     name = safe_name(stem)
-    layers = _layers(frame, scene)
+    layers = _layers(frame if band is None else coarse_outside(frame, band), scene)
     written = []
     exr = _encode_exr(layers)
     written.append(_write(folder / f"{name}.exr", exr))
@@ -88,6 +91,7 @@ def write_frame(
         "ambient": frame.ambient is not None,
         "truth": frame.truth is not None,
         "made_of": made_of,
+        "band": None if band is None else {"share": float(np.mean(band)), "block": BLOCK},
         "exr_sha256": hashlib.sha256(exr).hexdigest(),
     }
     written.append(_write(folder / f"{name}.json", to_text(sealed(record)).encode()))
@@ -166,6 +170,7 @@ def _frame(record: Record, layers: Layers) -> Frame:
         truth=truth,
         plan=plan,
         quality=quality,
+        warnings=(told(float(record["band"]["share"])),) if record.get("band") is not None else (),
         seconds=numbers_from(record["seconds"]),
         counts=counts,
     )

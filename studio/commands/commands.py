@@ -28,6 +28,7 @@ SCAN_OPTIONS = {
     "threads": "threads",
     "time_limit": "seconds",
     "report": "report",
+    "frames": "frames",
     "resume": "resume",
 }
 """Option of the command line -> field of `studio.scan.options.ScanOptions`."""
@@ -119,7 +120,11 @@ def run_project(
     if not quiet:
         _print_light(done.manifest["light"])
     _print_results(done.manifest)
-    print(f"{len(done.manifest['frames'])} frame(s) in {folder}, {done.manifest['seconds']['all']:.1f} s")
+    kept = {"all": "frame(s)", "band": "frame(s), a band of each,", "none": "frame(s) measured, none kept,"}
+    told = f"{done.manifest['frame_count']} {kept[done.manifest['frames_kept']]}"
+    rate = done.manifest.get("profiles_per_second")
+    quick = f", {rate:.2g} profiles a second" if rate is not None and done.manifest["frame_count"] > 1 else ""
+    print(f"{told} in {folder}, {done.manifest['seconds']['all']:.1f} s{quick}")
     for file in done.report:
         print(f"report: {file}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from analysis.report.model import FrameResult
 from render.base.threads import Cancel
@@ -14,6 +15,8 @@ from studio.project.project import Project
 from studio.runtime.console import StageProgress, silent
 from studio.scan.scan_folder import Begun
 from studio.scan.stages import Clock
+
+Keep = Literal["all", "band", "none"]
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ class ScanOptions:
     """Off: stop after the frames."""
     report: bool = True
     """Off: stop after the points."""
+    frames: Keep = "all"
+    """What is kept of each frame as files: all; a band about the line, coarse elsewhere; nothing."""
     resume: bool = False
     """Take the frames that an earlier scan left in the folder, and go on with the one that it left unfinished."""
 
@@ -65,6 +70,15 @@ class Scan:
     @property
     def project(self) -> Project:
         return self.begun.project
+
+    @property
+    def rendered(self) -> Project:
+        """The project as its frames are rendered: without the truth of pixels where no frame is kept to hold it."""
+        project = self.project
+        depth_is_used = project.sensor.defocus_by(project.scene.camera.lens.model).startswith("developing")
+        if self.options.frames != "none" or depth_is_used:
+            return project
+        return project.model_copy(update={"render": project.render.model_copy(update={"truth_images": False})})
 
     @property
     def run(self) -> Run:

@@ -36,6 +36,7 @@ def reconstruct_folder(
     Writes points and, where requested, the report into `out`. InputError: frames missing or damaged, `project` differs
     in what the frames fix, or as `scan_folder.measuring`.
     """
+    scan_folder.check_kept(found)
     scan_folder.check_measures(found, project)
     with scan_folder.measuring(found, root, out):
         return _measured(found, project, root, out, clock, report=report, threads=threads)
@@ -69,7 +70,7 @@ def _measured(
                     "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
                 )
             world = step_world(project, root, frame.step, None if frame.step == 0 else world)
-            cautions.look(frame, scene_warnings(world, project.scene, frame.step))
+            cautions.look(frame, (*frame.warnings, *scene_warnings(world, project.scene, frame.step)))
             measuring.add(frame, world, develop_step(project, frame, clock, threads, how.laser_power))
         measuring.finish()
         if not measuring.record.steps or not project.scene.lasers:

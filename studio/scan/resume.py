@@ -30,11 +30,12 @@ def frame_of_step(scan: Scan, world: World, step: int) -> tuple[Frame, RenderSta
     InputError: what an earlier scan left in the folder, and is to be gone on with, is of something else. Cancelled:
     what was done is kept in a file.
     """
-    project, path = scan.project, saved_path(scan.begun.folder, step)
+    project = scan.rendered
+    path = None if scan.options.frames == "none" else saved_path(scan.begun.folder, step)
     mark = None if scan.plan is None else scan.plan.mark
     state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path, plan=mark)
     if scan.options.resume:
-        found = None if path.is_file() else _found(scan, world, step, state)
+        found = None if path is not None and path.is_file() else _found(scan, world, step, state)
         if found is not None:
             scan.refined(found)
             return found, state
@@ -65,9 +66,12 @@ def _found(scan: Scan, world: World, step: int, state: RenderState) -> Frame | N
     if not sidecar.is_file():
         return None
     try:
-        if read_object(sidecar, "frame").get("made_of") != made_of(project, state.marks, begun.inputs):
+        record = read_object(sidecar, "frame")
+        if record.get("made_of") != made_of(project, state.marks, begun.inputs):
+            return None
+        if record.get("band") is not None and scan.options.frames == "all":
             return None
         frame = read_frame(sidecar)
     except InputError:
         return None
-    return replace(frame, warnings=scene_warnings(world, project.scene, step))
+    return replace(frame, warnings=(*frame.warnings, *scene_warnings(world, project.scene, step)))

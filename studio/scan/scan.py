@@ -11,24 +11,22 @@ from typing import Any
 
 from render.base.errors import InputError
 from render.frame import Frame
-from render.output.frame_files import write_frame
 from render.output.light_record import plan_record, quality_record
 from render.scan_plan import ScanPlan, plan_scan
-from render.sensor.develop import Image, develop
 from render.world.world import World, build_world
 from studio.project.date_and_time import now
 from studio.project.input_files import input_hashes
 from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
+from studio.scan.frame_writer import FrameWriter
 from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
 from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.remarks import result_remarks
-from studio.scan.rendered_from import made_of
-from studio.scan.resume import frame_of_step, settle
+from studio.scan.resume import frame_of_step
 from studio.scan.stages import Clock, Measurement, develop_step, scaled, step_world, validated
-from studio.scan.summary import summarise
+from studio.scan.summary import profile_rate, summarise
 
 __all__ = ["Measurement", "ScanResult", "run_scan"]
 
@@ -50,7 +48,7 @@ class Written:
     cautions: Cautions
     files: list[Path] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
-    """Of their sidecars."""
+    """Of the frames' sidecars."""
     light: list[dict[str, Any]] = field(default_factory=list)
 
     def add(self, frame: Frame) -> None:
@@ -78,6 +76,7 @@ def run_scan(
     way.
     """
     start = time.perf_counter()
+    _check_options(options)
     image_scale = options.image_scale
     project = validated(scaled(project, image_scale), f"at image scale {image_scale:g}")
     if options.seed is not None:
@@ -106,6 +105,8 @@ def run_scan(
             "name": project.name,
             "created": now(),
             "frames": written.names,
+            "frames_kept": options.frames,
+            "frame_count": count,
             "image_scale": image_scale,
             "seed": project.seed,
             "notes": [],
@@ -114,6 +115,7 @@ def run_scan(
         }
         if measuring:
             written.files += measuring.write_points(out)
+            result["profiles_per_second"] = profile_rate(measuring.record, clock.seconds)
             result["results"] = summarise(measuring.record)
             result["remarks"] = result_remarks(measuring.record)
         result["notes"] = cautions.notes(result.get("results", ()))
@@ -134,21 +136,43 @@ def run_scan(
     return ScanResult(out, (*written.files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
 
 
+def _check_options(options: ScanOptions) -> None:
+    """InputError: what is to be kept of the frames does not go with what else is asked for."""
+    if options.frames != "none":
+        return
+    if options.resume:
+        raise InputError(
+            "a scan goes on from the frames that an earlier one left, and none are to be kept",
+            where="--frames",
+            found="none, with --resume",
+            allowed="all or band",
+        )
+    if not options.measure:
+        raise InputError("a render that keeps no frame leaves nothing", where="--frames", found="none", cure="run")
+
+
 def _take_frames(scan: Scan, first: World, count: int, written: Written, measuring: Measuring | None) -> None:
     """Render, write and measure one frame after the other; `first`: the world of step 0."""
     scan, world = replace(scan, plan=_plan(scan, first)), first
-    for step in scan.clock.frames(count):
-        world = world if step == 0 else step_world(scan.project, scan.begun.root, step, world)
-        frame, images = _write_frame(scan, world, step, written)
-        if measuring is not None:
-            measuring.add(frame, world, images)
+    with FrameWriter(scan) as writer:
+        for step in scan.clock.frames(count):
+            world = world if step == 0 else step_world(scan.project, scan.begun.root, step, world)
+            frame, state = frame_of_step(scan, world, step)
+            written.add(frame)
+            images = develop_step(scan.project, frame, scan.clock, scan.options.threads)
+            writer.add(frame, state, images)
+            if measuring is not None:
+                measuring.add(frame, world, images)
+        writer.finish()
     if measuring is not None:
         measuring.finish()
+    written.files += writer.files
+    written.names += writer.names
 
 
 def _plan(scan: Scan, first: World) -> ScanPlan | None:
     """What all frames compute, whichever of them are taken; None: there is only one."""
-    project = scan.project
+    project = scan.rendered
     if project.scene.frame_count == 1:
         return None
 
@@ -159,35 +183,6 @@ def _plan(scan: Scan, first: World) -> ScanPlan | None:
         return plan_scan(project.scene, project.render, world, replace(scan.run, progress=progress))
 
 
-def _write_frame(scan: Scan, world: World, step: int, written: Written) -> tuple[Frame, list[Image]]:
-    """One frame as files, and its image of each laser."""
-    project, clock = scan.project, scan.clock
-    frame, state = frame_of_step(scan, world, step)
-    written.add(frame)
-    images = develop_step(project, frame, clock, scan.options.threads)
-    with clock.stage("writing frames"):
-        files = write_frame(
-            scan.begun.folder,
-            scan_folder.frame_stem(step),
-            frame,
-            together(project, frame, images),
-            project.scene,
-            sensor=project.sensor,
-            made_of=made_of(project, state.marks, scan.begun.inputs),
-        )
-        settle(frame, state)
-    written.files += files
-    written.names.append(files[-1].name)
-    return frame, images
-
-
 def light_record(frame: Frame) -> dict[str, Any]:
     """The plan of a frame, and how well each light group is known, as the manifest has them."""
     return {"plan": plan_record(frame.plan), "groups": quality_record(frame.quality)}
-
-
-def together(project: Project, frame: Frame, images: list[Image]) -> Image:
-    """The image to keep as a file: the only laser's own, else one with all lasers at once."""
-    if len(images) == 1:
-        return images[0]
-    return develop(frame, project.scene, project.sensor, seed=project.seed)

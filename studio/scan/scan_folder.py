@@ -182,6 +182,17 @@ def measured_project(found: ScanFolder) -> Project:
     return Project.from_data({**data, **record}, f"{found.folder / MANIFEST}: measured_with")
 
 
+def check_kept(found: ScanFolder) -> None:
+    """InputError: the scan kept no frames, so that there is nothing to look at or to measure again."""
+    if found.manifest.get("frames_kept") != "none":
+        return
+    raise InputError(
+        "the scan kept none of its frames (--frames none)",
+        where=str(found.folder),
+        cure="run it again with --frames all or band; what it measured is in the folder",
+    )
+
+
 def check_measures(found: ScanFolder, project: Project) -> None:
     """InputError: frames rendered from the folder's project cannot be measured as `project`; it names what differs."""
     scale = image_scale_of(found)

@@ -23,7 +23,7 @@ from studio.project.input_files import check_unchanged
 from studio.project.project import Project
 from studio.scan.point_sample import PointSample
 from studio.scan.result_series import MEASURED, ErrorView
-from studio.scan.scan_folder import MANIFEST, PROJECT, ScanFolder, check_frame, image_scale_of
+from studio.scan.scan_folder import MANIFEST, PROJECT, ScanFolder, check_frame, check_kept, image_scale_of
 from studio.scan.stages import scaled, step_world
 
 Float = NDArray[np.float64]
@@ -118,7 +118,11 @@ def holds_scan(path: Path) -> Path | None:
 
 
 def read_results(found: ScanFolder, cancelled: Cancel = never) -> ScanResults:
-    """Go once through the scan's points, a piece at a time. InputError: they are damaged, or an input file changed."""
+    """Go once through the scan's points, a piece at a time.
+
+    InputError: they are damaged, an input file changed, or the scan kept no frames to look at.
+    """
+    check_kept(found)
     cure = "restore them, or run the project again"
     check_unchanged(found.inputs, found.project.scene, found.root, cure=cure)
     path = found.folder / "points.ply"

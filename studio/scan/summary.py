@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from analysis.measures import Measures
@@ -20,6 +21,15 @@ def summarise(record: ScanRecord) -> list[dict[str, Any]]:
             found = total(record.chosen(i, k))
             rows.append({"laser": laser.name, "method": found.method, **_figures(found)})
     return rows
+
+
+def profile_rate(record: ScanRecord, seconds: Mapping[str, float]) -> float | None:
+    """Profiles, one of each laser in each frame, in a second of all that was done for them; None: nothing was timed.
+
+    seconds: wall time by stage.
+    """
+    spent = sum(seconds.values())
+    return len(record.steps) * len(record.scene.lasers) / spent if spent > 0.0 else None
 
 
 def _figures(found: Total) -> dict[str, Any]:
