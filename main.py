@@ -147,13 +147,27 @@ def why_no_studio() -> str | None:
 @cli.command()
 @PROJECT
 @click.option("--report/--no-report", default=True, show_default=True, help="Write the HTML and PDF report.")
+@click.option("--root", type=click.Path(path_type=Path), help="Folder of the meshes and textures of a report.")
 @measuring
 @working
-def run(project: Path | None, **options: Any) -> None:
-    """Scan a project: render, extract the line, triangulate, compare with the truth, report. Default: the sample."""
+@click.pass_context
+def run(context: click.Context, /, project: Path | None, root: Path | None, **options: Any) -> None:
+    """Scan a project: render, extract the line, triangulate, compare with the truth, report. Default: the sample.
+
+    A report.html in place of a project is run again as it was, to the same numbers.
+    """
     _require_system()
+    if project is not None and project.suffix.lower() in (".html", ".htm"):
+        from studio.commands.run_report import run_report
+
+        told = click.core.ParameterSource.COMMANDLINE
+        chosen = [name for name in options if context.get_parameter_source(name) is told]
+        run_report(project, root, chosen, **options)
+        return
     from studio.commands.commands import run_project
 
+    if root is not None:
+        raise click.UsageError("--root is of a report; the meshes of a project are in its own folder", context)
     run_project(project, **options)
 
 

@@ -138,6 +138,7 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "counts": counts(report),
         "repeat": _repeat(report),
         "glossary": GLOSSARY,
+        "run": report.run,
     }
 
 

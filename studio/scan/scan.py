@@ -27,6 +27,7 @@ from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.remarks import result_remarks
 from studio.scan.rendered_from import made_of
 from studio.scan.resume import frame_of_step, settle
+from studio.scan.run_record import ended_by_clock, run_text
 from studio.scan.stages import Clock, Measurement, develop_step, scaled, step_world, validated
 from studio.scan.summary import summarise
 
@@ -79,7 +80,8 @@ def run_scan(
     """
     start = time.perf_counter()
     image_scale = options.image_scale
-    project = validated(scaled(project, image_scale), f"at image scale {image_scale:g}")
+    if not options.at_scale:
+        project = validated(scaled(project, image_scale), f"at image scale {image_scale:g}")
     if options.seed is not None:
         project = validated(project.model_copy(update={"seed": options.seed}), "with another seed")
     if options.measure and not project.scene.lasers:
@@ -127,8 +129,15 @@ def run_scan(
         reports: list[Path] = []
         manifest = finish(reports)
         if measuring and options.report:
+            run = run_text(
+                project,
+                measuring.record,
+                image_scale=image_scale,
+                inputs=inputs,
+                finished=not ended_by_clock(written.light),
+            )
             reports = measuring.write_reports(
-                out, first, notes=result["notes"], created=result["created"], image_scale=image_scale
+                out, first, notes=result["notes"], created=result["created"], image_scale=image_scale, run=run
             )
             manifest = finish(reports)
     return ScanResult(out, (*written.files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)
