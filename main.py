@@ -255,6 +255,21 @@ def report(folder: Path, **options: Any) -> None:
 
 
 @cli.command()
+@click.argument("a", type=click.Path(path_type=Path))
+@click.argument("b", type=click.Path(path_type=Path))
+@common
+def compare(a: Path, b: Path, **options: Any) -> None:
+    """What changed from one finished run to another, in set-up and results, and whether it is more than chance.
+
+    A and B are results folders, or reports (report.html).
+    """
+    _require_system()
+    from studio.commands.compare import compare_paths
+
+    compare_paths(a, b, **options)
+
+
+@cli.command()
 @PROJECT
 @common
 def inspect(project: Path | None, **options: Any) -> None:

@@ -35,10 +35,10 @@ from studio.scan.scan_folder import MANIFEST
 from studio.scan.summary import summarise
 
 MAX_BYTES = 256 * 2**20
-MOST_LINES = 1 << 16
+MOST_LINES = 1 << 15
 """Points of a laser that a report holds the errors of; of a longer scan only every so many steps."""
 MOST_POINTS = 1 << 24
-POINT = np.dtype([("step", "<i4"), ("row", "<i4"), ("error", "<f4")])
+POINT = np.dtype([("step", "<i4"), ("row", "<i4"), ("error", "<f8")])
 ELEMENT = re.compile(r'<template id="blazer-run">([^<]*)</template>')
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Points = NDArray[np.void]
