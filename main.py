@@ -292,6 +292,33 @@ def new(template: str | None, folder: Path | None, **options: Any) -> None:
     start_project(template, folder, **options)
 
 
+def repeating(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of the commands that run a project many times."""
+    for option in (
+        click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor]."),
+        click.option("--laser", type=click.IntRange(0), default=0, show_default=True, help="Which laser is measured."),
+        click.option("--scale", type=FiniteRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
+    ):
+        command = option(command)
+    return common(command)
+
+
+@cli.command()
+@PROJECT
+@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/budget-<name>].")
+@click.option("--repeats", type=click.IntRange(3, 10_000), default=8, show_default=True, help="Of each state.")
+@repeating
+def budget(project: Path | None, **options: Any) -> None:
+    """What makes the depth error: each effect switched off and on alone, bias and spread apart. Default: the sample.
+
+    The same command goes on after an interrupt; study show tells what a folder holds.
+    """
+    _require_system()
+    from studio.commands.budget import budget_project
+
+    budget_project(project, **options)
+
+
 @cli.group()
 def study() -> None:
     """Many runs with one question: speed against accuracy, where a method breaks; as a table and charts."""
