@@ -154,13 +154,27 @@ def why_no_studio() -> str | None:
 @cli.command()
 @PROJECT
 @click.option("--report/--no-report", default=True, show_default=True, help="Write the HTML and PDF report.")
+@click.option("--root", type=click.Path(path_type=Path), help="Folder of the meshes and textures of a report.")
 @measuring
 @working
-def run(project: Path | None, **options: Any) -> None:
-    """Scan a project: render, extract the line, triangulate, compare with the truth, report. Default: the sample."""
+@click.pass_context
+def run(context: click.Context, /, project: Path | None, root: Path | None, **options: Any) -> None:
+    """Scan a project: render, extract the line, triangulate, compare with the truth, report. Default: the sample.
+
+    A report.html in place of a project is run again as it was, to the same numbers.
+    """
     _require_system()
+    if project is not None and project.suffix.lower() in (".html", ".htm"):
+        from studio.commands.run_report import run_report
+
+        told = click.core.ParameterSource.COMMANDLINE
+        chosen = [name for name in options if context.get_parameter_source(name) is told]
+        run_report(project, root, chosen, **options)
+        return
     from studio.commands.commands import run_project
 
+    if root is not None:
+        raise click.UsageError("--root is of a report; the meshes of a project are in its own folder", context)
     run_project(project, **options)
 
 
@@ -248,6 +262,21 @@ def report(folder: Path, **options: Any) -> None:
 
 
 @cli.command()
+@click.argument("a", type=click.Path(path_type=Path))
+@click.argument("b", type=click.Path(path_type=Path))
+@common
+def compare(a: Path, b: Path, **options: Any) -> None:
+    """What changed from one finished run to another, in set-up and results, and whether it is more than chance.
+
+    A and B are results folders, or reports (report.html).
+    """
+    _require_system()
+    from studio.commands.compare import compare_paths
+
+    compare_paths(a, b, **options)
+
+
+@cli.command()
 @PROJECT
 @common
 def inspect(project: Path | None, **options: Any) -> None:
@@ -268,6 +297,33 @@ def new(template: str | None, folder: Path | None, **options: Any) -> None:
     from studio.commands.commands import start_project
 
     start_project(template, folder, **options)
+
+
+def repeating(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of the commands that run a project many times."""
+    for option in (
+        click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor]."),
+        click.option("--laser", type=click.IntRange(0), default=0, show_default=True, help="Which laser is measured."),
+        click.option("--scale", type=FiniteRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
+    ):
+        command = option(command)
+    return common(command)
+
+
+@cli.command()
+@PROJECT
+@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/budget-<name>].")
+@click.option("--repeats", type=click.IntRange(3, 10_000), default=8, show_default=True, help="Of each state.")
+@repeating
+def budget(project: Path | None, **options: Any) -> None:
+    """What makes the depth error: each effect switched off and on alone, bias and spread apart. Default: the sample.
+
+    The same command goes on after an interrupt; study show tells what a folder holds.
+    """
+    _require_system()
+    from studio.commands.budget import budget_project
+
+    budget_project(project, **options)
 
 
 @cli.group()

@@ -96,6 +96,8 @@ class ReportInput:
     """Pixels a side of what was measured, over those of the scanner."""
     created: str = ""
     """Date and time of the run, as it shall be printed."""
+    run: str = ""
+    """What was run, for a program that reads the page: any text; empty: it is not told."""
 
 
 def frame_rmse(frame: FrameResult) -> float:

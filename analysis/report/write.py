@@ -140,6 +140,7 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "counts": counts(report),
         "repeat": _repeat(report),
         "glossary": columns(GLOSSARY, [sentence_height(*entry) for entry in GLOSSARY]),
+        "run": report.run,
     }
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from render.base.errors import InputError
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from render.frame import Frame
     from render.plan import GroupQuality
     from studio.preview.inspection import Inspection, LaserView
+    from studio.scan.options import ScanOptions
+    from studio.scan.scan import ScanResult
 
 SAMPLE = "weld_seam"
 OUTPUT = "scan-output"
@@ -90,13 +94,23 @@ def run_project(
 
     given: options of the scan, by the names of the command line, and extraction settings; None: the project's.
     """
-    from studio.scan.options import Listener, ScanOptions
-    from studio.scan.scan import run_scan
+    from studio.scan.options import ScanOptions
 
     named = {name: given.pop(option) for option, name in SCAN_OPTIONS.items() if option in given}
     options, file = ScanOptions(measure=measure, **named), chosen_file(path)
-    project, root = with_extraction(Project.load(file), given), file.parent
+    project = with_extraction(Project.load(file), given)
     folder = out if out is not None else Path(OUTPUT) / folder_name(project.name)
+    done = scan_into(folder, project, file.parent, options, source=file, quiet=quiet)
+    print_scan(done, quiet=quiet, as_json=as_json)
+
+
+def scan_into(
+    folder: Path, project: Project, root: Path, options: ScanOptions, *, source: Path, quiet: bool
+) -> ScanResult:
+    """A scan with its plan and progress on standard error."""
+    from studio.scan.options import Listener
+    from studio.scan.scan import run_scan
+
     check_output(folder)
     from analysis.report.light_text import plan_lines, stage_note
     from render.products import expected_plan
@@ -108,14 +122,20 @@ def run_project(
         quality = frame.quality
 
     if not quiet:
-        plan = expected_plan(project.scene.scaled(options.image_scale), project.render)
+        scene = project.scene if options.at_scale else project.scene.scaled(options.image_scale)
+        plan = expected_plan(scene, project.render)
         print_plan(plan_lines(plan), to_errors=True)
     frames = min(options.steps or project.scene.frame_count, project.scene.frame_count)
     with stage_progress(quiet, lambda stage: stage_note(stage, quality), frames=frames) as progress:
         listener = Listener(progress, refined=refined)
-        done = run_scan(project, root, out=folder, options=options, listener=listener, source=file)
+        return run_scan(project, root, out=folder, options=options, listener=listener, source=source)
+
+
+def print_scan(done: ScanResult, *, quiet: bool, as_json: bool, more: Mapping[str, Any] = MappingProxyType({})) -> None:
+    """What a scan found; more: of the JSON object."""
     if as_json:
-        print_json({"ok": True, "folder": str(folder), "files": [str(file) for file in done.files], **done.manifest})
+        files = [str(file) for file in done.files]
+        print_json({"ok": True, "folder": str(done.folder), "files": files, **done.manifest, **more})
         return
     if not quiet:
         _print_light(done.manifest["light"])
@@ -124,7 +144,7 @@ def run_project(
     told = f"{done.manifest['frame_count']} {kept[done.manifest['frames_kept']]}"
     rate = done.manifest.get("profiles_per_second")
     quick = f", {rate:.2g} profiles a second" if rate is not None and done.manifest["frame_count"] > 1 else ""
-    print(f"{told} in {folder}, {done.manifest['seconds']['all']:.1f} s{quick}")
+    print(f"{told} in {done.folder}, {done.manifest['seconds']['all']:.1f} s{quick}")
     for file in done.report:
         print(f"report: {file}")
 

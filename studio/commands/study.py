@@ -42,6 +42,13 @@ def run_file(
     study, root = Study.load(file)
     part, bases = _shard(shard), study.bases(root)
     folder = out if out is not None else Path("scan-output") / f"study-{folder_name(study.name)}"
+    run_into(folder, study, bases, part, Engine(workers, scheduler), quiet=quiet, as_json=as_json)
+
+
+def run_into(
+    folder: Path, study: Study, bases: dict[str, Project], part: Shard, engine: Engine, *, quiet: bool, as_json: bool
+) -> None:
+    """Measure what is missing of a study in a folder, and write what it says so far."""
     check_output(folder)
     check_size(study)
     first = next_cells(study, bases, {}, part)  # every field and value is looked at before anything runs
@@ -60,7 +67,7 @@ def run_file(
                     study,
                     bases,
                     store,
-                    engine=Engine(workers, scheduler),
+                    engine=engine,
                     shard=part,
                     progress=lambda done, known: progress("cells", done / max(known, 1)),
                     cancelled=cancelled,

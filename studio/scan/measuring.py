@@ -100,9 +100,16 @@ class Measuring:
         return [out / "points.ply", out / "points.csv"]
 
     def write_reports(
-        self, out: Path, world: World, *, notes: Sequence[str], created: str | None = None, image_scale: float = 1.0
+        self,
+        out: Path,
+        world: World,
+        *,
+        notes: Sequence[str],
+        created: str | None = None,
+        image_scale: float = 1.0,
+        run: str = "",
     ) -> list[Path]:
-        """report.html and report.pdf; `world` is that of step 0."""
+        """report.html and report.pdf; `world` is that of step 0, `run` as of `run_text`."""
         from analysis.report.write import write_report
 
         data = report_input(
@@ -113,6 +120,7 @@ class Measuring:
             notes=[*notes, *self.notes()],
             created=created or now(),
             image_scale=image_scale,
+            run=run,
         )
         with self._clock.stage("report"):
             return list(write_report(out, data))

@@ -27,6 +27,8 @@ class ScanOptions:
     """Only the first so many frames; None: all."""
     image_scale: float = 1.0
     """Pixels a side over those of the camera."""
+    at_scale: bool = False
+    """The project is at the image scale already, with the exposure that goes with it."""
     seed: int | None = None
     """In place of the project's."""
     threads: int | None = None

@@ -6,6 +6,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from analysis.report.record import ScanRecord
 from render.base.errors import InputError
 from render.output.frame_files import read_frame
 from render.world.material_checks import scene_warnings
@@ -15,8 +16,9 @@ from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
 from studio.scan.measuring import Measuring
-from studio.scan.redevelop import development
+from studio.scan.redevelop import Development, development
 from studio.scan.remarks import result_remarks
+from studio.scan.run_record import ended_by_clock, run_text
 from studio.scan.stages import Clock, develop_step, step_world
 from studio.scan.summary import summarise
 
@@ -85,7 +87,11 @@ def _measured(
                 measured["measured_with"] = requested.model_dump(mode="json", include={"sensor", "extraction"})
             if report:
                 created = str(found.manifest.get("created", now()))
-                reports = measuring.write_reports(out, first, notes=notes, created=created, image_scale=image_scale)
+                # another laser power scales the frames' light, which a render with that power repeats but for rounding
+                run = _run_text(found, how, measuring.record) if how.powered.scene == project.scene else ""
+                reports = measuring.write_reports(
+                    out, first, notes=notes, created=created, image_scale=image_scale, run=run
+                )
                 measured["report"] = [path.name for path in reports]
                 files += reports
     return {
@@ -97,3 +103,14 @@ def _measured(
         "extraction": measured["extraction"],
         "seconds": clock.seconds,
     }
+
+
+def _run_text(found: scan_folder.ScanFolder, how: Development, record: ScanRecord) -> str:
+    light = found.manifest.get("light")
+    return run_text(
+        how.project,
+        record,
+        image_scale=scan_folder.image_scale_of(found),
+        inputs=found.inputs,
+        finished=not ended_by_clock(light),
+    )

@@ -77,8 +77,9 @@ def report_input(
     notes: Sequence[str],
     created: str,
     image_scale: float = 1.0,
+    run: str = "",
 ) -> ReportInput:
-    """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage."""
+    """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage, `run` as of `run_text`."""
     return ReportInput(
         title=project.name,
         scene=project.scene,
@@ -95,6 +96,7 @@ def report_input(
         notes=tuple(notes),
         created=created,
         image_scale=image_scale,
+        run=run,
     )
 
 

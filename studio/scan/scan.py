@@ -25,6 +25,7 @@ from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.remarks import result_remarks
 from studio.scan.resume import frame_of_step
+from studio.scan.run_record import ended_by_clock, run_text
 from studio.scan.stages import Clock, Measurement, develop_step, scaled, step_world, validated
 from studio.scan.summary import profile_rate, summarise
 
@@ -78,7 +79,8 @@ def run_scan(
     start = time.perf_counter()
     _check_options(options)
     image_scale = options.image_scale
-    project = validated(scaled(project, image_scale), f"at image scale {image_scale:g}")
+    if not options.at_scale:
+        project = validated(scaled(project, image_scale), f"at image scale {image_scale:g}")
     if options.seed is not None:
         project = validated(project.model_copy(update={"seed": options.seed}), "with another seed")
     if options.measure and not project.scene.lasers:
@@ -129,8 +131,15 @@ def run_scan(
         reports: list[Path] = []
         manifest = finish(reports)
         if measuring and options.report:
+            run = run_text(
+                project,
+                measuring.record,
+                image_scale=image_scale,
+                inputs=inputs,
+                finished=not ended_by_clock(written.light),
+            )
             reports = measuring.write_reports(
-                out, first, notes=result["notes"], created=result["created"], image_scale=image_scale
+                out, first, notes=result["notes"], created=result["created"], image_scale=image_scale, run=run
             )
             manifest = finish(reports)
     return ScanResult(out, (*written.files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.study.breakdown import Breakdown, breakdown
+from analysis.study.budget import Budget, budget
 from analysis.study.cause import cause
 from analysis.study.intervals import Interval, mean_interval
 from analysis.study.pareto import Front, bootstrapped_front
 from studio.project.project import Project
 from studio.study.cells import Point, measured_along, methods_of, search_of
+from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
 from studio.study.store import Row
-from studio.study.study import Study, Sweep
+from studio.study.study import Study, Sweep, with_fields
 from studio.study.tables import grouped, seconds_of, values_of
 
 Groups = dict[tuple[Point, str], list[Row]]
@@ -42,6 +44,15 @@ class Broken:
 
 
 @dataclass(frozen=True)
+class ErrorBudget:
+    """What each effect makes of the depth error, by one method: of its bias, m, and of its variance, m^2."""
+
+    method: str
+    bias: Budget
+    variance: Budget
+
+
+@dataclass(frozen=True)
 class Answer:
     """Of one sweep."""
 
@@ -51,6 +62,8 @@ class Answer:
     """Of a chart of speed, in the order of the spots."""
     broken: tuple[Broken, ...]
     """Of a bisection, by method."""
+    budgets: tuple[ErrorBudget, ...] = ()
+    """Of effects, by method."""
 
 
 def answers(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Answer]:
@@ -68,7 +81,36 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
         for (point, method), error, time in zip(groups, errors, times, strict=True)
     )
     front = bootstrapped_front(times, errors) if sweep.chart == "speed" and spots else None
-    return Answer(sweep, spots, front, _broken(study, number, bases, rows, groups))
+    return Answer(
+        sweep, spots, front, _broken(study, number, bases, rows, groups), _budgets(sweep, study, bases, groups)
+    )
+
+
+def _budgets(sweep: Sweep, study: Study, bases: Mapping[str, Project], groups: Groups) -> tuple[ErrorBudget, ...]:
+    """Of the methods that are measured in all states."""
+    if sweep.sampling != "effects":
+        return ()
+    base = with_fields(bases[sweep.base or study.base], {**study.set, **sweep.set}, sweep.name)
+    effects, found = effects_of(base.in_folder(bases[sweep.base or study.base].folder)), []
+    for method in methods_of(study, sweep):
+        states = {str(point[0]): rows for (point, of), rows in groups.items() if of == method}
+        needed = (TOTAL, NONE, *(WITHOUT + name for name in effects), *(ONLY + name for name in effects))
+        if any(len(states.get(state, ())) < study.repeats for state in needed):
+            continue
+
+        bias = {state: values_of(states[state], "depth_bias") for state in needed}
+        variance = {state: values_of(states[state], "depth_sigma") ** 2 for state in needed}
+        found.append(ErrorBudget(method, _made(bias, effects), _made(variance, effects)))
+    return tuple(found)
+
+
+def _made(values: Mapping[str, np.ndarray], effects: list[str]) -> Budget:
+    return budget(
+        values[TOTAL],
+        values[NONE],
+        {name: values[WITHOUT + name] for name in effects},
+        {name: values[ONLY + name] for name in effects},
+    )
 
 
 def _broken(

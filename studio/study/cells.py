@@ -15,7 +15,8 @@ import numpy as np
 from analysis.study.breakdown import Search, next_values
 from render.base.errors import InputError
 from studio.project.project import MAX_SEED, Project
-from studio.study.study import MOST_CELLS, Study, Sweep, Value, with_fields
+from studio.study.effects import in_state
+from studio.study.study import EFFECTS_FIELD, MOST_CELLS, Study, Sweep, Value, with_fields
 
 Point = tuple[Value, ...]
 """One value for each parameter of a sweep."""
@@ -100,7 +101,10 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
     where = f"sweep {sweep.name!r}"
     for point in wanted:
         values = {**study.set, **sweep.set, **{p.field: v for p, v in zip(sweep.vary, point, strict=True)}}
+        state = values.pop(EFFECTS_FIELD, None)
         varied = with_fields(base, values, where)
+        if state is not None:
+            varied = in_state(varied, str(state))
         for method, repeat in itertools.product(methods_of(study, sweep), range(study.repeats)):
             extraction = varied.extraction.model_copy(update={"method": method})
             seed = (varied.seed + repeat) % (MAX_SEED + 1)

@@ -11,6 +11,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from analysis.report.colour import INK, MUTED, method_colour, method_name
 from analysis.report.style import figure
 from studio.study.answers import Answer, Spot
+from studio.study.budget_chart import budget_figure
 from studio.study.measures import MEASURES, Measure
 from studio.study.study import Parameter, Value
 
@@ -22,6 +23,8 @@ DASHES = ("-", "--", "-.", ":")
 
 def chart(answer: Answer, labels: dict[str, str]) -> Any:
     """A matplotlib figure of one sweep. labels: of the fields, with their units."""
+    if answer.sweep.chart == "budget":
+        return budget_figure(answer.budgets[0])
     draw = {"sweep": _sweep, "speed": _speed, "map": _map}[answer.sweep.chart]
     with figure(3.4) as made:
         axes = made.subplots()

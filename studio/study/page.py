@@ -14,6 +14,7 @@ from analysis.report.style import png_uri
 from render.base.files import atomic_write
 from studio.project.project import Project
 from studio.study.answers import Answer, Broken, answers
+from studio.study.budget_table import HEADER, page_rows, sentences_of, write_budgets
 from studio.study.charts import chart, field_label, shown
 from studio.study.labels import field_labels
 from studio.study.measures import MEASURES
@@ -31,8 +32,8 @@ def write_page(
     labels = field_labels(bases.values(), [one.field for sweep in study.sweeps for one in sweep.vary])
     parts = []
     for number, answer in enumerate(found):
-        if not answer.spots:
-            continue
+        if not answer.spots or (answer.sweep.chart == "budget" and not answer.budgets):
+            continue  # nothing is known of it yet
         made = chart(answer, labels)
         picture = io.BytesIO()
         made.savefig(picture, format="png", dpi=160)
@@ -44,10 +45,11 @@ def write_page(
                 "question": answer.sweep.question,
                 "picture": png_uri(made),
                 "lines": sentences(answer, labels),
-                "header": [*(field_label(one, labels) for one in answer.sweep.vary), "method", *_columns(answer)],
-                "table": _table(answer),
+                "header": _header(answer, labels),
+                "table": page_rows(answer.budgets[0]) if answer.budgets else _table(answer),
             }
         )
+        write_budgets(folder, answer.budgets, number + 1)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=jinja2.StrictUndefined
     )
@@ -66,7 +68,7 @@ def write_page(
 
 def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
     """What a sweep found, in words."""
-    said = [_breakdown_sentence(one, answer, labels) for one in answer.broken]
+    said = [_breakdown_sentence(one, answer, labels) for one in answer.broken] + sentences_of(answer.budgets)
     front = answer.front
     if front is not None and front.knee is not None:
         spot = answer.spots[front.knee]
@@ -95,6 +97,12 @@ def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -
         return f"{name}: {limit} is not kept even at {parameter} {shown(ended.first_bad)}."
     interval = f"95 % interval {shown(ended.low)} to {shown(ended.high)}"
     return f"{name}: {limit} holds up to {parameter} {shown(ended.value)} ({interval}); beyond, {found.cause}."
+
+
+def _header(answer: Answer, labels: dict[str, str]) -> list[str]:
+    if answer.budgets:
+        return list(HEADER)
+    return [*(field_label(one, labels) for one in answer.sweep.vary), "method", *_columns(answer)]
 
 
 def _columns(answer: Answer) -> list[str]:

@@ -20,11 +20,14 @@ from studio.project.project import Project
 from studio.project.strict_json import read_object
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.project.validation_messages import input_error
+from studio.study.effects import STATES
 from studio.study.measures import MEASURES
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "studies"
 MOST_VALUES, MOST_CELLS, MOST_VARIED, MOST_SWEEPS = 10_000, 1_000_000, 8, 100
 Value = bool | int | float | str | None
+EFFECTS_FIELD = "effects"
+"""What a sweep of effects varies in place of a field: `studio.study.effects.STATES`."""
 
 
 class Parameter(Model):
@@ -87,20 +90,21 @@ class Sweep(Model):
     question: str = quantity("", label="Question", max_length=500)
     base: str | None = quantity(None, label="Base project", help="In place of the study's.")
     set: dict[str, Value] = Field(default_factory=dict, description="Fields of the project that are fixed.")
-    vary: tuple[Parameter, ...]
-    sampling: Literal["grid", "sobol", "bisection"] = quantity(
+    vary: tuple[Parameter, ...] = ()
+    sampling: Literal["grid", "sobol", "bisection", "effects"] = quantity(
         "grid",
         label="Sampling",
         help="grid: all combinations. sobol: quasi-random in the ranges. bisection: where the limit is crossed, from "
-        "low, where it is to hold, to high.",
+        "low, where it is to hold, to high. effects: what makes the error, each effect switched off and on alone.",
     )
     samples: int = quantity(64, label="Samples", help="Of sobol.", ge=2, le=65536)
     tolerance: float = quantity(0.01, label="Tolerance", help="Of bisection, as a share of the range.", gt=1e-6, le=0.5)
     methods: tuple[Method, ...] = Field(default=(), description="In place of the study's.")
-    chart: Literal["sweep", "speed", "map"] = quantity(
+    chart: Literal["sweep", "speed", "map", "budget"] = quantity(
         "sweep",
         label="Chart",
-        help="sweep: a measure over the first parameter. speed: a measure over processor time. map: over two.",
+        help="sweep: a measure over the first parameter. speed: a measure over processor time. map: over two. budget: "
+        "what each effect makes of the depth error.",
     )
     time: Literal["frame", "line"] = quantity(
         "frame", label="Time", help="Of a chart of speed: the whole frame, or finding the line in its image."
@@ -109,14 +113,26 @@ class Sweep(Model):
     limit: Limit | None = None
 
     @model_validator(mode="after")
+    def _effects_are_all(self) -> Self:
+        """What effects vary is not a field of the project, and chosen by no one."""
+        if self.sampling != "effects":
+            return self
+        if any(one.field != EFFECTS_FIELD for one in self.vary):
+            raise ValueError("effects are switched, and no field is varied; allowed: no vary")
+        states = Parameter(field=EFFECTS_FIELD, label="Effects", values=STATES)
+        return self.model_copy(update={"vary": (states,), "chart": "budget"})
+
+    @model_validator(mode="after")
     def _fits(self) -> Self:
         check_measure(self.measure)
+        if (self.chart == "budget") != (self.sampling == "effects"):
+            raise ValueError("a budget is of effects; allowed: sampling effects")
         if not 1 <= len(self.vary) <= MOST_VARIED:
             raise ValueError(f"{len(self.vary)} fields are varied; allowed: 1 to {MOST_VARIED}")
         fields = [one.field for one in self.vary]
         if len(set(fields)) < len(fields) or set(fields) & self.set.keys():
             raise ValueError("a field is there twice; allowed: each once in vary and set together")
-        if self.sampling != "grid" and any(one.values for one in self.vary):
+        if self.sampling in ("sobol", "bisection") and any(one.values for one in self.vary):
             raise ValueError(f"{self.sampling} takes ranges; allowed: low and high for every parameter")
         if self.sampling == "bisection" and (len(self.vary) != 1 or self.limit is None):
             raise ValueError("bisection looks for one limit along one parameter; allowed: one in vary, and a limit")
@@ -146,8 +162,8 @@ class Study(Model):
             raise ValueError(f"there is nothing to run; allowed: a method, and 1 to {MOST_SWEEPS} sweeps")
         if len(set(names)) < len(names):
             raise ValueError("two sweeps have one name; allowed: each its own")
-        if self.repeats < 3 and any(sweep.sampling == "bisection" for sweep in self.sweeps):
-            raise ValueError("bisection tells noise from change by repeats; allowed: repeats of at least 3")
+        if self.repeats < 3 and any(sweep.sampling in ("bisection", "effects") for sweep in self.sweeps):
+            raise ValueError("bisection and effects tell noise from change by repeats; allowed: repeats of at least 3")
         return self
 
     @classmethod
