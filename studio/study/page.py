@@ -44,8 +44,8 @@ def write_page(
                 "question": answer.sweep.question,
                 "picture": png_uri(made),
                 "lines": sentences(answer, labels),
-                "header": [*(field_label(one, labels) for one in answer.sweep.vary), "method", *_columns(answer)],
-                "table": _table(answer),
+                "header": [*(field_label(one, labels) for one in answer.sweep.vary), "method", *columns(answer)],
+                "table": table(answer),
             }
         )
     environment = jinja2.Environment(
@@ -97,14 +97,16 @@ def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -
     return f"{name}: {limit} holds up to {parameter} {shown(ended.value)} ({interval}); beyond, {found.cause}."
 
 
-def _columns(answer: Answer) -> list[str]:
+def columns(answer: Answer) -> list[str]:
+    """Headings of `table`, after those of the fields and the method."""
     measure = MEASURES[answer.sweep.measure]
     unit = f" ({measure.unit})" if measure.unit else ""
     columns = [f"{measure.label}{unit}", "95 % interval", "repeats", "time (s)"]
     return [*columns, "on the front"] if answer.front is not None else columns
 
 
-def _table(answer: Answer) -> list[list[str]]:
+def table(answer: Answer) -> list[list[str]]:
+    """A row for each spot of a chart, as text: its values, method, mean, interval, repeats and seconds."""
     scale, rows = MEASURES[answer.sweep.measure].scale, []
     for number, spot in enumerate(answer.spots):
         one = spot.measure
