@@ -39,6 +39,28 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
         return made
 
 
+def places(answer: Answer) -> np.ndarray:
+    """(spots, 2) where each spot stands in the chart's own units; NaN: it is not drawn."""
+    sweep, scale, spots = answer.sweep, MEASURES[answer.sweep.measure].scale, answer.spots
+    if sweep.chart == "map":
+        found = [(*spot.point, spot.method == spots[0].method) for spot in spots]
+        return np.array([(x, y) if drawn else (math.nan, math.nan) for x, y, drawn in found], dtype=np.float64)
+    if sweep.chart == "speed":
+        x = [spot.seconds if spot.measure.mean > 0.0 else math.nan for spot in spots]
+    else:
+        x = _along(answer)
+    return np.array([(a, spot.measure.mean * scale) for a, spot in zip(x, spots, strict=True)]).reshape(-1, 2)
+
+
+def _along(answer: Answer) -> list[float]:
+    """The first parameter of each spot, as a number; of names, their order."""
+    first = [spot.point[0] for spot in answer.spots]
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in first):
+        return [float(value) for value in first]  # type: ignore[arg-type]
+    names = list(dict.fromkeys(first))
+    return [float(names.index(value)) for value in first]
+
+
 def _tick(value: float, place: object) -> str:
     return f"{value:g}"
 

@@ -46,7 +46,7 @@ def write_page(
                 "picture": png_uri(made),
                 "lines": sentences(answer, labels),
                 "header": _header(answer, labels),
-                "table": page_rows(answer.budgets[0]) if answer.budgets else _table(answer),
+                "table": page_rows(answer.budgets[0]) if answer.budgets else table(answer),
             }
         )
         write_budgets(folder, answer.budgets, number + 1)
@@ -102,17 +102,19 @@ def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -
 def _header(answer: Answer, labels: dict[str, str]) -> list[str]:
     if answer.budgets:
         return list(HEADER)
-    return [*(field_label(one, labels) for one in answer.sweep.vary), "method", *_columns(answer)]
+    return [*(field_label(one, labels) for one in answer.sweep.vary), "method", *columns(answer)]
 
 
-def _columns(answer: Answer) -> list[str]:
+def columns(answer: Answer) -> list[str]:
+    """Headings of `table`, after those of the fields and the method."""
     measure = MEASURES[answer.sweep.measure]
     unit = f" ({measure.unit})" if measure.unit else ""
     columns = [f"{measure.label}{unit}", "95 % interval", "repeats", "time (s)"]
     return [*columns, "on the front"] if answer.front is not None else columns
 
 
-def _table(answer: Answer) -> list[list[str]]:
+def table(answer: Answer) -> list[list[str]]:
+    """A row for each spot of a chart, as text: its values, method, mean, interval, repeats and seconds."""
     scale, rows = MEASURES[answer.sweep.measure].scale, []
     for number, spot in enumerate(answer.spots):
         one = spot.measure

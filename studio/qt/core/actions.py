@@ -60,6 +60,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("setup", "View", "&Set up", "F6", "", "", True),
     Command("render_workspace", "View", "&Render", "F7", "", "", True),
     Command("measure", "View", "&Measure", "F8", "", "", True),
+    Command("study", "View", "S&tudy", "F12", "", "", True),
     "View/-",
     Command("panels", "View", "&Panels"),
     Command("log", "View", "M&essages", "Ctrl+L", "", "The log of this session"),

@@ -18,6 +18,7 @@ from render.sensor.develop import Image
 from render.world.world import World
 from studio.project.document import Document, FieldPath
 from studio.project.project import Project
+from studio.scan.redevelop import is_stale
 from studio.scan.scan import Measurement
 from studio.scan.scan_results import ScanResults
 
@@ -55,11 +56,21 @@ class Render:
     """Where a report of it was written last."""
     scan: ScanResults | None = None
     """The scan that the frame is a step of; None: it was rendered alone."""
+    cell: str = ""
+    """Key of the study's cell that it is: developed and measured by its own `source`, whatever the open project has."""
 
     @property
     def scanner_scale(self) -> float:
         """Of the image, to the scanner's."""
         return self.image_scale if self.scan is None else self.scan.image_scale
+
+    def developed_by(self, now: Project) -> Project:
+        """The project, at full scale, by whose sensor, power and extraction it is developed and measured."""
+        return self.source if self.cell and self.source is not None else now
+
+    def is_stale(self, now: Project) -> bool:
+        """The scene has changed since, in a way that developing cannot follow; what a study measured stays as it is."""
+        return not self.cell and is_stale(self.source or self.project, now)
 
 
 class Session(QObject):
@@ -86,6 +97,8 @@ class Session(QObject):
     """A panel other than the render panel asks for a render with the present settings."""
     problems_changed = Signal()
     """`problems` are others."""
+    vary_asked = Signal(object, object)
+    """The field at a path, of a `FieldSpec`, is to be varied in a study."""
     message = Signal(str, str)
     """level ("info", "warning", "error") and text, for log and status bar."""
     document_replaced = Signal()

@@ -12,6 +12,7 @@ from typing import Any
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
+    QContextMenuEvent,
     QFocusEvent,
     QKeyEvent,
     QKeySequence,
@@ -35,6 +36,8 @@ class TextField(QLineEdit):
     entered = Signal(object)
     refused = Signal(str)
     """While typing: why the text will not do; empty when it will."""
+    menu_asked = Signal(object)
+    """A `QMenu` is about to open, for whoever has something to add."""
 
     def __init__(self, spec: FieldSpec, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -136,6 +139,15 @@ class TextField(QLineEdit):
             if self.pending:
                 self.revert()
             self.deselect()
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        menu = self.createStandardContextMenu()
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        before = len(menu.actions())
+        self.menu_asked.emit(menu)
+        if len(menu.actions()) > before:
+            menu.insertSeparator(menu.actions()[before])
+        menu.popup(event.globalPos())
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)

@@ -8,7 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtGui import QContextMenuEvent
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QMenu, QVBoxLayout, QWidget
 
 from studio.editing.euler_angles import euler_angles, rotation_from_euler
 from studio.editing.forms import REQUIRED, FieldSpec, field_path
@@ -16,6 +17,7 @@ from studio.editing.units import Unit
 from studio.project.document import FieldPath
 from studio.qt.forms.fields import ChoiceField, CurveField, CurvePlot, FlagField, NumbersField, TextField, tool_button
 from studio.qt.forms.number_field import NumberField, VectorField
+from studio.study.draft import varying
 
 if TYPE_CHECKING:
     from studio.qt.forms.form import Form
@@ -81,6 +83,24 @@ class Row(QWidget):
     def tell(self, why: str) -> None:
         self.reason.setText(why[:1].upper() + why[1:])
         self.reason.setVisible(bool(why))
+
+    def varied(self) -> list[tuple[FieldPath, FieldSpec]]:
+        """What a study can vary here."""
+        return varying(field_path(self.owner, self.spec), self.spec)
+
+    def fill_menu(self, menu: QMenu) -> None:
+        """What can be done with the field, besides what its editor offers."""
+        session = self.form.session
+        for path, spec in self.varied():
+            ask = partial(session.vary_asked.emit, path, spec)
+            menu.addAction(f"Vary {spec.label} in a study", ask)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.fill_menu(menu)
+        if menu.actions():
+            menu.popup(event.globalPos())
 
     def mark(self, wrong: bool) -> None:
         """Outline the value as one that will not do; what is being typed has its own say."""
@@ -186,6 +206,7 @@ class Row(QWidget):
         field.entered.connect(enter)
         if isinstance(field, TextField):
             field.refused.connect(self.tell)
+            field.menu_asked.connect(self.fill_menu)
         if isinstance(field, NumberField):
             merge = f"drag {field_path(self.owner, self.spec)} {id(field)}"
             field.drag_began.connect(self.form.session.begin_drag)
@@ -260,6 +281,9 @@ class RotationRow(Row):
     def __init__(self, form: Form, owner: FieldPath, spec: FieldSpec) -> None:
         self.angles = euler_angles(spec.value.rotation)
         super().__init__(form, owner, spec)
+
+    def varied(self) -> list[tuple[FieldPath, FieldSpec]]:
+        return []  # the project holds no angles
 
     def refresh(self, spec: FieldSpec) -> None:
         # near the angles that are shown, so that turning one leaves the others alone

@@ -31,7 +31,6 @@ from studio.qt.image.line_overlay import LineOverlay
 from studio.qt.image.row_profile import RowProfile
 from studio.runtime.jobs import Progress
 from studio.scan.frame_views import at_pixel, live_picture, picture, views
-from studio.scan.redevelop import is_stale
 
 DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 """Of work for a live picture: while something is dragged, and when it has come to rest."""
@@ -102,7 +101,7 @@ class CameraView(QWidget):
             return False
         before = self._judged
         if before is None or before[0] is not shown or before[1] is not project or before[2] != step:
-            changed = shown.frame.step != step or is_stale(shown.source or shown.project, project)
+            changed = not shown.cell and (shown.frame.step != step or shown.is_stale(project))
             self._judged = (shown, project, step, changed)
             return changed
         return before[3]

@@ -34,6 +34,7 @@ from studio.scan.redevelop import Development, develop_again, development, measu
 from studio.scan.results import METHODS
 from studio.scan.stages import Measurement
 
+OF_A_CELL = "This is a cell of a study, as it was measured; the settings above are for the project's own renders."
 REST_MS = 120
 """Without a change before the lines are measured: while something is dragged, new images come first."""
 
@@ -101,8 +102,9 @@ class DevelopPanel(QWidget):
         return self.runner.busy or self._rest.isActive()
 
     def chosen(self) -> tuple[Method, ...]:
-        """The methods to measure by; the project's own first."""
-        own = self.session.project.extraction.method
+        """The methods to measure by; the own one first: of the project, or of the study's cell that is shown."""
+        shown, now = self.session.shown, self.session.project
+        own = (now if shown is None else shown.developed_by(now)).extraction.method
         return (own, *(m for m, action in self.methods.items() if m != own and action.isChecked()))
 
     def _lay_out(self) -> None:
@@ -230,7 +232,7 @@ class DevelopPanel(QWidget):
             self.told.setText("Render the scene, then change these as often as you like.")
             return
         frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()
-        how = development(render.project, self.session.project, render.image_scale)
+        how = development(render.project, render.developed_by(self.session.project), render.image_scale)
         names = [laser.name for laser in render.project.scene.lasers]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Image]:
@@ -239,6 +241,7 @@ class DevelopPanel(QWidget):
             seconds = time.perf_counter() - start
             blur = how.project.sensor.defocus_by(how.project.scene.camera.lens.model)
             told = brightness(images, names) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
+            told += f"\n{OF_A_CELL}" if render.cell else ""
             render.noise = noise
             self._images_ready.emit(render, images, seconds, told)
             return images

@@ -36,7 +36,6 @@ from studio.qt.core.session import Render, Session
 from studio.qt.render.history import History
 from studio.qt.render.render_job import can_go_on, render_frames
 from studio.runtime.jobs import Job, Progress, State
-from studio.scan.redevelop import is_stale
 from studio.scan.stages import scaled
 
 SCALES = (0.125, 0.25, 0.5, 1.0)
@@ -287,7 +286,7 @@ class RenderPanel(QWidget):
         render = self.session.shown if self._job is None else self._render
         self.errors.setText("" if render is None else error_text(render))
         self.errors.setVisible(bool(self.errors.text()))
-        if render is not None and not is_stale(render.source or render.project, self.session.project):
+        if render is not None and not render.is_stale(self.session.project):
             self.plan.setText(plan_text(render.frame.plan))
 
     def _document_replaced(self) -> None:

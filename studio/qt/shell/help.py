@@ -22,6 +22,8 @@ PAGES = {
     "render": "Render",
     "develop": "Exposure and measurement",
     "results": "Results",
+    "study": "Study",
+    "charts": "Charts of a study",
     "motion": "Motion",
     "files": "Projects and files",
     "log": "Messages",

@@ -33,6 +33,8 @@ PANELS = (
     Panel("render", "Render", "studio.qt.render.render_panel", "RenderPanel", True),
     Panel("develop", "Exposure and measurement", "studio.qt.render.develop_panel", "DevelopPanel"),
     Panel("results", "Results", "studio.qt.results.results_panel", "ResultsPanel"),
+    Panel("study", "Study", "studio.qt.study.study_panel", "StudyPanel", True),
+    Panel("charts", "Charts", "studio.qt.study.charts_panel", "ChartsPanel", True),
     Panel("motion", "Motion", "studio.qt.render.motion_panel", "MotionPanel", True),
     Panel("log", "Messages", "studio.qt.shell.log_panel", "LogPanel"),
 )

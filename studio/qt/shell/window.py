@@ -1,4 +1,4 @@
-"""The main window: panels in docks, three workspaces, menus, toolbar and status bar over one session."""
+"""The main window: panels in docks, four workspaces, menus, toolbar and status bar over one session."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from studio.qt.core.dialogs import about, show_trouble
 from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
-from studio.qt.core.session import Session
+from studio.qt.core.session import Session, one_of
 from studio.qt.render.python_copy import copy_as_python
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
@@ -32,6 +32,7 @@ from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.status import StatusBar
 from studio.qt.shell.tour import Step, Tour
 from studio.qt.shell.workspaces import WORKSPACES, arrange, remembered, restore, sealed, share_out, unsealed, workspace
+from studio.qt.study.cell_opener import CellOpener
 from studio.qt.viewport.error_cloud import ErrorCloud
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
@@ -44,7 +45,7 @@ TRIM_MS = 1000
 """From opening another project until the memory of the former one is given back."""
 SMALL = 0.25
 """Image scale of the first look."""
-SWITCH = {"setup": "setup", "render": "render_workspace", "measure": "measure"}
+SWITCH = {"setup": "setup", "render": "render_workspace", "measure": "measure", "study": "study"}
 """Workspace -> command."""
 
 
@@ -288,6 +289,7 @@ class MainWindow(QMainWindow):
         QShortcut(Qt.Key.Key_Escape, self).activated.connect(self._escape)
         self.status.log_asked.connect(lambda: self.show_panel("log"))
         files.results_opened.connect(lambda: self.switch_to("measure"))
+        one_of(CellOpener, session).opened.connect(lambda: self.switch_to("measure"))
         session.project_changed.connect(self._tell_document)
         session.document_replaced.connect(self._tell_document)
         session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))

@@ -1,4 +1,4 @@
-"""The three workspaces: arrangements of the same panels, so that no screen shows more than the task needs."""
+"""The workspaces: arrangements of the same panels, so that no screen shows more than the task needs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Area = Qt.DockWidgetArea
 LEFT, RIGHT, BOTTOM = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
 WIDE = ("motion", "log")
 """Panels of no workspace that share a place below when they are called for."""
-VERSION = 1
+VERSION = 2
 """Of the arrangement; a remembered one of another version is dropped."""
 
 
@@ -77,6 +77,17 @@ WORKSPACES = (
             Column(BOTTOM, 0.5, (("results", 1.0),)),
         ),
         False,
+    ),
+    Workspace(
+        "study",
+        "Study",
+        "Many runs with one question: what a value changes, and where methods break",
+        False,
+        (
+            Column(LEFT, 0.32, (("study", 1.0),)),
+            Column(RIGHT, 0.68, (("charts", 1.0),)),
+        ),
+        True,
     ),
 )
 """In the order of the switch; the 3D view takes what the columns leave."""

@@ -30,14 +30,13 @@ from tests.studio.qt.small_session import small_project as sphere
 from tests.studio.qt.small_session import small_render
 
 POWER = ("scene", "rig", "lasers", 0, "power")
+KEYS = {"setup": Qt.Key.Key_F6, "render": Qt.Key.Key_F7, "measure": Qt.Key.Key_F8, "study": Qt.Key.Key_F12}
 
 
 class TestWorkspaces:
     def test_each_shows_its_own_panels(self, window: MainWindow, qtbot: QtBot) -> None:
         for each in WORKSPACES:
-            qtbot.keyClick(
-                window, {"setup": Qt.Key.Key_F6, "render": Qt.Key.Key_F7, "measure": Qt.Key.Key_F8}[each.key]
-            )
+            qtbot.keyClick(window, KEYS[each.key])
             assert window.workspace == each.key
             shown = {key for key, dock in window.docks.items() if dock.isVisible()}
             assert shown == {name for column in each.columns for name, _ in column.docks}

@@ -1,0 +1,73 @@
+"""The cell behind a point of a study's chart, rendered again and shown as it was measured: a study keeps numbers alone.
+
+Made once for a session by `one_of`.
+"""
+
+from __future__ import annotations
+
+import time
+
+from PySide6.QtCore import QObject, Signal
+
+from render.base.errors import InputError
+from render.base.threads import Cancel
+from studio.notebook.frame import RenderedFrame, render
+from studio.qt.core.jobs import BUSY, RENDER, JobRunner
+from studio.qt.core.session import Render, Session
+from studio.runtime.jobs import Progress
+from studio.study.cells import Cell
+from studio.study.charts import shown
+from studio.study.folder_run import Found
+
+
+class CellOpener(QObject):
+    opened = Signal()
+    """A cell is shown: look at it in Measure."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.session = session
+
+    def open(self, found: Found, number: int, spot: int, jobs: JobRunner) -> None:
+        """Show the cell behind a spot of a sweep's chart; one that is among the renders already, at once."""
+        session, document = self.session, self.session.document
+        cell, scale = found.cell_of(number, spot), found.study.image_scale
+        there = next((one for one in session.renders if one.cell == cell.key), None)
+        if there is not None:
+            session.show(there)
+            self.opened.emit()
+            return
+        if jobs.job(RENDER) is not None:
+            session.message.emit("warning", BUSY)
+            return
+
+        def work(progress: Progress, cancelled: Cancel) -> RenderedFrame | str:
+            try:
+                return render(cell.project, image_scale=scale, progress=progress, cancelled=cancelled)
+            except InputError as error:
+                return str(error)
+
+        def then(frame: RenderedFrame | str) -> None:
+            if isinstance(frame, str):
+                session.message.emit("error", frame)
+            elif session.document is document:
+                self._show(found, number, cell, frame)
+
+        jobs.run(RENDER, "cell of the study", work, then)
+
+    def _show(self, found: Found, number: int, cell: Cell, frame: RenderedFrame) -> None:
+        made = Render(
+            max([one.number for one in self.session.renders], default=0) + 1,
+            frame.project,
+            frame.world,
+            frame,
+            name=f"{found.answers[number].sweep.name}: {', '.join(map(shown, cell.point))}, repeat {cell.repeat + 1}",
+            created=time.strftime("%H:%M:%S"),
+            image_scale=frame.image_scale,
+            source=cell.project,
+            cell=cell.key,
+        )
+        self.session.add_render(made)
+        told = f"Repeat {cell.repeat + 1} of {found.study.repeats}, rendered again: a study keeps numbers, no frames"
+        self.session.message.emit("info", told)
+        self.opened.emit()

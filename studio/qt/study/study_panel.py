@@ -1,0 +1,339 @@
+"""The study that is put together: its question, what it takes, and run, stop, go on."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QHideEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QMenu,
+    QProgressBar,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from render.base.threads import thread_count
+from studio.qt.core.icons import icon_button
+from studio.qt.core.jobs import JobRunner, time_left
+from studio.qt.core.session import Session, one_of
+from studio.qt.study.study_work import StudyWork
+from studio.qt.study.sweep_editor import SweepEditor
+from studio.runtime.jobs import Job, State
+from studio.study.draft import new_sweep
+from studio.study.estimate import Estimate
+from studio.study.study import Study, ready_made
+
+FILES = "Studies (*.json);;All files (*)"
+
+
+class StudyPanel(QWidget):
+    """What a person does about a study; the charts have a panel of their own."""
+
+    def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session, self.runner = session, runner
+        self.work = one_of(StudyWork, session)
+        self.work.attach(runner)
+        self.name = QLineEdit(maxLength=100)
+        self.name.setAccessibleName("Name of the study")
+        self.files = QPushButton("File")
+        self.files.setToolTip("Ready-made studies, files, and results of earlier runs")
+        menu = QMenu(self.files)
+        menu.aboutToShow.connect(partial(self._fill_files, menu))
+        self.files.setMenu(menu)
+        self.base = QComboBox()
+        self.base.setToolTip("The project that every cell is a variation of")
+        self.sweeps = QComboBox()
+        self.sweeps.setToolTip("A study has one chart for each sweep; type to give this one another name")
+        self.sweeps.setEditable(True)
+        self.sweeps.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
+        for box in (self.base, self.sweeps):
+            box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.add_sweep = icon_button("new", "Another sweep", self._add_sweep)
+        self.remove_sweep = icon_button("cancel", "Remove this sweep", self._remove_sweep)
+        self.editor = SweepEditor(self.work)
+        self.repeats = QSpinBox(minimum=1, maximum=10_000)
+        self.repeats.setToolTip("Of every cell, each with a seed of its own: intervals come from them")
+        self.scale = QDoubleSpinBox(minimum=0.01, maximum=4.0, decimals=3, singleStep=0.05)
+        self.scale.setToolTip("So many times the pixels a side; figures are the scanner's at 1 alone")
+        self.repeats.setKeyboardTracking(False)
+        self.scale.setKeyboardTracking(False)
+        self.told = QLabel(wordWrap=True)
+        self.time = QPushButton("Time it")
+        self.time.setToolTip("Measure one cell of each sweep, to tell how long the study takes")
+        self.problem = QLabel(wordWrap=True)
+        self.problem.setObjectName("error")
+        self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.folder = QLabel()
+        self.folder.setObjectName("muted")
+        self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.choose = QPushButton("Folder…")
+        self.choose.setToolTip("Where the results go; a study that is there goes on")
+        self.run = QPushButton("Run…")
+        self.run.setObjectName("primary")
+        self.stop = QPushButton("Stop")
+        self.stop.setToolTip("What is measured stays")
+        self.bar = QProgressBar(maximum=1000, textVisible=False)
+        self.bar.setMaximumHeight(10)
+        self.stage = QLabel()
+        self.stage.setObjectName("muted")
+        self._lay_out()
+        self._connect()
+        self.refresh()
+        self._show_state()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.work.watched = True
+        if not self.work.running:
+            self.work.look_ahead()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        self.work.watched = False
+        super().hideEvent(event)
+
+    def refresh(self) -> None:
+        """Follow the draft."""
+        work, draft = self.work, self.work.draft
+        if not self.name.hasFocus():
+            self.name.setText(draft["name"])
+        for box in (self.base, self.sweeps, self.repeats, self.scale):
+            box.blockSignals(True)
+        self.base.clear()
+        self.base.addItem(f"Open project: {self.session.project.name}")
+        if draft["base"] in work.loaded:
+            self.base.addItem(f"{draft['base'].replace('_', ' ')}, as in the study")
+            self.base.setCurrentIndex(1)
+        self.sweeps.clear()
+        self.sweeps.addItems([sweep["name"] for sweep in draft["sweeps"]])
+        self.sweeps.setCurrentIndex(work.chosen)
+        self.repeats.setValue(draft.get("repeats", Study.model_fields["repeats"].default))
+        self.scale.setValue(draft.get("image_scale", 1.0))
+        for box in (self.base, self.sweeps, self.repeats, self.scale):
+            box.blockSignals(False)
+        self.remove_sweep.setEnabled(len(draft["sweeps"]) > 1)
+
+    def ask_and_run(self) -> None:
+        """Ask for a folder where there is none yet, then run, go on or extend."""
+        if self.work.folder is None and not self.ask_folder():
+            return
+        self.work.start()
+
+    def ask_folder(self) -> bool:
+        """False: none was chosen."""
+        start = self.session.document.path
+        chosen = QFileDialog.getExistingDirectory(
+            self, "Folder for the study's results", str(start.parent if start is not None else Path.home())
+        )
+        if chosen:
+            self.work.choose_folder(Path(chosen))
+        return bool(chosen)
+
+    def _fill_files(self, menu: QMenu) -> None:
+        menu.clear()
+        menu.addAction("New study", self.work.start_anew)
+        ready = menu.addMenu("Ready-made")
+        for name in ready_made():
+            ready.addAction(name.replace("_", " ").capitalize(), partial(self.work.load, name))
+        menu.addAction("Open a study's file…", self._open)
+        menu.addAction("Open results…", self._open_results)
+        menu.addSeparator()
+        menu.addAction("Save the study…", self._save)
+
+    def _open(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(self, "Open a study", self._place(), FILES)
+        if chosen:
+            self.work.load(Path(chosen))
+
+    def _open_results(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Folder of a study's results", self._place())
+        if chosen:
+            self.work.open_folder(Path(chosen))
+
+    def _save(self) -> None:
+        suggestion = str(Path(self._place()) / f"{self.work.draft['name']}.json")
+        chosen, _ = QFileDialog.getSaveFileName(self, "Save the study", suggestion, FILES)
+        if chosen:
+            self.work.save(Path(chosen))
+
+    def _place(self) -> str:
+        path = self.session.document.path
+        return str(path.parent if path is not None else Path.home())
+
+    def _add_sweep(self) -> None:
+        work = self.work
+        names = {sweep["name"] for sweep in work.draft["sweeps"]}
+        number = next(i for i in range(1, len(names) + 2) if f"Sweep {i}" not in names)
+        work.change(lambda draft: draft["sweeps"].append(new_sweep(f"Sweep {number}")))
+        work.choose_sweep(len(work.draft["sweeps"]) - 1)
+
+    def _remove_sweep(self) -> None:
+        chosen = self.work.chosen
+        if len(self.work.draft["sweeps"]) > 1:
+            self.work.change(lambda draft: draft["sweeps"].pop(chosen))
+
+    def _rename_sweep(self) -> None:
+        text = self.sweeps.currentText().strip()
+        if text and text != self.work.sweep["name"]:
+            self.work.change_sweep(name=text)
+
+    def _rename(self) -> None:
+        self.work.change(lambda draft: draft.update(name=self.name.text().strip() or "study"))
+
+    def _connect(self) -> None:
+        work = self.work
+        self.name.editingFinished.connect(self._rename)
+        self.base.activated.connect(lambda i: work.use_open_project() if i == 0 else None)
+        self.sweeps.activated.connect(work.choose_sweep)
+        line = self.sweeps.lineEdit()
+        if line is not None:
+            line.editingFinished.connect(self._rename_sweep)
+        self.repeats.valueChanged.connect(lambda count: work.change(lambda draft: draft.update(repeats=count)))
+        self.scale.valueChanged.connect(lambda scale: work.change(lambda draft: draft.update(image_scale=scale)))
+        self.time.clicked.connect(lambda: work.look_ahead(timed=True))
+        self.choose.clicked.connect(lambda: self.ask_folder())
+        self.run.clicked.connect(self.ask_and_run)
+        self.stop.clicked.connect(work.stop)
+        work.draft_changed.connect(self.refresh)
+        work.estimated.connect(self._tell_estimate)
+        work.state_changed.connect(self._show_state)
+        work.found_changed.connect(self._show_state)
+        work.unseen.progress.connect(self._tell_timing)
+        self.runner.progress.connect(self._tell_progress)
+        self.session.document_replaced.connect(self.refresh)
+
+    def _tell_estimate(self) -> None:
+        work = self.work
+        self.problem.setText(work.failure or work.problem)
+        self.problem.setVisible(bool(self.problem.text()))
+        self.told.setText("" if work.estimate is None else estimate_text(work.estimate, self._processors()))
+        self.told.setVisible(bool(self.told.text()))
+        self.time.setVisible(work.estimate is not None and work.estimate.seconds is None and not work.running)
+        self._show_state()
+
+    def _processors(self) -> int:
+        return thread_count(self.work.engine.workers)
+
+    def _tell_timing(self, job: Job[object]) -> None:
+        if job.stage:
+            self.told.setText(job.stage)
+
+    def _tell_progress(self, job: Job[object]) -> None:
+        if job is self.work.job:
+            self.bar.setValue(round(1000 * job.done))
+            left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
+            self.stage.setText("stopping" if job.cancel_asked else f"{job.stage}   {left}")
+
+    def _show_state(self) -> None:
+        work = self.work
+        running, job = work.running, work.job
+        there = len(work.found.rows) if work.found is not None else 0
+        left = work.estimate is None or work.estimate.cells + work.estimate.searched > 0
+        self.run.setVisible(not running)
+        self.run.setText("Run…" if work.folder is None else "Go on" if there and left else "Run")
+        self.run.setEnabled(work.estimate is not None and left)
+        self.run.setToolTip(f"{there} cells are there; what is missing is measured" if there else "")
+        self.stop.setVisible(running)
+        self.stop.setEnabled(job is not None and not job.cancel_asked)
+        self.choose.setEnabled(not running)
+        for widget in (self.bar, self.stage):
+            widget.setVisible(running)
+        if not running:
+            self.bar.setValue(0)
+            self.stage.clear()
+        text = str(work.folder) if work.folder is not None else "no folder yet"
+        self.folder.setText(
+            self.folder.fontMetrics().elidedText(text, Qt.TextElideMode.ElideMiddle, self.width() - 130)
+        )
+        self.folder.setToolTip(text)
+
+    def _lay_out(self) -> None:
+        head = QHBoxLayout()
+        head.addWidget(self.name, 1)
+        head.addWidget(self.files)
+        sweeps = QHBoxLayout()
+        sweeps.setSpacing(2)
+        sweeps.addWidget(self.sweeps, 1)
+        sweeps.addWidget(self.add_sweep)
+        sweeps.addWidget(self.remove_sweep)
+        form = QFormLayout()
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.addRow("Study", head)
+        form.addRow("Of", self.base)
+        form.addRow("Sweep", sweeps)
+        runs = QHBoxLayout()
+        runs.addWidget(self.repeats)
+        runs.addWidget(QLabel("at scale"))
+        runs.addWidget(self.scale)
+        runs.addStretch(1)
+        last = QFormLayout()
+        last.addRow("Repeats", runs)
+        inside = QWidget()
+        column = QVBoxLayout(inside)
+        column.setContentsMargins(8, 8, 8, 4)
+        column.addLayout(form)
+        column.addWidget(self.editor)
+        column.addLayout(last)
+        column.addStretch(1)
+        area = QScrollArea(widgetResizable=True)
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setWidget(inside)
+        area.setMinimumWidth(inside.minimumSizeHint().width() + 14)
+        where = QHBoxLayout()
+        where.addWidget(self.folder, 1)
+        where.addWidget(self.choose)
+        buttons = QHBoxLayout()
+        for button in (self.run, self.stop, self.time):
+            buttons.addWidget(button)
+        buttons.addStretch(1)
+        foot = QVBoxLayout()
+        foot.setContentsMargins(8, 4, 8, 8)
+        foot.setSpacing(4)
+        for widget in (self.told, self.problem):
+            foot.addWidget(widget)
+        foot.addLayout(where)
+        foot.addWidget(self.bar)
+        foot.addWidget(self.stage)
+        foot.addLayout(buttons)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(area, 1)
+        layout.addLayout(foot)
+
+
+def estimate_text(told: Estimate, processors: int) -> str:
+    """ "40 cells of 10 renders, about 2:10 on 2 processors, 0.3 MB"."""
+    if told.cells + told.searched == 0:
+        return "Every cell is measured."
+    parts = [f"{told.cells} cells of {told.renders} renders"]
+    if told.searched:
+        parts.append(f"up to {told.searched} more that the search asks for")
+    if told.seconds is not None:
+        parts.append(f"about {duration(told.seconds / processors)} on {processors} processors")
+    parts.append(f"{told.bytes / 1e6:.1f} MB")
+    return ", ".join(parts)
+
+
+def duration(seconds: float) -> str:
+    """To the second below a minute, to the minute from an hour."""
+    if seconds < 60.0:
+        return f"{max(1, math.ceil(seconds))} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"

@@ -1,0 +1,403 @@
+"""The study of a session: the draft, the folder, what was found so far, and the work in the background.
+
+Made once for a session by `one_of`; the panels change it and follow its signals.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from render.base.errors import InputError
+from render.base.threads import Cancel
+from studio.editing.forms import FieldSpec
+from studio.project.document import Document, FieldPath
+from studio.project.project import Project
+from studio.project.templates import DESCRIPTIONS, FOLDER
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.session import Session
+from studio.runtime.jobs import Job, Progress, State
+from studio.study.draft import Data, finished, new_draft, path_text, suggested
+from studio.study.estimate import Costs, Estimate, costs, estimate
+from studio.study.folder_run import Found, in_window, opened, run_into
+from studio.study.runner import Engine
+from studio.study.study import Study, base_project
+
+LANE = "study"
+"""A study takes hours: renders go on beside it."""
+REST_MS = 250
+"""Without a change before it is worked out what the study takes."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a run of the study went. problem: why it could not go on, in a sentence."""
+
+    found: Found | None
+    problem: str = ""
+
+
+class StudyWork(QObject):
+    """Never asks a person anything: what cannot be done is told in `problem`."""
+
+    draft_changed = Signal()
+    estimated = Signal()
+    """`estimate`, or `problem` in its place, or `failure` is another one."""
+    found_changed = Signal()
+    state_changed = Signal()
+    """It runs, or no longer; the folder is another one."""
+    asked_for = Signal()
+    """A field joined the draft."""
+    _grew = Signal(object, object)
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.session = session
+        self.engine = Engine()
+        self.jobs: JobRunner | None = None
+        """The window's, for what its status bar tells of."""
+        self.unseen = JobRunner(self)
+        """Estimates, and reading a folder."""
+        self.watched = False
+        """Someone looks at the estimate."""
+        self.loaded: dict[str, Project] = {}
+        """Base projects of a study that came from a file; empty: it is of the open project."""
+        self.draft: Data = new_draft(self.base_name)
+        self.chosen = 0
+        """The sweep that is edited and whose chart is shown."""
+        self.folder: Path | None = None
+        self.found: Found | None = None
+        self.estimate: Estimate | None = None
+        self.problem = ""
+        """Why the draft is no study."""
+        self.failure = ""
+        """Why the last thing that was asked for could not be done."""
+        self.job: Job[Ended] | None = None
+        self._timed: dict[str, Costs] = {}
+        self._run_bases: dict[str, Project] = {}
+        self._rest = QTimer(self, singleShot=True, interval=REST_MS)
+        self._rest.timeout.connect(self.look_ahead)
+        self._grew.connect(self._take_growth)
+        session.vary_asked.connect(self.vary)
+        session.project_changed.connect(self._follow_project)
+        session.document_replaced.connect(self._follow_document)
+
+    def attach(self, jobs: JobRunner) -> None:
+        """Work is done by the window's runner."""
+        self.jobs = jobs
+        jobs.cancelled.connect(self._end)
+        jobs.failed.connect(self._end)
+
+    @property
+    def running(self) -> bool:
+        return self.job is not None
+
+    @property
+    def base_name(self) -> str:
+        """What a study's file calls the open project: a template by its name, else the project's file."""
+        return name_of(self.session.document)
+
+    @property
+    def sweep(self) -> Data:
+        """The one that is edited."""
+        sweep: Data = self.draft["sweeps"][self.chosen]
+        return sweep
+
+    def project(self) -> Project:
+        """The base project of the sweep that is edited."""
+        own = self.loaded.get(self.sweep.get("base") or self.draft["base"])
+        return own if own is not None else self.session.project
+
+    def study(self) -> Study:
+        """InputError: what the draft lacks."""
+        return finished(self.draft)
+
+    def bases(self, study: Study) -> dict[str, Project]:
+        """Of the study by their names. InputError: one cannot be read."""
+        names = {study.base, *(sweep.base for sweep in study.sweeps if sweep.base is not None)}
+        document = self.session.document
+        own = self.session.project.in_folder(document.root)
+        missing = {name: own for name in names if name not in self.loaded}
+        return {**{name: self.loaded[name] for name in names if name in self.loaded}, **missing}
+
+    # the draft
+
+    def change(self, edit: Callable[[Data], object]) -> None:
+        """Edit the draft; whatever it becomes, it is kept, and `problem` tells what is wrong with it."""
+        draft = copy.deepcopy(self.draft)
+        edit(draft)
+        if draft != self.draft:
+            self.draft = draft
+            self.chosen = min(self.chosen, len(draft["sweeps"]) - 1)
+            self.draft_changed.emit()
+            self._rest.start()
+
+    def change_sweep(self, **values: Any) -> None:
+        """Set fields of the sweep that is edited; None takes one out."""
+
+        def edit(draft: Data) -> None:
+            sweep = draft["sweeps"][self.chosen]
+            for name, value in values.items():
+                if value is None:
+                    sweep.pop(name, None)
+                else:
+                    sweep[name] = value
+
+        self.change(edit)
+
+    def choose_sweep(self, number: int) -> None:
+        if number != self.chosen and 0 <= number < len(self.draft["sweeps"]):
+            self.chosen = number
+            self.draft_changed.emit()
+            self.found_changed.emit()
+
+    def vary(self, path: FieldPath, spec: FieldSpec) -> None:
+        """A field joins the sweep that is edited."""
+        field = path_text(path)
+        if all(one["field"] != field for one in self.sweep["vary"]):
+            self.change_sweep(vary=[*self.sweep["vary"], suggested(field, spec)])
+        self.session.message.emit("info", f"{spec.label} is varied in the study (F12)")
+        self.asked_for.emit()
+
+    def set_values(self, row: int, parameter: Data) -> None:
+        """Another list or range of a field that is varied."""
+        vary = list(self.sweep["vary"])
+        vary[row] = parameter
+        self.change_sweep(vary=vary)
+
+    def start_anew(self) -> None:
+        """An empty study of the open project."""
+        self._take({}, new_draft(self.base_name))
+
+    def load(self, path: Path | str) -> None:
+        """A study's file, or a ready-made one by its name, with its own base projects."""
+        try:
+            study, root = Study.load(path)
+            bases = study.bases(root)
+        except InputError as error:
+            self._fail(in_window(error))
+            return
+        self._take(bases, study.model_dump(mode="json", exclude_defaults=True))
+
+    def use_open_project(self) -> None:
+        """The draft asks its questions of the open project."""
+        self.loaded = {name: base for name, base in self.loaded.items() if name != self.draft["base"]}
+        self.loaded.pop(self.base_name, None)
+        self.change(lambda draft: draft.update(base=self.base_name))
+
+    def save(self, file: Path) -> bool:
+        """Write the study's file; False: told in `problem`, nothing is written."""
+        from render.base.files import atomic_write
+        from studio.project.strict_json import pretty
+
+        try:
+            study = self.study()
+            base = self._base_from(file.parent, study)
+            data = study.model_copy(update={"base": base}).model_dump(mode="json", exclude_defaults=True)
+            with atomic_write(file) as temporary:
+                temporary.write_text(pretty({"schema_version": 1, **data}) + "\n", encoding="utf-8")
+        except InputError as error:
+            self._fail(in_window(error))
+            return False
+        self.session.message.emit("info", f"Saved the study: {file}")
+        return True
+
+    # what it takes
+
+    def look_ahead(self, *, timed: bool = False) -> None:
+        """Work out what the draft takes; timed: measure a cell of each sweep for it."""
+        try:
+            study = self.study()
+            bases = self.bases(study)
+        except InputError as error:
+            self.estimate = None
+            self.unseen.cancel("estimate")
+            self._tell(in_window(error))
+            return
+        rows = self.found.rows if self.found is not None else {}
+        known = self._timed if not timed else {}
+
+        def work(progress: Progress, cancelled: Cancel) -> Estimate | str:
+            try:
+                for number, sweep in enumerate(study.sweeps if timed else ()):
+                    if not cancelled():
+                        progress(f"timing {sweep.name}", number / len(study.sweeps))
+                        known[sweep.name] = costs(study, bases, number)
+                return estimate(study, bases, rows, known)
+            except InputError as error:
+                return in_window(error)
+
+        def then(told: Estimate | str) -> None:
+            self._timed = known
+            self.estimate = told if isinstance(told, Estimate) else None
+            self._tell(told if isinstance(told, str) else "")
+
+        self.unseen.run("estimate", "estimate", work, then, interrupt=True)
+
+    # the run
+
+    def start(self) -> None:
+        """Measure what is missing in the folder; what is there stays, so that this goes on or extends as well."""
+        if self.running or self.folder is None or self.jobs is None:
+            return
+        try:
+            study = self.study()
+            bases = self.bases(study)
+        except InputError as error:
+            self._fail(in_window(error))
+            return
+        folder, engine, grew = self.folder, self.engine, self._grew.emit
+
+        def work(progress: Progress, cancelled: Cancel) -> Ended:
+            try:
+                return Ended(
+                    run_into(
+                        folder,
+                        study,
+                        bases,
+                        engine=engine,
+                        progress=progress,
+                        cancelled=cancelled,
+                        grew=lambda found: grew(folder, found),
+                    )
+                )
+            except InputError as error:
+                return Ended(None, in_window(error))
+
+        self._fail("")
+        self._run_bases = bases
+        self.job = self.jobs.run(LANE, "study", work, self._take_end)
+        self.state_changed.emit()
+
+    def stop(self) -> None:
+        """What is measured stays; `start` goes on from there."""
+        if self.job is not None:
+            self.job.cancel()
+            self.state_changed.emit()
+
+    def choose_folder(self, folder: Path) -> None:
+        """Where results are kept. One that holds a study: its rows count where they are of the same cells."""
+        if self.running:
+            return
+        self.folder, self.found, self.failure = folder, None, ""
+        self.state_changed.emit()
+        self.found_changed.emit()
+        self._read(folder, as_it_is=False)
+
+    def open_folder(self, folder: Path) -> None:
+        """A study that was run before, as its folder holds it."""
+        if not self.running:
+            self.folder = folder
+            self._read(folder, as_it_is=True)
+
+    def close(self) -> None:
+        self._rest.stop()
+        self.unseen.close()
+
+    # what follows
+
+    def _read(self, folder: Path, *, as_it_is: bool) -> None:
+        if not as_it_is and not (folder / "study.sqlite").exists():
+            self.look_ahead()
+            return
+
+        def work(progress: Progress, cancelled: Cancel) -> Ended:
+            try:
+                return Ended(opened(folder))
+            except InputError as error:
+                return Ended(None, in_window(error))
+
+        def then(ended: Ended) -> None:
+            self._fail(ended.problem)
+            if ended.found is None:
+                return
+            if as_it_is:
+                self._take(dict(ended.found.bases), ended.found.study.model_dump(mode="json", exclude_defaults=True))
+                self.folder, self.found = folder, ended.found
+                self.state_changed.emit()
+                self.found_changed.emit()
+                self.look_ahead()
+            elif self.folder == folder:
+                self.found = ended.found
+                self.found_changed.emit()
+                self.look_ahead()
+
+        self.unseen.run("read", "read the study", work, then)
+
+    def _take(self, bases: dict[str, Project], draft: Data) -> None:
+        """Another study in place of this one."""
+        self.loaded, self.chosen = bases, 0
+        self.folder, self.found, self._timed, self.failure = None, None, {}, ""
+        self.draft = {"schema_version": 1, "name": "study", **draft}
+        self.draft_changed.emit()
+        self.found_changed.emit()
+        self.state_changed.emit()
+        self.look_ahead()
+
+    def _take_growth(self, folder: Path, found: Found) -> None:
+        if folder == self.folder:
+            self.found = found
+            self.found_changed.emit()
+
+    def _take_end(self, ended: Ended) -> None:
+        if ended.found is not None:
+            self.session.message.emit("info", f"The study is done: {self.folder}")
+        self._end(self.job)
+        self._fail(ended.problem)
+
+    def _end(self, job: object) -> None:
+        if job is self.job and isinstance(job, Job):
+            self.job = None
+            if job.state is State.CANCELLED:
+                self.session.message.emit("info", f"The study was stopped; Go on continues it: {self.folder}")
+            self.state_changed.emit()
+            self.look_ahead()
+
+    def _fail(self, failure: str) -> None:
+        self.failure = failure
+        self.estimated.emit()
+
+    def _tell(self, problem: str) -> None:
+        self.problem = problem
+        self.estimated.emit()
+
+    def _follow_project(self) -> None:
+        if self.watched and not self.loaded:
+            self._rest.start()
+
+    def _follow_document(self) -> None:
+        """A study of the project that was open goes on, as it began; one that has not begun is of the new one."""
+        if self.loaded:
+            return
+        if self.running or self.found is not None:
+            self.loaded = dict(self.found.bases) if self.found is not None else self._run_bases
+        else:
+            self.start_anew()
+
+    def _base_from(self, folder: Path, study: Study) -> str:
+        """How a study's file in a folder calls its base. InputError: no path leads there."""
+        document = self.session.document
+        own = self.loaded.get(study.base, self.session.project)
+        if study.base in DESCRIPTIONS and own == base_project(study.base, folder):
+            return study.base
+        path = document.path
+        cure = "save the project, then the study beside it or in a folder above"
+        if study.base in self.loaded or path is None or document.dirty:
+            raise InputError("the study's base project is in no file beside it", where=study.base, cure=cure)
+        try:
+            return path.resolve().relative_to(folder.resolve()).as_posix()
+        except ValueError:
+            raise InputError("a study's file stands beside its base project", where=str(path), cure=cure) from None
+
+
+def name_of(document: Document) -> str:
+    """What a study's file calls a project: a template by its name, else its file."""
+    if document.path is not None:
+        return document.path.name
+    template = document.root.parent == FOLDER and document.root.name in DESCRIPTIONS
+    return document.root.name if template else "project.json"

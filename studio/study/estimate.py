@@ -1,0 +1,93 @@
+"""What a study will take before it runs: cells, renders, processor time and disk."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.study.breakdown import EXTRA
+from studio.project.project import Project
+from studio.study.cells import cells_at, check_size, methods_of, next_cells, points
+from studio.study.measuring import measure_task, tasks, warm_up
+from studio.study.store import Row
+from studio.study.study import Study
+from studio.study.tables import SECONDS, measured_cells
+
+ROW_BYTES, CHART_BYTES = 2500, 250_000
+"""On disk: of a cell in the store and the tables, and of a sweep's chart alone and in the page."""
+
+Costs = tuple[float, float]
+"""Processor seconds of a render, and of developing and measuring one cell of it."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Of what is still to be measured."""
+
+    cells: int
+    renders: int
+    searched: int
+    """Cells that the bisections may ask for beside those."""
+    seconds: float | None
+    """Of one processor; None: no cell of some sweep was timed yet."""
+    bytes: int
+    """Of the whole folder in the end."""
+
+
+def estimate(
+    study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row], timed: Mapping[str, Costs]
+) -> Estimate:
+    """timed: `costs` by the sweep's name, for sweeps without rows. InputError: a field or value that does not fit."""
+    check_size(study)
+    missing = next_cells(study, bases, rows)
+    cells, renders, searched, seconds = 0, 0, 0, 0.0
+    for number, sweep in enumerate(study.sweeps):
+        mine = [cell for cell in missing if cell.sweep == number]
+        frames = len(tasks(mine, study.image_scale, study.laser))
+        more = 0
+        if sweep.sampling == "bisection" and mine:
+            steps = math.ceil(math.log2(1.0 / sweep.tolerance)) + EXTRA
+            more = steps * study.repeats * len(methods_of(study, sweep))
+        cells, renders, searched = cells + len(mine), renders + frames, searched + more
+        cost = _known(study, number, bases, rows) or timed.get(sweep.name)
+        if mine:
+            # what a search asks for comes one value at a time, so each cell may take a render
+            taken = math.nan if cost is None else (frames + more) * cost[0] + (len(mine) + more) * cost[1]
+            seconds += taken
+    size = ROW_BYTES * (len(rows) + cells + searched) + CHART_BYTES * len(study.sweeps)
+    return Estimate(cells, renders, searched, None if math.isnan(seconds) else seconds, size)
+
+
+def costs(study: Study, bases: Mapping[str, Project], number: int) -> Costs:
+    """What a cell of a sweep takes, by measuring its first point by every method.
+
+    InputError: a field or value that does not fit.
+    """
+    sweep = study.sweeps[number]
+    wanted = [(sweep.vary[0].low,)] if sweep.sampling == "bisection" else points(sweep)[:1]
+    cells = [cell for cell in cells_at(study, number, bases, wanted) if cell.repeat == 0]
+    warm_up(cells[0].project)
+    # a second time, as the first one loads what each method takes
+    (task,) = tasks([*cells, *cells], study.image_scale, study.laser)
+    found = [_split({**dict.fromkeys(SECONDS, 0.0), **seconds}) for _, _, seconds in measure_task(task)]
+    render, measure = np.mean(found[len(cells) :], axis=0)
+    return float(render), float(measure)
+
+
+def _known(study: Study, number: int, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> Costs | None:
+    """By the cells of the sweep that are measured: the median of each method, as methods differ by far."""
+    found: dict[str, list[Costs]] = {}
+    for cell, row in measured_cells(study, number, bases, rows):
+        if SECONDS[-1] in row:
+            found.setdefault(cell.method, []).append(_split(row))
+    if not found:
+        return None
+    render, measure = np.mean([np.median(one, axis=0) for one in found.values()], axis=0)
+    return float(render), float(measure)
+
+
+def _split(seconds: Mapping[str, float]) -> Costs:
+    return seconds[SECONDS[0]], sum(seconds[name] for name in SECONDS[1:])

@@ -1,0 +1,105 @@
+"""A study measured into a folder: the store while it runs, tables and page at its end, and what is heard meanwhile."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from render.base.errors import InputError
+from studio.project.project import Project
+from studio.runtime.console import StageProgress
+from studio.scan.folder_lock import hold
+from studio.study.answers import Answer, answers
+from studio.study.cells import Cell, cells_at, check_size, next_cells
+from studio.study.page import write_page
+from studio.study.runner import Engine, run_study
+from studio.study.store import Row, Store, described
+from studio.study.study import Study
+from studio.study.tables import values_of, write_tables
+
+EVERY_PROCESSOR = Engine()
+SHARE = 0.1
+"""Of the driver's time that may go into working out answers while the study runs."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a study's folder holds so far."""
+
+    study: Study
+    bases: Mapping[str, Project]
+    rows: Mapping[str, Row]
+    answers: tuple[Answer, ...]
+    """Of each sweep."""
+
+    def cell_of(self, number: int, spot: int) -> Cell:
+        """The cell behind a spot of a sweep's chart: of its repeats the one that is nearest to their mean."""
+        answer = self.answers[number]
+        shown, name = answer.spots[spot], answer.sweep.measure
+        cells = [
+            cell
+            for cell in cells_at(self.study, number, self.bases, [shown.point])
+            if cell.method == shown.method and cell.key in self.rows
+        ]
+        apart = abs(values_of([self.rows[cell.key] for cell in cells], name) - shown.measure.mean)
+        return min(zip(apart, cells, strict=True), key=lambda pair: (not pair[0] >= 0.0, pair[0]))[1]
+
+
+def found_in(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> Found:
+    return Found(study, bases, rows, tuple(answers(study, bases, rows)))
+
+
+def run_into(
+    folder: Path,
+    study: Study,
+    bases: dict[str, Project],
+    *,
+    engine: Engine = EVERY_PROCESSOR,
+    progress: StageProgress = lambda stage, done: None,
+    cancelled: Callable[[], bool] = lambda: False,
+    grew: Callable[[Found], None] = lambda found: None,
+) -> Found:
+    """Measure what is missing, then write tables, charts and page. grew: hears what is found as it grows.
+
+    InputError: as `run_study`, or the folder cannot be written, is at work elsewhere or holds another study. Cancelled:
+    so asked; what has been measured is kept.
+    """
+    check_size(study)
+    next_cells(study, bases, {})  # every field and value is looked at before anything runs
+    progress("preparing", 0.0)
+    with hold(folder), Store(folder, study.digest(bases)) as store:
+        store.describe(study, bases)
+        before, next_look = store.count(), 0.0
+
+        def tell(done: int, known: int) -> None:
+            nonlocal next_look
+            progress(f"{done} of {known} cells", (done - before) / max(known - before, 1))
+            now = time.monotonic()
+            if now >= next_look:
+                grew(found_in(study, bases, store.rows()))
+                spent = time.monotonic() - now
+                next_look = now + spent / SHARE
+
+        try:
+            run_study(study, bases, store, engine=engine, progress=tell, cancelled=cancelled)
+        finally:
+            found = found_in(study, bases, store.rows())
+            grew(found)
+        progress("writing tables and charts", 1.0)
+        write_tables(folder, study, bases, found.rows)
+        write_page(folder, study, bases, found.rows)
+        return found
+
+
+def opened(folder: Path) -> Found:
+    """What a folder's study found so far. InputError: it holds none, or one of another program version."""
+    study, bases = described(folder)
+    with hold(folder, reading=True), Store(folder, None) as store:
+        return found_in(study, bases, store.rows())
+
+
+def in_window(error: InputError) -> str:
+    """An error of a study as the window tells it, which has no options."""
+    return str(error).replace(" with --out", "").replace("fewer --workers", "fewer workers")

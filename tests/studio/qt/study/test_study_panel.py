@@ -1,0 +1,275 @@
+"""The Study workspace: a study made from the inspector, looked ahead, run, stopped, extended, and a point opened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtWidgets import QMenu
+from pytestqt.qtbot import QtBot
+
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.project.templates import template_folder
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session, one_of
+from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.scene.inspector import Inspector
+from studio.qt.study.charts_panel import ChartsPanel
+from studio.qt.study.study_panel import StudyPanel
+from studio.qt.study.study_work import StudyWork
+from studio.scan.folder_lock import hold
+from studio.study.draft import VALUES
+from studio.study.runner import Engine
+from studio.study.store import FILE
+
+NOISE = ("sensor", "read_noise")
+POWER = ("scene", "rig", "lasers", 0, "power")
+
+
+class Desk:
+    """The panels of the workspace on a small project, with an inspector beside them."""
+
+    def __init__(self, folder: Path) -> None:
+        project = Project.load(template_folder("plane"))
+        settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05, "transport": "direct"})
+        file = folder / "plane.json"
+        project.model_copy(update={"render": settings}).save(file)
+        self.session = Session(Document(Project.load(file), file))
+        self.runner = JobRunner(self.session)
+        self.panel, self.charts = StudyPanel(self.session, self.runner), ChartsPanel(self.session, self.runner)
+        self.inspector = Inspector(self.session)
+        self.work = one_of(StudyWork, self.session)
+        self.work.engine = Engine(workers=1)
+
+    def vary(self, item: tuple[Any, ...], *path: Any) -> None:
+        """By the menu of a field of the inspector."""
+        self.session.select(item)
+        menu = QMenu()
+        self.inspector.form.rows[(*item, *path)][0].fill_menu(menu)
+        (action,) = menu.actions()
+        action.trigger()
+
+    def small(self, values: list[float]) -> None:
+        """A study of as many cells as there are values."""
+        if not self.work.sweep["vary"]:
+            self.vary(NOISE[:1], NOISE[1])
+        self.work.set_values(0, {"field": "sensor.read_noise", "values": values})
+        self.work.change(lambda draft: draft.update(image_scale=0.05, repeats=1))
+
+    def close(self) -> None:
+        for panel in (self.panel, self.charts):
+            panel.close()
+        self.runner.close()
+        live(self.session).close()
+
+
+@pytest.fixture
+def desk(qtbot: QtBot, tmp_path: Path) -> Iterator[Desk]:
+    made = Desk(tmp_path)
+    for widget in (made.panel, made.charts, made.inspector):
+        qtbot.addWidget(widget)
+    made.charts.resize(700, 600)
+    made.charts.show()
+    made.panel.show()
+    qtbot.waitExposed(made.charts)
+    yield made
+    made.close()
+
+
+def run(qtbot: QtBot, desk: Desk) -> None:
+    desk.work.start()
+    qtbot.waitUntil(lambda: not desk.work.running)
+
+
+class TestDraft:
+    def test_a_field_is_picked_out_of_the_inspector_and_its_values_are_typed_in_its_unit(
+        self, qtbot: QtBot, desk: Desk
+    ) -> None:
+        desk.vary(POWER[:-1], POWER[-1])
+        (row,) = desk.panel.editor.rows
+        assert "Power" in row.title.text() and row.kind == "logarithmic"
+        row.kinds.entered.emit("list")
+        (row,) = desk.panel.editor.rows
+        qtbot.mouseClick(row.values, Qt.MouseButton.LeftButton)
+        row.values.selectAll()
+        qtbot.keyClicks(row.values, "5, 20 40000uW")
+        qtbot.keyClick(row.values, Qt.Key.Key_Return)
+        assert desk.work.sweep["vary"] == [
+            {"field": "scene.rig.lasers[0].power", "values": pytest.approx([0.005, 0.02, 0.04])}
+        ]
+
+    def test_a_field_is_varied_once_however_often_it_is_asked_for(self, desk: Desk) -> None:
+        desk.vary(NOISE[:1], NOISE[1])
+        desk.vary(NOISE[:1], NOISE[1])
+        assert [one["field"] for one in desk.work.sweep["vary"]] == ["sensor.read_noise"]
+
+    def test_every_field_of_the_form_that_holds_one_value_can_be_varied(self, desk: Desk) -> None:
+        """Beside what is worked out from other fields, and what a study varies by its methods."""
+        without = set()
+        for item in (("scene", "rig", "camera"), POWER[:-1], ("sensor",), ("render",), ("extraction",)):
+            desk.session.select(item)
+            specs = [rows[0].spec for rows in desk.inspector.form.rows.values() if not rows[0].varied()]
+            without |= {spec.name for spec in specs if spec.kind in VALUES}
+        assert without == {"focal_length", "method"}
+
+    def test_the_estimate_counts_cells_and_what_shares_a_render(self, qtbot: QtBot, desk: Desk) -> None:
+        desk.small([2.0, 4.0, 8.0])
+        desk.work.change_sweep(methods=["likelihood", "centre_of_mass"])
+        desk.work.change(lambda draft: draft.update(repeats=2))
+        qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.cells == 12)
+        assert desk.work.estimate is not None
+        assert desk.work.estimate.renders == 2 and desk.work.estimate.seconds is None
+        qtbot.mouseClick(desk.panel.time, Qt.MouseButton.LeftButton)
+        qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.seconds is not None)
+        assert "12 cells of 2 renders, about" in desk.panel.told.text()
+
+    def test_what_is_missing_or_impossible_is_told_and_nothing_runs(self, qtbot: QtBot, desk: Desk) -> None:
+        desk.work.look_ahead()
+        assert "0 fields are varied" in desk.panel.problem.text() and not desk.panel.run.isEnabled()
+        desk.small([2.0, -3.0])
+        qtbot.waitUntil(lambda: "read_noise" in desk.panel.problem.text())
+        assert not desk.panel.run.isEnabled()
+
+    def test_a_ready_made_study_comes_with_its_own_base(self, qtbot: QtBot, desk: Desk) -> None:
+        desk.work.load("quick")
+        assert desk.panel.sweeps.count() == 6 and desk.work.project().name != ""
+        qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.cells > 600)
+        assert set(desk.work.loaded) == {"plane", "shiny_weld_seam"}
+        desk.work.use_open_project()
+        assert desk.work.draft["base"] == "plane.json" and desk.work.project() is desk.session.project
+
+    def test_a_saved_study_asks_the_same(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
+        desk.small([2.0, 20.0])
+        assert desk.work.save(tmp_path / "noise.json")
+        before = desk.work.study()
+        desk.work.start_anew()
+        desk.work.load(tmp_path / "noise.json")
+        assert desk.work.study() == before
+
+
+class TestRun:
+    def test_charts_fill_and_more_values_are_added_without_losing_what_is_there(
+        self, qtbot: QtBot, desk: Desk, tmp_path: Path
+    ) -> None:
+        desk.small([2.0, 20.0])
+        desk.work.choose_folder(tmp_path / "results")
+        run(qtbot, desk)
+        assert desk.work.problem == "" and desk.work.found is not None
+        first = dict(desk.work.found.rows)
+        assert len(first) == 2 and desk.charts.table.rowCount() == 2
+        desk.small([2.0, 20.0, 60.0])
+        qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.cells == 1)
+        assert desk.panel.run.text() == "Go on"
+        run(qtbot, desk)
+        rows = desk.work.found.rows
+        assert len(rows) == 3 and {key: rows[key] for key in first} == first  # their seconds as well: not done twice
+        assert {"table.csv", "study.html", FILE} <= {path.name for path in (tmp_path / "results").iterdir()}
+
+    def test_it_stops_and_goes_on_where_it_stood(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
+        desk.vary(POWER[:-1], "wavelength_nm")  # each value takes a render
+        desk.work.set_values(0, {"field": "scene.rig.lasers[0].wavelength_nm", "values": [450.0, 520.0, 660.0]})
+        desk.work.change(lambda draft: draft.update(image_scale=0.05, repeats=1))
+        desk.work.choose_folder(tmp_path / "results")
+
+        def enough(*_: object) -> None:
+            if desk.work.found is not None and desk.work.found.rows and desk.work.running:
+                desk.work.stop()
+
+        desk.work.found_changed.connect(enough)
+        run(qtbot, desk)
+        desk.work.found_changed.disconnect(enough)
+        assert desk.work.found is not None
+        first = dict(desk.work.found.rows)
+        assert 0 < len(first) < 3
+        qtbot.waitUntil(lambda: desk.panel.run.text() == "Go on")
+        run(qtbot, desk)
+        rows = desk.work.found.rows
+        assert len(rows) == 3 and {key: rows[key] for key in first} == first
+
+    def test_a_point_opens_the_frame_that_was_measured(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
+        """Rendered again, and developed by the cell's own sensor whatever the open project has: the same numbers."""
+        desk.small([2.0, 20.0])
+        desk.work.change_sweep(methods=["centre_of_mass"])
+        desk.work.choose_folder(tmp_path / "results")
+        run(qtbot, desk)
+        desk.session.set(NOISE, 3.5)
+        develop = DevelopPanel(desk.session)
+        qtbot.addWidget(develop)
+        qtbot.waitUntil(lambda: desk.charts.chart.drawing is not None and len(desk.charts.chart.drawing.spots) == 2)
+        assert desk.charts.chart.drawing is not None
+        place = QPointF(*desk.charts.chart.drawing.spots[1])
+        with qtbot.waitSignals([desk.charts.opener.opened, desk.session.measured]):
+            qtbot.mouseClick(desk.charts.chart, Qt.MouseButton.LeftButton, pos=place.toPoint())
+        assert desk.work.found is not None and desk.session.shown is not None
+        row = desk.work.found.rows[desk.session.shown.cell]
+        measured = desk.session.shown.measurements["centre_of_mass"][0].errors
+        assert (measured.depth_z.rmse, measured.u.rmse) == (row["depth_rmse"], row["position_rmse"])
+        assert not desk.session.shown.is_stale(desk.session.project)
+        desk.charts.open(1)  # it is among the renders already
+        assert len(desk.session.renders) == 1
+        develop.close()
+
+    def test_results_of_another_day_are_opened(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
+        desk.small([2.0, 20.0])
+        desk.work.choose_folder(tmp_path / "results")
+        run(qtbot, desk)
+        draft = desk.work.study()
+        desk.work.start_anew()
+        assert desk.charts.answer is None
+        desk.work.open_folder(tmp_path / "results")
+        qtbot.waitUntil(lambda: desk.charts.answer is not None)
+        assert desk.work.study() == draft and desk.charts.table.rowCount() == 2
+
+
+class TestTrouble:
+    """Told in the panel in a sentence; nothing is lost."""
+
+    def test_a_folder_that_cannot_be_written(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
+        (tmp_path / "file").write_text("in the way")
+        desk.small([2.0])
+        desk.work.choose_folder(tmp_path / "file" / "results")
+        run(qtbot, desk)
+        assert "cannot be" in desk.panel.problem.text() and "--out" not in desk.panel.problem.text()
+
+    def test_another_program_works_in_the_folder(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
+        desk.small([2.0])
+        desk.work.choose_folder(tmp_path / "results")
+        with hold(tmp_path / "results"):
+            run(qtbot, desk)
+        assert "another program works in this folder" in desk.panel.problem.text()
+
+    def test_the_folder_is_of_another_study_or_program(
+        self, qtbot: QtBot, desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        desk.small([2.0])
+        desk.work.choose_folder(tmp_path / "results")
+        run(qtbot, desk)
+        monkeypatch.setattr("studio.study.study.program_digest", lambda: "a later version")
+        desk.small([2.0, 4.0])
+        run(qtbot, desk)
+        assert "program differ" in desk.panel.problem.text()
+        assert desk.work.found is not None and len(desk.work.found.rows) == 1
+
+
+def test_the_rings_stand_where_the_figure_has_its_marks(desk: Desk) -> None:
+    """Of each kind of chart, by the headless figure's own artists."""
+    from analysis.study.intervals import mean_interval
+    from studio.study.answers import Answer, Spot
+    from studio.study.charts import chart, places
+    from studio.study.study import Sweep
+
+    for kind in ("sweep", "speed"):
+        sweep = Sweep.model_validate({"name": "s", "vary": [{"field": "seed", "values": ["b", "a"]}], "chart": kind})
+        spots = tuple(
+            Spot((value,), "likelihood", mean_interval(np.array([1e-6, 2e-6]) * (i + 1)), 0.1 * (i + 1))
+            for i, value in enumerate(("b", "a"))
+        )
+        answer = Answer(sweep, spots, None, ())
+        drawn = [line.get_xydata() for line in chart(answer, {}).axes[0].lines if len(line.get_xydata()) == 2]
+        assert any(np.allclose(np.sort(marks, axis=0), np.sort(places(answer), axis=0)) for marks in drawn)
