@@ -86,6 +86,8 @@ class Plan:
     frame_count: int = 1
     text: tuple[str, ...] = ()
     """Sentences, of a frame whose file is of a version that knew nothing else."""
+    goal: float | None = None
+    """What the render's noise may add to the measured line, over the line's own sigma; None: the image is the goal."""
 
     def of(self, group: str) -> tuple[TransportStep, ...]:
         """The steps of one group."""
@@ -135,6 +137,11 @@ class GroupQuality:
     """Of direct light: the pixels that the laser lights."""
     share: float | None = None
     """Of indirect light: radiance over that of the direct light, both summed over the image; None: there is none."""
+    of: Literal["image", "line"] = "image"
+    """What error and target are of: the light of the image, or the position of the line measured in it, whose error is
+    a standard deviation over that by the sensor's noise."""
+    image_error: float | None = None
+    """Of the line: the estimated relative RMS error of the image that it takes."""
 
     @property
     def reached(self) -> bool:

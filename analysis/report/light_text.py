@@ -64,7 +64,14 @@ def quality_text(quality: GroupQuality) -> str:
     """Error, target and work of a light group, and what it lost."""
     places = 1 if quality.group == "indirect" else 2
     parts = []
-    if not math.isnan(quality.error):
+    if quality.of == "line":
+        known = (
+            f"noise moves the line by {quality.error:.2g} sigma" if math.isfinite(quality.error) else "line not known"
+        )
+        parts.append(f"{known}, goal {quality.target:.2g}")
+        if quality.image_error is not None and math.isfinite(quality.image_error):
+            parts.append(f"image error {quality.image_error:.0%}")
+    elif not math.isnan(quality.error):
         parts.append(f"error {quality.error:.{places}%}, target {quality.target:.{places}%}")
     match quality.unit:
         case "light paths":
@@ -82,6 +89,8 @@ def quality_text(quality: GroupQuality) -> str:
 
 def _all(plan: Plan) -> Iterator[tuple[bool, str]]:
     """Whether it is computed, and the sentence, of every step and every setting that bounds it."""
+    if plan.goal is not None:
+        yield True, f"goal: reflected light ends where its noise moves the line by less than {plan.goal:g} of its sigma"
     for step in plan.steps:
         if step.reason == "absent" and step.group == "indirect":
             continue  # nothing in the scene makes such light, or none that the pilot met
