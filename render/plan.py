@@ -45,6 +45,9 @@ class TransportStep:
     there is none of that. None: not measured."""
     error: float | None = None
     """Standard error of the share."""
+    moves: float | None = None
+    """With a goal the most that it may well move the line of any row, or add to a peak there, as a pilot found: over
+    the line's own sigma. None: not measured."""
 
 
 @dataclass(frozen=True)

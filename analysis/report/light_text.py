@@ -126,18 +126,25 @@ def _indirect(step: TransportStep, plan: Plan) -> tuple[bool, str]:
     if step.reason == "switched off":
         return False, f"{light} - switched off, its share was not measured"
     if step.computed is None:
-        return True, f"{light}: a pilot decides kind by kind, and leaves out what is below {plan.negligible or 0.0:.2%}"
+        least = (
+            f"is below {plan.negligible or 0.0:.2%}" if plan.goal is None else f"moves no row by {plan.goal:g} sigma"
+        )
+        return True, f"{light}: a pilot decides kind by kind, and leaves out what {least}"
     if step.share is None:
         return True, f"{step.name}: {LIGHT['indirect', 'indirect']} - requested"
     measured = f"a pilot puts it at {step.share:.2%} +- {step.error or 0.0:.2%} of the direct light in the image"
     if math.isinf(step.share):
         measured = "there is no direct light in the image to compare it with"
+    if step.moves is not None and step.share:
+        measured += f", which may move the line by {step.moves:.2g} of its sigma"
     match step.reason:
         case "requested":
             return True, f"{step.name}: {light} - requested; {measured}"
         case "implied":
             others = [one.name for one in plan.of("indirect") if one.computed and one.reason != "implied"]
             return True, f"{step.name}: {light} - comes with {others[-1]}; {measured}"
+        case "negligible" if step.moves is not None:
+            measured += f", less than the goal of {plan.goal or 0.0:g}"
         case "negligible":
             measured += f", below the negligible {plan.negligible or 0.0:.2%}"
         case "not requested":

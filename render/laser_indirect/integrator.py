@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -36,8 +36,8 @@ from render.laser_indirect.guiding import (
     specular_pixels,
     update_guide,
 )
-from render.laser_indirect.line_goal import LineErrors, Weigh
-from render.laser_indirect.path_vertex import CAUSTIC, SPECULAR_CHAIN, SUBSURFACE_LIGHT
+from render.laser_indirect.line_goal import Effect, LineErrors, Projection, Weigh
+from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
 from render.run import Run
 from render.world.placed import PlacedLaser
@@ -52,6 +52,14 @@ LEAST_PASS = 1 << 12
 LOOK_PATHS = 1 << 11
 PILOT_PATHS = 1 << 13
 ALL_KINDS = CAUSTIC | SUBSURFACE_LIGHT | SPECULAR_CHAIN
+
+STEPS = {
+    "interreflection": INTERREFLECTION,
+    "caustic": CAUSTIC,
+    "specular_chain": CAUSTIC | SPECULAR_CHAIN,
+    "subsurface": ALL_KINDS,
+}
+"""Kinds of light, each beside those before it, by the name of its share."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +105,9 @@ class Shares:
     """Through clear glass or off mirrors on both sides of a single rough surface."""
     subsurface: tuple[float, float]
     """Through a medium."""
+    effects: dict[str, float] = field(default_factory=dict)
+    """By the same names, the most that it may well move any line or add to a peak, over what is allowed; empty: where
+    errors matter is not known."""
 
 
 def indirect_image(
@@ -278,9 +289,13 @@ def indirect_shares(
     T_world_laser: Float,
     *,
     passes: int = 4,
+    projection: Projection | None = None,
     run: Run = Run(),
 ) -> Shares:
-    """A pilot of a few short passes: what each kind of indirect light brings. Raises Cancelled."""
+    """A pilot of a few short passes: what each kind of indirect light brings. Raises Cancelled.
+
+    projection: where errors of this laser's light matter, for the effects.
+    """
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     if high <= low:
         return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
@@ -299,13 +314,41 @@ def indirect_shares(
         )
         reserve_for_specular(camera_paths, specular, PILOT_PATHS)
     sampling = Sampling(PILOT_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
+    effect = None if projection is None else Effect(projection)
     for number in range(passes):
         buffer = empty_buffer(camera.width * camera.height)
         task.run(number, sampling, buffer, run.cancelled)
         interreflection, caustic, subsurface, both, specular_chain = buffer.sums
         sums.append((interreflection, caustic, specular_chain, subsurface + both))
+        if effect is not None:
+            effect.add(buffer)
     mean, error = np.mean(sums, axis=0), np.std(sums, axis=0, ddof=1) / math.sqrt(passes)
-    return Shares(*((float(m), float(e)) for m, e in zip(mean, error, strict=True)))
+    pairs = [(float(m), float(e)) for m, e in zip(mean, error, strict=True)]
+    found = Shares(pairs[0], pairs[1], pairs[2], pairs[3])
+    if effect is None:
+        return found
+    present = [name for name, flux in zip(STEPS, mean, strict=True) if flux > 0.0]
+    if len(present) <= 1:
+        return replace(found, effects={name: effect.most() if name in present else 0.0 for name in STEPS})
+    return replace(found, effects=_effects(task, sampling, passes, effect, run))
+
+
+def _effects(task: BdptPass, sampling: Sampling, passes: int, last: Effect, run: Run) -> dict[str, float]:
+    """What each kind of light does to the line, by passes of the same random numbers with ever more kinds.
+
+    last: of all kinds. Raises Cancelled.
+    """
+    effects, before = {}, None
+    for name, kinds in STEPS.items():
+        with_it = last if kinds == ALL_KINDS else Effect(last.projection)
+        specular = task.specular and bool(kinds & CAUSTIC)
+        for number in range(passes if kinds != ALL_KINDS else 0):
+            buffer = empty_buffer(len(sampling.camera_paths))
+            replace(task, kinds=kinds, specular=specular).run(number, sampling, buffer, run.cancelled)
+            with_it.add(buffer)
+        effects[name] = with_it.most(before)
+        before = with_it
+    return effects
 
 
 def seen_specular(task: BdptPass, world: World, camera: Camera, T_world_camera: Float) -> Bool:

@@ -51,8 +51,8 @@ class IndirectLight(LightGroup[IndirectPlan]):
         return settings.transport != "direct"
 
     def measured(self, placed: PlacedScene, settings: RenderSettings, frame: Frame, run: Run) -> Shares:
-        """Of each kind, over the direct light of the frame."""
-        return pilot_shares(placed, frame.laser_direct, run)
+        """Of each kind, over the direct light of the frame; with a goal also its effect on the line."""
+        return pilot_shares(placed, frame.laser_direct, run, frame.importance if settings.goal is not None else None)
 
     def plan(self, shares: Shares | None, world: World, scene: Scene, settings: RenderSettings) -> IndirectPlan:
         return IndirectPlan((SWITCHED_OFF,)) if shares is None else plan_of(shares, settings)

@@ -186,6 +186,36 @@ class LineErrors:
         return found
 
 
+@dataclass
+class Effect:
+    """What light of a kind does to the line and its rivals, by a few passes alike."""
+
+    projection: Projection
+    moves: list[Float] = field(default_factory=list)
+    """(lines,) of each pass."""
+    rises: list[Float] = field(default_factory=list)
+    """(blocks, BLOCK / CELL) likewise."""
+
+    def add(self, buffer: PassBuffer) -> None:
+        """One pass more."""
+        self.moves.append(self.projection.moves(buffer.image))
+        if len(self.projection.peaks):
+            self.rises.append(self.projection.rises(buffer.image, np.arange(len(self.projection.peaks))))
+
+    def most(self, without: Effect | None = None) -> float:
+        """The most that the light may well move any line, by its standard error, or add to a peak, over what is
+        allowed; without: less what other passes of the same random numbers do."""
+        moves, rises = np.stack(self.moves), np.stack(self.rises) if self.rises else np.zeros((1, 1))
+        if without is not None:
+            moves = moves - np.stack(without.moves)
+            rises = rises - np.stack(without.rises) if without.rises else rises
+        lit = self.projection.lit
+        moves = np.stack([pooled(one, lit) for one in moves])
+        error = moves.std(axis=0, ddof=1) / math.sqrt(len(moves))
+        moved = (np.abs(moves.mean(axis=0)) + 2.0 * error)[lit]
+        return max(float(moved.max(initial=0.0)), float(rises.mean(axis=0).max(initial=0.0)))
+
+
 def pooled(variance: Float, lit: NDArray[np.bool_]) -> Float:
     """(lines,) mean over the POOLED lit lines about each."""
     total = uniform_filter1d(np.where(lit, variance, 0.0), POOLED, mode="constant")

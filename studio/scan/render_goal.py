@@ -60,7 +60,8 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     joule = joules_per_radiance(scene.camera, sensor)
     bands = _tiled(joule * band_response(sensor).sum(axis=2), illumination)
     # reflected and ambient light have half of the variance each, where there is both
-    both = frame.ambient is not None and frame.plan.of("indirect") != ()
+    reflected = any(step.computed is not False for step in frame.plan.of("indirect"))
+    both = frame.ambient is not None and reflected
     allowed = goal.depth * (math.sqrt(0.5) if both else 1.0)
     lasers, peaks = [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
