@@ -29,6 +29,8 @@ POOLED = 25
 """Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one."""
 UNMET = 0.02
 """Share of the lit scan lines that may miss the goal: some meet a rare path that no estimate knows of."""
+LEAST_NEED = 0.02
+"""Of the camera paths of a scan line that needs most: what every line gets beside it."""
 LOOK_SIGMA = 2.0
 """px; the light of a few passes is smoothed so far before a line is looked for in it."""
 LOOKS = (0, 2)
@@ -70,11 +72,11 @@ class Projection:
             pixel, weight.ravel()[pixel].astype(np.float64), line, lit, peaks, np.arange(blocks) * BLOCK // width
         )
 
-    def aim(self, pixels: int) -> Float32:
-        """(pixels,) how much errors matter."""
-        aim = np.zeros(pixels, np.float32)
-        aim[self.pixel] = np.abs(self.weight)
-        return np.maximum(aim, self.peaks.ravel()[:pixels]) if len(self.peaks) else aim
+    def aim(self, pixels: int, need: Float) -> Float32:
+        """(pixels,) how much errors matter, where lines (lines,) need light more or less."""
+        aim = self.peaks.ravel()[:pixels].copy() if len(self.peaks) else np.zeros(pixels, np.float32)
+        aim[self.pixel] = np.maximum(aim[self.pixel], np.abs(self.weight) * need[self.line])
+        return aim
 
     def moves(self, image: Float) -> Float:
         """(lines,) how far the light of an image (pixels,) moves each line, over the allowed deviation."""
@@ -103,11 +105,18 @@ class LineErrors:
     """What the waves add to the variance whose spread was taken, in that of a pass of unit size and weight."""
     all_waves: float = 0.0
     """The same of all waves; some were projected onto other weights."""
-    aim: Float32 = field(init=False)
-    """(pixels,) how much errors matter."""
 
-    def __post_init__(self) -> None:
-        self.aim = self.projection.aim(self.shape[0] * self.shape[1])
+    @property
+    def aim(self) -> Float32:
+        """(pixels,) how much errors matter: more on scan lines that are known less well.
+
+        Lines that all had the same share of the paths need them in proportion to their variance.
+        """
+        lit = self.projection.lit
+        known = pooled(self.moved, lit)
+        most = float(np.quantile(known[lit], 1.0 - UNMET)) if lit.any() else 0.0
+        need = np.clip(known / most, LEAST_NEED, 1.0) if most > 0.0 else np.ones(len(lit))
+        return self.projection.aim(self.shape[0] * self.shape[1], need)
 
     @classmethod
     def of(cls, importance: Importance, laser: int) -> LineErrors:
