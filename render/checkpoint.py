@@ -27,7 +27,7 @@ from render.world.world import World
 
 T = TypeVar("T")
 
-TARGETS = {"indirect_error", "light_paths", "ambient_error", "ambient_samples", "truth_images"}
+TARGETS = {"goal", "indirect_error", "light_paths", "ambient_error", "ambient_samples", "truth_images"}
 """Settings that say when to end, which may be others when a render goes on."""
 MAX_BYTES = 2**33
 CURE = "delete it, or render without --resume"

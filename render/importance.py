@@ -26,10 +26,18 @@ class Importance:
     """
 
     laser: tuple[Float32, ...]
-    """For each laser (h, w) weight of its own light, 1 / (W/(m^2 sr)); zero where no error matters."""
+    """For each laser (h, w) weight of its own light, 1 / (W/(m^2 sr)), with its sign: the sum of weight and radiance
+    along a scan line is how far that light moves the line. Zero where no error matters."""
     ambient: Float32
     """(h, w) weight of ambient light, for each of its bands alike, 1 / (W/(m^2 sr))."""
     axis: Literal["rows", "columns"] = "rows"
+    peaks: tuple[Float32, ...] = ()
+    """For each laser (h, w) weight of its own light: of a run of CELL pixels along a row, the sum of weight and error
+    is at most 1 where no peak appears or vanishes by it."""
+
+
+CELL = 4
+"""Pixels; about as many as peaks are looked for with."""
 
 
 def line_errors(weight: Float32, variance: Float32, axis: Literal["rows", "columns"] = "rows") -> Float:

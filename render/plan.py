@@ -45,6 +45,9 @@ class TransportStep:
     there is none of that. None: not measured."""
     error: float | None = None
     """Standard error of the share."""
+    moves: float | None = None
+    """With a goal the most that it may well move the line of any row, or add to a peak there, as a pilot found: over
+    the line's own sigma. None: not measured."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,8 @@ class Plan:
     frame_count: int = 1
     text: tuple[str, ...] = ()
     """Sentences, of a frame whose file is of a version that knew nothing else."""
+    goal: float | None = None
+    """What the render's noise may add to the measured line, over the line's own sigma; None: the image is the goal."""
 
     def of(self, group: str) -> tuple[TransportStep, ...]:
         """The steps of one group."""
@@ -135,10 +140,14 @@ class GroupQuality:
     """Of direct light: the pixels that the laser lights."""
     share: float | None = None
     """Of indirect light: radiance over that of the direct light, both summed over the image; None: there is none."""
+    of: Literal["image", "line"] = "image"
+    """What error and target are of: the light of the image, or the position of the line measured in it, whose error is
+    a standard deviation over that by the sensor's noise."""
+    image_error: float | None = None
+    """Of the line: the estimated relative RMS error of the image that it takes."""
     coarse_error: float | None = None
-    """Of ambient light that is rendered for what is measured: relative RMS error of what is interpolated, where no
-    error matters, found on held-out pixels; `error` is then the deviation that it gives the scan lines (all but 1 in
-    20) over the allowed one. None: the goal is the image."""
+    """Of ambient light that is rendered for the line: relative RMS error of what is interpolated, where no error
+    matters, found on held-out pixels; None: nothing is."""
 
     @property
     def reached(self) -> bool:

@@ -16,10 +16,10 @@ from render.base.deadline import Deadline
 from render.base.errors import Cancelled
 from render.base.progress import Clock, StageProgress, WholeClock
 from render.base.threads import Cancel
-from render.frame import Axis, Frame, LaserCurve
+from render.frame import Axis, Float32, Frame, LaserCurve
 from render.laser_direct.light_group import QUICK_ERROR
 from render.light_group import LightGroup, chosen_plan, has_work
-from render.products import PRODUCTS, QUICK, expected_plan
+from render.products import PRODUCTS, QUICK, ambient_look, expected_plan
 from render.run import Run, never
 from render.scan_plan import ScanPlan
 from render.scene.scene import Scene
@@ -34,6 +34,10 @@ from render.world.world import World
 Products = Sequence[LightGroup[Any]]
 LOOK_SECONDS = 0.02
 """Between two questions whether the render is cancelled."""
+AIM = "where errors matter"
+"""Stage in which the goal is asked."""
+AIMING = ("direct", "indirect")
+"""Light groups that decide where errors of the later ones matter."""
 BUILD_WORK = 10.0
 """Rays that take as long as the acceleration structure of one triangle."""
 
@@ -70,9 +74,14 @@ def frames(
     axis: Axis = "rows",
     scan: ScanPlan | None = None,
 ) -> Iterator[Frame]:
-    """As `refine`; scan: what was decided for all frames. Raises InputError, Cancelled."""
+    """As `refine`; scan: what was decided for all frames. Raises InputError, Cancelled.
+
+    `run.goal` hears of the frame once the direct light is there, with a coarse look at the ambient light, again of each
+    laser's reflected light as it becomes known, and of all of it; `Frame.importance` is what it said last.
+    """
     world, scene, step = placed.world, placed.scene, placed.step
-    run = _begun(run)
+    goal = run.goal if settings.goal is not None and scene.lasers else None
+    run = _begun(replace(run, goal=goal))
     with clock.stage("acceleration structure", _build_work(world)):
         check_placement(world, scene, step)
         run.stop()
@@ -82,6 +91,7 @@ def frames(
             plan = replace(plan, pilot_steps=scan.pilot_steps, frame_count=scan.frame_count)
         frame = Frame(step, (), None, (), None, plan, warnings=scene_warnings(world, scene, step))
         rays = _rays(world, run.cancelled)
+    look: Float32 | None = None
     ray_start, embree_start = rays.rays, rays.seconds
     with clock.stage("exact line", 0):
         frame = replace(frame, curves=_curves(placed, axis, run.threads))
@@ -90,18 +100,29 @@ def frames(
         with clock.stage(product.stage, product.work(scene, settings)) as report:
             later = sum(other.parts(scene) for other in waiting[i + 1 :])
             part = replace(run, progress=report, later=later)
-            chosen = chosen_plan(product, placed, settings, frame, part) if scan is None else scan.plans[product.group]
+            seen = frame if look is None or frame.ambient is not None else replace(frame, ambient=look)
+            chosen = chosen_plan(product, placed, settings, seen, part) if scan is None else scan.plans[product.group]
             frame = replace(frame, plan=frame.plan.with_steps(product.group, chosen.steps))
-            for estimate in product.estimates(placed, settings, chosen, frame, part):
+            for estimate in product.estimates(placed, settings, chosen, replace(seen, plan=frame.plan), part):
                 frame = frame.with_estimate(product.field, estimate)
                 frame.check()
                 counts = {RAYS: float(rays.rays - ray_start), EMBREE_SECONDS: rays.seconds - embree_start}
                 shown = frame = replace(frame, seconds=clock.so_far(), counts=counts)
                 with clock.shown():
                     yield frame
+        if goal is not None and product.group in AIMING and aimed_later(waiting[i + 1 :], product):
+            with clock.stage(AIM, 0):
+                look = ambient_look(placed, settings, run) if look is None else look
+                frame = replace(frame, importance=goal(replace(frame, ambient=look)))
     if frame is not shown:
         # nothing was left to do but to say so
         yield replace(frame, seconds=clock.so_far())
+
+
+def aimed_later(later: Products, product: LightGroup[Any]) -> bool:
+    """Light is to come whose errors matter more in some places than in others, and no more of this one's group."""
+    groups = [other.group for other in later]
+    return product.group not in groups and ("indirect" in groups or "ambient" in groups)
 
 
 def _begun(run: Run) -> Run:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from render.base.deadline import Deadline
 from render.base.errors import Cancelled
 from render.base.threads import Cancel, Progress, map_chunks
+from render.frame import Frame
+from render.importance import Importance
 from render.sampling.random import wrapped
 
 Arrays = dict[str, NDArray[Any]]
@@ -47,7 +49,7 @@ def ignore(done: float) -> None:
 
 @dataclass(frozen=True)
 class Run:
-    """How work is done: nothing here but the seed changes a number of the finished image."""
+    """How work is done: nothing here but the seed and the goal changes a number of the finished image."""
 
     seed: int = 0
     """Any whole number; the same seed gives the same image on any number of threads."""
@@ -67,6 +69,8 @@ class Run:
     """Of the frame under way, which `render.progressive` begins from `seconds`."""
     later: int = 0
     """Parts of the frame that come after this one, which have their share of its time as well."""
+    goal: Callable[[Frame], Importance] | None = None
+    """Where errors matter, of a frame as far as it is known; None: everywhere alike."""
     part: str = ""
     """Name of what is rendered, under which the checkpoint keeps it."""
 

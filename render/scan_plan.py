@@ -14,7 +14,7 @@ import numpy as np
 from render.frame import Frame
 from render.light_group import LightGroup, Shares
 from render.plan import GroupPlan
-from render.products import PRODUCTS, QUICK
+from render.products import PRODUCTS, QUICK, ambient_look, expected_plan
 from render.run import Run, ignore
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
@@ -79,6 +79,10 @@ def _pilots(
     frame = Frame(placed.step, (), None, (), None)
     for estimate in QUICK.estimates(placed, settings, GroupPlan(()), frame, quiet):
         frame = frame.with_estimate(QUICK.field, estimate)
+    if run.goal is not None and settings.goal is not None and placed.lasers:
+        look = ambient_look(placed, settings, quiet)
+        expected = replace(frame, ambient=look, plan=expected_plan(placed.scene, settings))
+        frame = replace(frame, importance=run.goal(expected))
     run.progress(0.5)
     found = {product.group: product.measured(placed, settings, frame, quiet) for product in deciding}
     run.progress(1.0)

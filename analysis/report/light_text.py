@@ -64,18 +64,22 @@ def quality_text(quality: GroupQuality) -> str:
     """Error, target and work of a light group, and what it lost."""
     places = 1 if quality.group == "indirect" else 2
     parts = []
-    coarse = quality.coarse_error
-    if coarse is not None:
-        if not math.isnan(quality.error):
-            parts.append(f"adds {quality.error:.0%} of the allowed error to 19 of 20 scan lines at most")
-        parts.append(f"elsewhere interpolated to {coarse:.1%}")
+    if quality.of == "line":
+        known = (
+            f"noise moves the line by {quality.error:.2g} sigma" if math.isfinite(quality.error) else "line not known"
+        )
+        parts.append(f"{known}, goal {quality.target:.2g}")
+        if quality.image_error is not None and math.isfinite(quality.image_error):
+            parts.append(f"image error {quality.image_error:.0%}")
+        if quality.coarse_error is not None:
+            parts.append(f"elsewhere interpolated to {quality.coarse_error:.1%}")
     elif not math.isnan(quality.error):
         parts.append(f"error {quality.error:.{places}%}, target {quality.target:.{places}%}")
     match quality.unit:
         case "light paths":
             parts.append(f"{quality.work / 1e6:.2g} million light paths")
         case "samples a pixel":
-            parts.append(f"{quality.work:.{0 if coarse is None else 1}f} of {quality.most:.0f} samples")
+            parts.append(f"{quality.work:.{0 if quality.coarse_error is None else 1}f} of {quality.most:.0f} samples")
     if quality.share is not None:
         parts.append(f"{quality.share:.2%} of the direct light")
     if quality.clamped is not None:
@@ -87,6 +91,8 @@ def quality_text(quality: GroupQuality) -> str:
 
 def _all(plan: Plan) -> Iterator[tuple[bool, str]]:
     """Whether it is computed, and the sentence, of every step and every setting that bounds it."""
+    if plan.goal is not None:
+        yield True, f"goal: reflected light ends where its noise moves the line by less than {plan.goal:g} of its sigma"
     for step in plan.steps:
         if step.reason == "absent" and step.group == "indirect":
             continue  # nothing in the scene makes such light, or none that the pilot met
@@ -122,18 +128,25 @@ def _indirect(step: TransportStep, plan: Plan) -> tuple[bool, str]:
     if step.reason == "switched off":
         return False, f"{light} - switched off, its share was not measured"
     if step.computed is None:
-        return True, f"{light}: a pilot decides kind by kind, and leaves out what is below {plan.negligible or 0.0:.2%}"
+        least = (
+            f"is below {plan.negligible or 0.0:.2%}" if plan.goal is None else f"moves no row by {plan.goal:g} sigma"
+        )
+        return True, f"{light}: a pilot decides kind by kind, and leaves out what {least}"
     if step.share is None:
         return True, f"{step.name}: {LIGHT['indirect', 'indirect']} - requested"
     measured = f"a pilot puts it at {step.share:.2%} +- {step.error or 0.0:.2%} of the direct light in the image"
     if math.isinf(step.share):
         measured = "there is no direct light in the image to compare it with"
+    if step.moves is not None and step.share:
+        measured += f", which may move the line by {step.moves:.2g} of its sigma"
     match step.reason:
         case "requested":
             return True, f"{step.name}: {light} - requested; {measured}"
         case "implied":
             others = [one.name for one in plan.of("indirect") if one.computed and one.reason != "implied"]
             return True, f"{step.name}: {light} - comes with {others[-1]}; {measured}"
+        case "negligible" if step.moves is not None:
+            measured += f", less than the goal of {plan.goal or 0.0:g}"
         case "negligible":
             measured += f", below the negligible {plan.negligible or 0.0:.2%}"
         case "not requested":

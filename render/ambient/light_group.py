@@ -85,14 +85,16 @@ class AmbientLight(LightGroup[AmbientPlan]):
 def quality_of(image: AmbientImage, settings: RenderSettings) -> GroupQuality:
     """How well the ambient light is known; its error is not, after a single sample."""
     clamped = settings.clamp is not None
+    goal = None if image.coarse_error is None else settings.goal
     return GroupQuality(
         "ambient",
         None,
-        image.error,
-        settings.ambient_error if image.coarse_error is None else 1.0,
+        image.error if goal is None else image.error * goal.depth,
+        settings.ambient_error if goal is None else goal.depth,
         image.samples,
         "samples a pixel",
         settings.ambient_samples,
+        of="image" if goal is None else "line",
         invalid=image.dropped,
         clamped=image.clamped if clamped else None,
         clamped_radiance=image.cut if clamped else None,

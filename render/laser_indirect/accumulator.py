@@ -11,12 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.threads import map_chunks
+from render.importance import Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
-from render.laser_indirect.guiding import Guide, allocate_camera_paths, reserve_for_specular, update_guide
+from render.laser_indirect.guiding import (
+    Guide,
+    aim_camera_paths,
+    allocate_camera_paths,
+    reserve_for_specular,
+    update_guide,
+)
+from render.laser_indirect.line_goal import LineErrors
 from render.laser_indirect.photon_emission import FanDistribution
 
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
+WAVE = 4
+"""Passes at a time, whatever the number of threads."""
 MOST_PASS = 1 << 15
 MOST_CAMERA_PASS = 1 << 18
 """Most paths of a pass: a cancelled render loses at most one wave."""
@@ -84,8 +94,20 @@ class Accumulator:
     """Pixels of passes that the clamp has lowered."""
     clamped_radiance: float = 0.0
     """Radiance that the clamp took, weighted sum over pixels and passes."""
+    line: LineErrors | None = None
+    """Where errors matter, and what they come to there; None: everywhere alike."""
     consistent: bool = True
     """False within `add`: an interruption there leaves half a wave in the sums."""
+
+    @property
+    def line_error(self) -> float:
+        """Deviation of the measured line over the allowed one; infinite: not known."""
+        return math.inf if self.line is None else self.line.error(self.weight)
+
+    @property
+    def next_weight(self) -> float:
+        """Weight of each pass of the next wave."""
+        return float(self.growth**WAVE_WEIGHT_EXPONENT)
 
     @property
     def growth(self) -> int:
@@ -108,7 +130,9 @@ class Accumulator:
         """Add a wave of passes, whose buffers are zeroed; clamp: most radiance of one pass in one pixel."""
         self.consistent = False
         most, growth, passes = math.inf if clamp is None else clamp, self.growth, len(buffers)
-        weight = growth**WAVE_WEIGHT_EXPONENT
+        weight = self.next_weight
+        if self.line is not None:
+            self.line.add(buffers, weight, growth)
         found = sum_passes(buffers, self.total, self.camera_radiance, weight, most, threads)
         light, by_camera, squares, variance_sum, clamped, clamped_radiance = found
         self.squares += squares
@@ -132,9 +156,21 @@ class Accumulator:
         self.allocate(self.passes / growth)
         self.consistent = True
 
+    def aim_at(self, importance: Importance | None, laser: int) -> None:
+        """Know where errors matter from now on, if it was not known; None: everywhere alike."""
+        if importance is None:
+            self.line = None
+        elif self.line is None:
+            self.line = LineErrors.of(importance, laser)
+            sizes = (min(1 << max(wave - 1, 0), self.growth_limit) for wave in range(self.waves))
+            weights = ((size**WAVE_WEIGHT_EXPONENT) ** 2 / size for size in sizes)
+            self.line.all_waves = WAVE * sum(weights)
+
     def allocate(self, drawn: float) -> None:
         """Allocate the next wave's camera paths, where each pixel has had `drawn` times its `camera_paths` so far."""
         allocate_camera_paths(self.camera_radiance, self.guide.width, self.next_camera_paths, self.camera_paths, drawn)
+        if self.line is not None:
+            aim_camera_paths(self.camera_paths, self.line.aim, self.next_camera_paths)
         reserve_for_specular(self.camera_paths, self.specular, self.next_camera_paths)
 
     def radiance(self, shape: tuple[int, int]) -> Float32:
@@ -156,6 +192,7 @@ class Accumulator:
             "guide_width": np.array(self.guide.width),
             "guide_row": self.guide.row,
             "guide": self.guide.cumulative,
+            **({} if self.line is None else self.line.arrays()),
         }
 
     @classmethod
@@ -166,7 +203,8 @@ class Accumulator:
         low, high, *cumulative = arrays["fan"]
         fan = FanDistribution(float(low), float(high), np.array(cumulative))
         guide = Guide(int(arrays["guide_width"].item()), arrays["guide_row"], arrays["guide"])
-        return cls(**numbers, **images, fan=fan, guide=guide)
+        line = LineErrors.of_arrays(arrays) if "line_weight" in arrays else None
+        return cls(**numbers, **images, fan=fan, guide=guide, line=line)
 
 
 def sum_passes(

@@ -97,6 +97,16 @@ def allocate_camera_paths(
     return camera_paths
 
 
+def aim_camera_paths(camera_paths: Float, aim: Float32, count: float, threads: int | None = None) -> None:
+    """Give (pixels,) camera paths, `count` in all, to where errors matter: in proportion to aim (pixels,) as well.
+
+    Where none matters light tracing alone remains.
+    """
+    camera_paths *= aim
+    if camera_paths.any():
+        scale(camera_paths, active_pixels(camera_paths), count, threads)
+
+
 def active_pixels(camera_paths: Float) -> Int:
     """(n,) the pixels that may have camera paths, in order."""
     return np.flatnonzero(camera_paths).astype(np.int32)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,14 +19,16 @@ from numpy.typing import NDArray
 from render.base.errors import Cancelled
 from render.base.threads import map_chunks, thread_count
 from render.camera.camera import Camera
+from render.importance import Importance
 from render.laser.laser import LineLaser
-from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, Accumulator, sum_passes
+from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, WAVE, Accumulator, sum_passes
 from render.laser_indirect.bdpt_pass import KINDS, BdptPass, Sampling
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
     BINS,
     NO_PIXELS,
     active_pixels,
+    aim_camera_paths,
     allocate_camera_paths,
     first_guide,
     no_guide,
@@ -34,7 +36,8 @@ from render.laser_indirect.guiding import (
     specular_pixels,
     update_guide,
 )
-from render.laser_indirect.path_vertex import CAUSTIC, SPECULAR_CHAIN, SUBSURFACE_LIGHT
+from render.laser_indirect.line_goal import Effect, LineErrors, Projection, Weigh
+from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
 from render.run import Run
 from render.world.placed import PlacedLaser
@@ -48,9 +51,15 @@ LEAST_PASS = 1 << 12
 """Light paths in a pass of the first wave: at least, more in a large image; and half of its camera paths."""
 LOOK_PATHS = 1 << 11
 PILOT_PATHS = 1 << 13
-WAVE = 4
-"""Passes at a time, whatever the number of threads."""
 ALL_KINDS = CAUSTIC | SUBSURFACE_LIGHT | SPECULAR_CHAIN
+
+STEPS = {
+    "interreflection": INTERREFLECTION,
+    "caustic": CAUSTIC,
+    "specular_chain": CAUSTIC | SPECULAR_CHAIN,
+    "subsurface": ALL_KINDS,
+}
+"""Kinds of light, each beside those before it, by the name of its share."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,19 @@ class IndirectImage:
     """Pixels of passes that the clamp lowered."""
     cut: float = 0.0
     """Radiance that the clamp took away, mean over the image."""
+    line_error: float = math.inf
+    """Deviation of the measured line over the allowed one; infinite: not known."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """Where errors of one laser's light matter; its light ends where they are small enough."""
+
+    laser: int
+    importance: Importance
+    """By the other light so far."""
+    weigh: Weigh
+    """By its own light as well."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +105,9 @@ class Shares:
     """Through clear glass or off mirrors on both sides of a single rough surface."""
     subsurface: tuple[float, float]
     """Through a medium."""
+    effects: dict[str, float] = field(default_factory=dict)
+    """By the same names, the most that it may well move any line or add to a peak, over what is allowed; empty: where
+    errors matter is not known."""
 
 
 def indirect_image(
@@ -101,12 +126,14 @@ def indirect_images(
     kinds: int = ALL_KINDS,
     clamp: float | None = None,
     left: int = 1,
+    aim: Aim | None = None,
     run: Run = Run(),
 ) -> Iterator[IndirectImage]:
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
     An image at every doubling of the paths, and the final one. The error is that of the whole image: sqrt(sum of
-    variances / sum of squares); `most_paths`, or the end of the time, ends it in any case. kinds: of light, besides
+    variances / sum of squares); with an aim that of the measured line counts instead. `most_paths`, or the end of the
+    time, ends it in any case. kinds: of light, besides
     plain interreflection (`render.laser_indirect.path_vertex`). clamp: most radiance of one pass in one pixel,
     W/(m^2 sr); biased. left: lasers that have their share of the time, with this one. What it goes on from gives the
     same image bit for bit as without interruption; what it keeps stays consistent when Cancelled is raised.
@@ -119,16 +146,18 @@ def indirect_images(
         return
     waves = Waves(BdptPass.of(*placed, reach, run.seed, kinds), camera, run)
     time_is_over = run.time_is_over(left)
-    so_far = run.restore(Accumulator.of_arrays) or waves.first_looks(placed, uniform_fan(low, high), kinds)
+    so_far = run.restore(Accumulator.of_arrays) or waves.first_looks(placed, uniform_fan(low, high), kinds, aim)
+    so_far.aim_at(None if aim is None else aim.importance, 0 if aim is None else aim.laser)
     wave_moments = attach_wave_moments(waves.buffers, so_far)
 
     def image() -> IndirectImage:
         counts = so_far.paths, round(so_far.dropped), round(so_far.clamped)
         cut = so_far.clamped_radiance / so_far.weight / so_far.total.size
-        return IndirectImage(so_far.radiance(shape), so_far.error, *counts, cut)
+        return IndirectImage(so_far.radiance(shape), so_far.error, *counts, cut, so_far.line_error)
 
     def unfinished() -> bool:
-        return so_far.error > target and so_far.paths < most_paths
+        known = so_far.error <= target if aim is None else so_far.line_error <= 1.0
+        return not known and so_far.paths < most_paths
 
     shown = so_far.paths
     while unfinished():
@@ -138,10 +167,14 @@ def indirect_images(
             if so_far.passes and run.keep_partial():
                 yield image()
             raise
+        if aim is not None and so_far.line is not None:
+            sums = so_far.total, so_far.weight
+            so_far.line = so_far.line.look(waves.buffers, sums, so_far.next_weight, aim.weigh, aim.laser)
         so_far.add(waves.buffers, wave_moments, clamp, run.threads)
         run.keep(so_far)
         # the error falls with the root of the paths, at least
-        done = max((target / so_far.error) ** 2, so_far.paths / most_paths) if so_far.error > 0.0 else 1.0
+        over = so_far.error / target if aim is None else so_far.line_error
+        done = max(over**-2, so_far.paths / most_paths) if over > 0.0 else 1.0
         run.progress(min(0.99, done))
         if time_is_over():
             break
@@ -168,7 +201,7 @@ class Waves:
 
         map_chunks(work, WAVE, 1, min(WAVE, thread_count(run.threads)), run.cancelled)
 
-    def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int) -> Accumulator:
+    def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None = None) -> Accumulator:
         """An empty accumulator that knows where laser and camera should look; the light of two looks is thrown away.
 
         The first finds, by light, where it arrives at all (what is behind glass only the camera finds), the second,
@@ -181,6 +214,7 @@ class Waves:
         first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
         self.trace(0, first_look, reachable_pixels)
         found = initialise_guiding(self.buffers, fan, camera, kinds, specular)
+        found.line = None if aim is None else LineErrors.of(aim.importance, aim.laser)
         wave_moments = attach_wave_moments(self.buffers, found)
         self.trace(WAVE, sampling_of(found, LOOK_PATHS), reachable_pixels)
         refine_guiding(found, self.buffers, wave_moments, camera)
@@ -215,6 +249,8 @@ def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: 
     # a wide glow is best known by passes with a path for each of its pixels
     first.growth_limit = max((MOST_CAMERA_PASS // 2 if first.camera_share > 0.5 else MOST_PASS) // first.size, 1)
     allocate_camera_paths(camera_radiance, camera.width, first.next_camera_paths, first.camera_paths, float(WAVE))
+    if first.line is not None:
+        aim_camera_paths(first.camera_paths, first.line.aim, first.next_camera_paths)
     reserve_for_specular(first.camera_paths, first.specular, first.next_camera_paths)
 
 
@@ -253,9 +289,13 @@ def indirect_shares(
     T_world_laser: Float,
     *,
     passes: int = 4,
+    projection: Projection | None = None,
     run: Run = Run(),
 ) -> Shares:
-    """A pilot of a few short passes: what each kind of indirect light brings. Raises Cancelled."""
+    """A pilot of a few short passes: what each kind of indirect light brings. Raises Cancelled.
+
+    projection: where errors of this laser's light matter, for the effects.
+    """
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     if high <= low:
         return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
@@ -274,13 +314,41 @@ def indirect_shares(
         )
         reserve_for_specular(camera_paths, specular, PILOT_PATHS)
     sampling = Sampling(PILOT_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
+    effect = None if projection is None else Effect(projection)
     for number in range(passes):
         buffer = empty_buffer(camera.width * camera.height)
         task.run(number, sampling, buffer, run.cancelled)
         interreflection, caustic, subsurface, both, specular_chain = buffer.sums
         sums.append((interreflection, caustic, specular_chain, subsurface + both))
+        if effect is not None:
+            effect.add(buffer)
     mean, error = np.mean(sums, axis=0), np.std(sums, axis=0, ddof=1) / math.sqrt(passes)
-    return Shares(*((float(m), float(e)) for m, e in zip(mean, error, strict=True)))
+    pairs = [(float(m), float(e)) for m, e in zip(mean, error, strict=True)]
+    found = Shares(pairs[0], pairs[1], pairs[2], pairs[3])
+    if effect is None:
+        return found
+    present = [name for name, flux in zip(STEPS, mean, strict=True) if flux > 0.0]
+    if len(present) <= 1:
+        return replace(found, effects={name: effect.most() if name in present else 0.0 for name in STEPS})
+    return replace(found, effects=_effects(task, sampling, passes, effect, run))
+
+
+def _effects(task: BdptPass, sampling: Sampling, passes: int, last: Effect, run: Run) -> dict[str, float]:
+    """What each kind of light does to the line, by passes of the same random numbers with ever more kinds.
+
+    last: of all kinds. Raises Cancelled.
+    """
+    effects, before = {}, None
+    for name, kinds in STEPS.items():
+        with_it = last if kinds == ALL_KINDS else Effect(last.projection)
+        specular = task.specular and bool(kinds & CAUSTIC)
+        for number in range(passes if kinds != ALL_KINDS else 0):
+            buffer = empty_buffer(len(sampling.camera_paths))
+            replace(task, kinds=kinds, specular=specular).run(number, sampling, buffer, run.cancelled)
+            with_it.add(buffer)
+        effects[name] = with_it.most(before)
+        before = with_it
+    return effects
 
 
 def seen_specular(task: BdptPass, world: World, camera: Camera, T_world_camera: Float) -> Bool:

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.frame import Estimate, Frame
-from render.laser_indirect.integrator import IndirectImage, indirect_images
+from render.importance import Importance
+from render.laser_indirect.integrator import Aim, IndirectImage, indirect_images
 from render.laser_indirect.path_vertex import INTERREFLECTION
 from render.laser_indirect.transport_plan import SWITCHED_OFF, IndirectPlan, pilot_shares, plan_of
 from render.light_group import LightGroup, Shares
 from render.plan import GroupQuality, TransportStep
 from render.run import Run
 from render.scene.scene import Scene
-from render.scene.settings import RenderSettings
+from render.scene.settings import DepthGoal, RenderSettings
 from render.world.placed import PlacedScene
 from render.world.world import World
 
@@ -50,8 +51,8 @@ class IndirectLight(LightGroup[IndirectPlan]):
         return settings.transport != "direct"
 
     def measured(self, placed: PlacedScene, settings: RenderSettings, frame: Frame, run: Run) -> Shares:
-        """Of each kind, over the direct light of the frame."""
-        return pilot_shares(placed, frame.laser_direct, run)
+        """Of each kind, over the direct light of the frame; with a goal also its effect on the line."""
+        return pilot_shares(placed, frame.laser_direct, run, frame.importance if settings.goal is not None else None)
 
     def plan(self, shares: Shares | None, world: World, scene: Scene, settings: RenderSettings) -> IndirectPlan:
         return IndirectPlan((SWITCHED_OFF,)) if shares is None else plan_of(shares, settings)
@@ -68,6 +69,7 @@ class IndirectLight(LightGroup[IndirectPlan]):
         quality: list[GroupQuality] = []
         for i, laser in enumerate(placed.lasers[:count]):
             part = replace(run.between(i / count, (i + 1) / count).shifted(i), part=f"laser {i}")
+            aim = _aim(i, images, frame, run)
             for image in indirect_images(
                 laser,
                 target=settings.indirect_error,
@@ -75,25 +77,44 @@ class IndirectLight(LightGroup[IndirectPlan]):
                 kinds=plan.kinds or INTERREFLECTION,
                 clamp=settings.laser_clamp,
                 left=count - i,
+                aim=aim,
                 run=part,
             ):
                 images[i] = image.radiance
-                quality[i:] = [quality_of(laser.laser.name, image, settings, frame.laser_direct[i])]
+                goal = None if aim is None else settings.goal
+                quality[i:] = [quality_of(laser.laser.name, image, settings, goal, frame.laser_direct[i])]
                 yield Estimate(tuple(images), tuple(quality))
 
 
-def quality_of(laser: str, image: IndirectImage, settings: RenderSettings, direct: Float32) -> GroupQuality:
+def _aim(laser: int, images: list[Float32], frame: Frame, run: Run) -> Aim | None:
+    """Where errors of a laser's light matter; None: everywhere alike."""
+    goal, importance = run.goal, frame.importance
+    if goal is None or importance is None:
+        return None
+
+    def weigh(light: Float32) -> Importance:
+        reflected = (*images[:laser], light, *images[laser + 1 :])
+        return goal(replace(frame, laser_indirect=reflected))
+
+    return Aim(laser, importance, weigh)
+
+
+def quality_of(
+    laser: str, image: IndirectImage, settings: RenderSettings, goal: DepthGoal | None, direct: Float32
+) -> GroupQuality:
     """How well one laser's indirect light is known, and what share of its direct light it is."""
     clamped = settings.laser_clamp is not None
     known = float(direct.sum(dtype=np.float64))
     return GroupQuality(
         "indirect",
         laser,
-        image.error,
-        settings.indirect_error,
+        image.error if goal is None else image.line_error * goal.depth,
+        settings.indirect_error if goal is None else goal.depth,
         image.paths,
         "light paths",
         settings.light_paths,
+        of="image" if goal is None else "line",
+        image_error=None if goal is None else image.error,
         invalid=image.dropped,
         clamped=image.clamped if clamped else None,
         clamped_radiance=image.cut if clamped else None,

@@ -5,12 +5,14 @@ from __future__ import annotations
 import functools
 import math
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from render.importance import Importance
 from render.laser_indirect.integrator import indirect_shares
+from render.laser_indirect.line_goal import Projection
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.light_group import Shares
 from render.plan import GroupPlan, TransportStep
@@ -57,15 +59,11 @@ class IndirectPlan(GroupPlan):
 
 
 def plan_of(shares: Shares, settings: RenderSettings) -> IndirectPlan:
-    """The plan that follows from what a pilot measured."""
+    """The plan that follows from what a pilot measured: shares of the light, and with a goal effects on the line."""
     names = [kind.name for kind in LADDER]
     wanted = names.index(settings.transport) if settings.transport in names else -1
     # what may well be more than negligible is computed
-    chosen = [
-        kind
-        for i, kind in enumerate(LADDER)
-        if i <= wanted or (wanted < 0 and at_most(shares[kind.share]) > settings.negligible)
-    ]
+    chosen = [kind for i, kind in enumerate(LADDER) if i <= wanted or (wanted < 0 and _matters(kind, shares, settings))]
     kinds = functools.reduce(operator.or_, (kind.bits for kind in chosen), INTERREFLECTION) if chosen else None
     steps = []
     for i, kind in enumerate(LADDER):
@@ -78,8 +76,24 @@ def plan_of(shares: Shares, settings: RenderSettings) -> IndirectPlan:
             reason = "implied"
         elif kind not in chosen:
             computed, reason = False, "not requested" if wanted >= 0 else "negligible"
-        steps.append(TransportStep("indirect", kind.name, computed, reason, share, error))  # type: ignore[arg-type]
+        step = TransportStep("indirect", kind.name, computed, reason, share, error)  # type: ignore[arg-type]
+        moves = (
+            shares[effect_of(kind)][0] * settings.goal.depth if settings.goal and effect_of(kind) in shares else None
+        )
+        steps.append(replace(step, moves=moves))
     return IndirectPlan(tuple(steps), kinds)
+
+
+def effect_of(kind: LightKind) -> str:
+    """Where shares have what a kind of light may do to the line, over what is allowed."""
+    return f"effect of {kind.name}"
+
+
+def _matters(kind: LightKind, shares: Shares, settings: RenderSettings) -> bool:
+    """It may well do more to the line than the goal allows, or be more than a negligible share of the light."""
+    if settings.goal is not None and effect_of(kind) in shares:
+        return shares[effect_of(kind)][0] > 1.0
+    return at_most(shares[kind.share]) > settings.negligible
 
 
 def at_most(share: tuple[float, float]) -> float:
@@ -87,15 +101,26 @@ def at_most(share: tuple[float, float]) -> float:
     return share[0] + 2.0 * share[1]
 
 
-def pilot_shares(placed: PlacedScene, direct: tuple[Float32, ...], run: Run = Run()) -> Shares:
+def pilot_shares(
+    placed: PlacedScene, direct: tuple[Float32, ...], run: Run = Run(), importance: Importance | None = None
+) -> Shares:
     """Each kind of indirect light over the direct light in the image, over all lasers, with its standard error.
 
-    direct: (h, w) direct radiance of each laser. Raises Cancelled.
+    direct: (h, w) direct radiance of each laser. importance: where errors matter, for the effects. Raises Cancelled.
     """
     known = sum(float(image.sum(dtype=np.float64)) for image in direct)
-    found = [indirect_shares(*laser, run=run.shifted(PILOT_SEED * (i + 1))) for i, laser in enumerate(placed.lasers)]
+    found = [
+        indirect_shares(
+            *laser,
+            projection=None if importance is None else Projection.of(importance, i),
+            run=run.shifted(PILOT_SEED * (i + 1)),
+        )
+        for i, laser in enumerate(placed.lasers)
+    ]
     shares = {}
     for kind in LADDER:
+        if importance is not None:
+            shares[effect_of(kind)] = max(one.effects.get(kind.share, 0.0) for one in found), 0.0
         parts = [getattr(one, kind.share) for one in found]
         flux, error = sum(part[0] for part in parts), math.sqrt(sum(part[1] ** 2 for part in parts))
         if known > 0.0:

@@ -7,8 +7,28 @@ from typing import Literal
 from render.base.model import Model, quantity
 
 
+class DepthGoal(Model):
+    """The light is known well enough for what is measured in the image."""
+
+    depth: float = quantity(
+        0.1,
+        label="Error of the line",
+        help="What the render's own noise may add to the position of the line in each row, over the sigma that the "
+        "sensor's noise and speckle give that row.",
+        ge=1e-3,
+        le=10,
+    )
+
+
 class RenderSettings(Model):
     """Targets; the renderer works out the samples."""
+
+    goal: DepthGoal | None = quantity(
+        DepthGoal(),
+        label="Goal",
+        help="Reflected and ambient light end where the measured line is known well enough. Empty: where the image is, "
+        "to the errors of reflected and ambient light.",
+    )
 
     laser_error: float = quantity(
         0.003, label="Laser error", help="Target relative RMS error over the lit pixels.", gt=1e-6, le=1
@@ -24,7 +44,11 @@ class RenderSettings(Model):
         0.02, label="Negligible share", help="auto leaves out what adds less than this share of the light.", ge=0, le=1
     )
     indirect_error: float = quantity(
-        0.1, label="Reflection error", help="Target relative RMS error of the reflected light.", gt=1e-4, le=1
+        0.1,
+        label="Reflection error",
+        help="Target relative RMS error of the reflected light, without a goal.",
+        gt=1e-4,
+        le=1,
     )
     light_paths: int = quantity(
         1 << 23,
@@ -43,7 +67,11 @@ class RenderSettings(Model):
         le=1e12,
     )
     ambient_error: float = quantity(
-        0.01, label="Ambient error", help="Target relative RMS error of the ambient light.", gt=1e-4, le=1
+        0.01,
+        label="Ambient error",
+        help="Target relative RMS error of the ambient light, without a goal.",
+        gt=1e-4,
+        le=1,
     )
     ambient_samples: int = quantity(
         16,

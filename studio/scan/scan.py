@@ -24,6 +24,7 @@ from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
 from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.remarks import result_remarks
+from studio.scan.render_goal import goal_of
 from studio.scan.resume import frame_of_step
 from studio.scan.run_record import ended_by_clock, run_text
 from studio.scan.stages import Clock, Measurement, develop_step, scaled, step_world, validated
@@ -189,7 +190,8 @@ def _plan(scan: Scan, first: World) -> ScanPlan | None:
         return first if step == 0 else step_world(project, scan.begun.root, step, first)
 
     with scan.clock.stage("plan for all frames") as progress:
-        return plan_scan(project.scene, project.render, world, replace(scan.run, progress=progress))
+        run = replace(scan.run, progress=progress, goal=goal_of(project, scan.run.threads))
+        return plan_scan(project.scene, project.render, world, run)
 
 
 def light_record(frame: Frame) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from studio.project.project import Project
 from studio.runtime.console import FRAMES, StageProgress
 from studio.scan.exposure import expose
 from studio.scan.line_extraction import extract_line
+from studio.scan.render_goal import goal_of
 from studio.scan.spacetime_window import Passing, along_time
 
 
@@ -116,7 +117,7 @@ def render_step(
     refined: hears of every frame as it gets better, the last is the result. scan: the plan of a whole scan.
     """
     cancelled = clock.cancelled if run.cancelled is never else run.cancelled
-    run = replace(run, seed=project.seed, cancelled=cancelled)
+    run = replace(run, seed=project.seed, cancelled=cancelled, goal=goal_of(project, run.threads))
     placed, watch = PlacedScene(world, project.scene, step), RenderClock(clock.progress)
     for frame in frames(placed, project.render, run, watch, axis=project.extraction.axis, scan=scan):
         refined(frame)

@@ -27,6 +27,8 @@ TEXTURE = 1.25
 _taps = np.exp(-0.5 * (np.arange(RADIUS + 1) / FILTER_SIGMA) ** 2)
 _taps /= 2.0 * _taps.sum() - _taps[0]
 T0, T1, T2, T3, T4 = (np.float32(t) for t in _taps)
+TAPS = np.concatenate([_taps[:0:-1], _taps])
+"""(2 RADIUS + 1,)."""
 NOISE_GAIN = float(2.0 * (_taps**2).sum() - _taps[0] ** 2)
 """Variance of the response over that of a pixel."""
 SKEW_GAIN = float(2.0 * (_taps**3).sum() - _taps[0] ** 3)
@@ -34,8 +36,7 @@ SKEW_GAIN = float(2.0 * (_taps**3).sum() - _taps[0] ** 3)
 
 def response_gain(correlation: Array) -> float:
     """Variance of the response over that of a raw pixel, for pixels whose covariance at distance d is (m,)."""
-    kernel = np.concatenate([_taps[:0:-1], _taps])
-    overlap = np.correlate(kernel, kernel, "full")[2 * RADIUS :]
+    overlap = np.correlate(TAPS, TAPS, "full")[2 * RADIUS :]
     m = min(len(overlap), len(correlation))
     return float(2.0 * (overlap[:m] * correlation[:m]).sum() - overlap[0] * correlation[0])
 

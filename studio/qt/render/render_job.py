@@ -15,6 +15,7 @@ from studio.project.project import Project
 from studio.qt.core.session import Render
 from studio.runtime.jobs import Progress
 from studio.scan.kernel_warm_up import begin, needed, warm_up
+from studio.scan.render_goal import goal_of
 
 
 def render_frames(
@@ -45,7 +46,7 @@ def render_frames(
         settings=project.render,
         step=step,
         axis=project.extraction.axis,
-        run=replace(run, seed=project.seed),
+        run=replace(run, seed=project.seed, goal=goal_of(project, run.threads)),
         progress=progress,
     ):
         take(world, replace(frame, warnings=(*doubts, *frame.warnings)))

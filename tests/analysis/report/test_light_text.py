@@ -110,7 +110,7 @@ def test_quality_says_error_work_and_losses():
 
 
 def test_light_for_what_is_measured_tells_scan_lines_and_what_is_interpolated():
-    measured = replace(AMBIENT, error=0.83, target=1.0, work=0.21, most=16, coarse_error=0.041)
-    told = "adds 83% of the allowed error to 19 of 20 scan lines at most, elsewhere interpolated to 4.1%"
+    measured = replace(AMBIENT, of="line", error=0.083, target=0.1, work=0.21, most=16, coarse_error=0.041)
+    told = "noise moves the line by 0.083 sigma, goal 0.1, elsewhere interpolated to 4.1%"
     assert quality_text(measured) == f"{told}, 0.2 of 16 samples"
-    assert quality_text(replace(measured, error=math.nan)).startswith("elsewhere interpolated to 4.1%")
+    assert quality_text(replace(measured, error=math.nan)).startswith("line not known, goal 0.1, elsewhere")

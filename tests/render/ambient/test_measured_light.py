@@ -188,5 +188,5 @@ def test_a_frame_that_knows_what_matters_is_rendered_to_that():
     placed = PlacedScene(world, scene)
     *_, last = AmbientLight().estimates(placed, settings, plan, dark, Run())
     (quality,) = last.quality
-    assert isinstance(quality, GroupQuality) and quality.reached and quality.target == 1.0
+    assert isinstance(quality, GroupQuality) and quality.reached and quality.of == "line" and quality.target == 0.1
     assert 0.0 < quality.coarse_error <= COARSE_ERROR

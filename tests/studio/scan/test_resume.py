@@ -65,7 +65,8 @@ def test_a_frame_that_is_there_is_taken_as_it_is(project: Project, whole: Path) 
 
 
 def test_a_time_limit_leaves_a_frame_and_what_it_takes_to_go_on(project: Project, tmp_path: Path) -> None:
-    endless = project.render.model_copy(update={"indirect_error": 2e-4, "light_paths": 1 << 40, "truth_images": False})
+    long = {"goal": None, "indirect_error": 2e-4, "light_paths": 1 << 40, "truth_images": False}
+    endless = project.render.model_copy(update=long)
     slow = project.model_copy(update={"render": endless})
     done = scan(slow, tmp_path, seconds=0.5)
     first = read_frame(tmp_path / "frame_0000.json")

@@ -1,0 +1,176 @@
+"""How far each pixel moves the measured line: the derivative of every scan line's position by its pixels' electrons.
+
+Of maximum likelihood in closed form. With p = amplitude, centre, width, background, mu_i the model and v_i the variance
+of pixel i, a fit moves by
+
+    dp / dy_i  =  H^-1  dmu_i/dp  / v_i,        H = sum over i of dmu_i/dp (dmu_i/dp)^T / v_i
+
+(the influence function of an M-estimator at its own model; Huber, Robust Statistics, 1981, section 3.2). Of all other
+methods, and of what likelihood flags, by central differences of the method itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erf
+
+from analysis.line.detection.channel import Lines, scan_lines
+from analysis.line.detection.noise import NoiseModel
+from analysis.line.measure import METHODS, measure
+from analysis.line.result import Flag, Line
+from analysis.line.settings import ExtractionSettings
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+
+REACH, EDGE = 4.0, 1.5
+"""Sigmas and pixels on either side of a line that its fit looks at (`methods.gaussian_fit`)."""
+WIDEST = 64
+"""px; farther from a line no pixel is tried."""
+STEP = 0.01
+"""Of the line's amplitude: the differences' step."""
+TRIED = 64
+"""Scan lines on which differences are taken; others take their nearest one's, moved to their own place."""
+
+
+def influence(
+    image: NDArray[Any], line: Line, settings: ExtractionSettings, noise: NoiseModel, threads: int | None = None
+) -> Float32:
+    """Image (h, w) of DN, Line measured in it -> (h, w) px / e-, summed over its peaks; zero far from any.
+
+    settings: those that the line was measured with; `line.method` tells what "auto" picked. Methods that look at
+    neighbouring scan lines, or smooth over them, are taken to move with all of these at once.
+    """
+    chosen = settings.model_copy(update={"method": line.method})
+    if line.method == "likelihood":
+        chosen = chosen.model_copy(update={"smoothing": 0.0})
+    lines = scan_lines(np.asarray(image, np.float64), chosen, noise)
+    found = np.zeros(lines.image.shape, np.float32)
+    for k in range(line.u.shape[1]):
+        closed = line.valid[:, k] & (line.flag[:, k] == Flag.OK) & (line.method == "likelihood")
+        if closed.any():
+            _scatter(
+                found, np.flatnonzero(closed), *likelihood_influence(lines, line, chosen, np.flatnonzero(closed), k)
+            )
+        rest = np.flatnonzero(line.valid[:, k] & ~closed)
+        if len(rest):
+            alone = _alone(lines, chosen)
+            tried = rest[np.unique(np.linspace(0, len(rest) - 1, TRIED).astype(int))] if alone else rest
+            measured = difference_influence(lines, line, chosen, tried, k, threads)
+            _scatter(found, rest, *_of_nearest(line.u[rest, k], rest, line.u[tried, k], tried, *measured))
+    return found if line.axis == "rows" else np.ascontiguousarray(found.swapaxes(0, 1))
+
+
+def likelihood_influence(
+    lines: Lines, line: Line, settings: ExtractionSettings, rows: Int, peak: int
+) -> tuple[Int, Float]:
+    """Rows (n,) of a likelihood line -> first pixel (n,) and weight (n, m) px / e-; zero where a pixel is not used."""
+    u, width, height = line.u[rows, peak], line.width[rows, peak], line.amplitude[rows, peak]
+    half = np.ceil(np.minimum(REACH * width + EDGE, 6.0 * settings.max_width))
+    m = 2 * int(half.max()) + 1
+    first = np.rint(u).astype(np.int64) - m // 2
+    x = first[:, None] + np.arange(m, dtype=np.float64)
+    _, mask, floor = lines.read(0, lines.count)
+    inside = np.clip(x.astype(np.int64), 0, mask.shape[1] - 1)
+    used = (np.abs(x - u[:, None]) <= half[:, None]) & (x >= 0) & (x < mask.shape[1])
+    used &= np.take_along_axis(mask[rows], inside, axis=1) == 0
+    held = np.take_along_axis(floor[rows], np.minimum(inside, floor.shape[1] - 1), axis=1)
+    g, by_centre, by_width = _profile((x - u[:, None]), width[:, None], settings.profile == "integrated")
+    mu = height[:, None] * g + line.background[rows, peak][:, None]
+    weight = np.where(used, 1.0 / np.maximum(np.maximum(mu + held, 0.1 * np.abs(held)), 1e-9), 0.0)
+    slopes = [g, height[:, None] * by_centre, np.ones_like(g)]
+    if settings.width is None:
+        slopes.append(height[:, None] * by_width)
+    jacobian = np.stack(slopes, axis=2)
+    information = np.einsum("nij,nik,ni->njk", jacobian, jacobian, weight)
+    scale = np.sqrt(np.maximum(np.einsum("njj->nj", information), 1e-300))
+    information /= scale[:, :, None] * scale[:, None, :]
+    unit = np.zeros((len(rows), len(slopes), 1))
+    unit[:, 1, 0] = 1.0
+    row = (np.linalg.pinv(information, hermitian=True) @ unit)[..., 0] / scale / scale[:, 1:2]
+    return first, np.einsum("nj,nij->ni", row, jacobian) * weight
+
+
+def difference_influence(
+    lines: Lines, line: Line, settings: ExtractionSettings, rows: Int, peak: int, threads: int | None = None
+) -> tuple[Int, Float]:
+    """As `likelihood_influence`, of any method, by central differences of its position."""
+    u, width = line.u[rows, peak], line.width[rows, peak]
+    reach = int(np.ceil(min(float(np.nanmax(REACH * width + EDGE)) + 1.0, WIDEST)))
+    first = np.rint(u).astype(np.int64) - reach
+    alone = _alone(lines, settings)
+    kept = rows if alone else np.arange(lines.count)
+    own = np.arange(len(rows)) if alone else rows
+    base = replace(lines, image=np.ascontiguousarray(lines.image[kept], np.float64))
+    wanted = settings.model_copy(update={"peaks": max(settings.peaks, peak + 1, 5)})
+    step = np.maximum(STEP * line.amplitude[rows, peak], 1e-3) * lines.noise.gain
+    weight = np.zeros((len(rows), 2 * reach + 1))
+    for j in range(2 * reach + 1):
+        pixel = first + j
+        inside = (pixel >= 0) & (pixel < lines.image.shape[1])
+        place = own[inside], pixel[inside]
+        if lines.noise.saturation is not None:
+            inside[inside] = base.image[place] + step[inside] < lines.noise.saturation
+            place = own[inside], pixel[inside]
+        moved = []
+        for sign in (1.0, -1.0):
+            image = base.image.copy()
+            image[place] += sign * step[inside]
+            found = measure(replace(base, image=image), wanted, threads, judge=True)
+            there = np.where(found.valid, found.u, np.inf)[own[inside]]
+            nearest = np.argmin(np.abs(there - u[inside][:, None]), axis=1)
+            moved.append(there[np.arange(len(there)), nearest])
+        change = (moved[0] - moved[1]) / (2.0 * step[inside] / lines.noise.gain)
+        weight[inside, j] = np.where(np.isfinite(change) & (np.abs(moved[0] - u[inside]) < 2.0), change, 0.0)
+    return first, weight
+
+
+def _alone(lines: Lines, settings: ExtractionSettings) -> bool:
+    """Each scan line is measured by itself, wherever it is in the image."""
+    return METHODS[settings.method].halo == 0 and settings.smoothing == 0.0 and lines.pattern is None
+
+
+def _profile(distance: Float, width: Float, integrated: bool) -> tuple[Float, Float, Float]:
+    """A line of unit amplitude at some distances from its centre, and its derivatives by centre and width."""
+    if not integrated:
+        z = distance / width
+        g = np.exp(-0.5 * z * z)
+        return g, g * z / width, g * z * z / width
+    right, left = (distance + 0.5) / width, (distance - 0.5) / width
+    unit = np.sqrt(0.5 * np.pi) * (erf(right * np.sqrt(0.5)) - erf(left * np.sqrt(0.5)))
+    at_right, at_left = np.exp(-0.5 * right**2), np.exp(-0.5 * left**2)
+    return width * unit, at_left - at_right, unit - (right * at_right - left * at_left)
+
+
+def _scatter(image: Float32, rows: Int, first: Int, weight: Float) -> None:
+    """Add weights (n, m) from pixel `first` (n,) on to rows (n,) of an image."""
+    x = first[:, None] + np.arange(weight.shape[1])
+    inside = (x >= 0) & (x < image.shape[1])
+    np.add.at(image, (np.broadcast_to(rows[:, None], x.shape)[inside], x[inside]), weight[inside].astype(np.float32))
+
+
+def _of_nearest(u: Float, rows: Int, tried_u: Float, tried: Int, first: Int, weight: Float) -> tuple[Int, Float]:
+    """The weights (k, m) of the scan lines that were tried -> those of all (n,), each about its own position."""
+    if len(rows) == len(tried):
+        return first, weight
+    right = np.clip(np.searchsorted(tried, rows), 1, max(len(tried) - 1, 1))
+    left = right - 1
+    right = np.minimum(right, len(tried) - 1)
+    near = np.where(np.abs(tried[left] - rows) <= np.abs(tried[right] - rows), left, right)
+    own_first = np.rint(u).astype(np.int64) - weight.shape[1] // 2
+    # where in the nearest one's pixels the own ones lie, by their distance from the line
+    place = (own_first - u) - (first[near] - tried_u[near])
+    whole = np.floor(place).astype(np.int64)
+    t = (place - whole)[:, None]
+    index = whole[:, None] + np.arange(weight.shape[1])
+
+    def at(index: Int) -> Float:
+        inside = (index >= 0) & (index < weight.shape[1])
+        return np.where(inside, weight[near[:, None], np.clip(index, 0, weight.shape[1] - 1)], 0.0)
+
+    return own_first, (1.0 - t) * at(index) + t * at(index + 1)

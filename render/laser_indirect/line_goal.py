@@ -1,0 +1,231 @@
+"""When one laser's reflected light is known well enough for the line that is measured in it.
+
+Each pass is projected onto what counts: how far its light would move the line of each scan line, and what it would add
+to each run of pixels beside the line, where a peak could appear. The passes of a wave differ in their random numbers
+alone, so that the spread of these numbers is the variance of a pass, whatever its pixels have in common.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, uniform_filter1d
+
+from render.importance import CELL, Importance
+from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Int = NDArray[np.int64]
+Weigh = Callable[[Float32], Importance]
+"""Where errors matter, by the reflected light (h, w) of a laser so far."""
+
+POOLED = 25
+"""Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one."""
+UNMET = 0.02
+"""Share of the lit scan lines that may miss the goal: some meet a rare path that no estimate knows of."""
+LEAST_NEED = 0.02
+"""Of the camera paths of a scan line that needs most: what every line gets beside it."""
+LOOK_SIGMA = 2.0
+"""px; the light of a few passes is smoothed so far before a line is looked for in it."""
+LOOKS = (0, 2)
+"""Waves with whose light it is found anew where errors matter."""
+
+
+@dataclass(frozen=True)
+class Projection:
+    """Where one laser's light counts: (h, w) weights as the lists of their pixels."""
+
+    pixel: Int
+    """(m,) where `weight` is not zero."""
+    weight: Float
+    """(m,) of the line's position."""
+    line: Int
+    """(m,) its scan line."""
+    lit: NDArray[np.bool_]
+    """(lines,) with a line."""
+    peaks: Float32
+    """(blocks, BLOCK) weights where peaks could appear; (0, BLOCK): nowhere."""
+    block_row: Int
+    """(blocks,) the row of the image that a block begins in."""
+
+    @classmethod
+    def of(cls, importance: Importance, laser: int) -> Projection:
+        """Of the weights of one laser."""
+        weight = importance.laser[laser]
+        height, width = weight.shape
+        pixel = np.flatnonzero(weight)
+        line = pixel // width if importance.axis == "rows" else pixel % width
+        lines = height if importance.axis == "rows" else width
+        lit = np.zeros(lines, np.bool_)
+        lit[line] = True
+        blocks = -(-weight.size // BLOCK)
+        peaks: Float32 = np.zeros((blocks if importance.peaks else 0, BLOCK), np.float32)
+        if importance.peaks:
+            peaks.ravel()[: weight.size] = importance.peaks[laser].ravel()
+        return cls(
+            pixel, weight.ravel()[pixel].astype(np.float64), line, lit, peaks, np.arange(blocks) * BLOCK // width
+        )
+
+    def aim(self, pixels: int, need: Float) -> Float32:
+        """(pixels,) how much errors matter, where lines (lines,) need light more or less."""
+        aim = self.peaks.ravel()[:pixels].copy() if len(self.peaks) else np.zeros(pixels, np.float32)
+        aim[self.pixel] = np.maximum(aim[self.pixel], np.abs(self.weight) * need[self.line])
+        return aim
+
+    def moves(self, image: Float) -> Float:
+        """(lines,) how far the light of an image (pixels,) moves each line, over the allowed deviation."""
+        moved = self.weight * image[self.pixel]
+        return np.bincount(self.line, moved, len(self.lit)).astype(np.float64)
+
+    def rises(self, image: Float, blocks: Int) -> Float:
+        """(n, BLOCK / CELL) what (pixels,) adds to each run of pixels of some blocks, over the allowed deviation."""
+        places = blocks[:, None] * BLOCK + np.arange(BLOCK)
+        light = image[np.minimum(places, len(image) - 1)] * self.peaks[blocks]
+        return np.asarray(light.reshape(len(blocks), BLOCK // CELL, CELL).sum(axis=2))
+
+
+@dataclass
+class LineErrors:
+    """The variance of what counts, of one laser's light so far; grows by waves."""
+
+    projection: Projection
+    shape: tuple[int, int]
+    moved: Float
+    """(lines,) variance of the weighted sum of the passes."""
+    risen: Float32
+    """(blocks, BLOCK / CELL) likewise."""
+    waves: int = 0
+    measured: float = 0.0
+    """What the waves add to the variance whose spread was taken, in that of a pass of unit size and weight."""
+    all_waves: float = 0.0
+    """The same of all waves; some were projected onto other weights."""
+
+    @property
+    def aim(self) -> Float32:
+        """(pixels,) how much errors matter: more on scan lines that are known less well.
+
+        Lines that all had the same share of the paths need them in proportion to their variance.
+        """
+        lit = self.projection.lit
+        known = pooled(self.moved, lit)
+        most = float(np.quantile(known[lit], 1.0 - UNMET)) if lit.any() else 0.0
+        need = np.clip(known / most, LEAST_NEED, 1.0) if most > 0.0 else np.ones(len(lit))
+        return self.projection.aim(self.shape[0] * self.shape[1], need)
+
+    @classmethod
+    def of(cls, importance: Importance, laser: int) -> LineErrors:
+        """Before the first wave."""
+        projection = Projection.of(importance, laser)
+        height, width = importance.laser[laser].shape
+        moved, risen = np.zeros(len(projection.lit)), np.zeros((len(projection.peaks), BLOCK // CELL), np.float32)
+        return cls(projection, (height, width), moved, risen)
+
+    def look(
+        self, buffers: list[PassBuffer], so_far: tuple[Float, float], weight: float, weigh: Weigh, laser: int
+    ) -> LineErrors:
+        """Projected anew, where that is due, by the light with a wave that is yet to be added.
+
+        so_far: (pixels,) weighted sum of passes, and the sum of their weights; weight: of each of the wave's.
+        """
+        if self.waves not in LOOKS:
+            return self
+        light = so_far[0].copy()
+        for buffer in buffers:
+            light += weight * buffer.image
+        light /= so_far[1] + weight * len(buffers)
+        seen = gaussian_filter(light.astype(np.float32).reshape(self.shape), LOOK_SIGMA)
+        found = LineErrors.of(weigh(seen), laser)
+        found.waves, found.all_waves = self.waves, self.all_waves
+        return found
+
+    def add(self, buffers: list[PassBuffer], weight: float, size: float) -> None:
+        """Take the spread of a wave's passes; weight: of each of them; size: of a pass, in that of the first wave."""
+        passes = len(buffers)
+        share = weight**2 * passes / size
+        self.waves, self.measured, self.all_waves = self.waves + 1, self.measured + share, self.all_waves + share
+        moves = np.stack([self.projection.moves(buffer.image) for buffer in buffers])
+        self.moved += weight**2 * passes * np.var(moves, axis=0, ddof=1)
+        if len(self.projection.peaks):
+            touched = np.flatnonzero(np.any([buffer.touched for buffer in buffers], axis=0))
+            rises = np.stack([self.projection.rises(buffer.image, touched) for buffer in buffers])
+            self.risen[touched] += (weight**2 * passes * np.var(rises, axis=0, ddof=1)).astype(np.float32)
+
+    def error(self, weights: float) -> float:
+        """Deviation over the allowed one of all scan lines but the share UNMET; weights: sum over all passes."""
+        if not self.measured:
+            return math.inf
+        scale = self.all_waves / self.measured / weights**2
+        lit = self.projection.lit
+        lines = scale * pooled(self.moved, lit)[lit]
+        rows = np.zeros(self.shape[0])
+        if len(self.risen):
+            np.maximum.at(rows, self.projection.block_row, scale * self.risen.max(axis=1))
+        found = [float(np.quantile(one, 1.0 - UNMET)) for one in (lines, rows) if len(one)]
+        return math.sqrt(max(found, default=0.0))
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """What a checkpoint keeps."""
+        weight = np.zeros(self.shape, np.float32)
+        weight.ravel()[self.projection.pixel] = self.projection.weight
+        peaks = self.projection.peaks.ravel()[: weight.size].reshape(self.shape) if len(self.projection.peaks) else None
+        return {
+            "line_weight": weight,
+            "line_peaks": np.zeros((0, 0), np.float32) if peaks is None else peaks,
+            "line_moved": self.moved,
+            "line_risen": self.risen,
+            "line_numbers": np.array([self.waves, self.measured, self.all_waves]),
+        }
+
+    @classmethod
+    def of_arrays(cls, arrays: dict[str, NDArray[Any]]) -> LineErrors:
+        """The inverse. KeyError, ValueError: they are of something else."""
+        weight, peaks, moved = arrays["line_weight"], arrays["line_peaks"], arrays["line_moved"]
+        axis: Literal["rows", "columns"] = "rows" if len(moved) == len(weight) else "columns"
+        importance = Importance((weight,), weight, axis, (peaks,) if peaks.size else ())
+        waves, measured, all_waves = arrays["line_numbers"].tolist()
+        found = cls.of(importance, 0)
+        found.moved, found.risen = moved.copy(), arrays["line_risen"].copy()
+        found.waves, found.measured, found.all_waves = int(waves), measured, all_waves
+        return found
+
+
+@dataclass
+class Effect:
+    """What light of a kind does to the line and its rivals, by a few passes alike."""
+
+    projection: Projection
+    moves: list[Float] = field(default_factory=list)
+    """(lines,) of each pass."""
+    rises: list[Float] = field(default_factory=list)
+    """(blocks, BLOCK / CELL) likewise."""
+
+    def add(self, buffer: PassBuffer) -> None:
+        """One pass more."""
+        self.moves.append(self.projection.moves(buffer.image))
+        if len(self.projection.peaks):
+            self.rises.append(self.projection.rises(buffer.image, np.arange(len(self.projection.peaks))))
+
+    def most(self, without: Effect | None = None) -> float:
+        """The most that the light may well move any line, by its standard error, or add to a peak, over what is
+        allowed; without: less what other passes of the same random numbers do."""
+        moves, rises = np.stack(self.moves), np.stack(self.rises) if self.rises else np.zeros((1, 1))
+        if without is not None:
+            moves = moves - np.stack(without.moves)
+            rises = rises - np.stack(without.rises) if without.rises else rises
+        lit = self.projection.lit
+        moves = np.stack([pooled(one, lit) for one in moves])
+        error = moves.std(axis=0, ddof=1) / math.sqrt(len(moves))
+        moved = (np.abs(moves.mean(axis=0)) + 2.0 * error)[lit]
+        return max(float(moved.max(initial=0.0)), float(rises.mean(axis=0).max(initial=0.0)))
+
+
+def pooled(variance: Float, lit: NDArray[np.bool_]) -> Float:
+    """(lines,) mean over the POOLED lit lines about each."""
+    total = uniform_filter1d(np.where(lit, variance, 0.0), POOLED, mode="constant")
+    return np.asarray(total / np.maximum(uniform_filter1d(lit.astype(np.float64), POOLED, mode="constant"), 1e-9))

@@ -1,0 +1,155 @@
+"""Where the errors of a render matter, by the project's own sensor and line extraction: what the goal in depth asks.
+
+The light so far is developed without noise and measured. What moves a row's position (`analysis.line.influence`) is
+weighed by the goal's share of that row's sigma; elsewhere what counts is by how much light a peak would appear there,
+or the line no longer be the strongest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import correlate1d, median_filter
+
+from analysis.line.detection.matched_filter import BLOCK, NOISE_GAIN, TAPS
+from analysis.line.detection.noise import NoiseModel
+from analysis.line.influence import influence
+from analysis.line.result import Line
+from render.frame import Frame
+from render.importance import CELL, Importance
+from render.scene.settings import DepthGoal
+from render.sensor.develop import Image, expected_electrons
+from render.sensor.response import band_response, joules_per_radiance, laser_response, relative_illumination
+from studio.project.project import Project
+from studio.scan.line_extraction import extract_line, noise_model
+
+Float = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+
+CERTAIN = 3.0
+"""Standard deviations of the render by which a response must stay away from what would change a row."""
+NEAREST = 0.25
+"""Of the detection threshold: where a response is nearer than this to a change, the sensor's noise decides."""
+AROUND = 3.0
+"""Sigmas of a line within which it is itself the peak."""
+
+
+def goal_of(project: Project, threads: int | None = None) -> Callable[[Frame], Importance] | None:
+    """What a render of the project asks (`Run.goal`); None: its goal is the image."""
+    goal = project.render.goal
+    if goal is None:
+        return None
+    return lambda frame: importance(project, goal, frame, threads)
+
+
+def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | None = None) -> Importance:
+    """Of a frame as far as it is known. InputError: as `develop` and `extract`."""
+    scene, sensor = project.scene, project.sensor
+    if frame.truth is None or project.extraction.exposures > 1:
+        # a blur that is left out makes the line sharper, an exposure that is left out brighter: both ask for more
+        sensor = sensor.model_copy(update={"defocus": False})
+        project = project.model_copy(
+            update={"sensor": sensor, "extraction": project.extraction.model_copy(update={"exposures": 1})}
+        )
+    axis = project.extraction.axis
+    illumination = relative_illumination(scene.camera, threads)
+    joule = joules_per_radiance(scene.camera, sensor)
+    bands = _tiled(joule * band_response(sensor).sum(axis=2), illumination)
+    # reflected and ambient light have half of the variance each, where there is both
+    reflected = any(step.computed is not False for step in frame.plan.of("indirect"))
+    both = frame.ambient is not None and reflected
+    allowed = goal.depth * (math.sqrt(0.5) if both else 1.0)
+    lasers, peaks = [], []
+    ambient: Float32 = np.zeros(illumination.shape, np.float32)
+    for i, laser in enumerate(scene.lasers):
+        moved, risen = _weights(project, frame, i, allowed, threads)
+        response = _tiled(joule * laser_response(sensor, laser.wavelength_nm), illumination)
+        lasers.append(moved * response)
+        peaks.append(risen * response)
+        # a whole row counts as one sum there, of which a quarter of its pixels may come near
+        even = risen / math.sqrt(max(0.25 * illumination.shape[1 if axis == "rows" else 0] / CELL, 1.0))
+        ambient = np.maximum(ambient, np.maximum(np.abs(moved), even) * bands)
+    return Importance(tuple(lasers), ambient, axis, tuple(peaks))
+
+
+def _weights(
+    project: Project, frame: Frame, laser: int, allowed: float, threads: int | None
+) -> tuple[Float32, Float32]:
+    """(h, w) how far an electron moves the line over what is allowed, and how far it goes to make or hide a peak."""
+    powers = [one.power if i == laser else 0.0 for i, one in enumerate(project.scene.lasers)]
+    electrons = expected_electrons(frame, project.scene, project.sensor, threads=threads, laser_power=powers)
+    image = _expected_image(project, electrons)
+    noise = noise_model(image, project, laser)
+    line = extract_line(project, image, laser, threads)
+    settings = project.extraction
+    if image.pattern is not None and settings.pattern is None:
+        settings = settings.model_copy(update={"pattern": image.pattern})
+    # of a selection the candidates' method is the one that measured them
+    derivative = influence(image.pixels, line, settings, noise, threads)
+    axis = 1 if line.axis == "rows" else 0
+    sigma = _sigma(line, derivative, electrons, noise, axis)
+    moved = derivative / np.expand_dims(allowed * sigma, axis)
+    risen = _peaks(electrons if axis == 1 else electrons.T, line, noise, settings.threshold, settings.select)
+    return moved.astype(np.float32), np.ascontiguousarray(risen if axis == 1 else risen.T)
+
+
+def _expected_image(project: Project, electrons: Float32) -> Image:
+    """The image of mean electrons (h, w), not quantised."""
+    sensor = project.sensor
+    top, gain = float(2**sensor.bits - 1), sensor.dn_per_electron
+    saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
+    numbers: Any = np.minimum(gain * electrons.astype(np.float64) + sensor.black_level, saturation)
+    pattern = sensor.pattern if sensor.colour == "bayer" else None
+    return Image(
+        numbers, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time
+    )
+
+
+def _sigma(line: Line, derivative: Float32, electrons: Float32, noise: NoiseModel, axis: int) -> Float:
+    """(n,) standard deviation of each scan line's position, px; infinite where there is none."""
+    told = np.where(line.valid, line.sigma_u, np.nan)
+    counted = np.sqrt(np.sum(derivative.astype(np.float64) ** 2 * (electrons + noise.floor), axis=axis))
+    least = np.min(np.where(np.isfinite(told), told, np.inf), axis=1)
+    sigma = np.where(np.isfinite(least), least, counted)
+    return np.where(line.valid.any(axis=1) & (sigma > 0.0), sigma, np.inf)
+
+
+def _peaks(electrons: Float32, line: Line, noise: NoiseModel, threshold: float, select: str) -> Float32:
+    """(n, w) what an electron adds to the matched filter's response, over what may be added without a change."""
+    light = np.asarray(electrons, np.float32)
+    response = correlate1d(light, TAPS.astype(np.float32), axis=1, mode="nearest")
+    n, w = response.shape
+    block = max(1, min(BLOCK, w // 8))
+    means = response[:, : w // block * block].reshape(n, -1, block).mean(axis=2)
+    level = np.repeat(median_filter(means, (1, 7), mode="nearest"), block, axis=1)
+    level = np.pad(level, ((0, 0), (0, w - level.shape[1])), mode="edge")
+    margin = threshold * np.sqrt(NOISE_GAIN * np.maximum(level + noise.floor, 1e-2))
+    height = response - level
+    # alone, the strongest peak is the line, and another one counts only where it would be higher
+    bound = margin.copy()
+    x = np.arange(w)
+    top = np.zeros(n)
+    if select == "strongest" and line.u.shape[1] == 1:
+        seen = line.valid[:, 0]
+        centre = np.clip(np.rint(np.where(seen, line.u[:, 0], 0.0)).astype(np.int64), 0, w - 1)
+        top = np.where(seen, height[np.arange(n), centre], 0.0)
+        bound = np.maximum(bound, top[:, None])
+    away = np.abs(bound - height)
+    for k in range(line.u.shape[1]):
+        rows = np.flatnonzero(line.valid[:, k])
+        reach = AROUND * np.maximum(line.width[rows, k], 1.0)
+        own = np.abs(x - line.u[rows, k][:, None]) <= reach[:, None]
+        away[rows] = np.where(own, np.maximum(top[rows][:, None] - margin[rows], margin[rows]), away[rows])
+    weight = CERTAIN * TAPS[len(TAPS) // 2] / np.maximum(away, NEAREST * margin)
+    return np.asarray(weight, np.float32)
+
+
+def _tiled(response: Float, illumination: Float32) -> Float32:
+    """(h, w) of a (2, 2) response by parity of row and column, times the illumination."""
+    height, width = illumination.shape
+    tiles = np.tile(response, (height // 2 + 1, width // 2 + 1))[:height, :width]
+    return np.asarray(tiles * illumination, np.float32)

@@ -1,0 +1,113 @@
+"""The deviation that passes put the line to, from their spread: against the deviation that they were drawn with."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from render.importance import CELL, Importance
+from render.laser_indirect.connection_buffer import PassBuffer
+from render.laser_indirect.integrator import empty_buffer
+from render.laser_indirect.line_goal import Effect, LineErrors, Projection
+
+HEIGHT, WIDTH = 200, 64
+LINE = slice(28, 36)
+DEVIATION = 0.3
+
+
+def importance(peaks: float = 0.0) -> Importance:
+    """Of a line down the middle of the image: what is left of it pulls to the left, what is right to the right."""
+    weight = np.zeros((HEIGHT, WIDTH), np.float32)
+    weight[:, LINE] = np.linspace(-1.0, 1.0, 8)
+    away = np.full((HEIGHT, WIDTH), peaks, np.float32)
+    away[:, LINE] = 0.0
+    return Importance((weight,), np.abs(weight), "rows", (away,) if peaks else ())
+
+
+def passes(rng: np.random.Generator, common: float = 0.0) -> list[PassBuffer]:
+    """Four passes with independent light in every pixel, and light that all pixels of a row have in common."""
+    buffers = [empty_buffer(HEIGHT * WIDTH) for _ in range(4)]
+    for buffer in buffers:
+        light = 5.0 + DEVIATION * rng.standard_normal((HEIGHT, WIDTH))
+        light[:, : WIDTH // 2] += common * rng.standard_normal((HEIGHT, 1))
+        buffer.image[:] = light.ravel()
+        buffer.touched[:] = True
+    return buffers
+
+
+@pytest.mark.parametrize("common", [0.0, 0.5])
+def test_the_error_is_that_of_the_mean_of_all_passes(common: float) -> None:
+    rng, errors = np.random.default_rng(1), LineErrors.of(importance(), 0)
+    weights = 0.0
+    for size in (1, 1, 2, 4):
+        errors.add(passes(rng, common), weight=float(size), size=float(size))
+        weights += 4.0 * size
+    weight = np.linspace(-1.0, 1.0, 8)
+    one = DEVIATION**2 * np.sum(weight**2) + common**2 * np.sum(weight[:4]) ** 2
+    mean = np.sqrt(one * 4.0 * (1 + 1 + 4 + 16)) / weights
+    # of 25 rows with 12 degrees of freedom the variance is known to 8 %; the error is that of the second row of 100
+    assert mean < errors.error(weights) < mean * 1.15
+
+
+def test_waves_of_before_count_by_those_that_were_measured() -> None:
+    """Projected anew after two waves of four: the two that follow tell of all."""
+    rng, all_of_them, later = np.random.default_rng(2), LineErrors.of(importance(), 0), LineErrors.of(importance(), 0)
+    weights = 0.0
+    for n in range(4):
+        buffers = passes(rng)
+        all_of_them.add(buffers, 1.0, 1.0)
+        later.all_waves += 0.0 if n >= 2 else 4.0
+        if n >= 2:
+            later.add(buffers, 1.0, 1.0)
+        weights += 4.0
+    assert later.all_waves == all_of_them.all_waves == 16.0
+    assert later.error(weights) == pytest.approx(all_of_them.error(weights), rel=0.15)
+
+
+def test_a_bright_dot_where_a_peak_could_appear_is_an_error() -> None:
+    errors = LineErrors.of(importance(peaks=0.1), 0)
+    buffers = [empty_buffer(HEIGHT * WIDTH) for _ in range(4)]
+    errors.add(buffers, 1.0, 1.0)
+    assert errors.error(4.0) == 0.0
+    for row in range(0, HEIGHT, 10):
+        buffers[1].image[row * WIDTH + 7] = 80.0
+        buffers[1].touched[row * WIDTH // 64] = True
+    errors = LineErrors.of(importance(peaks=0.1), 0)
+    errors.add(buffers, 1.0, 1.0)
+    # one of four passes has all of it: the deviation of the mean is the mean itself
+    assert errors.error(4.0) == pytest.approx(0.1 * 80.0 / 4.0, rel=1e-6)
+
+
+def test_what_a_checkpoint_keeps_gives_the_same_error() -> None:
+    rng, errors = np.random.default_rng(3), LineErrors.of(importance(peaks=0.01), 0)
+    errors.add(passes(rng), 1.0, 1.0)
+    again = LineErrors.of_arrays(errors.arrays())
+    buffers = passes(rng)
+    for one in (errors, again):
+        one.add(buffers, 2.0, 2.0)
+    assert again.error(12.0) == errors.error(12.0) > 0.0
+    np.testing.assert_array_equal(again.aim, errors.aim)
+
+
+def test_even_light_has_no_effect_on_the_line_but_a_slope_has() -> None:
+    even, slope = Effect(Projection.of(importance(), 0)), Effect(Projection.of(importance(), 0))
+    columns = np.arange(HEIGHT * WIDTH) % WIDTH
+    for _ in range(4):
+        buffer = empty_buffer(HEIGHT * WIDTH)
+        buffer.image[:] = 3.0
+        even.add(buffer)
+        buffer.image[:] += 0.1 * columns
+        slope.add(buffer)
+    assert even.most() < 1e-5
+    expected = 0.1 * np.sum(np.linspace(-1.0, 1.0, 8) * np.arange(8))
+    assert slope.most() == pytest.approx(expected, rel=1e-5)
+    assert slope.most(without=even) == pytest.approx(expected, rel=1e-5)
+
+
+def test_light_beside_the_line_counts_by_the_peak_that_it_would_be() -> None:
+    effect = Effect(Projection.of(importance(peaks=0.25), 0))
+    for _ in range(4):
+        buffer = empty_buffer(HEIGHT * WIDTH)
+        buffer.image[50 * WIDTH + 8 : 50 * WIDTH + 8 + CELL] = 2.0
+        effect.add(buffer)
+    assert effect.most() == pytest.approx(0.25 * 2.0 * CELL)
