@@ -39,6 +39,22 @@ class Checkpoint(Protocol):
         """Hold on to the sums of a part, which change from then on."""
 
 
+class Memory:
+    """What a frame leaves to those after it, which would find the same: the last value of each part of the light."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, tuple[object, Any, Any]] = {}
+
+    def recall(self, part: str, world: object, made_of: Any) -> Any:
+        """The value of a part that was made in the very same world, of the equal; None: there is none."""
+        kept = self._kept.get(part)
+        return kept[2] if kept is not None and kept[0] is world and kept[1] == made_of else None
+
+    def keep(self, part: str, world: object, made_of: Any, value: object) -> None:
+        """Of a part as of now, in place of the one before."""
+        self._kept[part] = world, made_of, value
+
+
 def never() -> bool:
     return False
 
@@ -65,6 +81,8 @@ class Run:
     """Time for the light of a frame, each group with its share; it ends then, whatever its errors. None: no end."""
     checkpoint: Checkpoint | None = None
     """What to go on from, and what keeps the sums under way."""
+    memory: Memory | None = None
+    """What frames before this one left: the same value for all frames of a scan. None: each is by itself."""
     deadline: Deadline = Deadline()  # noqa: RUF009, it has no end and does not change
     """Of the frame under way, which `render.progressive` begins from `seconds`."""
     later: int = 0
@@ -104,6 +122,15 @@ class Run:
         """Hold on to the sums of this part."""
         if self.checkpoint is not None:
             self.checkpoint.keep(self.part, sums)
+
+    def recall(self, part: str, world: object, made_of: Any) -> Any:
+        """As `Memory.recall`."""
+        return None if self.memory is None else self.memory.recall(part, world, made_of)
+
+    def leave(self, part: str, world: object, made_of: Any, value: object) -> None:
+        """As `Memory.keep`."""
+        if self.memory is not None:
+            self.memory.keep(part, world, made_of, value)
 
     def until_over(self, images: Callable[[Run], Iterator[Item]]) -> Iterator[Item]:
         """images(run), whose run the end of the time cancels as well, though not before there is a first image.

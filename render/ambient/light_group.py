@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from render.ambient.integrator import AmbientImage, ambient_images
-from render.ambient.measured_light import measured_images
+from render.ambient.measured_light import measured_images, seen_from
 from render.ambient.transport_plan import (
     DARK,
     LAMPS,
@@ -70,13 +70,21 @@ class AmbientLight(LightGroup[AmbientPlan]):
         self, placed: PlacedScene, settings: RenderSettings, plan: AmbientPlan, frame: Frame, run: Run
     ) -> Iterator[Estimate]:
         """(h, w, 3) radiance in the bands R, G, B; to the goal of the frame's importance, where it has one."""
-        most, importance = settings.ambient_samples, frame.importance
+        most, importance, target = settings.ambient_samples, frame.importance, settings.ambient_error
         how: dict[str, Any] = {"most": most, "surfaces": plan.surfaces, "clamp": settings.clamp}
 
         def images(part: Run) -> Iterator[AmbientImage]:
             if importance is not None:
-                return measured_images(placed, importance, **how, run=part)
-            return ambient_images(placed, target=settings.ambient_error, **how, run=part)
+                yield from measured_images(placed, importance, **how, run=part)
+                return
+            made_of = seen_from(placed, target, *how.values(), run.seed)
+            kept = run.recall(self.field, placed.world, made_of)
+            if kept is not None:
+                yield kept
+                return
+            for image in ambient_images(placed, target=target, **how, run=part):
+                yield image
+            run.leave(self.field, placed.world, made_of, image)
 
         for image in replace(run, part="ambient").until_over(images):
             yield Estimate(image.radiance, (quality_of(image, settings),))

@@ -18,6 +18,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.ambient.coarse_image import CoarseImage
 from render.ambient.integrator import CONVERGENCE
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
@@ -30,6 +31,8 @@ Int = NDArray[np.int32]
 
 MARGIN = 1.3
 """By which the variance of a scan line is to be less than allowed: it is known to about a sixth only."""
+COARSE_SHARE = 0.05
+"""Of what a scan line may be off, by the error of the coarse image in one pixel: where it is less, that is enough."""
 AROUND = 3
 """Pixels on each side of those with weight that are sampled as well, so that what a lens blurs into them is no mere
 interpolation."""
@@ -53,10 +56,11 @@ class Band:
     """(h, w) of each pixel in `pixels`, -1: it is none of them."""
 
 
-def band_of(importance: Importance) -> Band:
-    """Where the ambient light matters."""
-    weight = importance.ambient
-    wide = weight > 0.0
+def band_of(importance: Importance, coarse: CoarseImage) -> Band:
+    """Where the error of the coarse image would matter."""
+    weight = np.abs(importance.ambient)
+    wide = weight * coarse.radiance.max(axis=2) * coarse.error > COARSE_SHARE
+    weight = np.where(wide, weight, np.float32(0.0))
     for _ in range(AROUND):
         grown = wide.copy()
         grown[1:] |= wide[:-1]
@@ -74,8 +78,6 @@ def band_of(importance: Importance) -> Band:
 
 def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, run: Run) -> None:
     """Samples of the band until each scan line meets the goal, or `most` are spent. Raises Cancelled."""
-    if not len(band.pixels):
-        return
     for level in range(1, PILOT + 1):
         film.add(paths, band.pixels, np.full((len(band.pixels), 2), level, np.int32), run.between(0.0, 0.3))
     for _ in range(PASSES):

@@ -39,20 +39,29 @@ def measured_images(
         raise ValueError(f"weights {importance.ambient.shape} of an image of {camera.height} x {camera.width}")
     paths = camera_paths(placed.world, placed.scene, view, surfaces=surfaces, clamp=clamp, seed=run.seed)
     budget = most * camera.width * camera.height
-    coarse = coarse_image(paths, camera.height, budget, run.between(0.0, 0.5))
-    film, band = PixelSamples(camera.width, camera.height), band_of(importance)
-    if not len(band.pixels):
-        yield _image(coarse, film, band)
-        return
+    made_of = seen_from(placed, most, surfaces, clamp, run.seed)
+    coarse: CoarseImage | None = run.recall("coarse ambient", placed.world, made_of)
+    if coarse is None:
+        coarse = coarse_image(paths, camera.height, budget, run.between(0.0, 0.5))
+        run.leave("coarse ambient", placed.world, made_of, coarse)
+    film, band = PixelSamples(camera.width, camera.height), band_of(importance, coarse)
     yield _image(coarse, film, band, begun=False)
-    sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
+    if len(band.pixels):
+        sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
     yield _image(coarse, film, band)
+
+
+def seen_from(placed: PlacedScene, *settings: object) -> tuple[object, ...]:
+    """All that the ambient light depends on besides the world, with the settings of its render: not the lasers."""
+    scene = placed.scene
+    return scene.camera, placed.T_world_camera.tobytes(), scene.lights, scene.environment, *settings
 
 
 def _image(coarse: CoarseImage, film: PixelSamples, band: Band, *, begun: bool = True) -> AmbientImage:
     """The coarse image with the band in it, once that has been sampled."""
     radiance, error, total = coarse.radiance, float("nan"), coarse.samples + film.total
     if begun:
+        # whoever shows the first image still holds it
         radiance = radiance.copy()
         radiance.reshape(-1, 3)[band.pixels] = film.means(band.pixels).mean(axis=1)
         deviations = line_deviations(film, band)

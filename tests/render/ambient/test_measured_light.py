@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from render.ambient.coarse_image import COARSE_ERROR, coarse_image
+from render.ambient.coarse_image import COARSE_ERROR, CoarseImage, coarse_image
 from render.ambient.guided_interpolation import SEEN, grid_of, interpolate, smooth_grid
 from render.ambient.integrator import ambient_images
 from render.ambient.light_group import AmbientLight
@@ -17,16 +17,20 @@ from render.ambient.measured_light import measured_images
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
 from render.ambient.transport_plan import LAMPS, AmbientPlan
+from render.base.pose import Pose
 from render.frame import Frame
 from render.importance import Importance
 from render.plan import GroupQuality
-from render.run import Run
+from render.run import Memory, Run
+from render.scene.lights import Environment
 from render.scene.settings import RenderSettings
 from render.world.placed import PlacedScene
 from tests.render.ambient.test_ambient_error import box_on_a_wall
+from tests.render.scenes import paper_laser
 
+DARK = Frame(0, (), None, (), None)
 SEEDS = 30
-REFERENCE_SAMPLES = 1024
+REFERENCE_SAMPLES = 256
 """Of each half."""
 
 
@@ -48,7 +52,8 @@ def many_bands():
     scene, world = box_on_a_wall()
     placed = PlacedScene(world, scene)
     width, height = scene.camera.width, scene.camera.height
-    band = band_of(Importance((), band_weights(height, width, 20.0)))
+    even = CoarseImage(np.ones((height, width, 3), np.float32), 1.0, 8, 1, 0, 0, 0.0)
+    band = band_of(Importance((), band_weights(height, width, 20.0)), even)
     images, samples = [], []
     for seed in range(SEEDS):
         film = PixelSamples(width, height)
@@ -167,8 +172,9 @@ def test_threads_do_not_change_a_bit(axis):
 def test_where_nothing_matters_all_is_coarse_and_weights_of_another_image_are_refused():
     scene, world = box_on_a_wall()
     placed, shape = PlacedScene(world, scene), (scene.camera.height, scene.camera.width)
-    (only,) = measured_images(placed, Importance((), np.zeros(shape, np.float32)))
-    assert only.error == 0.0 and only.coarse_error > 0.0
+    first, last = measured_images(placed, Importance((), np.zeros(shape, np.float32)))
+    assert last.error == 0.0 and last.coarse_error > 0.0 and last.samples == first.samples
+    assert np.array_equal(first.radiance, last.radiance)
     with pytest.raises(ValueError, match="weights"):
         next(measured_images(placed, Importance((), np.zeros((3, 4), np.float32))))
 
@@ -180,13 +186,79 @@ def test_no_more_samples_are_spent_than_are_allowed():
     assert image.samples <= 2.0 and image.error > 1.0
 
 
+def test_what_the_coarse_image_knows_well_enough_is_not_sampled():
+    scene, world = box_on_a_wall()
+    placed, shape = PlacedScene(world, scene), (scene.camera.height, scene.camera.width)
+    weight = np.full(shape, 0.01, np.float32)
+    weight[:, 40:50] = -20.0
+    _, image = measured_images(placed, Importance((), weight))
+    _, band_alone = measured_images(placed, Importance((), np.where(weight < 0.0, -weight, np.float32(0.0))))
+    assert np.array_equal(image.radiance, band_alone.radiance) and image.samples == band_alone.samples
+
+
+def test_the_next_frame_has_what_the_lasers_do_not_change():
+    scene, world = box_on_a_wall()
+    weight = band_weights(scene.camera.height, scene.camera.width, 20.0)
+    # the line is elsewhere in the second frame
+    frames = [Importance((), np.roll(weight, shift, axis=1)) for shift in (0, 20)]
+
+    def rendered(importance, run):
+        start = world.rays.rays
+        *_, image = measured_images(PlacedScene(world, scene), importance, run=run)
+        return image, world.rays.rays - start
+
+    apart = [rendered(one, Run()) for one in frames]
+    run = Run(memory=Memory())
+    together = [rendered(one, run) for one in frames]
+    for (alone, _), (image, _) in zip(apart, together, strict=True):
+        assert np.array_equal(image.radiance, alone.radiance) and image.error == alone.error
+    # the first makes the coarse image, for which a ray a pixel tells what is seen; the second has it
+    assert together[0][1] == apart[0][1]
+    assert apart[1][1] - together[1][1] > weight.size
+
+
+def with_rig(scene, **changes):
+    return scene.model_copy(update={"rig": scene.rig.model_copy(update=changes)})
+
+
+@pytest.mark.parametrize("changed", ["laser", "lamp", "camera", "world", "seed"])
+def test_an_image_is_taken_over_from_the_frame_before_only_where_it_would_be_the_same(changed):
+    scene, world = box_on_a_wall()
+    scene = with_rig(scene, lasers=(paper_laser(),))
+    plan, settings, run = AmbientPlan((LAMPS,)), RenderSettings(ambient_samples=8), Run(memory=Memory())
+
+    def image(world, scene, run):
+        start = world.rays.rays
+        *_, last = AmbientLight().estimates(PlacedScene(world, scene), settings, plan, DARK, run)
+        return last.value, last.quality, world.rays.rays - start
+
+    first = image(world, scene, run)
+    other, elsewhere, later = scene, world, run
+    match changed:
+        case "laser":
+            other = with_rig(scene, lasers=(paper_laser(power=0.5, wavelength_nm=450.0),))
+        case "lamp":
+            other = scene.model_copy(update={"environment": Environment(radiance=(0.2, 0.3, 0.5))})
+        case "camera":
+            aside = scene.camera.model_copy(update={"T_rig_camera": Pose(translation=(0.01, 0.0, 0.0))})
+            other = with_rig(scene, camera=aside)
+        case "world":
+            elsewhere = box_on_a_wall()[1]
+        case "seed":
+            later = replace(run, seed=1)
+    again, alone = image(elsewhere, other, later), image(elsewhere, other, replace(later, memory=None))
+    assert np.array_equal(again[0], alone[0]) and again[1] == alone[1] and alone[2] > 0
+    assert again[2] == (0 if changed == "laser" else alone[2])
+    assert np.array_equal(again[0], first[0]) == (changed in ("laser", "world"))
+
+
 def test_a_frame_that_knows_what_matters_is_rendered_to_that():
     scene, world = box_on_a_wall()
     weight = band_weights(scene.camera.height, scene.camera.width, 20.0)
-    dark = replace(Frame(0, (), None, (), None), importance=Importance((), weight))
+    aimed = replace(DARK, importance=Importance((), weight))
     plan, settings = AmbientPlan((LAMPS,)), RenderSettings(ambient_samples=64)
     placed = PlacedScene(world, scene)
-    *_, last = AmbientLight().estimates(placed, settings, plan, dark, Run())
+    *_, last = AmbientLight().estimates(placed, settings, plan, aimed, Run())
     (quality,) = last.quality
     assert isinstance(quality, GroupQuality) and quality.reached and quality.of == "line" and quality.target == 0.1
     assert 0.0 < quality.coarse_error <= COARSE_ERROR
