@@ -61,20 +61,24 @@ MOST_BYTES = 2**36
 def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: Scene | None = None) -> Cloud:
     """Valid points of one laser and step; errors are NaN without `errors`. "row" is the scan line.
 
+    With `errors` the systematic sigmas hold, beside the calibration, the bias that the truth predicts of the sheet's
+    own width, as one standard deviation; of photographs nobody knows it.
     With a scene whose objects move, x, y, z are carried back to step 0, so that the clouds of all steps fit together.
     """
     here = points.valid
     xyz = points.world[here] if scene is None else at_first_step(points.world[here], scene, step)
     count = len(xyz)
     nan = np.full(count, np.nan)
+    sheet = np.zeros(count) if errors is None else np.nan_to_num(errors.sheet_bias[here])
+    gradient = points.gradient[here]
     return {
         "x": xyz[:, 0].copy(),
         "y": xyz[:, 1].copy(),
         "z": xyz[:, 2].copy(),
         "sigma_random": points.sigma[here],
-        "sigma_systematic": points.sigma_systematic[here],
+        "sigma_systematic": np.hypot(points.sigma_systematic[here], np.linalg.norm(gradient, axis=1) * sheet),
         "sigma_depth_random": points.sigma_depth[here],
-        "sigma_depth_systematic": points.sigma_depth_systematic[here],
+        "sigma_depth_systematic": np.hypot(points.sigma_depth_systematic[here], gradient[:, 2] * sheet),
         "correlation_length": points.correlation_length[here],
         "error_depth": nan if errors is None else errors.depth[here],
         "error_distance": nan if errors is None else errors.distance[here],

@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING, Lines, smoothed_covariances, smoothing_correlation
-from analysis.line.detection.detect import SEED_COLUMNS, Limits, detect
+from analysis.line.detection.detect import PRIOR_BEND, PRIOR_SLOPE, SEED_COLUMNS, Limits, detect
 from analysis.line.detection.matched_filter import response_gain
 from analysis.line.methods.blais_rioux import measure_zero_crossing
 from analysis.line.methods.centre_of_mass import measure_centroid
@@ -18,7 +19,8 @@ from analysis.line.methods.gaussian_fit import LEAST_SQUARES, LIKELIHOOD, measur
 from analysis.line.methods.half_energy import measure_half_energy
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.phase import measure_phase
-from analysis.line.methods.seed_loop import COLUMNS, ROOM, Options, Pixels, seed_kernel
+from analysis.line.methods.seed_loop import COLUMNS, CORRELATION_LENGTH, ROOM, WIDTH_SLOPE, Options, Pixels, seed_kernel
+from analysis.line.methods.shared_width import width_priors
 from analysis.line.methods.steger_2d import HALO, NORMAL_CENTROID, RIDGE, fill_gaps, measure_ridge
 from analysis.line.methods.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, measure_three_pixels
 from analysis.line.methods.threshold import SUBTRACTED, WHOLE, measure_above_threshold
@@ -92,25 +94,41 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
         judge=judge,
     )
 
-    shared = smoothed_covariances(lines.noise, settings.smoothing)
-    scattering = shared, lines.noise.table, lines.noise.fineness, 1.0 / correlation[0] ** 0.5
+    light = smoothed_covariances(lines.noise, settings.smoothing)
+    scattering = light, lines.noise.table, lines.noise.fineness, 1.0 / correlation[0] ** 0.5
 
-    def work(start: int, stop: int) -> None:
+    def work(start: int, stop: int, priors: NDArray[np.float64] | None = None) -> None:
+        again = np.ones(stop - start, np.bool_) if priors is None else priors[start:stop].any(axis=(1, 2))
+        if not again.any():
+            return
         first, last = max(0, start - halo), min(lines.count, stop + halo)
         signal, mask, floor = lines.read(first, last)
         own = slice(start - first, stop - first)
         seeds = np.empty((stop - start, settings.peaks, SEED_COLUMNS))
-        detect(signal[own], mask[own], floor[own], limits, seeds, flags[start:stop])
+        found = np.empty((stop - start, settings.peaks), np.uint8)
+        detect(signal[own], mask[own], floor[own], limits, seeds, found)
+        if priors is not None:
+            seeds[..., PRIOR_SLOPE : PRIOR_BEND + 1] = priors[start:stop]
         if halo and (mask & MISSING).any():
             signal = fill_gaps(signal, mask)
         room = np.full((ROOM, signal.shape[1]), np.nan)  # what is read before it is written shows
         pixels = Pixels(signal, mask, floor, correlation, own.start, room, *scattering)
-        run(pixels, seeds, flags[start:stop], options, out[start:stop])
+        measured = np.empty((stop - start, settings.peaks, COLUMNS))
+        run(pixels, seeds, found, options, measured)
+        out[start:stop][again], flags[start:stop][again] = measured[again], found[again]
 
     map_chunks(work, lines.count, TALL_CHUNK if halo else CHUNK, threads)
+    if not options.known_width:
+        shared = [width_priors(out[:, k, WIDTH_SLOPE : WIDTH_SLOPE + 2]) for k in range(settings.peaks)]
+        if any(one is not None for one in shared):
+            none = np.zeros((lines.count, 2))
+            priors = np.stack([none if one is None else one for one in shared], axis=1)
+            map_chunks(lambda start, stop: work(start, stop, priors), lines.count, CHUNK, threads)
     # a position that says less than a guess along the whole scan line is none
     lost = out[..., 1] > lines.image.shape[1] / np.sqrt(12.0)
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
-    u, sigma_u, width, amplitude, background, chi2, length = (np.ascontiguousarray(out[..., j]) for j in range(COLUMNS))
+    u, sigma_u, width, amplitude, background, chi2, length = (
+        np.ascontiguousarray(out[..., j]) for j in range(CORRELATION_LENGTH + 1)
+    )
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
     return replace(line, correlation_length=length)

@@ -91,7 +91,7 @@ class _Rows:
     def __init__(self, lines: Lines, line: Line) -> None:
         signal, mask, floor = lines.read(0, lines.count)
         u, width, height = line.u[:, 0], line.width[:, 0], line.amplitude[:, 0]
-        whole = line.flag[:, 0] == Flag.OK
+        whole = np.isin(line.flag[:, 0], (Flag.OK, Flag.SPECKLED))
         if whole.any():
             whole &= line.chi2[:, 0] < STRAY * np.median(line.chi2[whole, 0])
         runs = lines.count // RUN

@@ -44,9 +44,11 @@ class Flag(IntEnum):
     """Two lines closer than they can be told apart; the position is that of the brighter one."""
     MISFIT = 14
     """The profile is not that of a line, nor of two; sigma_u holds what that may cost."""
+    SPECKLED = 15
+    """A few grains of speckle make up the line, and one may be taken for all of it; sigma_u is up to 40 % small."""
 
 
-CAUTIOUS = (Flag.SATURATED, Flag.UNRESOLVED, Flag.BLENDED, Flag.MISFIT)
+CAUTIOUS = (Flag.SATURATED, Flag.UNRESOLVED, Flag.BLENDED, Flag.MISFIT, Flag.SPECKLED)
 """Flags of positions that the model of a line on level ground does not hold for; sigma_u says what that costs."""
 
 

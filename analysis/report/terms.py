@@ -12,6 +12,8 @@ from analysis.report.units import NONE, count, micrometres, percent
 TERM_COLUMNS = ("n", "predicted sigma", "true RMSE", "within ±1 sigma", "within ±2 sigma")
 MEANS = (10, 100)
 """Neighbouring scan lines."""
+LEAST = 0.1
+"""Of the noise; a bias below it is not worth a row."""
 
 
 def term_tables(report: ReportInput) -> list[tuple[str, list[tuple[str, list[str]]]]]:
@@ -24,8 +26,10 @@ def term_tables(report: ReportInput) -> list[tuple[str, list[tuple[str, list[str
 
 
 def term_rows(rows: Rows) -> list[tuple[str, list[str]]]:
-    """Noise of one point, of means over neighbours, the calibration, and a point's noise and calibration together."""
+    """Noise of one point, of means over neighbours, the calibration, what the truth predicts of the sheet's own width,
+    and all that a point's error is made of together."""
     error, random, systematic = rows["depth"], rows["sigma_depth"], rows["sigma_systematic"]
+    sheet = np.abs(rows["sheet_bias"]) * rows["pixel_depth"]
     where = rows["index"], rows["rank"]
     told = [("each point: noise", _cells(error, random))]
     for number in MEANS:
@@ -36,6 +40,11 @@ def term_rows(rows: Rows) -> list[tuple[str, list[str]]]:
         known = systematic[np.isfinite(error) & np.isfinite(systematic)]
         told.append(("calibration, common to all", [count(len(known)), micrometres(_rms(known)), *[NONE] * 3]))
         told.append(("noise and calibration", _cells(error, np.hypot(random, systematic))))
+    if _rms(np.nan_to_num(sheet)) > LEAST * _rms(np.nan_to_num(random)):
+        known = sheet[np.isfinite(error) & np.isfinite(sheet)]
+        told.append(("sheet's own width, from the truth", [count(len(known)), micrometres(_rms(known)), *[NONE] * 3]))
+        all_of_it = np.hypot(np.hypot(random, systematic), np.nan_to_num(sheet))
+        told.append(("noise, calibration and sheet", _cells(error, all_of_it)))
     return told
 
 
@@ -54,4 +63,4 @@ def _cells(error: np.ndarray, sigma: np.ndarray) -> list[str]:
 
 
 def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -64,6 +65,19 @@ def test_only_points_with_coordinates_are_kept():
     assert len(columns["x"]) == 60
     assert np.isfinite(columns["x"]).all()
     assert np.array_equal(columns["row"], points.index[points.valid])
+
+
+def test_what_the_truth_predicts_of_the_sheet_is_systematic_and_of_photographs_nothing_is():
+    points = some_points(70)
+    bias = np.where(np.arange(70) % 2 == 0, np.nan, 0.3)
+    nothing = np.full(70, np.nan)
+    errors = SimpleNamespace(sheet_bias=bias, depth=nothing, distance=nothing)
+    told, alone = cloud(points, errors, 0, 0), cloud(points, None, 0, 0)
+    moved = 0.3 * np.abs(points.gradient[points.valid])
+    unknown = np.isnan(bias[points.valid])
+    np.testing.assert_allclose(told["sigma_depth_systematic"], np.where(unknown, 0.0, moved[:, 2]))
+    np.testing.assert_allclose(told["sigma_systematic"], np.where(unknown, 0.0, np.linalg.norm(moved, axis=1)))
+    assert not alone["sigma_systematic"].any() and not alone["sigma_depth_systematic"].any()
 
 
 def test_other_programs_read_the_ply(tmp_path):

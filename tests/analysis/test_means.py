@@ -64,3 +64,20 @@ def test_the_report_tells_cover_by_term():
         "mean of 10 scan lines: noise",
         "mean of 100 scan lines: noise",
     ]
+
+
+def test_the_report_tells_what_the_sheet_adds_where_it_matters():
+    rows = np.zeros(4000, ROW)
+    rng = np.random.default_rng(3)
+    rows["index"], rows["alike"], rows["sigma_depth"], rows["pixel_depth"] = np.arange(4000), 1.0, 3e-5, 1e-3
+    rows["sheet_bias"] = np.where(np.arange(4000) < 2000, 0.1, np.nan)  # px, 100 um
+    rows["depth"] = rng.normal(0.0, 3e-5, 4000) + 1e-3 * np.nan_to_num(rows["sheet_bias"])
+    told = dict(term_rows(rows))
+    number, size = told["sheet's own width, from the truth"][:2]
+    assert number.split() == ["2", "000"] and size.split() == ["100", "µm"]
+    cells = dict(zip(TERM_COLUMNS, told["noise, calibration and sheet"], strict=True))
+    assert float(cells["within ±2 sigma"].split()[0]) == pytest.approx(
+        97.7, abs=0.7
+    )  # half of them always, half 95.4 %
+    rows["sheet_bias"] *= 0.01
+    assert "noise, calibration and sheet" not in dict(term_rows(rows))

@@ -31,10 +31,11 @@ Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-CENTRE, WIDTH, AMPLITUDE, BACKGROUND, REACH, PLATEAU, SLOPE, SLOPE_SIGMA = range(8)
+CENTRE, WIDTH, AMPLITUDE, BACKGROUND, REACH, PLATEAU, SLOPE, SLOPE_SIGMA, PRIOR_SLOPE, PRIOR_BEND = range(10)
 """Columns of a seed: px, px, e-, e-, px half-way to the nearest other peak, half width in px of a saturated plateau;
-slope of the background along the scan line and its standard deviation, e-/px."""
-SEED_COLUMNS = 8
+slope of the background along the scan line and its standard deviation, e-/px; k and q of a prior exp(k s + q s^2) of a
+narrow line's width s, 0 where nothing is known (`methods.shared_width`)."""
+SEED_COLUMNS = 10
 
 NEIGHBOUR = 0.05
 """Fraction of a peak's response from which another peak limits its window of pixels."""
@@ -165,7 +166,7 @@ def _measure(
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: Array, flags: Mask) -> None:
-    """Scan lines (n, w) in electrons -> seeds (n, k, 8) and flags (n, k), strongest first.
+    """Scan lines (n, w) in electrons -> seeds (n, k, 10) and flags (n, k), strongest first.
 
     floor (n, w) or (n, 1): variance of a pixel without signal, e-^2.
     """
@@ -224,4 +225,5 @@ def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: A
             if slope != 0.0:  # on it the blocks' median is the level beside the line
                 flags[y, taken] = _measure(line, response, mask[y], pixel, beside, dark, limits, seed)
             seed[SLOPE], seed[SLOPE_SIGMA] = slope, slope_sigma
+            seed[PRIOR_SLOPE], seed[PRIOR_BEND] = 0.0, 0.0
             taken += 1

@@ -11,12 +11,30 @@ import math
 import numpy as np
 from numba import njit
 
-from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, REACH, SLOPE, WIDTH
+from analysis.line.detection.detect import (
+    AMPLITUDE,
+    BACKGROUND,
+    CENTRE,
+    PLATEAU,
+    PRIOR_BEND,
+    PRIOR_SLOPE,
+    REACH,
+    SLOPE,
+    WIDTH,
+)
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE, profile
 from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
-from analysis.line.methods.narrow_line import NARROWEST, posterior
+from analysis.line.methods.narrow_line import NARROWEST, WIDEST, posterior
 from analysis.line.methods.scintillation import position_variance, shared_variance
-from analysis.line.methods.seed_loop import CORRELATION_LENGTH, Array, Options, Pixels, peak_kernel
+from analysis.line.methods.seed_loop import (
+    CORRELATION_LENGTH,
+    WIDTH_BEND,
+    WIDTH_SLOPE,
+    Array,
+    Options,
+    Pixels,
+    peak_kernel,
+)
 from analysis.line.methods.two_lines import UNKNOWNS
 from analysis.line.methods.window import slope_variance
 from analysis.line.result import Flag
@@ -31,6 +49,12 @@ NARROWEST_SATURATED = 0.35
 COARSE, RESOLVED, FINE = 0.5, 0.3, 0.35
 """px; a narrower line than the first, whose width may as well be below the second (2 sigma), is not a matter of a fit;
 if it is also narrower than the third on average over what its width may be, it is flagged."""
+GLOW, GLOW_BESIDE, GLOW_WIDTH = 0.005, 3.0, 4.0
+"""What a lens may put beside a saturated line, where nobody sees it: height of the peak, in sigmas its place and width.
+Taken as given, since the wings cannot tell it."""
+SPECKLED = 0.06
+"""px; variance by scintillation over the line's width from which few grains make up a line: an expansion in their
+contrast no longer holds. By seeded trials of f/5.6 to f/11 on lines of 0.8 to 4 px."""
 JUDGED = 0.01
 """Relative variance of the light from which no fit is judged: what scintillates strongly keeps to no profile."""
 
@@ -228,14 +252,18 @@ def _is_coarse(pixel: Array, n: int, p: Array, options: Options, hessian: Array)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _measure_narrow(pixels: Pixels, pixel: Array, n: int, p: Array, options: Options, shape: Array, out: Array) -> int:
-    """The posterior of a line that may be too narrow for its pixels (4, n) -> out (6,); returns UNRESOLVED if it is."""
+def _measure_narrow(
+    pixels: Pixels, pixel: Array, n: int, p: Array, seed: Array, options: Options, shape: Array, out: Array
+) -> int:
+    """The posterior of a line that may be too narrow for its pixels (4, n) -> out (9,); returns UNRESOLVED if it is."""
     x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
-    out[1] = posterior(x, y, floor, n, p, options.known_width, options.integrated, shape)
+    width = seed[PRIOR_SLOPE : PRIOR_BEND + 1].copy()
+    out[1] = posterior(pixel, n, p, options.known_width, options.integrated, shape, width)
     if not math.isfinite(p[1]) or not math.isfinite(out[1]):
         out[:] = np.nan
         return Flag.NOT_CONVERGED.value
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
+    out[WIDTH_SLOPE], out[WIDTH_BEND] = width[0], width[1]
     chi2 = mass = 0.0
     light, weight = np.empty(n), np.empty(n)
     for i in range(n):
@@ -280,6 +308,25 @@ def _asymmetry(pixel: Array, n: int, p: Array, held: bool, shape: Array, hessian
     return float(moment / math.sqrt(square)) if square > 0.0 else 0.0
 
 
+@njit(nogil=True, cache=True, error_model="numpy")
+def _widen_saturated(x: Array, n: int, p: Array, weight: Array, chi2: float, plateau: float, out: Array) -> None:
+    """What the wings of a saturated line cannot know -> sigma in out: the glow beside its hidden peak, and a misfit.
+
+    weight (n,): how far the centre moves for one electron more in the pixels x (n,). plateau: half its width, px, which
+    the line is within. That of a line that hardly reaches its neighbours is anywhere within a pixel.
+    """
+    moved = 0.0
+    for side in (-1.0, 1.0):
+        shift = 0.0
+        for i in range(n):
+            z = (x[i] - p[1] - side * GLOW_BESIDE * p[2]) / (GLOW_WIDTH * p[2])
+            shift += weight[i] * GLOW * p[0] * math.exp(-0.5 * z * z)
+        moved = max(moved, abs(shift))
+    coarse = 1.0 / 12.0 if p[2] < COARSE else 0.0
+    moved = min(moved, plateau / math.sqrt(3.0))
+    out[1] = math.sqrt(out[1] * out[1] * max(chi2, 1.0) + moved * moved + coarse)
+
+
 @peak_kernel
 def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
     """Peak kernel (`seed_loop`). options.variant: LEAST_SQUARES or LIKELIHOOD. chi2 only for independent pixels."""
@@ -308,8 +355,8 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     if flag == Flag.OK.value and min(p[2], seed[WIDTH]) < COARSE:
         if not converged:
             p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
-        if not converged or _is_coarse(pixel, count, p, options, hessian):
-            return _measure_narrow(pixels, pixel, count, p, options, shape, out)
+        if not converged or seed[PRIOR_BEND] < 0.0 or _is_coarse(pixel, count, p, options, hessian):
+            return _measure_narrow(pixels, pixel, count, p, seed, options, shape, out)
     independent = pixels.correlation.shape[0] == 1
     scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
     # of a line below half a pixel three pixels hold all the light, which two lines would explain as well; and what
@@ -340,12 +387,20 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     light = trial_shape[0]
     for i in range(count):
         light[i] = p[0] * shape[0, i]
-    noise, out[CORRELATION_LENGTH] = position_variance(
+    noise, out[CORRELATION_LENGTH], speckled = position_variance(
         pixels, weight, pixel[VARIANCE], light, pixel[POSITION], count, p[2], False
     )
     out[1] = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], count))
     if independent:
         out[5] = chi2 / (count - 4)
+    if flag == Flag.SATURATED.value:
+        _widen_saturated(pixel[POSITION], count, p, weight, chi2 / max(count - 4, 1), seed[PLATEAU], out)
+    elif likelihood and not options.known_width and p[2] < WIDEST:
+        unit[1], unit[2] = 0.0, 1.0
+        if _solve(hessian, 0.0, unit, factor, row):
+            out[WIDTH_SLOPE], out[WIDTH_BEND] = p[2] / row[2], -0.5 / row[2]
+    if flag == Flag.OK.value and speckled > SPECKLED * p[2]:
+        return Flag.SPECKLED.value
     if not judged:
         return flag
     for i in range(count):

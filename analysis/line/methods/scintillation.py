@@ -69,15 +69,18 @@ def shared_variance(
 @njit(nogil=True, cache=True, error_model="numpy")
 def position_variance(
     pixels: Pixels, weight: Array, variance: Array, light: Array, x: Array, n: int, width: float, measured: bool
-) -> tuple[float, float]:
-    """px^2 of a position by all noise, and the scan lines that err alike; arguments as in `shared_variance`."""
+) -> tuple[float, float, float]:
+    """px^2 of a position by all noise, the scan lines that err alike, and px^2 by scintillation alone.
+
+    Arguments as in `shared_variance`.
+    """
     count = linear_variance(weight, variance, x, n, pixels.correlation)
     if pixels.covariances.shape[1] == 0:
-        return count, pixels.alike
+        return count, pixels.alike, 0.0
     shared, all_lines = shared_variance(weight, light, x, n, pixels.covariances, pixels.fineness, width, measured)
     grown = (SECOND_ORDER_MEASURED if measured else SECOND_ORDER) * shared / (width * width + PIXEL)
     shared, all_lines = shared * (1.0 + grown), all_lines * (1.0 + grown)
-    return count + shared, (count * pixels.alike + all_lines) / max(count + shared, 1e-300)
+    return count + shared, (count * pixels.alike + all_lines) / max(count + shared, 1e-300), shared
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -88,6 +91,6 @@ def write_sigma(
     light = np.empty(n)
     for i in range(n):
         light[i] = pixels.signal[y, int(x[i])] - seed[BACKGROUND] - seed[SLOPE] * (x[i] - seed[CENTRE])
-    spread, length = position_variance(pixels, weight, variance, light, x, n, seed[WIDTH], True)
+    spread, length, _ = position_variance(pixels, weight, variance, light, x, n, seed[WIDTH], True)
     out[CORRELATION_LENGTH] = length
     return math.sqrt(spread)

@@ -2,10 +2,10 @@
 
     measure(pixels, y, seed, flag, options, out) -> flag
 
-pixels holds the scan line y and those around it, seed (8,) where `detect` saw a peak and how wide and high it is, flag
-what it said of it (OK or SATURATED). The kernel writes out (7,): u, sigma_u, width, amplitude, background, chi2,
-correlation length, NaN where it has none, and returns the flag that the peak keeps. An out without a position stays
-NaN.
+pixels holds the scan line y and those around it, seed (10,) where `detect` saw a peak and how wide and high it is, flag
+what it said of it (OK or SATURATED). The kernel writes out (9,): u, sigma_u, width, amplitude, background, chi2,
+correlation length, and what the pixels of a narrow line say of its width (`shared_width`), NaN where it has none, and
+returns the flag that the peak keeps. An out without a position stays NaN.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-COLUMNS = 7
+COLUMNS = 9
 """Of out."""
-CORRELATION_LENGTH = 6
-"""The last of them: scan lines."""
+CORRELATION_LENGTH, WIDTH_SLOPE, WIDTH_BEND = 6, 7, 8
+"""The last of them: scan lines; k and q of exp(k s + q s^2), what the pixels of a narrow line say of its width s."""
 ROOM = 11
 """Scan lines of scratch that a method may use."""
 
@@ -81,7 +81,7 @@ peak_kernel = register_jitable(error_model="numpy", forceinline=True)
 
 @cache
 def seed_kernel(measure: Callable[..., int]) -> Callable[[Pixels, Array, Mask, Options, Array], None]:
-    """The kernel of one peak -> that of all seeds (n, k, 8): flags (n, k) are updated, out (n, k, 7) is written."""
+    """The kernel of one peak -> that of all seeds (n, k, 10): flags (n, k) are updated, out (n, k, 9) is written."""
 
     @njit(nogil=True, cache=True, error_model="numpy")
     def run(pixels: Pixels, seeds: Array, flags: Mask, options: Options, out: Array) -> None:

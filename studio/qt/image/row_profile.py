@@ -36,6 +36,7 @@ CAUTIONS = {
     Flag.UNRESOLVED: "narrower than its pixels",
     Flag.BLENDED: "two lines in one",
     Flag.MISFIT: "not the profile of a line",
+    Flag.SPECKLED: "made up of few speckle grains",
 }
 
 

@@ -1,4 +1,5 @@
-"""A scan line's result depends on nothing but its own pixels: not on the rows before it, nor on what memory held."""
+"""A scan line's result depends on nothing but its own pixels, and of a narrow line on the width that its neighbours on
+either side have: not on the order of the rows, nor on what memory held."""
 
 from __future__ import annotations
 

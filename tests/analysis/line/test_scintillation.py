@@ -14,6 +14,7 @@ from analysis.line.detection.channel import smoothed_covariances
 from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
+from analysis.line.result import Flag
 from analysis.line.settings import ExtractionSettings
 from render.sensor.speckle import speckle
 from tests.analysis.line.line_images import expected
@@ -96,6 +97,13 @@ def test_shot_noise_is_no_scintillation():
         assert noise.scintillation == ()
         assert noise.gain == pytest.approx(0.1, rel=0.15)
         assert 0.93 - CHANCE < cover(extract(image), centre, 2.0) < 0.97 + CHANCE
+
+
+@pytest.mark.parametrize(("kind", "flagged"), [((11.0, False), True), (COARSE, False), (0.2, False)])
+def test_a_line_of_few_grains_is_flagged(kind, flagged):
+    image, _ = scintillating(kind, 400, 4.0, seed=10)
+    flags = extract(image, noise=known_noise(kind)).flag
+    assert (np.mean(flags == Flag.SPECKLED) > 0.85) if flagged else (np.mean(flags == Flag.SPECKLED) <= 0.02)
 
 
 @pytest.mark.parametrize("signal", [300.0, 3000.0])

@@ -123,6 +123,44 @@ def test_lines_that_do_not_part_are_flagged_and_their_sigma_holds_the_distance()
     assert within(np.mean(error[blended] < 2 * line.sigma_u[blended, 0]), 0.93, 1.0 - 1e-9, blended.sum())
 
 
+@pytest.mark.parametrize("overexposure", [3.0, 10.0, 30.0])
+@pytest.mark.parametrize("sigma", [2.0, 8.0])
+def test_sigma_of_a_saturated_line_holds_a_glow_beside_it(overexposure, sigma):
+    """Half a percent of the peak, 3 sigmas beside: 0.03 to 0.6 px that the wings, at chi-square 1, did not tell."""
+    halo = Trouble(overexposure=overexposure, halo=0.005)
+    line, centre = measured(halo, 1000.0, sigma, ROWS, seed=12)
+    found = coverage(line, centre)
+    assert (line.flag[line.valid] == Flag.SATURATED).all()
+    assert within(found.two, 0.93, 1.0 - 1e-9, found.count)
+    assert found.sigma < 3.0 * found.rms
+
+
+def test_rows_share_the_width_that_each_hardly_tells():
+    """Each row on its own left a line of 0.4 px and 300 e- at 0.78 of the bound's efficiency."""
+    rows = 3000
+    for sigma, least in ((0.4, 1.0), (0.45, 1.0), (0.5, 0.97)):
+        image, centre, noise = photographed(PLAIN, 300.0, sigma, rows, seed=13)
+        line = extract(image, noise=noise)
+        error = (line.u - centre[:, None])[line.valid]
+        bound = cramer_rao(300.0, sigma, READ_NOISE, BACKGROUND)  # of a width that is unknown to each
+        assert bound**2 / np.mean(error**2) > least * (1 - 3 * np.sqrt(2 / rows))
+        assert holds(coverage(line, centre))
+
+
+def test_a_row_of_another_width_keeps_its_own():
+    rng = np.random.default_rng(14)
+    wide = np.arange(600) % 20 == 7
+    centre = 60 + rng.uniform(-0.5, 0.5, 600)
+    mean = np.where(wide[:, None], expected(121, centre, 1000.0, 0.48, 10.0), expected(121, centre, 1000.0, 0.3, 10.0))
+    line = extract((rng.poisson(mean) + rng.normal(0, READ_NOISE, mean.shape)).astype(np.float32), noise=electrons(2.5))
+    assert np.median(line.width[wide]) == pytest.approx(0.48, abs=0.03)
+    assert np.median(line.width[~wide]) == pytest.approx(0.3, abs=0.02)
+    inside = np.abs(line.u[:, 0] - centre) < 2 * line.sigma_u[:, 0]
+    assert within(inside[wide].mean(), 0.93, 0.97, wide.sum()) and within(
+        inside[~wide].mean(), 0.93, 0.98, (~wide).sum()
+    )
+
+
 def test_a_line_on_level_ground_is_hardly_ever_taken_for_anything_else():
     rows = 3000
     for signal in (100.0, 10000.0):
