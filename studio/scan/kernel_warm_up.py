@@ -1,23 +1,30 @@
 """Compiles every kernel, or loads it from its cache, by asking of tiny scenes what the program asks of large ones.
 
 That takes most of a minute where the cache is empty, a second where it is not. It happens once in the life of the
-program, step by step on a thread of its own: whoever waits can be cancelled at once, which a compiler cannot.
+program, step by step on a thread of its own: whoever waits can be cancelled at once, which a compiler cannot. Where the
+cache is empty, a process of its own compiles the kernels of the last step meanwhile, which here are then only loaded.
 """
 
 from __future__ import annotations
 
+import atexit
 import gc
+import os
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, wait
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from render.base.errors import Cancelled
+from render.base.kernel_cache import ROOT, kept_in
 from render.base.pose import Pose
-from render.base.threads import Cancel
+from render.base.threads import Cancel, thread_count
 from render.camera.camera import Camera, Lens
 from render.laser.laser import LineLaser
 from render.material.material import Conductor, Emitter, Glass, Material, Subsurface
@@ -49,14 +56,21 @@ WAX = Subsurface(mean_free_path=0.01, scattering_albedo=0.5)
 SENSOR = Sensor(efficiency=(SpectralCurve(wavelength_nm=(400.0, 700.0), value=(0.5, 0.5)),))
 
 
+BESIDE = "light"
+"""The step that another process compiles: half of all kernels, and the last that are needed."""
+
 _ends: dict[str, Future[None]] = {}
+_helper: subprocess.Popen[bytes] | None = None
 _lock = threading.Lock()
 
 
 def begin(steps: Iterable[str]) -> None:
     """Start on some of STEPS, after those that were started before."""
+    global _helper
     for name in steps:
         with _lock:
+            if not _ends:
+                _helper = _start_helper()
             if name not in _ends:
                 _ends[name] = Future()
                 before = list(_ends.values())[:-1]
@@ -89,12 +103,58 @@ def _run(name: str, before: list[Future[None]]) -> None:
     # a compiler leaves much garbage, and looking for it as often as usual takes a tenth of its time
     gc.set_threshold(*COLLECTED)
     try:
+        if name == BESIDE:
+            _wait_for_helper()
         STEPS[name](_program_ends)
+        if name == BESIDE:
+            _mark()
         _ends[name].set_result(None)
     except BaseException as error:
         _ends[name].set_exception(error)
     finally:
         gc.set_threshold(*thresholds)
+
+
+def _compiled() -> Path:
+    """The file that says that the kernels of BESIDE have been compiled into the cache."""
+    return Path(kept_in(), f"{BESIDE}.compiled")
+
+
+def _mark() -> None:
+    with suppress(OSError):
+        _compiled().touch()
+
+
+def _start_helper() -> subprocess.Popen[bytes] | None:
+    """Begin to compile in another process; None: it is done already, or that process could not hand anything over."""
+    folder = _compiled().parent
+    if _compiled().exists() or thread_count(None) < 2:
+        return None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            return None
+        path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+        helper = subprocess.Popen(
+            [sys.executable, "-m", "studio.scan.kernel_warm_up"],
+            env=os.environ | {"PYTHONPATH": path},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+    except OSError:  # no more processes or memory: it is compiled here
+        return None
+    atexit.register(helper.kill)
+    return helper
+
+
+def _wait_for_helper() -> None:
+    """Until the other process has ended; it is ended where nobody is left to wait. What it left undone is done here."""
+    while _helper is not None and _helper.poll() is None:
+        if _program_ends():
+            _helper.kill()
+        with suppress(subprocess.TimeoutExpired):
+            _helper.wait(LOOK_SECONDS)
 
 
 def _program_ends() -> bool:
@@ -211,3 +271,8 @@ STEPS: dict[str, Callable[[Cancel], None]] = {
     "scan": scan,
     "light": light,
 }
+
+
+if __name__ == "__main__":
+    gc.set_threshold(*COLLECTED)
+    STEPS[BESIDE](lambda: False)

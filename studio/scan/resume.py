@@ -31,11 +31,14 @@ def frame_of_step(scan: Scan, world: World, step: int) -> tuple[Frame, RenderSta
     what was done is kept in a file.
     """
     project = scan.rendered
-    path = None if scan.options.frames == "none" else saved_path(scan.begun.folder, step)
+    path = saved_path(scan.begun.folder, step)
     mark = None if scan.plan is None else scan.plan.mark
-    state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path, plan=mark)
+    if scan.options.frames == "none":
+        state = RenderState({})  # nothing goes on from it, and all triangles would be hashed for its marks
+    else:
+        state = state_of(world, project.scene, project.render, step=step, seed=project.seed, path=path, plan=mark)
     if scan.options.resume:
-        found = None if path is not None and path.is_file() else _found(scan, world, step, state)
+        found = None if path.is_file() else _found(scan, world, step, state)
         if found is not None:
             scan.refined(found)
             return found, state

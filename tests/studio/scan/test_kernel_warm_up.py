@@ -136,3 +136,52 @@ def test_what_is_broken_is_told_to_all_who_wait(monkeypatch):
         with pytest.raises(RuntimeError, match="damaged"):
             kernel_warm_up.warm_up(("broken",), lambda stage, done: None, lambda: False)
     kernel_warm_up._ends.pop("broken", None)
+
+
+@pytest.fixture
+def empty_cache(monkeypatch, tmp_path):
+    """A program that has compiled nothing yet, and does so in no time; what it did, in order."""
+    done = []
+    monkeypatch.setattr(kernel_warm_up, "kept_in", lambda: str(tmp_path / "kernels"))
+    monkeypatch.setattr(kernel_warm_up, "thread_count", lambda threads: 2)
+    monkeypatch.setattr(kernel_warm_up, "_ends", {})
+    monkeypatch.setattr(kernel_warm_up, "_helper", None)
+    for name in ("draw", "light"):
+        monkeypatch.setitem(kernel_warm_up.STEPS, name, lambda cancelled, name=name: done.append(name))
+    return done
+
+
+def warm(*names: str) -> None:
+    kernel_warm_up.warm_up(names, lambda stage, done: None, lambda: False)
+
+
+@pytest.mark.parametrize("code", ["", "raise SystemExit(1)"])
+def test_where_nothing_is_compiled_another_process_begins_at_the_other_end(empty_cache, monkeypatch, code) -> None:
+    """The last step waits for it, and does itself what it left undone; the next start needs it no more."""
+    started, start = [], subprocess.Popen
+
+    def helper(command, **options):
+        started.append(command)
+        return start([sys.executable, "-c", f"import time; time.sleep(0.3); {code}"], **options)
+
+    monkeypatch.setattr(subprocess, "Popen", helper)
+    for _ in range(2):
+        warm("draw", "light")
+        assert kernel_warm_up._helper is None or kernel_warm_up._helper.poll() is not None
+        kernel_warm_up._ends.clear()
+    assert len(started) == 1 and started[0][1:] == ["-m", "studio.scan.kernel_warm_up"]
+    assert empty_cache == ["draw", "light"] * 2
+
+
+def test_no_process_is_started_that_could_not_hand_anything_over(empty_cache, monkeypatch, tmp_path) -> None:
+    (tmp_path / "kernels").write_text("a file where the folder would be")
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("it cannot write there"))
+    warm("draw", "light")
+    assert empty_cache == ["draw", "light"]
+
+
+def test_on_one_processor_everything_is_compiled_here(empty_cache, monkeypatch) -> None:
+    monkeypatch.setattr(kernel_warm_up, "thread_count", lambda threads: 1)
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("there is no processor for it"))
+    warm("draw", "light")
+    assert empty_cache == ["draw", "light"]
