@@ -319,6 +319,27 @@ def budget(project: Path | None, **options: Any) -> None:
     budget_project(project, **options)
 
 
+@cli.command()
+@PROJECT
+@click.option("--out", type=click.Path(path_type=Path), help="Write the cheaper project there, if it is proved.")
+@click.option(
+    "--within",
+    type=FiniteRange(0.1, 50.0),
+    default=3.0,
+    show_default=True,
+    metavar="PERCENT",
+    help="By which depth bias, sigma and completeness may change.",
+)
+@click.option("--seeds", type=click.IntRange(3, 10_000), default=8, show_default=True, help="Fresh ones, of a proof.")
+@repeating
+def advise(project: Path | None, **options: Any) -> None:
+    """No more than a scene needs: a cheaper project that is proved to measure depth alike. Default: the sample."""
+    _require_system()
+    from studio.commands.advise import advise_project
+
+    advise_project(project, **options)
+
+
 @cli.group()
 def study() -> None:
     """Many runs with one question: speed against accuracy, where a method breaks; as a table and charts."""
