@@ -84,11 +84,12 @@ def _print(found: Advice, question: Question, project: Project) -> None:
 
 def _sentence(proof: Proof, asked: str) -> str:
     found, parts = proof.found, ", ".join(f"{part.name} {part.change}" for part in proof.parts)
-    within = f"within {asked}" if proof.holds else f"not shown to be within {asked}"
+    within = f"within {asked}" if proof.alike else f"not shown to be within {asked}"
+    pays = "" if proof.holds or not proof.alike else ", which is not worth a change"
     return (
         f"{parts}: on {len(proof.seeds)} fresh seeds bias changes by {_percent(found.bias)}, sigma by "
         f"{_percent(found.sigma)}, completeness by {_percent(found.completeness)} (95 % intervals), {within}; "
-        f"{found.seconds:.3g} s in place of {found.seconds_before:.3g} s a frame."
+        f"{found.seconds:.3g} s in place of {found.seconds_before:.3g} s a frame{pays}."
     )
 
 

@@ -77,13 +77,18 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
     errors = [values_of(found, sweep.measure) for found in groups.values()]
     times = [seconds_of(found, sweep.time) for found in groups.values()]
     spots = tuple(
-        Spot(point, method, mean_interval(error), float(np.median(time)))
+        Spot(point, method, mean_interval(error), _median(time[np.isfinite(error)]))
         for (point, method), error, time in zip(groups, errors, times, strict=True)
     )
     front = bootstrapped_front(times, errors) if sweep.chart == "speed" and spots else None
     return Answer(
         sweep, spots, front, _broken(study, number, bases, rows, groups), _budgets(sweep, study, bases, groups)
     )
+
+
+def _median(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else float("nan")
 
 
 def _budgets(sweep: Sweep, study: Study, bases: Mapping[str, Project], groups: Groups) -> tuple[ErrorBudget, ...]:
