@@ -167,8 +167,8 @@ def run(context: click.Context, /, project: Path | None, root: Path | None, **op
     if project is not None and project.suffix.lower() in (".html", ".htm"):
         from studio.commands.run_report import run_report
 
-        told = click.core.ParameterSource.COMMANDLINE
-        chosen = [name for name in options if context.get_parameter_source(name) is told]
+        given = click.core.ParameterSource.COMMANDLINE
+        chosen = [name for name in options if context.get_parameter_source(name) is given]
         run_report(project, root, chosen, **options)
         return
     from studio.commands.commands import run_project
@@ -324,6 +324,20 @@ def budget(project: Path | None, **options: Any) -> None:
     from studio.commands.budget import budget_project
 
     budget_project(project, **options)
+
+
+@cli.command()
+@PROJECT
+@click.option("--out", type=click.Path(path_type=Path), help="Write the cheaper project there, if it is proved.")
+@click.option("--within", type=FiniteRange(0.1, 50.0), default=3.0, help="Percent that depth may change  [default: 3].")
+@click.option("--seeds", type=click.IntRange(3, 10_000), default=8, show_default=True, help="Fresh ones, of a proof.")
+@repeating
+def advise(project: Path | None, **options: Any) -> None:
+    """No more than a scene needs: a cheaper project that is proved to measure depth alike. Default: the sample."""
+    _require_system()
+    from studio.commands.advise import advise_project
+
+    advise_project(project, **options)
 
 
 @cli.group()

@@ -64,8 +64,13 @@ def knee(cost: Float, error: Float) -> int | None:
 def bootstrapped_front(costs: Sequence[Float], errors: Sequence[Float], seed: int = 0) -> Front:
     """Repeats of each way, (repeats,) costs and errors -> the front of median cost and mean error.
 
-    The repeats of a way are drawn anew with replacement, cost and error together. Source: Efron (1979).
+    A repeat that measured nothing, NaN, is left out with its cost, as it is of the interval of the mean; a way of which
+    none measured anything is not on the front. The repeats of a way are drawn anew with replacement, cost and error
+    together. Source: Efron (1979).
     """
+    usable = [np.isfinite(cost) & np.isfinite(error) for cost, error in zip(costs, errors, strict=True)]
+    costs = [np.asarray(one)[here] for one, here in zip(costs, usable, strict=True)]
+    errors = [np.asarray(one)[here] for one, here in zip(errors, usable, strict=True)]
     generator = np.random.Generator(np.random.Philox(seed))
     cost = np.array([_or_nan(np.median, one) for one in costs])
     error = np.array([_or_nan(np.mean, one) for one in errors])

@@ -17,7 +17,7 @@ from studio.study.cells import Point, measured_along, methods_of, search_of
 from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
 from studio.study.store import Row
 from studio.study.study import Study, Sweep, with_fields
-from studio.study.tables import grouped, seconds_of, values_of
+from studio.study.tables import grouped, rays_of, seconds_of, values_of
 
 Groups = dict[tuple[Point, str], list[Row]]
 
@@ -31,6 +31,8 @@ class Spot:
     measure: Interval
     seconds: float
     """Median processor seconds of the frame, or of its line."""
+    rays: float = float("nan")
+    """Median of the same in million rays of the machine's own."""
 
 
 @dataclass(frozen=True)
@@ -76,14 +78,20 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
     groups = grouped(study, bases, rows, number)
     errors = [values_of(found, sweep.measure) for found in groups.values()]
     times = [seconds_of(found, sweep.time) for found in groups.values()]
+    units = [rays_of(found, sweep.time) for found in groups.values()]
     spots = tuple(
-        Spot(point, method, mean_interval(error), float(np.median(time)))
-        for (point, method), error, time in zip(groups, errors, times, strict=True)
+        Spot(point, method, mean_interval(error), _median(time[np.isfinite(error)]), _median(unit[np.isfinite(error)]))
+        for (point, method), error, time, unit in zip(groups, errors, times, units, strict=True)
     )
     front = bootstrapped_front(times, errors) if sweep.chart == "speed" and spots else None
     return Answer(
         sweep, spots, front, _broken(study, number, bases, rows, groups), _budgets(sweep, study, bases, groups)
     )
+
+
+def _median(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else float("nan")
 
 
 def _budgets(sweep: Sweep, study: Study, bases: Mapping[str, Project], groups: Groups) -> tuple[ErrorBudget, ...]:

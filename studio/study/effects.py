@@ -25,7 +25,7 @@ MOST_LIGHT = 1e4
 """Electrons where shot noise is off, over those where it is on: its variance is relatively so many times smaller."""
 FINER = 3.0
 """The errors that a render without its own noise is asked for are so many times smaller."""
-ROUNDER = 4
+ROUNDER = 3
 """Facets where they are off: so many times as many a direction."""
 
 

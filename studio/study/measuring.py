@@ -13,6 +13,7 @@ from studio.notebook.frame import render
 from studio.notebook.measuring import compare, develop, extract, triangulate
 from studio.project.project import Project
 from studio.study.measures import MEASURES, measures
+from studio.study.ray_units import RAY_SPEED, rays_per_second
 
 Row = tuple[str, dict[str, Any], dict[str, float]]
 
@@ -54,12 +55,13 @@ def measure_task(task: Task) -> list[Row]:
             points = triangulate(line)
             found = measures(line, points, compare(points, frame))
         except InputError as error:
-            rows.append((key, _nothing(str(error)), {"seconds_render": rendering}))
+            rows.append((key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
             continue
         seconds = {
             "seconds_render": rendering,
             "seconds_develop": developed - started,
             "seconds_extract": extracted - developed,
+            RAY_SPEED: rays_per_second(),
         }
         rows.append((key, {**found, "reason": ""}, seconds))
     return rows
@@ -71,6 +73,7 @@ def _nothing(reason: str) -> dict[str, Any]:
 
 def warm_up(project: Project) -> None:
     """Compile or load the kernels that measuring takes, so that no cell's seconds hold them."""
+    rays_per_second()
     small = project.model_copy(update={"render": project.render.model_copy(update={"laser_error": 0.3})})
     frame = render(small, image_scale=0.05, threads=1)
     for _ in range(2):

@@ -109,7 +109,7 @@ def columns(answer: Answer) -> list[str]:
     """Headings of `table`, after those of the fields and the method."""
     measure = MEASURES[answer.sweep.measure]
     unit = f" ({measure.unit})" if measure.unit else ""
-    columns = [f"{measure.label}{unit}", "95 % interval", "repeats", "time (s)"]
+    columns = [f"{measure.label}{unit}", "95 % interval", "repeats", "time (s)", "time (million rays)"]
     return [*columns, "on the front"] if answer.front is not None else columns
 
 
@@ -119,7 +119,12 @@ def table(answer: Answer) -> list[list[str]]:
     for number, spot in enumerate(answer.spots):
         one = spot.measure
         row: list[Any] = [*map(shown, spot.point), method_name(spot.method), _number(one.mean * scale)]
-        row += [f"{_number(one.low * scale)} to {_number(one.high * scale)}", one.count, _number(spot.seconds)]
+        row += [
+            f"{_number(one.low * scale)} to {_number(one.high * scale)}",
+            one.count,
+            _number(spot.seconds),
+            _number(spot.rays),
+        ]
         if answer.front is not None:
             row.append(f"{answer.front.member_probability[number]:.0%}")
         rows.append([str(cell) for cell in row])

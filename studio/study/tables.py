@@ -17,10 +17,13 @@ from render.base.files import atomic_write
 from studio.project.project import Project
 from studio.study.cells import Cell, Point, cells_at, measured_along, methods_of, points
 from studio.study.measures import MEASURES
+from studio.study.ray_units import MILLION, RAY_SPEED
 from studio.study.store import Row
 from studio.study.study import Study
 
 SECONDS = ("seconds_render", "seconds_develop", "seconds_extract")
+RAY_UNITS = "ray_units"
+"""Of times.csv: million rays that the machine could have traced in the frame's seconds."""
 
 
 def measured_cells(
@@ -55,7 +58,7 @@ def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows:
     columns: dict[str, list[Any]] = {
         name: [] for name in ("sweep", "key", "method", "repeat", "seed", *fields, *MEASURES, "reason")
     }
-    times: dict[str, list[Any]] = {name: [] for name in ("key", *SECONDS)}
+    times: dict[str, list[Any]] = {name: [] for name in ("key", *SECONDS, RAY_UNITS)}
     cells = (measured_cells(study, number, bases, rows) for number in range(len(study.sweeps)))
     for cell, row in chain.from_iterable(cells):
         sweep = study.sweeps[cell.sweep]
@@ -67,9 +70,10 @@ def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows:
             else:
                 column.append(said[name] if name in said else values.get(name) if name in fields else row.get(name))
         for name, column in times.items():
-            column.append(cell.key if name == "key" else row.get(name, math.nan))
+            value = rays_of([row], "frame")[0] if name == RAY_UNITS else row.get(name, math.nan)
+            column.append(cell.key if name == "key" else value)
     tables = {"table": pa.table({k: _typed(v, k in MEASURES) for k, v in columns.items()})}
-    tables["times"] = pa.table({k: _typed(v, k in SECONDS) for k, v in times.items()})
+    tables["times"] = pa.table({k: _typed(v, k != "key") for k, v in times.items()})
     written = []
     for name, suffix in (("table", "csv"), ("table", "parquet"), ("times", "csv")):
         write = pyarrow.csv.write_csv if suffix == "csv" else pyarrow.parquet.write_table
@@ -105,6 +109,12 @@ def seconds_of(rows: list[Row], time: str) -> np.ndarray:
     """(repeats,) processor seconds: of the whole "frame", or of finding the "line"."""
     parts = SECONDS if time == "frame" else SECONDS[-1:]
     return np.array([sum(row.get(part, math.nan) for part in parts) for row in rows])
+
+
+def rays_of(rows: list[Row], time: str) -> np.ndarray:
+    """(repeats,) million rays that the machine traces in that time, so that two machines compare."""
+    speed = np.array([row.get(RAY_SPEED, math.nan) for row in rows], dtype=np.float64)
+    return seconds_of(rows, time) * speed / MILLION
 
 
 def values_of(rows: list[Row], name: str) -> np.ndarray:

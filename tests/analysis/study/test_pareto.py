@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.study.intervals import mean_interval
 from analysis.study.pareto import bootstrapped_front, front, knee
 
 INF = float("inf")
@@ -62,3 +63,13 @@ def test_membership_of_two_equal_ways_is_decided_by_chance_and_of_a_clear_one_is
     assert found.member_probability[2] == 1.0
     assert found.member_probability[:2].sum() == pytest.approx(1.0, abs=0.02)
     assert np.array_equal(found.member_probability, bootstrapped_front(costs, errors).member_probability)
+
+
+def test_a_repeat_that_measured_nothing_is_left_out_as_it_is_of_the_interval() -> None:
+    costs = [np.array([1.0, 1.0, 90.0]), np.full(3, 2.0), np.full(3, 3.0)]
+    errors = [np.array([5.0, 5.0, np.nan]), np.full(3, 4.0), np.full(3, np.nan)]
+    found = bootstrapped_front(costs, errors)
+    without = bootstrapped_front([costs[0][:2], costs[1], np.empty(0)], [errors[0][:2], errors[1], np.empty(0)])
+    assert found.member.tolist() == without.member.tolist() == [True, True, False]
+    assert found.member_probability.tolist() == [1.0, 1.0, 0.0]
+    assert mean_interval(errors[0]).mean == 5.0
