@@ -54,18 +54,21 @@ def resolution(camera: Camera, plane: Float, pixels: Float, direction: tuple[flo
 
 
 def line_width_px(
-    camera: Camera, laser: LineLaser, T_camera_laser: Float, lit: Lit, pixels: Float, rows: bool
+    camera: Camera, laser: LineLaser, T_camera_laser: Float, normal: Float, point: Float, pixels: Float, rows: bool
 ) -> Float:
-    """(n,) sigma, px, of the line's image across the scan line: the sheet's Gaussian on each point's own facet."""
+    """(n,) sigma, px, of the line's image across the scan line: the sheet's Gaussian on each point's own facet.
+
+    normal, point: (n, 3) of the facet, camera frame; pixels: (n, 2) where its line is.
+    """
     T_laser_camera = invert(T_camera_laser)
-    offset = np.einsum("ij,ij->i", lit.normal, lit.curve.point)
+    offset = np.einsum("ij,ij->i", normal, point)
     slopes = []
     for direction in ((1.0, 0.0), (0.0, 1.0)):
         q = []
         for sign in (-HALF, HALF):
             rays, _ = camera.rays(pixels + sign * np.asarray(direction))
             with np.errstate(divide="ignore", invalid="ignore"):
-                on_facet = rays * (offset / np.einsum("ij,ij->i", lit.normal, rays))[:, None]
+                on_facet = rays * (offset / np.einsum("ij,ij->i", normal, rays))[:, None]
             local = transform_points(T_laser_camera, on_facet)
             with np.errstate(divide="ignore", invalid="ignore"):
                 q.append(local[:, 0] / laser.sigma(local[:, 2]))

@@ -28,6 +28,7 @@ from render.sensor.response import laser_response
 from render.world.material_checks import check_materials, scene_warnings
 from render.world.placement_checks import check_placement
 from render.world.world import build_world
+from studio.preview.estimates import line_width_px
 from studio.project.project import Project
 
 Float = NDArray[np.float64]
@@ -39,6 +40,8 @@ PROBE_REFLECTED = 0.3
 """The same of reflected light."""
 WORKING_DISTANCES = np.geomspace(0.01, 100.0, 4001)
 NARROW_PX, WIDE_PX = 0.5, 6.0
+SHOWN_PX = 0.45
+"""Sigma below which a line's second moment in an image depends on where between the pixels it lies."""
 BROADEST_PX = 100.0
 """Light this broad is no line; its width is not followed farther."""
 DIM_ELECTRONS = 100.0
@@ -167,7 +170,7 @@ def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: F
         working_farthest=farthest,
         depth_per_px=depth_px,
         along_line_per_px=along_px,
-        width_px=float(np.median(width[light > 0.0])) if np.any(light > 0.0) else None,
+        width_px=_width(project, frame, i, width[light > 0.0]),
         light_electrons=float(np.median(light)) if some else None,
         peak_electrons=float(np.median(peak)) if some else None,
         peak_electrons_most=float(peak.max()) if some else None,
@@ -175,6 +178,47 @@ def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: F
         ambient_saturated=_saturated_along(curve, ambient, project.sensor.full_well),
         steepest_view=float(max(curve.camera_angle.max(), curve.laser_angle.max())) if some else None,
     )
+
+
+def _width(project: Project, frame: Frame, i: int, seen: Float) -> float | None:
+    """The line's median sigma, px: as the image has it, or where pixels are too coarse to show it, on the surface.
+
+    seen: of the image. A line within a pixel has no second moment there, and one between two has that of their step.
+    """
+    if len(seen) == 0:
+        return None
+    width = float(np.median(seen))
+    scene, curve = project.scene, frame.curves[i]
+    if width >= SHOWN_PX or len(curve.index) < 2:
+        return width
+    T_camera_laser = scene.T_camera_laser(i)
+    pair = (curve.position, curve.index) if curve.axis == "rows" else (curve.index, curve.position)
+    pixels = np.stack(pair, axis=1).astype(np.float64)
+    normal = _facets(curve, T_camera_laser[:3, 3])
+    known = line_width_px(
+        scene.camera, scene.lasers[i], T_camera_laser, normal, curve.point, pixels, curve.axis == "rows"
+    )
+    known = known[np.isfinite(known)]
+    return float(np.median(known)) if len(known) else width
+
+
+def _facets(curve: LaserCurve, origin: Float) -> Float:
+    """(n, 3) unit normals, camera frame, by their angles to camera (at 0) and laser.
+
+    Two normals have them, mirrored in the plane of both directions; the one perpendicular to the line is taken.
+    """
+    to_camera, to_laser = -curve.point, origin - curve.point
+    a = to_camera / np.linalg.norm(to_camera, axis=1, keepdims=True)
+    b = to_laser / np.linalg.norm(to_laser, axis=1, keepdims=True)
+    cosine = np.einsum("ij,ij->i", a, b)
+    cos_a, cos_b, apart = np.cos(curve.camera_angle), np.cos(curve.laser_angle), np.maximum(1.0 - cosine**2, 1e-12)
+    along_a, along_b = (cos_a - cosine * cos_b) / apart, (cos_b - cosine * cos_a) / apart
+    within = along_a[:, None] * a + along_b[:, None] * b
+    out = np.cross(a, b) / np.sqrt(apart)[:, None]
+    out *= np.sqrt(np.maximum(1.0 - np.einsum("ij,ij->i", within, within), 0.0))[:, None]
+    tangent = np.gradient(curve.point, axis=0)
+    first, second = (np.abs(np.einsum("ij,ij->i", within + sign * out, tangent)) for sign in (1.0, -1.0))
+    return np.asarray(within + np.where(first <= second, 1.0, -1.0)[:, None] * out)
 
 
 def _between_rays(points: Float, origin: Float) -> float:

@@ -109,7 +109,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         return known
     pixels = estimates.line_pixels(lit)
     depth = estimates.resolution(camera, plane, pixels, across)[:, 2]
-    width = estimates.line_width_px(camera, source, T_camera_laser, lit, pixels, rows)
+    width = estimates.line_width_px(camera, source, T_camera_laser, lit.normal, curve.point, pixels, rows)
     ambient = estimates.ambient_electrons(look, lit, pixels) + sensor.dark_current * sensor.exposure_time
     amplitude = estimates.line_electrons(camera, source, sensor, lit, pixels)
     peak = amplitude * estimates.pixel_share(curve.position, width) + ambient

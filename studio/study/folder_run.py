@@ -13,7 +13,6 @@ from studio.runtime.console import StageProgress
 from studio.scan.folder_lock import hold
 from studio.study.answers import Answer, answers
 from studio.study.cells import Cell, cells_at, check_size, next_cells
-from studio.study.page import write_page
 from studio.study.runner import Engine, run_study
 from studio.study.store import Row, Store, described
 from studio.study.study import Study
@@ -87,6 +86,8 @@ def run_into(
         finally:
             found = found_in(study, bases, store.rows())
             grew(found)
+        from studio.study.page import write_page
+
         progress("writing tables and charts", 1.0)
         write_tables(folder, study, bases, found.rows)
         write_page(folder, study, bases, found.rows)

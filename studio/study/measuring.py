@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from render.base.errors import InputError
+from render.base.threads import Cancel
 from studio.notebook.frame import render
 from studio.notebook.measuring import compare, develop, extract, triangulate
 from studio.project.project import Project
@@ -30,17 +31,17 @@ class Task:
     """Key and project, JSON, of each."""
 
 
-def measure_task(task: Task) -> list[Row]:
+def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
     """Rows of a task's cells: key, measures, processor seconds. One thread: the caller shares tasks out.
 
-    A cell that cannot be measured (nothing to see, an image of nothing) is a row of NaN with the `reason`; the rest
-    of a study goes on.
+    cancelled: asked often; then Cancelled, without rows. A cell that cannot be measured (nothing to see, an image of
+    nothing) is a row of NaN with the `reason`; the rest of a study goes on.
     """
     rows: list[Row] = []
     projects = [Project.from_text(text).in_folder(Path(task.folder)) for _, text in task.cells]
     before = time.process_time()
     try:
-        frame = render(projects[0], image_scale=task.image_scale, threads=1)
+        frame = render(projects[0], image_scale=task.image_scale, threads=1, cancelled=cancelled)
     except InputError as error:
         return [(key, _nothing(str(error)), {}) for key, _ in task.cells]
     rendering = time.process_time() - before

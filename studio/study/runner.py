@@ -8,10 +8,13 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from multiprocessing.synchronize import Event
 from typing import Any
 
 from render.base.errors import Cancelled, InputError
-from render.base.threads import thread_count
+from render.base.threads import Cancel, thread_count
+from render.run import never
 from studio.study.cells import WHOLE, Shard, next_cells
 from studio.study.measuring import Task, measure_task, tasks, warm_up
 from studio.study.store import Store
@@ -42,14 +45,14 @@ def run_study(
     engine: Engine = Engine(),
     shard: Shard = WHOLE,
     progress: Progress = lambda done, known: None,
-    cancelled: Callable[[], bool] = lambda: False,
+    cancelled: Cancel = lambda: False,
 ) -> None:
     """Measure what is missing. Every task's rows are kept as it ends, so that nothing is lost or done twice.
 
     InputError: a field, value or base that does not fit, told before anything runs; workers that are lost again and
     again. Cancelled: so asked; what has been measured is kept.
     """
-    with _workers(study, bases, engine) as (submit, together):
+    with _workers(bases, engine, cancelled) as (submit, together):
         while True:
             rows = store.rows()
             work = tasks(next_cells(study, bases, rows, shard), study.image_scale, study.laser)
@@ -62,9 +65,7 @@ def run_study(
                 progress(done, known)
 
 
-def _measured(
-    submit: Submit, together: int, work: Sequence[Task], cancelled: Callable[[], bool]
-) -> Iterator[list[Any]]:
+def _measured(submit: Submit, together: int, work: Sequence[Task], cancelled: Cancel) -> Iterator[list[Any]]:
     """Rows of each task as it ends; few are handed out at a time, so that a long study takes no memory."""
     waiting, lost = list(reversed(work)), dict[Task, int]()
     running: dict[Future[Any], Task] = {}
@@ -91,7 +92,7 @@ def _measured(
 
 
 @contextmanager
-def _workers(study: Study, bases: dict[str, Any], engine: Engine) -> Iterator[tuple[Submit, int]]:
+def _workers(bases: dict[str, Any], engine: Engine, cancelled: Cancel) -> Iterator[tuple[Submit, int]]:
     """How to hand a task out, and how many at a time."""
     if engine.scheduler is not None:
         from studio.study.cluster import cluster
@@ -103,7 +104,7 @@ def _workers(study: Study, bases: dict[str, Any], engine: Engine) -> Iterator[tu
     first = next(iter(bases.values()))
     warm_up(first)  # once, before the processes do it beside each other
     if count == 1:
-        yield _here, 1
+        yield partial(_here, cancelled=cancelled), 1
         return
     pool = _Pool(count, first)
     try:
@@ -112,10 +113,10 @@ def _workers(study: Study, bases: dict[str, Any], engine: Engine) -> Iterator[tu
         pool.close()
 
 
-def _here(task: Task) -> Future[Any]:
+def _here(task: Task, cancelled: Cancel) -> Future[Any]:
     """Measure in this process."""
     done: Future[Any] = Future()
-    done.set_result(measure_task(task))
+    done.set_result(measure_task(task, cancelled))
     return done
 
 
@@ -124,31 +125,43 @@ class _Pool:
 
     def __init__(self, count: int, base: Any) -> None:
         self.count, self.base = count, base
+        self.context = multiprocessing.get_context("spawn")  # a fork would copy threads' locks
+        self.stop = self.context.Event()
         self.executor = self._start()
 
     def _start(self) -> ProcessPoolExecutor:
-        context = multiprocessing.get_context("spawn")  # a fork would copy threads' locks
-        return ProcessPoolExecutor(
-            self.count, context, initializer=_begin, initargs=(self.base.to_text(), str(self.base.folder))
-        )
+        begin_with = self.base.to_text(), str(self.base.folder), self.stop
+        return ProcessPoolExecutor(self.count, self.context, initializer=_begin, initargs=begin_with)
 
     def submit(self, task: Task) -> Future[Any]:
         try:
-            return self.executor.submit(measure_task, task)
+            return self.executor.submit(_in_worker, task)
         except BrokenProcessPool:
             self.executor.shutdown(wait=False, cancel_futures=True)
             self.executor = self._start()
-            return self.executor.submit(measure_task, task)
+            return self.executor.submit(_in_worker, task)
 
     def close(self) -> None:
+        """What is under way is given up, so that a study that was stopped ends at once."""
+        self.stop.set()
         self.executor.shutdown(wait=True, cancel_futures=True)
 
 
-def _begin(text: str, folder: str) -> None:
+_stopped: Cancel = never
+"""In a worker: the driver gives up."""
+
+
+def _in_worker(task: Task) -> list[Any]:
+    return measure_task(task, _stopped)
+
+
+def _begin(text: str, folder: str, stop: Event) -> None:
     """In each process: Ctrl-C is the driver's to hear, and kernels are loaded before anything is timed."""
+    global _stopped
     import signal
 
     from studio.project.project import Project
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _stopped = stop.is_set
     warm_up(Project.from_text(text).in_folder(folder))

@@ -6,18 +6,20 @@ Made once for a session by `one_of`.
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 
 from render.base.errors import InputError
 from render.base.threads import Cancel
-from studio.notebook.frame import RenderedFrame, render
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.session import Render, Session
 from studio.runtime.jobs import Progress
-from studio.study.cells import Cell
-from studio.study.charts import shown
-from studio.study.folder_run import Found
+
+if TYPE_CHECKING:
+    from studio.notebook.frame import RenderedFrame
+    from studio.study.cells import Cell
+    from studio.study.folder_run import Found
 
 
 class CellOpener(QObject):
@@ -42,6 +44,8 @@ class CellOpener(QObject):
             return
 
         def work(progress: Progress, cancelled: Cancel) -> RenderedFrame | str:
+            from studio.notebook.frame import render
+
             try:
                 return render(cell.project, image_scale=scale, progress=progress, cancelled=cancelled)
             except InputError as error:
@@ -56,6 +60,8 @@ class CellOpener(QObject):
         jobs.run(RENDER, "cell of the study", work, then)
 
     def _show(self, found: Found, number: int, cell: Cell, frame: RenderedFrame) -> None:
+        from studio.study.charts import shown
+
         made = Render(
             max([one.number for one in self.session.renders], default=0) + 1,
             frame.project,

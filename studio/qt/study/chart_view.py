@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QImage, QMouseEvent, QPainter, QPaintEvent, QPen, QResizeEvent
@@ -10,9 +12,11 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from render.base.threads import Cancel
 from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
-from studio.qt.study.chart_drawing import Drawing, draw
 from studio.runtime.jobs import Progress
-from studio.study.answers import Answer
+
+if TYPE_CHECKING:
+    from studio.qt.study.chart_drawing import Drawing
+    from studio.study.answers import Answer
 
 NEAR_PX = 16.0
 REST_MS = 60
@@ -113,6 +117,8 @@ class ChartView(QWidget):
         size, ratio, colours = (self.width(), self.height()), self.devicePixelRatioF(), theme.colours()
 
         def work(progress: Progress, cancelled: Cancel) -> Drawing:
+            from studio.qt.study.chart_drawing import draw
+
             return draw(answer, labels, size, ratio, colours)
 
         self.runner.run("draw", "draw the chart", work, self._take)

@@ -23,9 +23,7 @@ from studio.qt.study.cell_opener import CellOpener
 from studio.qt.study.chart_view import ChartView
 from studio.qt.study.study_work import StudyWork
 from studio.study.answers import Answer
-from studio.study.charts import field_label
 from studio.study.labels import field_labels
-from studio.study.page import columns, sentences, table
 
 NOTHING = (
     "Nothing is measured yet. Choose a field to vary and run the study: charts fill while it runs, "
@@ -53,6 +51,8 @@ class ChartsPanel(QWidget):
         self.reading.setMinimumHeight(2 * self.reading.fontMetrics().lineSpacing())
         self.table = QTableWidget()
         self._header: list[str] = []
+        self._texts: list[list[str]] = []
+        """Of the table, by row."""
         self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -97,6 +97,9 @@ class ChartsPanel(QWidget):
         if found is None or answer is None or not have:
             self.chart.show_answer(None, {})
             return
+        from studio.study.charts import field_label  # matplotlib takes a moment: not before there is a chart
+        from studio.study.page import columns, sentences, table
+
         labels = field_labels(found.bases.values(), [one.field for one in answer.sweep.vary])
         self.question.setText(answer.sweep.question)
         self.question.setVisible(bool(answer.sweep.question))
@@ -105,7 +108,8 @@ class ChartsPanel(QWidget):
         self.findings.setVisible(bool(said))
         self.chart.show_answer(answer, labels)
         header = [*(field_label(one, labels) for one in answer.sweep.vary), "method", *columns(answer)]
-        self._fill(header, table(answer))
+        self._texts = table(answer)
+        self._fill(header, self._texts)
         self._tell(self.chart.spot)
 
     def _follow_sweep(self) -> None:
@@ -154,8 +158,8 @@ class ChartsPanel(QWidget):
             self.reading.setText("A click on a point opens its frame, line and errors in Measure.")
             return
         self.chart.mark(spot)
-        cells = table(answer)[spot]
-        self.reading.setText(", ".join(f"{name} {text}" for name, text in zip(self._header, cells, strict=True)))
+        pairs = zip(self._header, self._texts[spot], strict=True)
+        self.reading.setText(", ".join(f"{name} {text}" for name, text in pairs))
 
     def _lay_out(self) -> None:
         empty = QLabel(NOTHING, wordWrap=True)

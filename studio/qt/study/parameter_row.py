@@ -7,9 +7,9 @@ from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
-    QGridLayout,
     QHBoxLayout,
     QLabel,
+    QLayout,
     QMenu,
     QPushButton,
     QSizePolicy,
@@ -107,13 +107,15 @@ class ParameterRow(QWidget):
         self.reason.setObjectName("error")
         self.reason.hide()
         head = QHBoxLayout()
+        head.setSpacing(2)
         head.addWidget(self.title, 1)
-        head.addWidget(remove)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 2, 0, 4)
+        column.setSizeConstraint(QLayout.SizeConstraint.SetMinimumSize)  # until the panel has grown to hold it
         column.setSpacing(3)
         column.addLayout(head)
-        column.addLayout(self._editors())
+        column.addLayout(self._editors(head))
+        head.addWidget(remove)
         column.addWidget(self.reason)
         self.refresh(parameter)
 
@@ -142,10 +144,10 @@ class ParameterRow(QWidget):
         if self.choices is None and self.kind != "list":
             self.count.setEnabled(allowed)
 
-    def _editors(self) -> QGridLayout:
-        grid, spec = QGridLayout(), self.spec
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(4)
+    def _editors(self, head: QHBoxLayout) -> QHBoxLayout:
+        """The line of values; how they are told joins the head."""
+        line, spec = QHBoxLayout(), self.spec
+        line.setSpacing(4)
         self.choices: ChoicesButton | None = None
         others = spec.choices if spec.kind == "choice" else (False, True) if spec.kind == "flag" else ()
         listed = self.parameter.get("values", [])
@@ -154,33 +156,32 @@ class ParameterRow(QWidget):
         if others:
             self.choices = ChoicesButton(others)
             self.choices.entered.connect(lambda values: self._change(values=values))
-            grid.addWidget(self.choices, 0, 0)
-            return grid
+            line.addWidget(self.choices)
+            return line
         self.kinds = ChoiceField(KINDS)
         self.kinds.setAccessibleName("Values as")
         self.kinds.entered.connect(self._change_kind)
-        grid.addWidget(self.kinds, 0, 0)
+        head.addWidget(self.kinds)
         if self.kind == "list":
             self.values = ValuesField(replace(spec, value=listed))
             self.values.setToolTip(f"Values in {spec.unit.shown}" if spec.unit.shown else "Values")
             self.values.entered.connect(lambda values: self._change(values=values))
             self.values.refused.connect(self._tell)
-            grid.addWidget(self.values, 0, 1, 1, 2)
+            line.addWidget(self.values, 1)
             unit = QLabel(spec.unit.shown)
             unit.setObjectName("muted")
-            grid.addWidget(unit, 0, 3)
-            grid.setColumnStretch(1, 1)
-            return grid
+            line.addWidget(unit)
+            return line
         self.low, self.high = (self._end(name) for name in ("low", "high"))
         self.count = QSpinBox(minimum=2, maximum=MOST_VALUES)
         self.count.setToolTip("How many values, both ends among them")
         self.count.setKeyboardTracking(False)
         self.count.valueChanged.connect(lambda count: self._change(count=count))
-        for i, field in enumerate((self.low, self.high)):
-            grid.addWidget(field, 0, 1 + i)
-            grid.setColumnStretch(1 + i, 1)
-        grid.addWidget(self.count, 0, 3)
-        return grid
+        self.count.setMinimumHeight(self.low.sizeHint().height())
+        for field in (self.low, self.high):
+            line.addWidget(field, 1)
+        line.addWidget(self.count)
+        return line
 
     def _end(self, name: str) -> NumberField:
         # the values of a range need not be allowed one by one: a search goes from where a limit holds

@@ -38,6 +38,8 @@ from studio.study.draft import new_sweep
 from studio.study.estimate import Estimate
 from studio.study.study import Study, ready_made
 
+NARROWEST = 300
+"""px; every row has room for its values then."""
 FILES = "Studies (*.json);;All files (*)"
 
 
@@ -294,7 +296,8 @@ class StudyPanel(QWidget):
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setWidget(inside)
-        area.setMinimumWidth(inside.minimumSizeHint().width() + 14)
+        self.inside = inside
+        area.setMinimumWidth(NARROWEST)
         where = QHBoxLayout()
         where.addWidget(self.folder, 1)
         where.addWidget(self.choose)

@@ -20,6 +20,7 @@ from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.scan.options import ScanOptions
 from studio.scan.scan import run_scan
+from studio.scan.stages import scaled
 
 ROOT = template_folder("plane")
 BASELINE, TILT, DEPTH, FOCAL = 0.2, 0.226893, 0.8663, 3478.26
@@ -74,6 +75,15 @@ def test_line_width(facing: Project, found: Inspection) -> None:
     sheet = float(laser.sigma(DEPTH / math.cos(TILT)))
     sigma = sheet / math.cos(TILT) * FOCAL / DEPTH
     assert found.lasers[0].width_px == pytest.approx(sigma, rel=0.01)
+
+
+@pytest.mark.parametrize("image_scale", [0.25, 0.1, 0.05])
+def test_the_width_of_a_line_within_a_pixel_is_that_on_the_surface(
+    facing: Project, found: Inspection, image_scale: float
+) -> None:
+    """Whether it lies within a pixel, where its image has no width, or between two, where it has half a pixel's."""
+    small = inspect(scaled(facing, image_scale), ROOT)
+    assert small.lasers[0].width_px == pytest.approx(image_scale * found.lasers[0].width_px, rel=0.01)  # type: ignore[operator]
 
 
 def test_peak_electrons_are_those_of_the_image(facing: Project, found: Inspection, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -99,20 +100,21 @@ def test_parquet_and_csv_hold_the_same_table(whole: tuple[Path, bytes]) -> None:
 
 
 def test_a_study_that_is_stopped_anywhere_goes_on_to_the_same_table(whole: tuple[Path, bytes], tmp_path: Path) -> None:
-    asked = 0
+    chance, stops, patience = random.Random(1), 0, 0
 
     def impatient() -> bool:
-        nonlocal asked
-        asked += 1
-        return asked % 3 == 0
+        nonlocal patience
+        patience -= 1
+        return patience < 0
 
-    for _ in range(100):
+    for attempt in range(100):
+        patience = chance.randrange(40 * (attempt + 1))  # looks, of which a render takes many
         try:
             again = run(tmp_path, cancelled=impatient)
             break
         except Cancelled:
-            continue
-    assert again == whole[1] and asked > 6
+            stops += 1
+    assert again == whole[1] and stops > 2
 
 
 def test_three_shards_merged_give_the_same_table(whole: tuple[Path, bytes], tmp_path: Path) -> None:
@@ -141,11 +143,11 @@ def test_a_worker_that_dies_again_and_again_is_told_and_what_was_measured_is_kep
 
     done = 0
 
-    def lost(task: Any) -> Future[Any]:
+    def lost(task: Any, cancelled: Any) -> Future[Any]:
         nonlocal done
         done += 1
         if done <= 2:
-            return here(task)
+            return here(task, cancelled)
         future: Future[Any] = Future()
         future.set_exception(BrokenProcessPool("a worker was killed"))
         return future
@@ -228,3 +230,18 @@ def test_show_tells_what_a_folder_holds(whole: tuple[Path, bytes]) -> None:
 def test_a_folder_without_a_study_is_told(tmp_path: Path) -> None:
     done = subprocess.run(command("show", tmp_path), capture_output=True, text=True, timeout=300)
     assert done.returncode == 2 and "the folder holds no study" in done.stderr
+
+
+def test_a_render_under_way_is_given_up_where_the_study_is_stopped(tmp_path: Path) -> None:
+    """Not only between two renders, of which each may take minutes."""
+    asked = 0
+
+    def at_the_second_look() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked > 1
+
+    with pytest.raises(Cancelled):
+        run(tmp_path, cancelled=at_the_second_look)
+    with Store(tmp_path, None) as store:
+        assert asked > 1 and store.count() == 0

@@ -152,6 +152,19 @@ class TestDraft:
         desk.work.load(tmp_path / "noise.json")
         assert desk.work.study() == before
 
+    def test_the_panel_has_room_for_every_kind_of_row(self, qtbot: QtBot, desk: Desk) -> None:
+        """At its narrowest nothing is cut off, nor hidden behind the edge of the scrolled part."""
+        desk.vary(POWER[:-1], POWER[-1])
+        desk.vary(NOISE[:1], NOISE[1])
+        desk.small([2.0, 20.0])
+        desk.vary(("render",), "transport")
+        desk.work.change_sweep(sampling="bisection", limit={"measure": "completeness", "value": 0.9, "above": False})
+        desk.panel.resize(desk.panel.minimumSizeHint().width(), 500)
+        qtbot.wait(50)
+        inside = desk.panel.inside
+        assert inside.minimumSizeHint().width() <= inside.width() <= desk.panel.width()
+        assert [row.width() >= row.minimumSizeHint().width() for row in desk.panel.editor.rows] == 3 * [True]
+
 
 class TestRun:
     def test_charts_fill_and_more_values_are_added_without_losing_what_is_there(
