@@ -6,8 +6,8 @@ and a, b the two halves of such a pixel's samples, which know nothing of each ot
     E[(I - a)(I - b)] = (I - L)^2,     E[a b] = L^2
 
 so that the mean over them is the squared error of the image, of noise and of interpolation together, and without the
-noise of the held-out pixels themselves. Where noise is most of it the points of the grid get more samples, otherwise
-the grid gets finer; in the end every pixel is sampled.
+noise of the held-out pixels themselves. Where noise is most of it the points of the grid get more samples, those of
+large deviation most, otherwise the grid gets finer; in the end every pixel is sampled.
 """
 
 from __future__ import annotations
@@ -17,13 +17,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
-from render.ambient.guided_interpolation import grid_of, interpolate, seen_at, smooth_grid
+from render.ambient.guided_interpolation import ON_EDGE, grid_of, interpolate, seen_at, smooth_grid
+from render.ambient.integrator import EVEN_SHARE, MOST_SHARE
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
 from render.run import Run
 from render.world.embree import CHUNK
 
+Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 
@@ -67,16 +70,18 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
     held = _held_out(width * height, run)
     film.add(paths, held, np.full((len(held), 2), HELD_OUT_SAMPLES, np.int32), run.between(0.0, 0.1))
     while True:
-        grid, _ = grid_of(width, height, block)
-        film.add(paths, grid, np.full((len(grid), 2), count, np.int32), run.between(0.1, 0.5))
+        grid, across = grid_of(width, height, block)
+        part = run.between(0.1, 0.5)
+        for level in range(1, FIRST_SAMPLES + 1):
+            film.add(paths, grid, np.full((len(grid), 2), level, np.int32), part)
+        if count > FIRST_SAMPLES:
+            film.add(paths, grid, np.maximum(FIRST_SAMPLES, np.rint(count * _shares(film, grid, across))), part)
         error, noise = _errors(film, paths, height, grid, block, held)
-        wanted = 2 * len(grid) if 2.0 * noise**2 > error**2 or block == 1 else 8 * len(grid)
-        if error <= COARSE_ERROR or film.total + count * wanted > most:
+        noisy = 2.0 * noise**2 > error**2 or block == 1
+        needed = 2 * count * len(grid) if noisy else 3 * 2 * FIRST_SAMPLES * len(grid)
+        if error <= COARSE_ERROR or film.total + needed > most:
             break
-        if 2.0 * noise**2 > error**2 or block == 1:
-            count *= 2
-        else:
-            block //= 2
+        count, block = (2 * count, block) if noisy else (count, block // 2)
     radiance = _image(film, paths, height, grid, block, run.between(0.5, 1.0))
     dropped, clamped = film.invalid_counts.astype(int).tolist()
     return CoarseImage(radiance, error, block, film.total, dropped, clamped, film.cut / film.total)
@@ -88,6 +93,15 @@ def _held_out(pixels: int, run: Run) -> Int:
     random = np.random.default_rng(run.shifted(HELD_OUT_SEED).seed)
     edges = np.linspace(0, pixels, count + 1).astype(np.int64)
     return random.integers(edges[:-1], edges[1:]).astype(np.int32)
+
+
+def _shares(film: PixelSamples, grid: Int, across: int) -> Float:
+    """(n, 2) samples of each half on the points of a grid over their mean, by the deviation in the other half."""
+    variance = film.spread[grid].mean(axis=2).reshape(-1, across, 2)
+    deviation = np.sqrt(uniform_filter(variance, (3, 3, 0), mode="nearest")).reshape(-1, 2)[:, ::-1]
+    mean = deviation.mean(axis=0)
+    relative = np.where(mean > 0.0, deviation / np.where(mean > 0.0, mean, 1.0), 1.0)
+    return np.asarray(EVEN_SHARE + (1.0 - EVEN_SHARE) * np.minimum(relative, MOST_SHARE), dtype=np.float64)
 
 
 def _errors(
@@ -119,11 +133,22 @@ def _grid_light(
 ) -> tuple[Float32, Int, Float32]:
     """What is seen at the points of the grid, and their light: the mean of both halves, or both side by side."""
     seen, item = seen_at(grid, paths.view, paths.surface, paths.lights, paths.rays)
+    item = np.where(_on_edge(paths, height, grid, item), np.int32(ON_EDGE), item)
     halves = film.means(grid)
     radiance = halves.reshape(-1, 6) if apart else halves.mean(axis=1)
     light = np.empty_like(radiance)
     smooth_grid(grid_of(paths.view.width, height, block)[1], seen, item, radiance, light)
     return seen, item, light
+
+
+def _on_edge(paths: CameraPaths, height: int, grid: Int, item: Int) -> NDArray[np.bool_]:
+    """(n,) another object is seen beside a point of the grid: its pixel holds light of both, and speaks for neither."""
+    width, edge = paths.view.width, np.zeros(len(grid), np.bool_)
+    for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        row = np.clip(grid // width + down, 0, height - 1)
+        beside = (row * width + np.clip(grid % width + right, 0, width - 1)).astype(np.int32)
+        edge |= seen_at(beside, paths.view, paths.surface, paths.lights, paths.rays)[1] != item
+    return edge
 
 
 def _interpolated(

@@ -27,12 +27,14 @@ Int = NDArray[np.int32]
 SEEN = 9
 NOTHING, NO_RAY, FIRST_LAMP = -1, -2, -3
 """In place of an object: the surroundings; a pixel that the lens sends no ray through; the first lamp, others below."""
+ON_EDGE = -(1 << 30)
+"""In place of the object at a point of a grid that several share."""
 DARK = 1e-3
 """Added to the albedo, so that what is black and shines does not divide by nothing."""
 BENT, STEP = 0.05, 0.05
 """1 - cosine between two normals, and squared sine of a point's elevation over the tangent plane, that halve a weight.
 """
-LEAST_WEIGHT = 1e-3
+LEAST_WEIGHT = 1e-6
 """Of a point that fits badly: it decides only where none fits better."""
 
 
@@ -58,11 +60,13 @@ def fill_seen(
     seen: Float32,
     item: Int,
 ) -> None:
-    """The first hits of rays from the eye -> seen (n, SEEN), all 0 where no object is met, and item (n,)."""
+    """The first hits of rays from the eye -> seen (n, SEEN), where no object is met white without a place, and item."""
     rgb = np.empty(3)
     for r in range(triangle.shape[0]):
         d0, d1, d2 = float(directions[r, 0]), float(directions[r, 1]), float(directions[r, 2])
         t, distance = triangle[r], np.inf
+        for band in range(3):
+            seen[r, band] = 1.0
         if d0 == 0.0 and d1 == 0.0 and d2 == 0.0:
             item[r] = NO_RAY
             continue

@@ -31,7 +31,7 @@ Int = NDArray[np.int32]
 
 MARGIN = 1.3
 """By which the variance of a scan line is to be less than allowed: it is known to about a sixth only."""
-COARSE_SHARE = 0.05
+ENOUGH = 0.05
 """Of what a scan line may be off, by the error of the coarse image in one pixel: where it is less, that is enough."""
 AROUND = 3
 """Pixels on each side of those with weight that are sampled as well, so that what a lens blurs into them is no mere
@@ -59,7 +59,7 @@ class Band:
 def band_of(importance: Importance, coarse: CoarseImage) -> Band:
     """Where the error of the coarse image would matter."""
     weight = np.abs(importance.ambient)
-    wide = weight * coarse.radiance.max(axis=2) * coarse.error > COARSE_SHARE
+    wide = weight * coarse.radiance.max(axis=2) * coarse.error > ENOUGH
     weight = np.where(wide, weight, np.float32(0.0))
     for _ in range(AROUND):
         grown = wide.copy()

@@ -16,6 +16,9 @@ from render.importance import Importance
 from render.run import Run
 from render.world.placed import PlacedScene
 
+COARSE_SAMPLES, COARSE_SHARE = 0.5, 0.125
+"""Most samples a pixel, and of those that are allowed, for the coarse image: where what it does not reach matters, the
+band is wider."""
 LINES_KNOWN = 0.95
 """Share of the scan lines that are known at least as well as is told."""
 
@@ -42,7 +45,8 @@ def measured_images(
     made_of = seen_from(placed, most, surfaces, clamp, run.seed)
     coarse: CoarseImage | None = run.recall("coarse ambient", placed.world, made_of)
     if coarse is None:
-        coarse = coarse_image(paths, camera.height, budget, run.between(0.0, 0.5))
+        share = min(COARSE_SAMPLES / most, COARSE_SHARE)
+        coarse = coarse_image(paths, camera.height, int(share * budget), run.between(0.0, 0.5))
         run.leave("coarse ambient", placed.world, made_of, coarse)
     film, band = PixelSamples(camera.width, camera.height), band_of(importance, coarse)
     yield _image(coarse, film, band, begun=False)

@@ -41,7 +41,7 @@ class PixelSamples:
         """(m, 2, 3) radiance of both halves of some pixels; each half must have samples."""
         return np.asarray(self.sums[pixels] / self.done[pixels][..., None], dtype=np.float32)
 
-    def add(self, paths: CameraPaths, pixels: Int, count: Int, run: Run) -> None:
+    def add(self, paths: CameraPaths, pixels: Int, count: Int | Float, run: Run) -> None:
         """Samples until each of the pixels (m,), all different, has count (m, 2) of both halves. Raises Cancelled."""
         while True:
             more = np.clip(count - self.done[pixels], 0, ROUND).astype(np.int32)

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.ndimage import maximum_filter
 
 from render.ambient.coarse_image import COARSE_ERROR, CoarseImage, coarse_image
 from render.ambient.guided_interpolation import SEEN, grid_of, interpolate, smooth_grid
@@ -20,13 +21,18 @@ from render.ambient.transport_plan import LAMPS, AmbientPlan
 from render.base.pose import Pose
 from render.frame import Frame
 from render.importance import Importance
+from render.material.material import Lambertian
+from render.mesh.primitives import primitive_mesh
 from render.plan import GroupQuality
 from render.run import Memory, Run
 from render.scene.lights import Environment
 from render.scene.settings import RenderSettings
+from render.scene.shape import Box
+from render.truth.pixel_truth import truth_images
 from render.world.placed import PlacedScene
-from tests.render.ambient.test_ambient_error import box_on_a_wall
-from tests.render.scenes import paper_laser
+from tests.render.ambient.test_ambient_error import SKY, box_on_a_wall
+from tests.render.ambient.test_path_kernels import scene_with
+from tests.render.scenes import moved, paper_camera, paper_laser
 
 DARK = Frame(0, (), None, (), None)
 SEEDS = 30
@@ -145,6 +151,20 @@ def test_light_over_a_texture_is_interpolated_as_light():
     assert np.abs(out[column > 30]).max() < 0.01 * radiance.max()
 
 
+def test_no_light_of_the_sky_leaks_onto_a_dark_body_nor_its_own_into_the_sky():
+    box = moved(primitive_mesh(Box(size_x=0.2, size_y=0.2, size_z=0.02)), (0, 0, 0.8), (0.2, 0.3, 0.0))
+    scene, world = scene_with(paper_camera(0.05), (box, Lambertian(albedo=0.002)), environment=SKY)
+    placed = PlacedScene(world, scene)
+    coarse = coarse_image(paths_of(placed), scene.camera.height, 10**9, Run())
+    seen = truth_images(world, scene.camera, scene.T_world_camera()).object_id
+    # beside its edge, whose pixels hold both
+    sky, box = (maximum_filter(other, 3) == 0 for other in (seen >= 0, seen < 0))
+    assert coarse.radiance[sky] == pytest.approx(np.broadcast_to(SKY.radiance, (sky.sum(), 3)), rel=1e-3)
+    # a body under an even sky reflects its albedo's share of it
+    expected = np.broadcast_to(0.002 * np.array(SKY.radiance), (box.sum(), 3))
+    assert box.sum() > 500 and coarse.radiance[box] == pytest.approx(expected, rel=1e-2)
+
+
 def test_it_takes_a_fraction_of_the_rays_of_an_image_as_good():
     scene, world = box_on_a_wall(0.25)
     placed = PlacedScene(world, scene)
@@ -253,7 +273,7 @@ def test_an_image_is_taken_over_from_the_frame_before_only_where_it_would_be_the
 
 
 def test_a_frame_that_knows_what_matters_is_rendered_to_that():
-    scene, world = box_on_a_wall()
+    scene, world = box_on_a_wall(0.1)
     weight = band_weights(scene.camera.height, scene.camera.width, 20.0)
     aimed = replace(DARK, importance=Importance((), weight))
     plan, settings = AmbientPlan((LAMPS,)), RenderSettings(ambient_samples=64)
