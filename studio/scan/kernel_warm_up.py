@@ -2,7 +2,8 @@
 
 That takes most of a minute where the cache is empty, a second where it is not. It happens once in the life of the
 program, step by step on a thread of its own: whoever waits can be cancelled at once, which a compiler cannot. Where the
-cache is empty, a process of its own compiles the kernels of the last step meanwhile, which here are then only loaded.
+cache is empty, a process of its own compiles meanwhile what shares the fewest kernels with the first steps (`beside`);
+here that is then only loaded.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from render.base.threads import Cancel, thread_count
 from render.camera.camera import Camera, Lens
 from render.laser.laser import LineLaser
 from render.material.material import Conductor, Emitter, Glass, Material, Subsurface
+from render.run import Run, never
 from render.scene.lights import Environment, PointLight, RectangleLight
 from render.scene.scene import Rig, Scene, SceneObject
 from render.scene.settings import RenderSettings
@@ -56,8 +58,8 @@ WAX = Subsurface(mean_free_path=0.01, scattering_albedo=0.5)
 SENSOR = Sensor(efficiency=(SpectralCurve(wavelength_nm=(400.0, 700.0), value=(0.5, 0.5)),))
 
 
-BESIDE = "light"
-"""The step that another process compiles: half of all kernels, and the last that are needed."""
+LAST = "scan"
+"""The step that waits for what another process has compiled."""
 
 _ends: dict[str, Future[None]] = {}
 _helper: subprocess.Popen[bytes] | None = None
@@ -94,7 +96,7 @@ def warm_up(steps: Iterable[str], progress: StageProgress, cancelled: Cancel) ->
 def needed(project: Project) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The steps whose kernels the line of a project needs, and those of what is drawn and measured after it."""
     pinhole = project.scene.camera.lens.model == "pinhole"
-    return ("draw",) if pinhole else ("draw", "lens"), ("scan", "light")
+    return ("draw",) if pinhole else ("draw", "lens"), ("light", "scan")
 
 
 def _run(name: str, before: list[Future[None]]) -> None:
@@ -103,10 +105,10 @@ def _run(name: str, before: list[Future[None]]) -> None:
     # a compiler leaves much garbage, and looking for it as often as usual takes a tenth of its time
     gc.set_threshold(*COLLECTED)
     try:
-        if name == BESIDE:
+        if name == LAST:
             _wait_for_helper()
         STEPS[name](_program_ends)
-        if name == BESIDE:
+        if name == LAST:
             _mark()
         _ends[name].set_result(None)
     except BaseException as error:
@@ -116,8 +118,8 @@ def _run(name: str, before: list[Future[None]]) -> None:
 
 
 def _compiled() -> Path:
-    """The file that says that the kernels of BESIDE have been compiled into the cache."""
-    return Path(kept_in(), f"{BESIDE}.compiled")
+    """The file that says that a program has compiled all of its kernels into the cache."""
+    return Path(kept_in(), f"{LAST}.compiled")
 
 
 def _mark() -> None:
@@ -192,10 +194,9 @@ def scan(cancelled: Cancel) -> None:
 
 def _drawn(cancelled: Cancel) -> tuple[Project, Frame, World, list[Image], Clock]:
     from render.world.world import build_world
-    from studio.scan.stages import Clock, develop_step, render_step, scaled
+    from studio.scan.stages import Clock, develop_step, render_step
 
-    folder = template_folder(TEMPLATE)
-    project = scaled(Project.load(folder / "project.json"), IMAGE_SCALE)
+    folder, project = template_folder(TEMPLATE), _small()
     line = project.scene.model_copy(update={"lights": (), "environment": Environment()})
     direct = project.render.model_copy(update={"transport": "direct", "truth_images": False})
     project = project.model_copy(update={"scene": line, "render": direct})
@@ -207,12 +208,39 @@ def _drawn(cancelled: Cancel) -> tuple[Project, Frame, World, list[Image], Clock
     return project, frame, world, images, clock
 
 
+def _small() -> Project:
+    """The project that is drawn and measured."""
+    from studio.scan.stages import scaled
+
+    return scaled(Project.load(template_folder(TEMPLATE) / "project.json"), IMAGE_SCALE)
+
+
 def light(cancelled: Cancel) -> None:
     """Every kind of light: of lamps and shining objects, reflected, through glass, below surfaces."""
     _render(CAMERA, cancelled, "subsurface")
     _render(CAMERA, cancelled, "subsurface", Glass(), Conductor(), WAX, Emitter())
     # drawn into each other
     _render(CAMERA, cancelled, "subsurface", Glass(), WAX.model_copy(update={"priority": 1}), apart=0.03)
+
+
+def beside() -> None:
+    """What needs no laser's light: lines in an image that is made up, then the light of lamps."""
+    from render.sensor.develop import Image
+    from studio.scan.line_extraction import extract_line
+    from studio.scan.results import METHODS
+
+    project = _small()
+    camera, sensor = project.scene.camera, project.sensor
+    across = np.arange(camera.width) - 0.5 * camera.width
+    level = np.tile(0.05 + 0.5 * np.exp(-0.5 * (across / 1.5) ** 2), (camera.height, 1))
+    top = 2**sensor.bits - 1
+    pixels = (top * level).astype(np.uint8 if sensor.bits == 8 else np.uint16)
+    gain, noise = sensor.dn_per_electron, sensor.read_noise
+    image = Image(pixels, sensor.bits, gain, sensor.black_level, float(top), noise, None, sensor.exposure_time)
+    for method in METHODS:
+        extract_line(project, image, 0, None, method)
+    scene = _blocks(CAMERA, (Glass(), Conductor(), WAX, Emitter()), 0.05)
+    _rendered(scene.model_copy(update={"rig": Rig(camera=CAMERA)}), "subsurface")
 
 
 def lens(cancelled: Cancel) -> None:
@@ -224,33 +252,48 @@ def lens(cancelled: Cancel) -> None:
 
 def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Material, apart: float = 0.05) -> None:
     """A plate, and blocks of some materials before it, so far apart, under all sorts of lamps, by few paths."""
+    from studio.scan.exposure import expose
+
+    scene = _blocks(camera, materials, apart)
+    frame = _rendered(scene, transport, cancelled)
+    _show(scene, frame, [expose(Project(scene=scene, sensor=SENSOR), frame, [1.0], 0)])
+
+
+def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
+    """By next to no paths of every kind, for the image; and its ambient light for what is measured as well."""
     from render.ambient.measured_light import measured_images
     from render.importance import Importance
     from render.render import render_world
-    from render.run import Run
     from render.world.placed import PlacedScene
     from render.world.world import build_world
-    from studio.scan.exposure import expose
 
+    world, run, camera = build_world(scene, Path()), Run(cancelled=cancelled), scene.camera
+    frame = render_world(world, scene, settings=_few(transport), run=run)
+    everywhere = Importance((), np.ones((camera.height, camera.width), np.float32))
+    list(measured_images(PlacedScene(world, scene), everywhere, most=2, run=run))
+    return frame
+
+
+def _few(transport: str) -> RenderSettings:
+    """Settings by which next to nothing is rendered, of every kind."""
+    few = {"transport": transport, "light_paths": 1, "ambient_samples": 2, "laser_error": 0.1}
+    return RenderSettings().model_copy(update=few)
+
+
+def _blocks(camera: Camera, materials: tuple[Material, ...], apart: float) -> Scene:
+    """The scene of `_render`."""
     blocks = []
     for i, material in enumerate(materials):
         shape = Box(size_x=0.04, size_y=0.04, size_z=0.02)
         pose = Pose(translation=(apart * i - 0.05, 0.005 * i, 0.45 + 0.005 * i))
         blocks.append(SceneObject(name=material.kind, shape=shape, material=material, T_world_object=pose))
     lamps = PointLight(), RectangleLight(T_world_light=Pose(translation=(0.0, -0.3, 0.0)))
-    scene = Scene(
+    return Scene(
         rig=Rig(camera=camera, lasers=(LASER,)),
         objects=(PLATE, *blocks),
         lights=lamps,
         environment=Environment(radiance=(1.0, 1.0, 1.0)),
     )
-    few = {"transport": transport, "light_paths": 1, "ambient_samples": 2, "laser_error": 0.1}
-    settings = RenderSettings().model_copy(update=few)
-    world, run = build_world(scene, Path()), Run(cancelled=cancelled)
-    frame = render_world(world, scene, settings=settings, run=run)
-    everywhere = Importance((), np.ones((camera.height, camera.width), np.float32))
-    list(measured_images(PlacedScene(world, scene), everywhere, most=2, run=run))
-    _show(scene, frame, [expose(Project(scene=scene, sensor=SENSOR), frame, [1.0], 0)])
 
 
 def _show(scene: Scene, frame: Frame, images: list[Image]) -> None:
@@ -275,4 +318,4 @@ STEPS: dict[str, Callable[[Cancel], None]] = {
 
 if __name__ == "__main__":
     gc.set_threshold(*COLLECTED)
-    STEPS[BESIDE](lambda: False)
+    beside()

@@ -24,7 +24,7 @@ from numba.core.dispatcher import Dispatcher
 import analysis, render
 from studio.project.project import Project
 from studio.scan.stages import scaled
-from studio.scan.kernel_warm_up import needed, warm_up
+from studio.scan.kernel_warm_up import beside, needed, warm_up
 
 def quietly(stage, done): pass
 
@@ -64,12 +64,18 @@ for folder in map(Path, sys.argv[2:]):
     options = ScanOptions(steps=1, report=False, seconds=0.5)
     run_scan(project, folder, out=Path(sys.argv[1], folder.name), options=options)
     late[folder.name] = sorted(name for name, there in read().items() if there - before.get(name, set()))
+before = read()
+beside()
+late["beside"] = sorted(name for name, there in read().items() if there - before.get(name, set()))
 print(json.dumps({"late": late, "kernels": len(read())}))
 """
 
 
 def test_nothing_is_compiled_or_loaded_after_the_warm_up(tmp_path):
-    """No kernel of render and analysis, whatever its name, meets types in a scan that the warm-up has not shown it."""
+    """No kernel of render and analysis, whatever its name, meets types in a scan that the warm-up has not shown it.
+
+    Nor does the process beside the first one compile any that this has no use for.
+    """
     names = ("scan", "weld_seam", "shiny_weld_seam", "glass_ball", "sphere")
     done = subprocess.run(
         [sys.executable, "-c", CHILD, str(tmp_path), *(str(template_folder(name)) for name in names)],
@@ -80,7 +86,7 @@ def test_nothing_is_compiled_or_loaded_after_the_warm_up(tmp_path):
     )
     told = json.loads(done.stdout.splitlines()[-1])
     assert told["kernels"] > 150
-    assert told["late"] == {name: [] for name in names}
+    assert told["late"] == {name: [] for name in (*names, "beside")}
 
 
 def test_a_lens_that_blurs_is_prepared_where_there_is_one():
@@ -146,7 +152,7 @@ def empty_cache(monkeypatch, tmp_path):
     monkeypatch.setattr(kernel_warm_up, "thread_count", lambda threads: 2)
     monkeypatch.setattr(kernel_warm_up, "_ends", {})
     monkeypatch.setattr(kernel_warm_up, "_helper", None)
-    for name in ("draw", "light"):
+    for name in ("draw", "scan"):
         monkeypatch.setitem(kernel_warm_up.STEPS, name, lambda cancelled, name=name: done.append(name))
     return done
 
@@ -166,22 +172,22 @@ def test_where_nothing_is_compiled_another_process_begins_at_the_other_end(empty
 
     monkeypatch.setattr(subprocess, "Popen", helper)
     for _ in range(2):
-        warm("draw", "light")
+        warm("draw", "scan")
         assert kernel_warm_up._helper is None or kernel_warm_up._helper.poll() is not None
         kernel_warm_up._ends.clear()
     assert len(started) == 1 and started[0][1:] == ["-m", "studio.scan.kernel_warm_up"]
-    assert empty_cache == ["draw", "light"] * 2
+    assert empty_cache == ["draw", "scan"] * 2
 
 
 def test_no_process_is_started_that_could_not_hand_anything_over(empty_cache, monkeypatch, tmp_path) -> None:
     (tmp_path / "kernels").write_text("a file where the folder would be")
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("it cannot write there"))
-    warm("draw", "light")
-    assert empty_cache == ["draw", "light"]
+    warm("draw", "scan")
+    assert empty_cache == ["draw", "scan"]
 
 
 def test_on_one_processor_everything_is_compiled_here(empty_cache, monkeypatch) -> None:
     monkeypatch.setattr(kernel_warm_up, "thread_count", lambda threads: 1)
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("there is no processor for it"))
-    warm("draw", "light")
-    assert empty_cache == ["draw", "light"]
+    warm("draw", "scan")
+    assert empty_cache == ["draw", "scan"]
