@@ -36,6 +36,8 @@ def is_beyond(trouble: Trouble, signal: float, sigma: float, known: bool) -> str
         return "of three pixels on a slope hardly anything is left over; of an unbounded slope the ground is no count"
     if trouble.overexposure:
         return "the wings alone cannot tell a halo from a line beside the plateau: flagged SATURATED"
+    if trouble.neighbour and sigma < 0.6:
+        return "of the three pixels of a narrow line none is left to judge it by"
     if trouble.neighbour and signal < 1000:
         return "a neighbour of 30 % leaves less over than the noise of so faint a line"
     if trouble.neighbour and trouble.neighbour < 2 and signal < 3000:
