@@ -30,6 +30,8 @@ WIDEST = 48
 """px on either side of a line's centre that are looked at."""
 STRAY = 5.0
 """Times the typical chi-square from which a scan line shows something else than a line."""
+SLOPING = 3.0
+"""Mean square of the residuals' slope over its variance from which the background has one; 1 where it has none."""
 SURE = 3.0
 """Standard errors from which a number is believed."""
 
@@ -127,11 +129,17 @@ class _Rows:
             [shape[..., 0], amplitude * shape[..., 1], amplitude * shape[..., 2], np.ones_like(shape[..., 0])], axis=-1
         )
         jacobian = np.where(usable[..., None], jacobian, 0.0)
+        along = np.where(usable, x[:, None, :] - np.nan_to_num(u[index])[:, :, None], 0.0)
+        certain = np.sum(along**2 / self.variance, axis=2)
+        lean = np.sum(along * residual / self.variance, axis=2) ** 2 / np.maximum(certain, 1e-300)
+        sloping = float(np.mean(lean[certain > 0.0])) > SLOPING
+        if sloping:  # of the background, which the fit had taken off
+            jacobian = np.concatenate([jacobian, along[..., None]], axis=-1)
         weighted = jacobian / self.variance[..., None]
         # a row without a line has no information, and is zero throughout
         normal = np.linalg.pinv(np.swapaxes(jacobian, -1, -2) @ weighted, rcond=1e-12, hermitian=True)
         self.left = np.eye(size) * usable[..., None] - jacobian @ normal @ np.swapaxes(weighted, -1, -2)
-        self.residual = residual
+        self.residual = np.einsum("rpij,rpj->rpi", self.left, residual) if sloping else residual
 
     def _run(self, rows: slice, whole: NDArray[np.bool_], u: Float) -> tuple[int, int]:
         """First pixel and size of the window of a run, (0, 0) without two whole rows or where they are far apart."""

@@ -252,6 +252,21 @@ def _is_coarse(pixel: Array, n: int, p: Array, options: Options, hessian: Array)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def _weigh_of_known_width(pixel: Array, n: int, p: Array, shape: Array, weight: Array) -> None:
+    """How far the centre of a line p (4,) of known width moves for one electron more in each pixel -> weight (n,)."""
+    height, cross, place = 0.0, 0.0, 0.0
+    for i in range(n):
+        variance = max(p[0] * shape[0, i] + p[3] + pixel[FLOOR, i], 0.1 * pixel[FLOOR, i])
+        height += shape[0, i] * shape[0, i] / variance
+        cross += shape[0, i] * p[0] * shape[1, i] / variance
+        place += (p[0] * shape[1, i]) ** 2 / variance
+    determinant = max(height * place - cross * cross, 1e-300)
+    for i in range(n):
+        variance = max(p[0] * shape[0, i] + p[3] + pixel[FLOOR, i], 0.1 * pixel[FLOOR, i])
+        weight[i] = (height * p[0] * shape[1, i] - cross * shape[0, i]) / variance / determinant
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def _measure_narrow(
     pixels: Pixels, pixel: Array, n: int, p: Array, seed: Array, options: Options, shape: Array, out: Array
 ) -> int:
@@ -273,12 +288,17 @@ def _measure_narrow(
         mass += light[i]
     out[5], out[CORRELATION_LENGTH] = chi2 / (n - 4), 1.0
     if pixels.covariances.shape[1] > 0 and mass > 0.0:
-        for i in range(n):  # of so few pixels the position is hardly more than their centre of mass
+        # the position takes the centre of mass of so few pixels as their width lets it, or better
+        _weigh_of_known_width(pixel, n, p, shape, weight)
+        own, all_lines = shared_variance(weight, light, x, n, pixels.covariances, pixels.fineness, p[2], False)
+        for i in range(n):
             weight[i] = (x[i] - p[1]) / mass
-        shared, all_lines = shared_variance(weight, light, x, n, pixels.covariances, pixels.fineness, p[2], False)
+        shared, mean = shared_variance(weight, light, x, n, pixels.covariances, pixels.fineness, p[2], False)
+        if own < shared:
+            shared, mean = own, all_lines
         count = out[1] * out[1]
         out[1] = math.sqrt(count + shared)
-        out[CORRELATION_LENGTH] = (count + all_lines) / max(count + shared, 1e-300)
+        out[CORRELATION_LENGTH] = (count + mean) / max(count + shared, 1e-300)
     return Flag.UNRESOLVED.value if p[2] < FINE else Flag.OK.value
 
 
