@@ -219,6 +219,7 @@ class StudyWork(QObject):
             self.unseen.cancel("estimate")
             self._tell(in_window(error))
             return
+        self._tell("")  # what was wrong before no longer is
         rows = self.found.rows if self.found is not None else {}
         known = self._timed if not timed else {}
 
@@ -332,7 +333,7 @@ class StudyWork(QObject):
     def _take(self, bases: dict[str, Project], draft: Data) -> None:
         """Another study in place of this one."""
         self.loaded, self.chosen = bases, 0
-        self.folder, self.found, self._timed, self.failure = None, None, {}, ""
+        self.folder, self.found, self.estimate, self._timed, self.failure = None, None, None, {}, ""
         self.draft = {"schema_version": 1, "name": "study", **draft}
         self.draft_changed.emit()
         self.found_changed.emit()
