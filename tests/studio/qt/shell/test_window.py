@@ -9,7 +9,15 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QMainWindow
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QLineEdit,
+    QMainWindow,
+    QPushButton,
+    QSpinBox,
+)
 from pytestqt.qtbot import QtBot
 
 from render.material.material import Texture
@@ -218,6 +226,18 @@ class TestTheme:
             for text, ground in ((c.text, c.window), (c.text, c.base), (c.on_accent, c.accent)):
                 assert contrast(text, ground) > 4.5
             assert contrast(c.muted, c.window) > 4.5
+
+    @pytest.mark.parametrize("choice", ["dark", "light"])
+    def test_empty_controls_can_be_seen(self, window: MainWindow, qtbot: QtBot, choice: theme.Choice) -> None:
+        """A box that is not ticked and a field without text are their outline alone (WCAG 2.1: 3 to 1)."""
+        window.commands[f"theme_{choice}"].trigger()
+        for kind in (QCheckBox, QLineEdit, QSpinBox, QComboBox, QPushButton):
+            control = kind()
+            qtbot.addWidget(control)
+            control.resize(60, 24)
+            picture = control.grab().toImage()
+            seen = [picture.pixelColor(x, picture.height() // 2).name() for x in range(4)]
+            assert max(contrast(colour, theme.colours().window) for colour in seen) > 3.0, kind.__name__
 
 
 class TestCommands:
