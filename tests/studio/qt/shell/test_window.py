@@ -59,6 +59,23 @@ class TestWorkspaces:
         window.rearrange()
         assert window.docks["readout"].isVisible()
 
+    @pytest.mark.parametrize("panel", ["render", "motion"])
+    def test_a_panel_that_a_command_called_goes_with_the_workspace(self, window: MainWindow, panel: str) -> None:
+        """F5 in Set up showed the Render panel there at every later start as well."""
+        window.call_panel(panel)
+        assert window.docks[panel].isVisible()
+        window.switch_to("measure")
+        window.switch_to("setup")
+        assert not window.docks[panel].isVisible()
+
+    def test_a_panel_that_a_person_chose_stays(self, window: MainWindow) -> None:
+        window.call_panel("render")
+        for _ in range(2):  # off, and on again
+            window.docks["render"].toggleViewAction().trigger()
+        window.switch_to("measure")
+        window.switch_to("setup")
+        assert window.docks["render"].isVisible()
+
     def test_the_arrangement_is_there_at_the_next_start(self, own_window: MainWindow, tmp_path: Path) -> None:
         window = own_window
         window.switch_to("render")
