@@ -16,7 +16,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from studio.editing.forms import FieldSpec
-from studio.project.document import Document, FieldPath
+from studio.project.document import FieldPath
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, FOLDER
 from studio.qt.core.jobs import JobRunner
@@ -100,7 +100,11 @@ class StudyWork(QObject):
     @property
     def base_name(self) -> str:
         """What a study's file calls the open project: a template by its name, else the project's file."""
-        return name_of(self.session.document)
+        document = self.session.document
+        if document.path is not None:
+            return document.path.name
+        template = document.root.parent == FOLDER and document.root.name in DESCRIPTIONS
+        return document.root.name if template else "project.json"
 
     @property
     def sweep(self) -> Data:
@@ -394,11 +398,3 @@ class StudyWork(QObject):
             return path.resolve().relative_to(folder.resolve()).as_posix()
         except ValueError:
             raise InputError("a study's file stands beside its base project", where=str(path), cure=cure) from None
-
-
-def name_of(document: Document) -> str:
-    """What a study's file calls a project: a template by its name, else its file."""
-    if document.path is not None:
-        return document.path.name
-    template = document.root.parent == FOLDER and document.root.name in DESCRIPTIONS
-    return document.root.name if template else "project.json"
