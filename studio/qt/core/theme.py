@@ -10,6 +10,9 @@ from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QApplication, QStyleFactory
 
 Choice = Literal["system", "dark", "light"]
+OUTLINED = ("QCheckBox", "QRadioButton", "QLineEdit", "QAbstractSpinBox", "QComboBox", "QPushButton")
+FUSION_DARKER = 140
+"""Percent, as Qt's `QColor.darker` has it."""
 CHOICES: tuple[Choice, ...] = ("system", "dark", "light")
 
 
@@ -23,6 +26,8 @@ class Colours:
     text: str
     muted: str
     line: str
+    edge: str
+    """Of what can be ticked, typed into or pressed."""
     accent: str
     on_accent: str
     warning: str
@@ -37,6 +42,7 @@ DARK = Colours(
     text="#dfe4e9",
     muted="#94a0ab",
     line="#38414a",
+    edge="#7c8894",
     accent="#2f9fc0",
     on_accent="#06161c",
     warning="#e8b04a",
@@ -50,6 +56,7 @@ LIGHT = Colours(
     text="#1c2733",
     muted="#5d6974",
     line="#d3d9de",
+    edge="#6f7982",
     accent="#0b6e8a",
     on_accent="#ffffff",
     warning="#9a6500",
@@ -80,6 +87,8 @@ def apply(choice: Choice) -> None:
     if style is not None and app.style().name().lower() != "fusion":
         app.setStyle(style)
     app.setPalette(palette(colours))
+    for kind in OUTLINED:
+        app.setPalette(outlined(colours), kind)  # type: ignore[arg-type]  # takes no bytes, whatever its stub says
     app.setStyleSheet(style_sheet(colours))
     notice.changed.emit()
 
@@ -121,6 +130,13 @@ def palette(c: Colours) -> QPalette:
     for which in (role.WindowText, role.Text, role.ButtonText):
         made.setColor(group.Disabled, which, QColor(faded))
     made.setColor(group.Disabled, role.Highlight, QColor(c.line))
+    return made
+
+
+def outlined(c: Colours) -> QPalette:
+    """The palette of controls that are an outline: Fusion draws it a good part darker than the window's colour."""
+    made = palette(c)
+    made.setColor(QPalette.ColorRole.Window, QColor(c.edge).lighter(FUSION_DARKER))
     return made
 
 

@@ -64,6 +64,8 @@ class MainWindow(QMainWindow):
         self.session = session
         self.preferences = preferences or PreferencesFile()
         self.workspace = ""
+        self._called: set[str] = set()
+        """Panels that no person put where they are."""
         self.setObjectName("main")
         self.setAcceptDrops(True)
         self.setDockOptions(QMainWindow.DockOption.AllowTabbedDocks | QMainWindow.DockOption.AllowNestedDocks)
@@ -88,6 +90,7 @@ class MainWindow(QMainWindow):
     def switch_to(self, key: str) -> None:
         """Another workspace; the panels stand as they were left there."""
         if self.workspace:
+            self._send_back()
             self._remember_arrangement()
         wanted = workspace(key)
         self.workspace = wanted.key
@@ -108,6 +111,12 @@ class MainWindow(QMainWindow):
         """Bring a panel to the front, wherever it is."""
         self.docks[key].show()
         self.docks[key].raise_()
+
+    def call_panel(self, key: str) -> None:
+        """Show a panel for what is done just now: it goes with the workspace, and is not remembered as part of it."""
+        if self.docks[key].isHidden():
+            self._called.add(key)
+        self.show_panel(key)
 
     def render_small(self) -> None:
         """A quick render of what is open, for a first look."""
@@ -140,6 +149,7 @@ class MainWindow(QMainWindow):
         if not self.files.may_close():
             event.ignore()
             return
+        self._send_back()
         self._remember_arrangement()
         self.preferences.change(geometry=sealed(self.saveGeometry()))
         if self.tour is not None:
@@ -184,6 +194,7 @@ class MainWindow(QMainWindow):
             self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
             dock.hide()
             self.commands.submenus["panels"].addAction(dock.toggleViewAction())
+            dock.toggleViewAction().triggered.connect(lambda _on, key=panel.key: self._called.discard(key))
             docks[panel.key] = dock
         return docks
 
@@ -295,7 +306,7 @@ class MainWindow(QMainWindow):
         session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))
         session.selection_changed.connect(self._tell_selection)
         session.step_changed.connect(lambda: live(session).show_step(session.step))
-        session.render_asked.connect(lambda: self.show_panel("render"))
+        session.render_asked.connect(lambda: self.call_panel("render"))
         runner.failed.connect(self._tell_failure)
         self._tell_selection()
 
@@ -312,7 +323,7 @@ class MainWindow(QMainWindow):
         self.panels["scene"].rename_selection()  # type: ignore[attr-defined]
 
     def _scan(self) -> None:
-        self.show_panel("motion")
+        self.call_panel("motion")
         self.panels["motion"].ask_and_run()  # type: ignore[attr-defined]
 
     def _tell_selection(self) -> None:
@@ -341,6 +352,11 @@ class MainWindow(QMainWindow):
         """Once more, in the size that the window has come to."""
         if not self._restore_panels():
             share_out(self, self.docks, workspace(self.workspace))
+
+    def _send_back(self) -> None:
+        for key in self._called:
+            self.docks[key].hide()
+        self._called.clear()
 
     def _remember_arrangement(self) -> None:
         kept = {**self.preferences.values.arrangements, self.workspace: remembered(self)}

@@ -223,7 +223,10 @@ class StudyPanel(QWidget):
         work = self.work
         self.problem.setText(work.failure or work.problem)
         self.problem.setVisible(bool(self.problem.text()))
-        self.told.setText("" if work.estimate is None else estimate_text(work.estimate, self._processors()))
+        if work.estimate is not None:
+            self.told.setText(estimate_text(work.estimate, self._processors()))
+        else:
+            self.told.setText("" if work.problem else "Working out what it takes…")
         self.told.setVisible(bool(self.told.text()))
         self.time.setVisible(work.estimate is not None and work.estimate.seconds is None and not work.running)
         self._show_state()

@@ -16,7 +16,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from studio.editing.forms import FieldSpec
-from studio.project.document import Document, FieldPath
+from studio.project.document import FieldPath
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, FOLDER
 from studio.qt.core.jobs import JobRunner
@@ -100,7 +100,11 @@ class StudyWork(QObject):
     @property
     def base_name(self) -> str:
         """What a study's file calls the open project: a template by its name, else the project's file."""
-        return name_of(self.session.document)
+        document = self.session.document
+        if document.path is not None:
+            return document.path.name
+        template = document.root.parent == FOLDER and document.root.name in DESCRIPTIONS
+        return document.root.name if template else "project.json"
 
     @property
     def sweep(self) -> Data:
@@ -219,6 +223,7 @@ class StudyWork(QObject):
             self.unseen.cancel("estimate")
             self._tell(in_window(error))
             return
+        self._tell("")  # what was wrong before no longer is
         rows = self.found.rows if self.found is not None else {}
         known = self._timed if not timed else {}
 
@@ -332,7 +337,7 @@ class StudyWork(QObject):
     def _take(self, bases: dict[str, Project], draft: Data) -> None:
         """Another study in place of this one."""
         self.loaded, self.chosen = bases, 0
-        self.folder, self.found, self._timed, self.failure = None, None, {}, ""
+        self.folder, self.found, self.estimate, self._timed, self.failure = None, None, None, {}, ""
         self.draft = {"schema_version": 1, "name": "study", **draft}
         self.draft_changed.emit()
         self.found_changed.emit()
@@ -393,11 +398,3 @@ class StudyWork(QObject):
             return path.resolve().relative_to(folder.resolve()).as_posix()
         except ValueError:
             raise InputError("a study's file stands beside its base project", where=str(path), cure=cure) from None
-
-
-def name_of(document: Document) -> str:
-    """What a study's file calls a project: a template by its name, else its file."""
-    if document.path is not None:
-        return document.path.name
-    template = document.root.parent == FOLDER and document.root.name in DESCRIPTIONS
-    return document.root.name if template else "project.json"

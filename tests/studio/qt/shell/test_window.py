@@ -9,7 +9,15 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QMainWindow
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QLineEdit,
+    QMainWindow,
+    QPushButton,
+    QSpinBox,
+)
 from pytestqt.qtbot import QtBot
 
 from render.material.material import Texture
@@ -50,6 +58,23 @@ class TestWorkspaces:
         assert not window.docks["readout"].isVisible()
         window.rearrange()
         assert window.docks["readout"].isVisible()
+
+    @pytest.mark.parametrize("panel", ["render", "motion"])
+    def test_a_panel_that_a_command_called_goes_with_the_workspace(self, window: MainWindow, panel: str) -> None:
+        """F5 in Set up showed the Render panel there at every later start as well."""
+        window.call_panel(panel)
+        assert window.docks[panel].isVisible()
+        window.switch_to("measure")
+        window.switch_to("setup")
+        assert not window.docks[panel].isVisible()
+
+    def test_a_panel_that_a_person_chose_stays(self, window: MainWindow) -> None:
+        window.call_panel("render")
+        for _ in range(2):  # off, and on again
+            window.docks["render"].toggleViewAction().trigger()
+        window.switch_to("measure")
+        window.switch_to("setup")
+        assert window.docks["render"].isVisible()
 
     def test_the_arrangement_is_there_at_the_next_start(self, own_window: MainWindow, tmp_path: Path) -> None:
         window = own_window
@@ -218,6 +243,18 @@ class TestTheme:
             for text, ground in ((c.text, c.window), (c.text, c.base), (c.on_accent, c.accent)):
                 assert contrast(text, ground) > 4.5
             assert contrast(c.muted, c.window) > 4.5
+
+    @pytest.mark.parametrize("choice", ["dark", "light"])
+    def test_empty_controls_can_be_seen(self, window: MainWindow, qtbot: QtBot, choice: theme.Choice) -> None:
+        """A box that is not ticked and a field without text are their outline alone (WCAG 2.1: 3 to 1)."""
+        window.commands[f"theme_{choice}"].trigger()
+        for kind in (QCheckBox, QLineEdit, QSpinBox, QComboBox, QPushButton):
+            control = kind()
+            qtbot.addWidget(control)
+            control.resize(60, 24)
+            picture = control.grab().toImage()
+            seen = [picture.pixelColor(x, picture.height() // 2).name() for x in range(4)]
+            assert max(contrast(colour, theme.colours().window) for colour in seen) > 3.0, kind.__name__
 
 
 class TestCommands:
