@@ -5,9 +5,9 @@ of pixel i, a fit moves by
 
     dp / dy_i  =  H^-1  dmu_i/dp  / v_i,        H = sum over i of dmu_i/dp (dmu_i/dp)^T / v_i
 
-(the influence function of an M-estimator at its own model; Huber, Robust Statistics, 1981, section 3.2). A line too
-narrow for its pixels has its width held; what is flagged otherwise moves about as the single line that is fitted to it.
-Of all other methods by central differences of the method itself.
+(the influence function of an M-estimator at its own model; Huber, Robust Statistics, 1981, section 3.2). What is
+flagged as no single line moves about as the one that is fitted to it. Of all other methods, and of lines too narrow for
+their pixels, whose position is that of a posterior, by central differences of the method itself.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def influence(
     lines = scan_lines(np.asarray(image, np.float64), chosen, noise)
     found = np.zeros(lines.image.shape, np.float32)
     for k in range(line.u.shape[1]):
-        closed = line.valid[:, k] & (line.method == "likelihood")
+        closed = line.valid[:, k] & (line.flag[:, k] != Flag.UNRESOLVED) & (line.method == "likelihood")
         if closed.any():
             _scatter(
                 found, np.flatnonzero(closed), *likelihood_influence(lines, line, chosen, np.flatnonzero(closed), k)
@@ -86,8 +86,7 @@ def likelihood_influence(
     weight = np.where(used, 1.0 / np.maximum(np.maximum(mu + held, 0.1 * np.abs(held)), 1e-9), 0.0)
     slopes = [g, height[:, None] * by_centre, np.ones_like(g)]
     if settings.width is None:
-        free = line.flag[rows, peak] != Flag.UNRESOLVED
-        slopes.append(np.where(free[:, None], height[:, None] * by_width, 0.0))
+        slopes.append(height[:, None] * by_width)
     jacobian = np.stack(slopes, axis=2)
     information = np.einsum("nij,nik,ni->njk", jacobian, jacobian, weight)
     scale = np.sqrt(np.maximum(np.einsum("njj->nj", information), 1e-300))

@@ -27,9 +27,8 @@ Weigh = Callable[[Float32], Importance]
 
 POOLED = 25
 """Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one."""
-NEXT, OWN = 3, 4.0
-"""Lines about one whose own variance it is at most so many times: by chance 9 degrees of freedom show less once in 100.
-"""
+MARGIN = 1.5
+"""On the deviation that a few passes tell: rare bright paths are in few of them, and narrow lines move unevenly."""
 UNMET = 0.02
 """Share of the lit scan lines that may miss the goal: some meet a rare path that no estimate knows of."""
 LEAST_NEED = 0.02
@@ -116,7 +115,7 @@ class LineErrors:
         Lines that all had the same share of the paths need them in proportion to their variance.
         """
         lit = self.projection.lit
-        variance = known(self.moved, lit)
+        variance = pooled(self.moved, lit)
         most = float(np.quantile(variance[lit], 1.0 - UNMET)) if lit.any() else 0.0
         need = np.clip(variance / most, LEAST_NEED, 1.0) if most > 0.0 else np.ones(len(lit))
         return self.projection.aim(self.shape[0] * self.shape[1], need)
@@ -165,12 +164,12 @@ class LineErrors:
             return math.inf
         scale = self.all_waves / self.measured / weights**2
         lit = self.projection.lit
-        lines = scale * known(self.moved, lit)[lit]
+        lines = scale * pooled(self.moved, lit)[lit]
         rows = np.zeros(self.shape[0])
         if len(self.risen):
             np.maximum.at(rows, self.projection.block_row, scale * self.risen.max(axis=1))
         found = [float(np.quantile(one, 1.0 - UNMET)) for one in (lines, rows) if len(one)]
-        return math.sqrt(max(found, default=0.0))
+        return MARGIN * math.sqrt(max(found, default=0.0))
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What a checkpoint keeps."""
@@ -228,12 +227,7 @@ class Effect:
         return max(float(moved.max(initial=0.0)), float(rises.mean(axis=0).max(initial=0.0)))
 
 
-def pooled(values: Float, lit: NDArray[np.bool_], count: int = POOLED) -> Float:
-    """(lines,) mean over the `count` lines about each, of those that are lit."""
-    total = uniform_filter1d(np.where(lit, values, 0.0), count, mode="constant")
-    return np.asarray(total / np.maximum(uniform_filter1d(lit.astype(np.float64), count, mode="constant"), 1e-9))
-
-
-def known(variance: Float, lit: NDArray[np.bool_]) -> Float:
-    """(lines,) variance as it is expected of each line: one in a bright corner is not that of all lines about it."""
-    return np.minimum(pooled(variance, lit), OWN * pooled(variance, lit, NEXT))
+def pooled(values: Float, lit: NDArray[np.bool_]) -> Float:
+    """(lines,) mean over the POOLED lines about each, of those that are lit."""
+    total = uniform_filter1d(np.where(lit, values, 0.0), POOLED, mode="constant")
+    return np.asarray(total / np.maximum(uniform_filter1d(lit.astype(np.float64), POOLED, mode="constant"), 1e-9))
