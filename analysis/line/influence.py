@@ -5,8 +5,9 @@ of pixel i, a fit moves by
 
     dp / dy_i  =  H^-1  dmu_i/dp  / v_i,        H = sum over i of dmu_i/dp (dmu_i/dp)^T / v_i
 
-(the influence function of an M-estimator at its own model; Huber, Robust Statistics, 1981, section 3.2). Of all other
-methods, and of what likelihood flags, by central differences of the method itself.
+(the influence function of an M-estimator at its own model; Huber, Robust Statistics, 1981, section 3.2). What is
+flagged as no single line moves about as the one that is fitted to it. Of all other methods, and of lines too narrow for
+their pixels, whose position is that of a posterior, by central differences of the method itself.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def influence(
     lines = scan_lines(np.asarray(image, np.float64), chosen, noise)
     found = np.zeros(lines.image.shape, np.float32)
     for k in range(line.u.shape[1]):
-        closed = line.valid[:, k] & (line.flag[:, k] == Flag.OK) & (line.method == "likelihood")
+        closed = line.valid[:, k] & (line.flag[:, k] != Flag.UNRESOLVED) & (line.method == "likelihood")
         if closed.any():
             _scatter(
                 found, np.flatnonzero(closed), *likelihood_influence(lines, line, chosen, np.flatnonzero(closed), k)
@@ -117,7 +118,7 @@ def difference_influence(
         if lines.noise.saturation is not None:
             inside[inside] = base.image[place] + step[inside] < lines.noise.saturation
             place = own[inside], pixel[inside]
-        moved = []
+        moved, steady = [], np.ones(int(inside.sum()), np.bool_)
         for sign in (1.0, -1.0):
             image = base.image.copy()
             image[place] += sign * step[inside]
@@ -125,8 +126,11 @@ def difference_influence(
             there = np.where(found.valid, found.u, np.inf)[own[inside]]
             nearest = np.argmin(np.abs(there - u[inside][:, None]), axis=1)
             moved.append(there[np.arange(len(there)), nearest])
-        change = (moved[0] - moved[1]) / (2.0 * step[inside] / lines.noise.gain)
-        weight[inside, j] = np.where(np.isfinite(change) & (np.abs(moved[0] - u[inside]) < 2.0), change, 0.0)
+            # what takes the peak for another thing does so by chance, and moves it by no small step
+            steady &= found.flag[own[inside], nearest] == line.flag[rows[inside], peak]
+        with np.errstate(invalid="ignore"):
+            change = (moved[0] - moved[1]) / (2.0 * step[inside] / lines.noise.gain)
+        weight[inside, j] = np.where(steady & np.isfinite(change), change, 0.0)
     return first, weight
 
 

@@ -27,6 +27,8 @@ Weigh = Callable[[Float32], Importance]
 
 POOLED = 25
 """Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one."""
+MARGIN = 1.5
+"""On the deviation that a few passes tell: rare bright paths are in few of them, and narrow lines move unevenly."""
 UNMET = 0.02
 """Share of the lit scan lines that may miss the goal: some meet a rare path that no estimate knows of."""
 LEAST_NEED = 0.02
@@ -113,9 +115,9 @@ class LineErrors:
         Lines that all had the same share of the paths need them in proportion to their variance.
         """
         lit = self.projection.lit
-        known = pooled(self.moved, lit)
-        most = float(np.quantile(known[lit], 1.0 - UNMET)) if lit.any() else 0.0
-        need = np.clip(known / most, LEAST_NEED, 1.0) if most > 0.0 else np.ones(len(lit))
+        variance = pooled(self.moved, lit)
+        most = float(np.quantile(variance[lit], 1.0 - UNMET)) if lit.any() else 0.0
+        need = np.clip(variance / most, LEAST_NEED, 1.0) if most > 0.0 else np.ones(len(lit))
         return self.projection.aim(self.shape[0] * self.shape[1], need)
 
     @classmethod
@@ -167,7 +169,7 @@ class LineErrors:
         if len(self.risen):
             np.maximum.at(rows, self.projection.block_row, scale * self.risen.max(axis=1))
         found = [float(np.quantile(one, 1.0 - UNMET)) for one in (lines, rows) if len(one)]
-        return math.sqrt(max(found, default=0.0))
+        return MARGIN * math.sqrt(max(found, default=0.0))
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What a checkpoint keeps."""
@@ -225,7 +227,7 @@ class Effect:
         return max(float(moved.max(initial=0.0)), float(rises.mean(axis=0).max(initial=0.0)))
 
 
-def pooled(variance: Float, lit: NDArray[np.bool_]) -> Float:
-    """(lines,) mean over the POOLED lit lines about each."""
-    total = uniform_filter1d(np.where(lit, variance, 0.0), POOLED, mode="constant")
+def pooled(values: Float, lit: NDArray[np.bool_]) -> Float:
+    """(lines,) mean over the POOLED lines about each, of those that are lit."""
+    total = uniform_filter1d(np.where(lit, values, 0.0), POOLED, mode="constant")
     return np.asarray(total / np.maximum(uniform_filter1d(lit.astype(np.float64), POOLED, mode="constant"), 1e-9))

@@ -33,7 +33,7 @@ Float32 = NDArray[np.float32]
 CERTAIN = 3.0
 """Standard deviations of the render by which a response must stay away from what would change a row."""
 NEAREST = 0.25
-"""Of the detection threshold: where a response is nearer than this to a change, the sensor's noise decides."""
+"""Of the detection threshold, in the noise of line and rival: nearer than this to a change the sensor decides."""
 AROUND = 3.0
 """Sigmas of a line within which it is itself the peak."""
 
@@ -144,7 +144,12 @@ def _peaks(electrons: Float32, line: Line, noise: NoiseModel, threshold: float, 
         reach = AROUND * np.maximum(line.width[rows, k], 1.0)
         own = np.abs(x - line.u[rows, k][:, None]) <= reach[:, None]
         away[rows] = np.where(own, np.maximum(top[rows][:, None] - margin[rows], margin[rows]), away[rows])
-    weight = CERTAIN * TAPS[len(TAPS) // 2] / np.maximum(away, NEAREST * margin)
+    scattered = noise.table[0, 0] if noise.scintillation else 0.0
+    variance = NOISE_GAIN * (np.maximum(response, 0.0) + top[:, None] + noise.floor)
+    variance += scattered * (np.maximum(height, 0.0) ** 2 + top[:, None] ** 2)
+    weight = (
+        CERTAIN * TAPS[len(TAPS) // 2] / np.maximum(away, NEAREST * threshold * np.sqrt(np.maximum(variance, 1e-2)))
+    )
     return np.asarray(weight, np.float32)
 
 

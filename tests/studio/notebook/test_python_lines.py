@@ -17,6 +17,7 @@ from studio.project.project import Project
 from studio.project.templates import new_project, template_folder
 from studio.scan.options import ScanOptions
 from studio.scan.redevelop import develop_again, development, measure_again
+from studio.scan.render_goal import goal_of
 from studio.scan.scan import run_scan
 from studio.scan.stages import scaled
 
@@ -35,7 +36,8 @@ def window(rendered, now, root, scale, methods, noise=True):
     project = scaled(rendered, scale)
     world = build_world(project.scene, root, 0)
     settings, axis = project.render, project.extraction.axis
-    *_, frame = refine(world, project.scene, settings=settings, axis=axis, run=Run(seed=project.seed))
+    how_done = Run(seed=project.seed, goal=goal_of(project))
+    *_, frame = refine(world, project.scene, settings=settings, axis=axis, run=how_done)
     how = development(project, now, scale)
     images = develop_again(frame, how, noise=noise)
     return measure_again(frame, world, how, images, methods, cancelled=lambda: False)
