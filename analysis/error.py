@@ -1,4 +1,4 @@
-"""The error of every point against exact truth: along the scan line, in depth, and off the surface."""
+"""The error of every point against the exact truth: along the scan line, in depth, and normal to the surface."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from render.frame import LaserCurve
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-REACH = 2.0
-"""Sigmas of a line to its 1/e^2 edge: a peak farther off is not that line, however wrong the other peaks are."""
+MATCH_SIGMAS = 2.0
+"""Sigmas from a line's centre to its 1/e^2 edge: a peak farther off is an outlier, however wide the errors spread."""
 
 
 @dataclass(frozen=True)
 class Errors:
-    """(m,) arrays in the order of the `Points`, NaN where there is nothing to compare with; measured minus true."""
+    """Measured minus true: (m,) arrays in the order of the `Points`, NaN where there is no truth to compare with."""
 
     truth: Index
-    """Index into the `LaserCurve` of the crossing matched to the point, -1: none on that scan line is left."""
+    """Index into the `LaserCurve` of the crossing matched to the point; -1: none on that scan line is left."""
     position: Float
-    """px, along the scan line (u on axis "rows")."""
+    """Error along the scan line (u on axis "rows"), px."""
     depth: Float
-    """m, `depth_z`: positive is too far from the camera."""
+    """Error of `depth_z`, m: positive is too far from the camera."""
     distance: Float
-    """m, off the mesh: positive is on the camera's side. Also where no truth is matched."""
+    """Signed distance from the mesh, m: positive is on the camera's side. Also where no truth is matched."""
     sigma_distance: Float
-    """m, predicted from sigma_u."""
+    """Standard deviation of `distance`, m, predicted from sigma_u."""
     sheet_bias: Float
-    """px: the part of `position` that the sheet's own width explains, on bent surfaces and at edges, from the truth."""
+    """Part of `position`, px, that the sheet's width explains on curved surfaces and at edges, from the truth."""
     outlier: NDArray[np.bool_]
-    """Position wrong by more than 1 px, and by more than 5 robust sigma or than half of the line's own 1/e^2 width."""
+    """Position wrong by more than 1 px, and by more than 5 robust sigma or half the line's 1/e^2 width."""
     u: Measures
-    """Of `position`, px."""
+    """Measures of `position`, px."""
     depth_z: Measures
-    """Of `depth`, m."""
+    """Measures of `depth`, m."""
     surface: Measures
-    """Of `distance`, m."""
+    """Measures of `distance`, m."""
     truth_rows: int
     """Scan lines on which the camera can see the line."""
     valid_rows: int
@@ -94,7 +94,7 @@ def compare(
         np.einsum("ij,ij->i", points.gradient @ T_world_camera[:3, :3].T, _normals(vertices, triangles, nearest))
     )
     step = np.linalg.norm(points.gradient, axis=1)
-    wrong = outliers(position, 1.0, REACH * line.width[points.index, points.rank])
+    wrong = outliers(position, 1.0, MATCH_SIGMAS * line.width[points.index, points.rank])
     where = points.index, points.rank
     valid_rows = np.unique(points.index[points.valid])
     truth_rows = np.unique(curve.index[lit])
@@ -119,7 +119,7 @@ def compare(
 def match(index: Index, position: Float, true_index: NDArray[np.int32], true_position: Float) -> Index:
     """One-to-one pairs on each scan line, nearest first: (m,) peaks -> (m,) index into the (n,) true crossings, or -1.
 
-    `position` NaN takes no part. `true_index` ascends.
+    A peak whose `position` is NaN is not matched. `true_index` ascends.
     """
     found = np.full(len(index), -1, dtype=np.intp)
     start = np.searchsorted(true_index, index, side="left")

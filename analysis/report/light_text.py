@@ -25,7 +25,7 @@ LIGHT = {
     ("ambient", "interreflection"): "ambient light that meets two or more surfaces (interreflection, light through "
     "glass)",
 }
-"""What each step of a plan is, by its group and name."""
+"""Description of each step of a plan, by its group and name."""
 STAGES = {"direct": "laser light", "indirect": "reflected laser light", "ambient": "ambient light"}
 """Stage of the render in which each light group is made."""
 

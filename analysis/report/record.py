@@ -24,7 +24,7 @@ class LaserStep:
     """One laser at one step, by the first method."""
 
     rmse: float
-    """Of depth_z, m."""
+    """RMSE of depth_z, m."""
     bias: float
     completeness: float
 
@@ -41,7 +41,7 @@ class StepResult:
 
 
 class ScanRecord:
-    """A scan's frames as far as report and summary need them.
+    """What report and summary need of a scan's frames.
 
     Sums are exact; quantiles come from a sample, which is the whole scan where that fits. Some frames, those whose
     images are there, wait in a file for the report to show one of them.
@@ -54,7 +54,7 @@ class ScanRecord:
         self.seconds: dict[str, float] = {}
         """Wall time of the frames by stage, s."""
         self.counts: dict[Quantity, tuple[float, int]] = {}
-        """Sum over the frames, and in how many of them it is."""
+        """Sum over the frames, and number of frames that have it."""
         self._sums: dict[tuple[int, int], Sums] = {}
         self._sample = Sample(most_lines)
         self._spool = Spool(folder)
@@ -102,7 +102,7 @@ class ScanRecord:
                 self._waiting.append((frame_rmse(frame), *place))
 
     def chosen(self, laser: int | None = None, method: int = 0) -> Chosen:
-        """What is known of one method's lines, of one laser or of all."""
+        """Sums and sample of one method's lines, of one laser or of all."""
         sums = Sums()
         for (i, k), part in self._sums.items():
             if laser in (None, i) and method == k:
@@ -111,7 +111,7 @@ class ScanRecord:
         return Chosen(sums, self._sample.rows(laser, method), kept, seen)
 
     def method_count(self, laser: int) -> int:
-        """How many methods measured a laser."""
+        """Number of methods that measured a laser."""
         return sum(1 for i, _ in self._sums if i == laser)
 
     def shown_frame(self) -> FrameResult:
@@ -124,7 +124,7 @@ class ScanRecord:
 
 
 def record_of(scene: Scene, frames: Iterable[FrameResult], folder: Path | None = None) -> ScanRecord:
-    """The record of frames that are all there."""
+    """The record of frames that are all in memory."""
     record = ScanRecord(scene, folder)
     for frame in frames:
         record.add(frame)

@@ -1,7 +1,7 @@
-"""A sample of a scan's points that never grows beyond a limit, for what no sum can give: quantiles and pictures.
+"""A sample of a scan's points of bounded size, for what sums cannot give: quantiles, correlations and pictures.
 
-It is one of whole runs of neighbouring scan lines, so that it tells as well how neighbours err alike. A scan that fits
-is kept whole, and its figures are exact.
+It consists of whole runs of neighbouring scan lines, so that it preserves the correlation of neighbours' errors. A scan
+within the bound is kept whole, and its figures are exact.
 """
 
 from __future__ import annotations
@@ -27,17 +27,18 @@ ROW = np.dtype(
         ("pixel_depth", "f8"), ("pixel_distance", "f8"), ("sigma_systematic", "f8"), ("alike", "f8"),
     ]
 )  # fmt: skip
-"""What figures ask of a point: of its peak `index`, `rank`, `flag`, `width` (px); whether it is `valid`, where it is at
-step 0 (`world`, m); its errors with their predicted sigma (px, m), what the sheet adds to the first (px), the errors in
-m that one pixel makes, the calibration's part of sigma in depth, m, and the correlation length, scan lines."""
+"""Fields of a point: `index`, `rank`, `flag`, `width` (px) of its peak; whether it is `valid`; its position at step 0
+(`world`, m); its errors and their predicted sigma (px, m); the sheet's bias of the position (px); the errors in m for
+one pixel; the calibration's part of sigma in depth, m; and the correlation length (`alike`), scan lines.
+"""
 
 MOST_LINES = 1 << 18
-"""Scan lines kept, of all lasers together: 128 frames of 2048."""
+"""Largest number of scan lines kept, of all lasers together: 128 frames of 2048."""
 RUN = 64
-"""Neighbouring scan lines that are kept or dropped together."""
+"""Number of neighbouring scan lines that are kept or dropped together."""
 SEED = 20_240_607
 IMAGE = 1_000_000
-"""Between the scan lines of different images, which are no neighbours."""
+"""Offset between the scan lines of different images, so that they are never taken for neighbours."""
 
 
 def rows_of(extraction: Extraction, scene: Scene, step: int) -> Rows:
@@ -58,7 +59,7 @@ def rows_of(extraction: Extraction, scene: Scene, step: int) -> Rows:
 
 
 class Sample:
-    """Runs drawn by chance, each as likely as any other; the same ones of every method. The chance is seeded."""
+    """A seeded, uniform random sample of runs, the same runs for every method."""
 
     def __init__(self, most: int = MOST_LINES) -> None:
         self._most = most

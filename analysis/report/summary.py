@@ -10,11 +10,11 @@ from analysis.report.total import NARROW_PX, Total, total
 from analysis.report.units import count, micrometres, percent, pixels
 
 ENOUGH = 30
-"""Fewer points than this are no statistics to draw a conclusion from."""
+"""Least number of points from which a conclusion is drawn."""
 SHEET_PX = 0.01
-"""What the sheet's width may add to a position untold: as much as a good line is known to."""
+"""Bias by the sheet's width, px, above which it is mentioned: the uncertainty of a good line."""
 LITTLE = 0.5
-"""Below this share of the line the errors say more of what was found by chance than of the line."""
+"""Completeness below which the errors describe chance finds rather than the line."""
 
 
 def headline(report: ReportInput) -> str:

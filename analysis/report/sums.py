@@ -1,4 +1,4 @@
-"""What adds up over the frames of a scan exactly: counts, and the mean and spread of the errors."""
+"""Statistics that add up exactly over the frames of a scan: counts, and moments of the errors."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Float = NDArray[np.float64]
 
 @dataclass
 class Moments:
-    """Of errors with their predicted sigma; NaN is left out."""
+    """Running moments of errors, and their coverage by the predicted sigma; NaN is ignored."""
 
     count: int = 0
     mean: float = 0.0
     squares: float = 0.0
-    """Sum of the squares about the mean."""
+    """Sum of squared deviations from the mean."""
     predicted: int = 0
-    """Errors that have a sigma."""
+    """Number of errors with a predicted sigma."""
     covered: int = 0
-    """Those of them within +-2 sigma."""
+    """Number of errors within +-2 predicted sigma."""
 
     def add(self, error: Float, sigma: Float) -> None:
         here = np.isfinite(error)
@@ -34,7 +34,7 @@ class Moments:
         self.merge(Moments(len(e), mean, float(np.sum((e - mean) ** 2)), int(np.count_nonzero(known)), covered))
 
     def merge(self, other: Moments) -> None:
-        """Chan, Golub & LeVeque (1983), The American Statistician 37(3), eq. 2.1: without cancellation."""
+        """Add other moments without cancellation (Chan, Golub, LeVeque 1983, American Statistician 37(3), eq. 2.1)."""
         count = self.count + other.count
         if other.count:
             apart = other.mean - self.mean
@@ -47,10 +47,10 @@ class Moments:
 
 @dataclass
 class Sums:
-    """Of one method's lines, over frames and lasers."""
+    """Sums of one method's lines over frames and lasers."""
 
     method: str = ""
-    """Of the first of them."""
+    """Name of the method, as the first line has it."""
     points: int = 0
     outliers: int = 0
     truth_rows: int = 0

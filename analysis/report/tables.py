@@ -162,7 +162,7 @@ def scene_tables(report: ReportInput) -> Tables:
 
 
 def _material(material: Material) -> str:
-    """In words, with the numbers that decide how it shines."""
+    """A material in words, with its main parameters."""
     if isinstance(material, Blend):
         return f"{_material(material.base)}; where {material.mask.path} is white, {_material(material.over)}"
     relief = f", relief of {material.relief.path}" if material.relief is not None else ""
@@ -242,7 +242,7 @@ def timing(report: ReportInput) -> tuple[list[tuple[str, str, float]], str]:
 
 
 def counts(report: ReportInput) -> list[tuple[str, str]]:
-    """What the renderer counted: sums over the frames, or means, as the kind of each quantity says."""
+    """The renderer's counts, summed or averaged over the frames by the kind of each quantity."""
     lasers = [laser.name for laser in report.scene.lasers]
     rows = []
     for quantity, (added, frames) in report.record.counts.items():

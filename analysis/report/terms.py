@@ -1,4 +1,4 @@
-"""What the predicted sigma is made of, and how well each part of it holds against the truth."""
+"""The terms of the predicted sigma, and how well each agrees with the true errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from analysis.report.units import NONE, count, micrometres, percent
 
 TERM_COLUMNS = ("n", "predicted sigma", "true RMSE", "within ±1 sigma", "within ±2 sigma")
 MEANS = (10, 100)
-"""Neighbouring scan lines."""
+"""Numbers of neighbouring scan lines over which means are taken."""
 LEAST = 0.1
 """Of the noise; a bias below it is not worth a row."""
 

@@ -1,4 +1,4 @@
-"""All points of a scan taken together: measures from exact sums, and from the sample what no sum can give."""
+"""Measures over all points of a scan: from exact sums, and from the sample where sums do not suffice (quantiles)."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from analysis.report.sums import Moments, Sums
 Float = NDArray[np.float64]
 
 NARROW_PX = 0.4
-"""Sigma of a line below which the pixels are too coarse for it."""
+"""Sigma of a line, px, below which the pixels undersample it."""
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """What is known of one method's lines, of one laser or of all."""
+    """Sums and sample of one method's lines, of one laser or of all."""
 
     sums: Sums
     rows: Rows
     """The points in the sample, in the order of the scan."""
     lines_kept: int
-    """Scan lines in the sample."""
+    """Number of scan lines in the sample."""
     lines: int
-    """Scan lines in all."""
+    """Number of scan lines in the scan."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Total:
     surface: Measures
     points: int
     outliers: int
-    """Of each image on its own."""
+    """Number of outliers, found in each image on its own."""
     truth_rows: int
     valid_rows: int
     measured_rows: int
@@ -54,11 +54,11 @@ class Total:
     lines_kept: int
     lines: int
     narrow: float = 0.0
-    """Share of the points on which the line is too narrow for the pixels, its sigma below `NARROW_PX`."""
+    """Fraction of the points where the line's sigma is below `NARROW_PX`."""
     saturated: float = 0.0
-    """Share of the points that are saturated."""
+    """Fraction of the points that are saturated."""
     sheet_bias: tuple[float, float] = (0.0, 0.0)
-    """px: RMS and 95th percentile of what the sheet's own width adds to the positions; 0: not known."""
+    """RMS and 95th percentile, px, of the bias of the positions by the sheet's width; 0: not known."""
 
     @property
     def completeness(self) -> float:
@@ -67,7 +67,7 @@ class Total:
 
     @property
     def sampled(self) -> bool:
-        """The sample does not hold the whole scan."""
+        """Whether the sample holds less than the whole scan."""
         return self.lines_kept < self.lines
 
 
@@ -108,22 +108,22 @@ def _sheet_bias(values: Float) -> tuple[float, float]:
 
 
 def position_measures(rows: Rows) -> Measures:
-    """Of the error along the scan line, px."""
+    """Measures of the error along the scan line, px."""
     return measure(rows["position"], rows["sigma_position"], 1.0, rows["index"], rows["rank"])
 
 
 def depth_measures(rows: Rows) -> Measures:
-    """Of depth_z, m."""
+    """Measures of the error of depth_z, m."""
     return measure(rows["depth"], rows["sigma_depth"], rows["pixel_depth"], rows["index"], rows["rank"])
 
 
 def distance_measures(rows: Rows) -> Measures:
-    """Of the signed distance from the surface, m."""
+    """Measures of the signed distance from the surface, m."""
     return measure(rows["distance"], rows["sigma_distance"], rows["pixel_distance"], rows["index"], rows["rank"])
 
 
 def _exact(found: Measures, moments: Moments) -> Measures:
-    """The sample's measures, with what the sums know better."""
+    """The sample's measures, with those replaced that the sums give exactly."""
     variance = moments.squares / moments.count
     return replace(
         found,

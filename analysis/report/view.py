@@ -21,7 +21,7 @@ MOST_POINTS = 200_000
 
 @dataclass(frozen=True)
 class View:
-    """A place to look from, world frame, m."""
+    """A viewpoint of a 3D picture, world frame, m."""
 
     eye: Float
     target: Float
@@ -39,7 +39,7 @@ class SceneView:
     frustum: Float
     """(5, 3) the camera's centre and the corners of what it sees, at the depth of the line."""
     emitters: Float
-    """(l, 3) where the lasers are."""
+    """(l, 3) positions of the lasers."""
     sheets: list[tuple[Float, NDArray[np.int32]]]
     """For each laser the lit part of its sheet, as triangles."""
     edges: list[Float]
@@ -50,7 +50,7 @@ class SceneView:
 
 
 def placed_vertices(report: ReportInput, step: int) -> Float:
-    """(v, 3) vertices where the objects are at a step."""
+    """(v, 3) vertices with the objects placed for a step."""
     motion = report.scene.motion
     if motion.kind == "none" or motion.moves != "objects":
         return report.vertices

@@ -34,7 +34,7 @@ from analysis.report.view import cloud_view, placed_vertices, scene_view
 from render.base.files import atomic_write
 
 MOST_DETAILS = 4
-"""Lasers shown in detail."""
+"""Largest number of lasers shown in detail."""
 PLAIN_NOTE = "Drawn in a simple way, because this machine has no library to draw 3D pictures off-screen."
 
 

@@ -1,4 +1,4 @@
-"""What a render tells of its work in numbers, each with its kind, so that nobody has to guess it from a name."""
+"""The numbers that a render reports of its work, each with the kind that says how it adds up over frames."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Quantity:
     """Index into `scene.lasers`; None: of the whole frame."""
 
     def of(self, laser: int) -> Quantity:
-        """The same of one laser."""
+        """This quantity, of one laser."""
         return replace(self, laser=laser)
 
     def label(self, lasers: Sequence[str]) -> str:

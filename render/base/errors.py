@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class InputError(ValueError):
-    """A bad input, told in one message; the command line prints it and exits with code 2.
+    """A bad input, reported in one message; the command line prints it and exits with code 2.
 
     what: what is wrong, a short clause ("albedo is out of range").
     where: file, field or object it concerns ("weld.json: scene.objects[0].material.albedo").

@@ -17,7 +17,7 @@ from render.base.errors import InputError
 
 TEMPORARY = re.compile(r"\.(?P<stem>.+)\.[0-9a-f]{8}(?P<suffix>(\.[^.]*)?)")
 ABANDONED = 3600.0
-"""s; no write of this program takes so long."""
+"""Age, s, above which a temporary file is abandoned: no write of this program takes so long."""
 
 
 @contextmanager
@@ -83,7 +83,7 @@ def inside(root: Path, relative: str, where: str) -> Path:
     base = os.path.realpath(root)
     allowed = "a path relative to the project file, inside its folder"
     cure = "copy the file into the project folder"
-    # Windows' rules are asked as well, so that a project is as safe there as here.
+    # Windows' rules are applied as well, so that a project is valid on every system.
     if not relative or "\0" in relative or os.path.isabs(relative) or PureWindowsPath(relative).anchor:
         raise InputError("the path is not relative", where=where, found=relative, allowed=allowed, cure=cure)
     resolved = Path(os.path.realpath(os.path.join(base, relative)))

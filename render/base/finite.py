@@ -1,4 +1,4 @@
-"""The guard between the stages: a number that is none ends the work, with stage and likely cause named."""
+"""The check between stages: NaN or infinity ends the work, with the stage and the likely cause named."""
 
 from __future__ import annotations
 

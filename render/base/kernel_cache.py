@@ -1,7 +1,7 @@
 """Where compiled kernels are kept: a folder for each state of their source, so that none outlives a change.
 
-Numba looks at the file of a kernel only, not at the kernels and constants that it takes from other files: after an
-update of the program it would go on with machine code of before.
+Numba checks the file of a kernel only, not the kernels and constants that it imports from other files: after an update
+of the program it would run outdated machine code.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from types import ModuleType
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = ("render", "analysis")
 KEPT = 2
-"""Folders that stay in any case: the one in use and the one before."""
+"""Number of folders that are never removed: the one in use and the one before."""
 UNUSED = 24 * 3600.0
-"""s; older folders may still be in use by a program that was started before the change."""
+"""Age, s, above which other folders are removed; a program started before the change may still use a younger one."""
 DISPATCHER = "numba.core.dispatcher"
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 KERNEL = re.compile(rb"^\s*@(?:(?:numba\.)?njit|peak_kernel)\b", re.MULTILINE)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Vector3 = tuple[float, float, float]
 Metres = Annotated[float, Field(ge=-1e5, le=1e5)]
-"""A place in the scene: Embree holds positions as float32, beyond this not even to a centimetre."""
+"""A coordinate, m: beyond this the float32 positions of Embree are coarser than a centimetre."""
 Position = tuple[Metres, Metres, Metres]
 UnitInterval = Annotated[float, Field(ge=0.0, le=1.0)]
 

@@ -1,4 +1,4 @@
-"""Seconds by stage of a render, and how far it is: of the whole, or of each stage on its own."""
+"""Wall time by stage of a render, and its progress: of the whole, or of each stage."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 
 StageProgress = Callable[[str, float], None]
-"""progress(what is being done, share 0..1)."""
+"""Called as progress(name of the stage, fraction done 0..1)."""
 
 
 @dataclass
 class Clock:
-    """Times stages, and tells each one's own progress."""
+    """Times stages, and reports each one's own progress."""
 
     progress: StageProgress | None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -29,7 +29,7 @@ class Clock:
 
     @contextmanager
     def shown(self) -> Iterator[None]:
-        """The time of whoever looks at a frame is no stage's."""
+        """Exclude the time in which a frame is shown from the running stage."""
         start = time.perf_counter()
         yield
         if self.running is not None:
@@ -38,7 +38,7 @@ class Clock:
 
     @contextmanager
     def stage(self, name: str, work: float) -> Iterator[Callable[[float], None]]:
-        """Time a stage; yields the function that takes its own progress, 0..1. work: about how many rays."""
+        """Time a stage; yields the function that takes its own progress, 0..1. work: estimated rays."""
         self.running = name, time.perf_counter()
 
         def report(done: float) -> None:
@@ -46,7 +46,7 @@ class Clock:
                 self.progress(name, done)
 
         report(0.0)
-        # it is not over before whoever watches has the last frame
+        # 1.0 is reported only after the last frame has been passed on
         yield lambda done: report(min(done, 0.999))
         self.seconds, self.running = self.so_far(), None
         report(1.0)
@@ -54,7 +54,7 @@ class Clock:
 
 @dataclass
 class WholeClock:
-    """Times stages, and tells the share of the whole work that is done."""
+    """Times stages, and reports the fraction of the whole work that is done."""
 
     total: float
     """Sum of the work of all stages."""

@@ -1,7 +1,8 @@
-"""Kernels as files that are believed only as they were written: damage, or a full disk, costs compiling anew.
+"""Cached kernels with a checksum: a damaged file, or a full disk, costs a compilation instead of stopping the program.
 
-Numba believes its cache: a damaged file stops the program (EOFError, or LLVM ends the process), and so does a folder
-that cannot be written. Here each file ends in a seal, which unpickling does not read: what fails it is not there.
+Numba trusts its cache: a damaged file stops the program (EOFError, or LLVM ends the process), and so does a folder that
+cannot be written. Here each file ends in a checksum (seal), which unpickling ignores; a file that fails it is treated
+as missing.
 """
 
 from __future__ import annotations
@@ -88,10 +89,10 @@ class SealedFiles(caching.IndexDataCacheFile):
 
 
 class KernelCache(caching.FunctionCache):
-    """The cache of one kernel. Nothing that is wrong with its files is an error."""
+    """The cache of one kernel; files that cannot be read or written are no error."""
 
     _impl_class = KernelImplementation
-    _told = False
+    _warned = False
 
     def __init__(self, kernel: Any) -> None:
         super().__init__(kernel)
@@ -102,14 +103,14 @@ class KernelCache(caching.FunctionCache):
         try:
             super().save_overload(signature, data)
         except OSError as error:
-            if not KernelCache._told:
-                KernelCache._told = True
+            if not KernelCache._warned:
+                KernelCache._warned = True
                 reason = f"{error.strerror or error}; they are compiled anew at the next start"
                 warnings.warn(f"compiled kernels cannot be kept in {kept_in()}: {reason}", UserWarning, stacklevel=2)
 
 
 def _seal(path: str, content: bytes) -> bytes:
-    """What the content of the file of that name ends in, 16 bytes."""
+    """The checksum of the content of a file of that name, 16 bytes."""
     digest = hashlib.blake2b(f"{numba.__version__} {os.path.basename(path)}\0".encode(), digest_size=SEAL_BYTES)
     digest.update(content)
     return digest.digest()

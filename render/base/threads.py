@@ -13,7 +13,7 @@ Progress = Callable[[float], None]
 
 
 def thread_count(threads: int | None) -> int:
-    """The number asked for, or the number of processors this process may use."""
+    """The requested number, or the number of processors that this process may use."""
     if threads is not None:
         return max(1, threads)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -29,15 +29,15 @@ def map_chunks(
 ) -> None:
     """Call work(start, stop) over range(count) in chunks. Raises Cancelled between chunks; progress gets 0..1.
 
-    The calling thread works as well, and alone it tells progress: a pool that it waits for would cost a short call more
-    than its work.
+    The calling thread works as well, and alone reports progress: starting a pool would cost a short call more than its
+    work.
     """
     starts = range(0, count, chunk)
     lock, left = threading.Lock(), iter(starts)
     done = 0
     failed: list[BaseException] = []
 
-    def some(told: Progress | None) -> None:
+    def run_chunks(report: Progress | None) -> None:
         nonlocal done
         while True:
             with lock:
@@ -49,12 +49,12 @@ def map_chunks(
             work(start, min(start + chunk, count))
             with lock:
                 done += 1
-            if told is not None:
-                told(done / len(starts))
+            if report is not None:
+                report(done / len(starts))
 
     def helper() -> None:
         try:
-            some(None)
+            run_chunks(None)
         except BaseException as error:
             failed.append(error)
 
@@ -62,7 +62,7 @@ def map_chunks(
     for thread in helpers:
         thread.start()
     try:
-        some(progress)
+        run_chunks(progress)
     except BaseException as error:
         failed.append(error)
     for thread in helpers:

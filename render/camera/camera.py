@@ -28,9 +28,9 @@ DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 MAX_SIDE = 32768
 MOST_TILT = math.radians(80)
 Coefficient = Annotated[float, Field(ge=-1e9, le=1e9)]
-"""Of a long lens, where the image radius is small, a calibration may well give millions."""
+"""A distortion coefficient: with a long lens, whose image radius is small, a calibration may well give millions."""
 FASTEST = 0.5
-"""f-number of an aperture as wide as the sine condition allows."""
+"""Least f-number of a thin lens: that of the widest aperture that the sine condition allows in air."""
 
 
 class Lens(Model):
@@ -127,7 +127,7 @@ class Camera(Model):
 
     @cached_property
     def matrix(self) -> Array:
-        """(3, 3) K."""
+        """(3, 3) camera matrix K."""
         return np.array([[self.fx, self.skew, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
     @cached_property
@@ -143,18 +143,18 @@ class Camera(Model):
 
     @property
     def focal_length(self) -> float:
-        """m; f of the thin lens with 1 / f = 1 / image distance + 1 / focus distance."""
+        """Focal length f of the thin lens, m: 1 / f = 1 / image distance + 1 / focus distance."""
         image_distance = self.fx * self.pixel_pitch
         return image_distance / (1.0 + image_distance * self.focus_vergence)
 
     @property
     def focus_vergence(self) -> float:
-        """1 / m; 1 / focus distance, 0 for far away."""
+        """1 / focus distance, 1/m; 0 where the lens is focused at infinity."""
         return 0.0 if self.lens.focus_distance is None else 1.0 / self.lens.focus_distance
 
     @property
     def aperture_radius(self) -> float:
-        """m; half of focal length over f-number."""
+        """Radius of the aperture, m: half of focal length over f-number."""
         return 0.5 * self.focal_length / self.lens.f_number
 
     @property
@@ -167,7 +167,7 @@ class Camera(Model):
 
     @property
     def working_f_number(self) -> float:
-        """N (1 + m), m the magnification of the focused plane."""
+        """Working f-number N (1 + m), m the magnification of the focused plane."""
         if self.lens.focus_distance is None:
             return self.lens.f_number
         return self.lens.f_number * (1.0 + self.fx * self.pixel_pitch / self.lens.focus_distance)
@@ -230,7 +230,7 @@ class Camera(Model):
         return directions, valid
 
     def view(self, T_world_camera: Array) -> View:
-        """The camera in the world, as the kernels take it."""
+        """The camera at the pose T_world_camera (4, 4), as the kernels read it."""
         intrinsics = np.array([self.fx, self.fy, self.cx, self.cy, self.skew])
         lens = np.zeros(4)
         if self.lens.model == "thin-lens":

@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FOLD_ANGLES = 720
+"""Number of directions in which the fold is tabulated."""
 MAX_RADIUS = 20.0
+"""Largest radius, normalised, at which a fold is looked for: 87 deg off the axis."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -28,7 +30,7 @@ def tilt_matrix(tau_x: float, tau_y: float) -> Array:
     return p @ r
 
 
-# numpy's error model: on a pole of the model the result is inf or NaN, which the fold then excludes
+# numpy's error model: at a pole of the rational model the result is inf or NaN, which the fold then excludes
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def distort(x: float, y: float, k: Array, tilt: Array) -> tuple[float, float, float, float, float, float]:
     """Distorted (x', y') and the Jacobian's entries dx'/dx, dx'/dy, dy'/dx, dy'/dy."""
@@ -71,7 +73,7 @@ def fold_radius_at(x: float, y: float, folds: Array) -> float:
 def _determinant(r: float, c: float, s: float, k: Array, tilt: Array) -> float:
     _, _, xx, xy, yx, yy = distort(r * c, r * s, k, tilt)
     det = xx * yy - xy * yx
-    # the map must also keep moving outwards: past a pole of the rational model it comes back from the other side
+    # the radius must also grow: past a pole of the rational model the image returns from the other side
     return min(det, xx * c * c + (xy + yx) * c * s + yy * s * s)
 
 
@@ -119,7 +121,7 @@ def distort_points(points: Array, k: Array, folds: Array) -> tuple[Array, Mask]:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def undistort(xd: float, yd: float, k: Array, tilt: Array, folds: Array, tolerance: float) -> tuple[float, float, bool]:
-    """Invert `distort` by Newton's method, kept inside the fold and damped so that the residual always falls."""
+    """Invert `distort` by damped Newton steps inside the fold; returns (x, y) and whether the residual <= tolerance."""
     x, y = xd, yd
     limit = fold_radius_at(x, y, folds)
     radius = math.hypot(x, y)

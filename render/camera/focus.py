@@ -1,4 +1,4 @@
-"""What a render does with the lens, known before it starts, and a tilt that leaves nothing in focus."""
+"""The thin lens in the plan of a render, and a check for sensor tilts that leave nothing in focus."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from render.camera.camera import Camera
 from render.plan import ThinLens, TransportStep
 
 GRID = 9
+"""Points a side at which the image is sampled."""
 
 
 def thin_lens(camera: Camera) -> ThinLens | None:
-    """What the plan of a render knows of the lens; None: a pinhole."""
+    """The thin lens, as the plan of a render describes it; None: a pinhole."""
     lens = camera.lens
     if lens.model == "pinhole":
         return None
@@ -24,7 +25,7 @@ def thin_lens(camera: Camera) -> ThinLens | None:
 
 
 def lens_steps(camera: Camera) -> tuple[TransportStep, ...]:
-    """Which blur of the lens is rendered, and which is not. A blur is never done twice."""
+    """Which blur of the lens is rendered, and which is left to the sensor or ignored; no blur is applied twice."""
     if camera.lens.model == "pinhole":
         return (
             TransportStep("lens", "defocus", False, "pinhole"),
@@ -34,13 +35,13 @@ def lens_steps(camera: Camera) -> tuple[TransportStep, ...]:
 
 
 def focus_tilt(camera: Camera) -> float:
-    """rad; between the plane of focus and the plane that faces the camera. 90 deg: it runs along the axis."""
+    """Angle between the plane of focus and the image plane, rad; at 90 deg the plane of focus contains the axis."""
     plane = camera.focus_plane
     return math.atan2(math.hypot(plane[0], plane[1]), plane[2])
 
 
 def sharp_share(camera: Camera) -> float:
-    """Share of the image whose chief rays meet the plane of focus ahead of the camera; focused far away counts."""
+    """Fraction of the image whose chief rays meet the plane of focus in front of the camera; 1 without tilt."""
     plane = camera.focus_plane
     if not plane[:2].any():
         return 1.0

@@ -1,7 +1,7 @@
 """The thin lens: rays through the points of its aperture, and where a point of the world lands through one of them.
 
-The calibrated camera is kept: the centre of the lens is the camera's centre, and the ray through it (the chief ray) is
-that of the pinhole with OpenCV's distortion and tilt, so truth and triangulation are the pinhole's. In camera
+The calibrated camera stays valid: the centre of the lens is the camera's centre, and the ray through it (the chief
+ray) is that of the pinhole with OpenCV's distortion and tilt, so truth and triangulation are the pinhole's. In camera
 coordinates the aperture is the disc of radius R = f / (2 N) on z = 0. With (x, y) the chief ray's undistorted slopes,
 v = fx pixel_pitch the image distance on the axis, s the focus distance and f the focal length,
 
@@ -40,7 +40,7 @@ Float = NDArray[np.float64]
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def lens_point(radius: float, r1: float, r2: float) -> tuple[float, float]:
-    """(a, b) on the aperture, flat for flat (r1, r2) in [0, 1)^2; keeps neighbours (Shirley and Chiu 1997)."""
+    """(a, b) on the aperture, m, uniform for uniform (r1, r2) in [0, 1)^2: concentric map (Shirley and Chiu 1997)."""
     x, y = 2.0 * r1 - 1.0, 2.0 * r2 - 1.0
     if x == 0.0 and y == 0.0:
         return 0.0, 0.0
@@ -93,14 +93,14 @@ def lens_position(view: View, a: float, b: float) -> tuple[float, float, float]:
 def lens_project(
     view: View, tilt: Float, distorted: bool, p0: float, p1: float, p2: float, a: float, b: float
 ) -> tuple[float, float, float]:
-    """Pixel (u, v) that the world point p lights through the lens point (a, b), and the image area a patch there has.
+    """Pixel (u, v) of the image of the world point p through the lens point (a, b), and the image area of a patch at p.
 
     The area, px^2 for each m^2 of a patch at p that faces the lens point, is 0 where p has no image (behind the camera,
     beyond the distortion's fold); whether (u, v) lies in the image is left to the caller. Light of power Phi that p
-    scatters by f adds  Phi f cos(at p, to the lens point) area  to the pixel's radiance, for a lens point drawn flat
-    from the aperture: I = mean over the aperture of the integral of L over the pixel, du dv. The other way, a ray drawn
-    flat from one pixel and the aperture meets p with the density `area` for each m^2 facing the lens point; times the
-    squared distance it is that of its direction, 1 / sr. A pinhole is (a, b) = (0, 0).
+    scatters by f adds  Phi f cos(at p, to the lens point) area  to the pixel's radiance, for a lens point sampled
+    uniformly on the aperture: I = mean over the aperture of the integral of L over the pixel, du dv. Conversely, a ray
+    sampled uniformly from one pixel and the aperture meets p with the pdf `area`, 1/m^2, on a patch that faces the lens
+    point; times the squared distance it is the pdf of the direction, 1/sr. A pinhole is (a, b) = (0, 0).
 
     Derivation. The ray from (a, b) to p = (X, Y, Z), camera coordinates, has the slopes e = ((X - a) / Z, (Y - b) / Z),
     and chief-ray slopes n with  e = n - w(n) (a, b),  w = 1 / s - g . n.  Hence  n + (a, b) (g . n) = q,
@@ -114,7 +114,7 @@ def lens_project(
     ex = m[0, 0] * p0 + m[1, 0] * p1 + m[2, 0] * p2 - a
     ey = m[0, 1] * p0 + m[1, 1] * p1 + m[2, 1] * p2 - b
     r = math.sqrt(ex * ex + ey * ey + z * z)
-    # nothing is seen nearly in the plane of the lens
+    # a point nearly in the plane of the lens has no image
     if not z > 1e-6 * r:
         return np.nan, np.nan, 0.0
     qx, qy = ex / z + lens[1] * a, ey / z + lens[1] * b

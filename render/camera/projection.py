@@ -1,4 +1,4 @@
-"""Where a point of the camera's frame falls in the image, for kernels; `Camera.project` is the same for arrays."""
+"""Projection of a point of the camera's frame to the image, for kernels; `Camera.project` does so for arrays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from render.camera.view import View
 Float = NDArray[np.float64]
 
 NEAR = 1e-9
-"""m; what is nearer to the plane of the camera has no image."""
+"""Depth, m, below which a point has no image."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

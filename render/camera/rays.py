@@ -1,6 +1,6 @@
-"""Rays through jittered cells of pixels: how every camera-side stage looks into the scene.
+"""Camera rays: stratified over the pixel's area, and over the aperture of a thin lens.
 
-`camera_rays` look through the lens's centre, `lens_rays` through the whole aperture (a pinhole's is a point).
+`camera_rays` pass through the lens's centre, `lens_rays` through the whole aperture (a pinhole's is a point).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 
 LENS_DIMENSION = 1 << 20
-"""Where the random numbers of the aperture begin, apart from those of the pixel's area."""
+"""First random dimension of the aperture, above those of the pixel's area."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -70,7 +70,7 @@ def camera_rays(
 
 @numba.njit(nogil=True, cache=True)
 def _morton(i: int, j: int) -> int:
-    """The bits of i and j, below 2^6, by turns."""
+    """Morton code: the bits of i and j, below 2^6, interleaved."""
     code = 0
     for bit in range(6):
         code |= ((i >> bit) & 1) << (2 * bit) | ((j >> bit) & 1) << (2 * bit + 1)
@@ -79,9 +79,10 @@ def _morton(i: int, j: int) -> int:
 
 @numba.njit(nogil=True, cache=True)
 def _net_point(table: Float32, draw: np.uint64, number: int) -> tuple[float, float]:
-    """Point `number` of the row of `pair_table` that 64 random bits choose, its digits flipped as they say.
+    """Point `number` of a row of `pair_table`; 64 random bits select the row and its digital shift (XOR).
 
-    Unlike a shift by chance this keeps nets aligned: of four cells each sees its own quarter of the aperture.
+    Unlike a Cranley-Patterson rotation this preserves nets: four neighbouring cells sample a quarter of the aperture
+    each.
     """
     row = np.int64(draw & np.uint64(ROWS - 1))
     x = np.int64(table[row, number, 0] * 2.0**24) ^ np.int64(draw >> np.uint64(40))

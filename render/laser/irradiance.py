@@ -1,4 +1,4 @@
-"""The light of a line laser at a point, as kernels; the formulas are in `render.laser.laser`.
+"""The irradiance of a line laser at a point, as kernels; the formulas are in `render.laser.laser`.
 
 `beam` is `LineLaser.packed()`: power, sigma0, focus, z_R (or dsigma/dz where sigma0 = 0), tan(fan / 2), profile, ...
 """
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 SQRT2 = math.sqrt(2.0)
 INV_SQRT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
 SHEET_SIGMAS = 5.0
-"""The sheet is followed this far out: 6e-7 of its power lies beyond."""
+"""Sigmas from the sheet's middle at which it is cut off: 6e-7 of its power lies beyond."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -33,7 +33,7 @@ def sheet_sigma(z: float, beam: Array) -> tuple[float, float]:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def fan_density(y: float, beam: Array) -> float:
-    """h(Y), unit area on |Y| <= tan(fan / 2)."""
+    """Fan profile h(Y), of unit area on |Y| <= tan(fan / 2)."""
     edge = beam[4]
     if abs(y) > edge:
         return 0.0

@@ -72,7 +72,7 @@ class LineLaser(Model):
     def sheet_parameters(self) -> tuple[float, float, float]:
         """(sigma0, focus, z_R) with sigma(z) = sigma0 sqrt(1 + ((z - focus)/z_R)^2).
 
-        A divergence is the limit of zero waist at the origin: sigma0 = 0 and z_R holds dsigma/dz instead.
+        A divergence is the limit of zero waist at the origin: sigma0 = 0, and z_R holds dsigma/dz instead.
         """
         if isinstance(self.sheet, Divergence):
             return 0.0, 0.0, math.tan(self.sheet.full_angle / 2) / 2

@@ -1,8 +1,8 @@
 """The Gaussian across the sheet, averaged over a cell of a pixel in closed form.
 
 On a facet the sheet's coordinate q = x / sigma(z) is linear over a pixel, so along one side of a cell its mean is a
-difference of error functions; along the other a few Gauss-Legendre nodes do. It is linear over the aperture as well,
-whose disc is seen edge-on along the change of q: the density of a semicircle, for which Gauss-Chebyshev nodes do.
+difference of error functions; along the other a few Gauss-Legendre nodes suffice. q is linear over the aperture as
+well: the disc, projected on the gradient of q, has a semicircular density, for which Gauss-Chebyshev nodes are used.
 """
 
 from __future__ import annotations
@@ -19,33 +19,34 @@ from render.laser.irradiance import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2
 Float = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
-SMALL = 0.3
-"""Half-widths of a cell, together, in sigmas, below which a series does."""
+SERIES_LIMIT = 0.3
+"""Sum of a cell's half-widths, in sigmas, below which a Taylor series replaces the error functions, to 1e-6."""
 
 
 class SheetHit(NamedTuple):
     """Where a ray o + s d meets a facet in the sheet."""
 
     normal: Vector
-    """Of the facet, unit, world frame."""
+    """Unit normal n of the facet, world frame."""
     direction: Vector
-    """d, of any length, world frame."""
+    """Direction d of the ray, of any length, world frame."""
     s: float
+    """Ray parameter of the hit."""
     cosine: float
     """n . d."""
     q: float
-    """x / sigma there."""
+    """Sheet's coordinate x / sigma at the hit."""
     sigma: float
-    """Of the sheet, m."""
+    """Sigma of the sheet at the hit, m."""
     slope: float
-    """d sigma / dz."""
+    """d sigma / dz of the sheet at the hit."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def sheet_slope(xs: float, ys: float, m: Float, w: Float, hit: SheetHit) -> float:
-    """Change of q = x / sigma(z) with a pixel coordinate along which the ray's (x, y) changes by (xs, ys).
+    """Derivative of q = x / sigma(z) by a pixel coordinate along which the ray's (x, y) has the derivative (xs, ys).
 
-    m, w: from camera to world, from world to laser, (4, 4).
+    m, w: T_world_camera and T_laser_world, (4, 4).
     """
     n0, n1, n2 = hit.normal
     d0, d1, d2 = hit.direction
@@ -63,7 +64,7 @@ def sheet_slope(xs: float, ys: float, m: Float, w: Float, hit: SheetHit) -> floa
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _mean_gaussian(q: float, half: float) -> float:
-    """Mean of the unit Gaussian over [q - half, q + half]; 0 beyond the sheet's end."""
+    """Mean of the unit Gaussian over [q - half, q + half]; 0 beyond the sheet's cut-off."""
     half = abs(half)
     if abs(q) - half > SHEET_SIGMAS:
         return 0.0
@@ -78,7 +79,7 @@ def _mean_gaussian(q: float, half: float) -> float:
 def mean_over(q: float, half_u: float, half_v: float) -> float:
     """Mean of the unit Gaussian over a cell: closed form along u, Gauss-Legendre along v; a series for small ones."""
     half_u, half_v = abs(half_u), abs(half_v)
-    if half_u + half_v < SMALL:
+    if half_u + half_v < SERIES_LIMIT:
         if abs(q) - half_u - half_v > SHEET_SIGMAS:
             return 0.0
         # moments of the cell times Hermite polynomials: Taylor, to 1e-6
@@ -103,7 +104,7 @@ def mean_over(q: float, half_u: float, half_v: float) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def about_over(q: float, half_u: float, half_v: float) -> float:
-    """`mean_over` cheaply: the cell as a Gaussian of its variance; right to 1e-3 for half-widths of half a sigma."""
+    """`mean_over`, approximated: the cell as a Gaussian of its variance; to 1e-3 for half-widths of half a sigma."""
     if abs(q) - abs(half_u) - abs(half_v) > SHEET_SIGMAS:
         return 0.0
     variance = 1.0 + (half_u * half_u + half_v * half_v) / 3.0
@@ -112,7 +113,7 @@ def about_over(q: float, half_u: float, half_v: float) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def mean_over_aperture(q: float, half_u: float, half_v: float, reach: float) -> float:
-    """`mean_over`, and over an aperture from whose centre to whose rim q changes by `reach` at most."""
+    """Mean over a cell, as `mean_over`, and over an aperture from whose centre to rim q changes by at most `reach`."""
     reach = abs(reach)
     if reach < 0.02:
         return mean_over(q, half_u, half_v)
@@ -131,6 +132,6 @@ def mean_over_aperture(q: float, half_u: float, half_v: float, reach: float) -> 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def about_over_aperture(q: float, half_u: float, half_v: float, reach: float) -> float:
-    """`mean_over_aperture` at the cost of `mean_over`: the disc as a Gaussian of its variance, reach^2 / 4."""
+    """`mean_over_aperture`, approximated by one `mean_over`: the disc as a Gaussian of its variance, reach^2 / 4."""
     narrower = 1.0 / math.sqrt(1.0 + 0.25 * reach * reach)
     return narrower * mean_over(q * narrower, half_u * narrower, half_v * narrower)

@@ -1,8 +1,8 @@
-"""How finely each pixel is divided: the fewest rays that bring the image's error below its target.
+"""Adaptive sampling: how finely each pixel is stratified, so that the fewest rays bring the error below its target.
 
-With v_i the variance of pixel i at c_i cells a side, v_i c_i^p =: A_i stays: p = 3 for an edge through jittered cells.
-The sum of A_i c_i^-p at a given number of rays, the sum of c_i^2, is least where c_i goes with A_i^(1 / (p + 2)): a few
-pixels on the worst edges are divided finely, most not at all. Cells come in powers of two.
+A pixel of c_i x c_i cells has the variance v_i = A_i c_i^-p, with p = 3 for an edge through jittered cells. At a given
+number of rays, the sum of c_i^2, the sum of the variances is least where c_i is proportional to A_i^(1 / (p + 2)): the
+few pixels on the worst edges are divided finely, most are not divided. c_i is a power of two.
 """
 
 from __future__ import annotations
@@ -17,57 +17,59 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int32]
 
 MOST_CELLS = 32
+"""Largest number of cells a side."""
 _LEVELS = 6
-_BINS, _FINENESS = 640, 16
-"""Of log2 A^(1 / (p + 2)), so many an octave of c: from 2^-40 of the largest up, below which nothing counts."""
+"""Number of levels; level k has 2^k cells a side."""
+_BINS, _BINS_PER_LEVEL = 640, 16
+"""Histogram of log2 A^(1 / (p + 2)): 40 octaves below the largest value, 16 bins each; the last bin takes the rest."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def cells_needed(error: Float, cells: Int, allowed: float, least: float, order: float, growth: int) -> Int:
-    """(n,) cells a side that bring the sum of the squares of `error` (n,) below `allowed`, from the present ones (n,).
+    """(n,) cells a side that bring the sum of the squares of `error` (n,) below `allowed`, from the present (n,).
 
-    least: errors up to this cannot matter; order: p; growth: at most so many times the present cells, since an estimate
-    from few rays is not to be believed too far.
+    least: pixels with errors up to this are not refined; order: p; growth: largest factor by which the cells a side
+    grow, since an estimate from few rays cannot be extrapolated far.
     """
     n = error.shape[0]
     power = 1.0 / (order + 2.0)
-    place = np.empty(n)
+    log_weight = np.empty(n)
     highest, fixed = -np.inf, 0.0
     for i in range(n):
-        place[i] = -np.inf
+        log_weight[i] = -np.inf
         if error[i] > least and cells[i] < MOST_CELLS:
-            place[i] = power * math.log2(error[i] * error[i] * float(cells[i]) ** order)
-            highest = max(highest, place[i])
+            log_weight[i] = power * math.log2(error[i] * error[i] * float(cells[i]) ** order)
+            highest = max(highest, log_weight[i])
         else:
             fixed += error[i] * error[i]
     wanted = cells.copy()
     if highest == -np.inf:
         return wanted
-    # the variances, by the present level and by the place on the scale of A
+    # histogram of the variances by present level and by weight
     sums = np.zeros((_LEVELS, _BINS))
     for i in range(n):
-        if place[i] > -np.inf:
-            bin_ = min(int((highest - place[i]) * _FINENESS), _BINS - 1)
+        if log_weight[i] > -np.inf:
+            bin_ = min(int((highest - log_weight[i]) * _BINS_PER_LEVEL), _BINS - 1)
             sums[_level(cells[i]), bin_] += error[i] * error[i]
     most = _level(growth)
-    # how far down the scale the first pixels get two cells a side, in bins: the least that is enough
-    low, high = 0, _BINS + _LEVELS * _FINENESS
+    # bisect for the threshold: the first bin whose undivided pixels stay undivided
+    low, high = 0, _BINS + _LEVELS * _BINS_PER_LEVEL
     while low < high:
         middle = (low + high) // 2
         left = fixed
         for level in range(_LEVELS):
             for bin_ in range(_BINS):
                 if sums[level, bin_] > 0.0:
-                    gain = max(_reached(bin_, middle, level, most) - level, 0)
+                    gain = max(_level_at(bin_, middle, level, most) - level, 0)
                     left += sums[level, bin_] * 2.0 ** (-order * gain)
         if left <= allowed:
             high = middle
         else:
             low = middle + 1
     for i in range(n):
-        if place[i] > -np.inf:
-            bin_ = min(int((highest - place[i]) * _FINENESS), _BINS - 1)
-            wanted[i] = max(cells[i], 1 << _reached(bin_, low, _level(cells[i]), most))
+        if log_weight[i] > -np.inf:
+            bin_ = min(int((highest - log_weight[i]) * _BINS_PER_LEVEL), _BINS - 1)
+            wanted[i] = max(cells[i], 1 << _level_at(bin_, low, _level(cells[i]), most))
     return wanted
 
 
@@ -81,23 +83,24 @@ def _level(cells: int) -> int:
 
 
 @numba.njit(nogil=True, cache=True)
-def _reached(bin_: int, threshold: int, level: int, most: int) -> int:
-    """The level that pixels so far down the scale get."""
+def _level_at(bin_: int, threshold: int, level: int, most: int) -> int:
+    """The level of pixels in a bin, from their present level up by `most` levels at most."""
     if bin_ >= threshold:
         return 0
-    return min(1 + (threshold - 1 - bin_) // _FINENESS, level + most, _LEVELS - 1)
+    return min(1 + (threshold - 1 - bin_) // _BINS_PER_LEVEL, level + most, _LEVELS - 1)
 
 
 @numba.njit(nogil=True, cache=True)
-def graded(wanted: Int, cells: Int, pixels: Int, width: int) -> Int:
-    """(n,) wanted cells of ascending flat pixel indices (n,) -> at least half as many beside each that is traced.
+def grade_neighbours(wanted: Int, cells: Int, pixels: Int, width: int) -> Int:
+    """(n,) wanted cells of ascending flat pixel indices (n,) -> the same, with at least half as many in the neighbours
+    of each pixel that is refined.
 
-    All rays may miss the edge of a shadow that cuts a pixel's corner: its neighbours tell. Across the left and right
-    edge of an image neighbours wrap: a pixel too many costs little.
+    All rays of a pixel may miss a shadow's edge that cuts its corner, but its neighbours' rays meet it. Neighbours wrap
+    around the left and right border of the image, which refines a few pixels too many.
     """
     n = len(pixels)
     out = wanted.copy()
-    # three places in the set that walk along with i: the row before, its own, the row after
+    # where the neighbours begin in the row before, the pixel's own and the row after; these indices only ascend
     start = np.zeros(3, np.int64)
     for i in range(n):
         if wanted[i] <= cells[i]:
@@ -115,19 +118,20 @@ def graded(wanted: Int, cells: Int, pixels: Int, width: int) -> Int:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def doubt_beside(
-    error: Float, doubt: Float, order: float, mean: Float, between: float, cells: Int, pixels: Int, width: int
+def raise_neighbour_errors(
+    error: Float, neighbour_error: Float, order: float, mean: Float, border: float, cells: Int, pixels: Int, width: int
 ) -> None:
-    """Raise the errors (n,) of pixels whose own rays may have missed what those of their neighbours have met.
+    """Raise the errors (n,) of pixels whose own rays may have missed an edge that their neighbours' rays have met.
 
-    doubt (n,): the error that each of the ascending flat pixel indices (n,) expects of a neighbour with one cell; it
-    falls with the power order / 2 of the neighbour's own cells (n,). between: of the radiance of a pixel beside one
-    that is wholly dark: the edge between the two may lie within either, closer to their border than any ray.
+    neighbour_error (n,): the error that each of the ascending flat pixel indices (n,) predicts for a neighbour of one
+    cell; it falls with the power order / 2 of the neighbour's own cells (n,). border: fraction of a pixel's radiance,
+    times the square of its cells, by which it and a dark neighbour may be wrong, since the edge between them may lie in
+    either, closer to their border than any ray.
     """
     n = len(pixels)
     start = np.zeros(3, np.int64)
     for i in range(n):
-        if doubt[i] <= 0.0 and mean[i] <= 0.0:
+        if neighbour_error[i] <= 0.0 and mean[i] <= 0.0:
             continue
         for row in range(3):
             low = pixels[i] + (row - 1) * width - 1
@@ -137,10 +141,10 @@ def doubt_beside(
             start[row] = j
             while j < n and pixels[j] <= low + 2:
                 if cells[j] > 1:
-                    error[j] = max(error[j], doubt[i] * float(cells[j]) ** (-0.5 * order))
+                    error[j] = max(error[j], neighbour_error[i] * float(cells[j]) ** (-0.5 * order))
                 if mean[j] == 0.0 and mean[i] > 0.0 and (row == 1 or pixels[j] == low + 1):
                     if cells[j] > 1:
-                        error[j] = max(error[j], between * mean[i] / float(cells[j]) ** 2)
+                        error[j] = max(error[j], border * mean[i] / float(cells[j]) ** 2)
                     if cells[i] > 1:
-                        error[i] = max(error[i], between * mean[i] / float(cells[i]) ** 2)
+                        error[i] = max(error[i], border * mean[i] / float(cells[i]) ** 2)
                 j += 1

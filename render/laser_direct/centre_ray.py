@@ -1,9 +1,9 @@
-"""One ray through the middle of each pixel, and what its neighbours say of the error that leaves.
+"""One ray through the centre of each pixel, and the error that this leaves, estimated from the pixel's neighbours.
 
-On a facet the Gaussian over a whole pixel is known in closed form from one ray, and how the radiance beneath it changes
-(distance, angles) from the rays beside it. So where a pixel's neighbours, each from its own facet, predict for it what
-it says itself, that ray is enough; where they do not (edges, shadows, curvature, texture) their difference bounds the
-error, and `render.laser_direct.integrator` looks closer.
+On a facet one ray gives the Gaussian's mean over the whole pixel in closed form, and the neighbouring rays give the
+gradient of the radiance beneath it (distance, angles). Where a pixel's neighbours, each from its own facet, predict the
+value that the pixel has, one ray is enough. Where they do not (edges, shadows, curvature, texture) their difference
+bounds the error, and `render.laser_direct.integrator` divides the pixel.
 """
 
 from __future__ import annotations
@@ -20,13 +20,15 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int32]
 
 EDGE_SHARE = 0.3
-"""RMS error of the middle of a pixel for its mean, over the jump, where an edge crosses it anywhere: 1 / sqrt(12)."""
+"""RMS error, as a fraction of the jump, of taking a pixel's centre for its mean where an edge crosses it anywhere:
+1 / sqrt(12), rounded up.
+"""
 BEYOND = -1.0
-"""In place of the radiance, where the sheet would not reach the pixel whatever stood in its way."""
+"""Marks, in place of the radiance, a pixel whose surface lies outside the sheet, occluded or not."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def look_around(
+def estimate_errors(
     start: int,
     stop: int,
     pixels: Int,
@@ -38,30 +40,30 @@ def look_around(
 ) -> None:
     """Fill mean and error (n,) of pixels start..stop of (n,) ascending flat indices.
 
-    planes (n, 4): q in the middle of the pixel, its change with u and with v, and the radiance in the sheet's middle,
-    0 where no light is seen, and then the others are anything; or BEYOND. middle (n,): the Gaussian's mean over the
-    pixel times that.
+    planes (n, 4): q at the pixel's centre, its derivatives by u and v, and the radiance in the sheet's middle. That is
+    0 where no light is seen, and q and its derivatives are then undefined; or BEYOND. middle (n,): the radiance times
+    the Gaussian's mean over the pixel.
     """
     n = len(pixels)
-    # three places in the set that walk along with i: the row before, its own, the row after
+    # where the neighbours begin in the row before, the pixel's own and the row after; these indices only ascend
     walk = np.empty(3, np.int64)
     for row in range(3):
         walk[row] = np.searchsorted(pixels, pixels[start] + (row - 1) * width - 1)
     for i in range(start, stop):
         q, peak, worst = planes[i, 0], planes[i, 3], 0.0
-        # change of the radiance with u and v: half the difference of the neighbours on either side
+        # gradient of the radiance by u and v: central differences of the neighbours
         along_u = along_v = 0.0
         share = slope = 0.0
         if peak > 0.0:
             share = middle[i] / peak
-            # change of the mean over the pixel with q: a difference of densities at its ends
+            # derivative of the mean over the pixel by q: a difference of the Gaussian at its ends
             half = 0.5 * max(abs(planes[i, 1]), abs(planes[i, 2]))
             if half < 0.05:
                 slope = abs(q) * share
             else:
                 ends = math.exp(-0.5 * (q - half) ** 2) - math.exp(-0.5 * (q + half) ** 2)
                 slope = abs(ends) * INV_SQRT_2PI / (2.0 * half)
-            # in the very middle the slope vanishes, and the curvature is what counts
+            # in the sheet's middle the slope vanishes, and the curvature decides
             slope = max(slope, 0.25 * share)
         for row in range(3):
             low = pixels[i] + (row - 1) * width - 1
@@ -79,12 +81,12 @@ def look_around(
                     elif pixels[j] == low + 1:
                         along_v += 0.5 * (other - peak) * (row - 1)
                 elif peak > 0.0 or other > 0.0:
-                    # dark beside the line is no edge where the same surface goes on there
+                    # a dark neighbour outside the sheet is no edge where the same surface continues there
                     beyond = min(peak, other) == BEYOND
                     worst = max(worst, max(middle[i], middle[j]) * (min(abs(predicted - q), 1.0) if beyond else 1.0))
                 j += 1
         error[i] = EDGE_SHARE * worst
-        # the mean of u times the Gaussian over the pixel, the pixel taken for a Gaussian of its variance
+        # first moment of the Gaussian over the pixel, with the pixel's box replaced by a Gaussian of equal variance
         mean[i] = middle[i]
         if peak > 0.0:
             moment = -share * q / (12.0 + planes[i, 1] ** 2 + planes[i, 2] ** 2)
@@ -92,10 +94,10 @@ def look_around(
 
 
 @numba.njit(nogil=True, cache=True)
-def gather_first(
+def gather_centre_rays(
     values: Float, occluded: NDArray[np.bool_], sample: Int, count: int, planes: Float, middle: Float
 ) -> None:
-    """Radiance of each pixel (n,) from its one ray; one in the shade has no radiance in the sheet's middle either."""
+    """Radiance of each pixel -> middle (n,) from its centre ray; an occluded one also gets 0 in planes (n, 4)."""
     for i in range(len(middle)):
         middle[i] = values[i, 0]
     for j in range(count):

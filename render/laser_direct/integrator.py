@@ -1,11 +1,11 @@
 """Direct light of a laser: each lit pixel's mean radiance under a box filter.
 
-A pixel is seen by one ray first (`render.laser_direct.centre_ray`). Where that is not enough (edges, shadows, strong
-curvature, texture) it is divided into n x n cells with one jittered ray each (`render.laser_direct.shading`). Each ray
-also predicts its whole pixel; the spread of these predictions is the error estimate, from which
-`render.laser_direct.adaptive_sampling` tells how many cells each pixel needs for the image's error to be below the
-target, until it is. Through a thin lens each ray has its own point of the aperture, and `render.laser_direct.aperture`
-takes the noise of that away.
+A pixel is sampled by one ray through its centre first (`render.laser_direct.centre_ray`). Where that is not enough
+(edges, shadows, strong curvature, texture) it is divided into n x n cells with one jittered ray each
+(`render.laser_direct.shading`). Each ray also predicts the mean over its whole pixel; the spread of these predictions
+is the error estimate, from which `render.laser_direct.adaptive_sampling` computes the cells that each pixel needs. This
+is repeated until the image's error is below the target. Through a thin lens each ray has its own point of the aperture;
+`render.laser_direct.aperture` removes the noise of these points.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from render.base.threads import map_chunks
 from render.camera.camera import Camera
 from render.camera.rays import camera_rays, lens_rays
 from render.laser.laser import LineLaser
-from render.laser_direct.adaptive_sampling import cells_needed, doubt_beside, graded
+from render.laser_direct.adaptive_sampling import cells_needed, grade_neighbours, raise_neighbour_errors
 from render.laser_direct.aperture import gather_aperture
-from render.laser_direct.centre_ray import gather_first, look_around
-from render.laser_direct.rasterise import reachable_pixels
+from render.laser_direct.centre_ray import estimate_errors, gather_centre_rays
+from render.laser_direct.rasterise import rasterise_sheet
 from render.laser_direct.shading import (
     CellRays,
     ShadowRays,
     Sheet,
     gather,
-    place,
     shade_diffuse,
     shade_diffuse_lens,
     shade_glossy,
     shade_glossy_lens,
+    write_pixels,
 )
 from render.material.material import reflectance_weights
 from render.run import Run
@@ -47,38 +47,44 @@ from render.world.world import World
 Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
-Places = NDArray[np.int64]
+Indices = NDArray[np.int64]
 
-RAYS_A_JOB = 1 << 13
-"""Enough to hide Python's share, few enough to share work evenly and to keep what is known of them near."""
+RAYS_PER_JOB = 1 << 13
+"""Large enough to hide Python's overhead, small enough to balance the threads and to stay in the processor's cache."""
 SAFETY = 0.9
-"""Fraction of the target that is aimed at, since an estimated error may turn out larger."""
-LEAST = 0.25
-"""Fraction of its equal share of the target below which a pixel cannot keep the image from it."""
-GROWTH = 4
-"""Factor by which the cells a side of a pixel may grow at once."""
+"""Fraction of the target that is aimed at: lower costs rays, higher more rounds where an estimate was too low."""
+NEGLIGIBLE_ERROR = 0.25
+"""Fraction of its equal share of the target below which a pixel is not refined further."""
+MAX_GROWTH = 4
+"""Largest factor by which a pixel's cells a side grow in a round: more would save rounds, but trust few rays."""
 EDGE_ORDER, APERTURE_ORDER = 3.0, 2.25
-"""Powers of the cells a side with which the variance falls: of an edge, and of one seen through an aperture."""
+"""Powers of the cells a side with which the variance falls: at an edge, and at an edge seen through an aperture."""
 EDGE_ERROR, EDGE_ERROR_ORDER = 0.3, 5.0
-"""Of the jump at an edge: the error of a pixel beside, a corner of which may be beyond it between its rays."""
+"""Error of a neighbour of one cell whose corner may lie beyond the edge unseen, as a fraction of the jump at the edge;
+and the power of its cells a side with which the variance falls.
+"""
 BORDER_ERROR = 0.35
-"""Of the radiance, over the square of the cells: the RMS area beyond an edge along a pixel's border that no ray met."""
-APERTURE_ERROR = 0.2
-"""Of the error of a pixel seen through an aperture: its neighbours', whose few rays may agree by chance, is no less."""
+"""RMS area beyond an edge along a pixel's border that no ray met, times the square of the cells a side."""
+NEIGHBOUR_ERROR_RATIO = 0.2
+"""Lower bound on the neighbours' errors, as a fraction of a pixel's own at equal cells: the few rays of a pixel seen
+through an aperture may agree by chance.
+"""
 
 
 @dataclass(frozen=True)
 class DirectImage:
-    """(h, w) float32 radiance W/(m^2 sr); the estimated relative RMS error over the lit pixels; what it took.
-
-    dropped: contributions that were NaN, infinite or negative.
-    """
+    """Direct radiance of one laser, how well it is known, and what it took."""
 
     radiance: Float32
+    """(h, w) W/(m^2 sr)."""
     error: float
+    """Estimated relative RMS error over the lit pixels."""
     pixels: int
+    """Number of lit pixels."""
     samples: int
-    dropped: int
+    """Number of camera rays."""
+    invalid: int
+    """Number of contributions that were NaN, infinite or negative, and count as 0."""
 
 
 def direct_image(
@@ -92,14 +98,14 @@ def direct_image(
     run: Run = Run(),
 ) -> DirectImage:
     """Direct radiance of one laser to a target relative RMS error over the lit pixels. Raises Cancelled."""
-    pixels = reachable_pixels(world, camera, laser, T_world_camera, T_world_laser, run.threads)
+    pixels = rasterise_sheet(world, camera, laser, T_world_camera, T_world_laser, run.threads)
     image = np.zeros(camera.height * camera.width, dtype=np.float32)
-    # through an aperture one ray knows but one point of it
+    # one ray samples one point of the aperture only, so centre rays do not do
     aperture = bool(camera.view(T_world_camera).lens[0] > 0.0)
     order = APERTURE_ORDER if aperture else EDGE_ORDER
     n = len(pixels)
     cells, wanted = np.zeros(n, np.int32), np.full(n, 2 if aperture else 1, np.int32)
-    first = 0 if aperture else n
+    centre_rays = 0 if aperture else n
     task = _Task(
         world,
         world.surface_at((laser.wavelength_nm,) * 3),
@@ -112,49 +118,49 @@ def direct_image(
         np.zeros(n),
         np.zeros(n),
         np.zeros(n),
-        np.empty((first, 4)),
-        np.empty(first),
+        np.empty((centre_rays, 4)),
+        np.empty(centre_rays),
     )
     samples, left = 0, 1.0
 
     while True:
         jobs, rays = schedule(cells, wanted)
-        # how many levels there will be is not known: each takes half of what is left
+        # the number of rounds is unknown: each reports half of the progress that is left
         run.between(1.0 - left, 1.0 - 0.5 * left).map(partial(task.run, jobs), len(jobs), 1)
         if samples == 0 and not aperture:
             map_chunks(task.predict_errors, n, max(1024, math.ceil(n / 4)), run.threads)
         samples += rays
         cells = wanted
-        doubts = (
-            (task.doubt, APERTURE_ORDER, task.mean, 0.0)
+        bounds = (
+            (task.neighbour_error, APERTURE_ORDER, task.mean, 0.0)
             if aperture
-            else (task.doubt, EDGE_ERROR_ORDER, task.mean, BORDER_ERROR)
+            else (task.neighbour_error, EDGE_ERROR_ORDER, task.mean, BORDER_ERROR)
         )
-        doubt_beside(task.error, *doubts, cells, pixels, camera.width)
+        raise_neighbour_errors(task.error, *bounds, cells, pixels, camera.width)
         count, power, variance = sum_squares(task.mean, task.error)
         signal = math.sqrt(power / max(count, 1))
         relative = math.sqrt(variance / count) / signal if count else 0.0
         if relative > target:
-            allowed, least = (SAFETY * target * signal) ** 2 * count, LEAST * target * signal
-            wanted = cells_needed(task.error, cells, allowed, least, order, GROWTH)
-            wanted = graded(wanted, cells, pixels, camera.width)
+            allowed, least = (SAFETY * target * signal) ** 2 * count, NEGLIGIBLE_ERROR * target * signal
+            wanted = cells_needed(task.error, cells, allowed, least, order, MAX_GROWTH)
+            wanted = grade_neighbours(wanted, cells, pixels, camera.width)
         if relative <= target or np.array_equal(wanted, cells):
-            dropped = sum(task.dropped) + place(pixels, task.mean, image)
-            return DirectImage(image.reshape(camera.height, camera.width), relative, count, samples, dropped)
+            invalid = sum(task.invalid) + write_pixels(pixels, task.mean, image)
+            return DirectImage(image.reshape(camera.height, camera.width), relative, count, samples, invalid)
         left *= 0.5
 
 
-def schedule(cells: Int, wanted: Int) -> tuple[list[tuple[int, Places]], int]:
-    """Jobs of about RAYS_A_JOB rays for the pixels that want more cells than they have, the finest first.
+def schedule(cells: Int, wanted: Int) -> tuple[list[tuple[int, Indices]], int]:
+    """Jobs of about RAYS_PER_JOB rays for the pixels that want more cells than they have, the finest first.
 
-    A job is the cells a side and which of the (n,) pixels. Also the number of rays.
+    A job is the cells a side and the indices of its pixels among the (n,). Also returns the number of rays.
     """
     jobs, rays = [], 0
     for level in range(int(wanted.max(initial=1)), 0, -1):
         if level & (level - 1):
             continue
         chosen = np.flatnonzero((wanted == level) & (cells < level))
-        pieces = math.ceil(len(chosen) * level**2 / RAYS_A_JOB)
+        pieces = math.ceil(len(chosen) * level**2 / RAYS_PER_JOB)
         jobs += [(level, piece) for piece in np.array_split(chosen, pieces)] if pieces else []
         rays += len(chosen) * level**2
     return jobs, rays
@@ -174,7 +180,7 @@ def sum_squares(radiance: Float, error: Float) -> tuple[int, float, float]:
 
 @dataclass(frozen=True)
 class _Task:
-    """The (n,) pixels of an image and what is known of them: `run` does some, each job with its own buffers."""
+    """The (n,) pixels of an image and their estimates so far: `run` traces some, each job with its own buffers."""
 
     world: World
     surface: Surface
@@ -186,24 +192,24 @@ class _Task:
     pixels: Int
     mean: Float
     error: Float
-    doubt: Float
-    """What a pixel with several rays says of its neighbours: `render.laser_direct.adaptive_sampling.doubt_beside`."""
+    neighbour_error: Float
+    """(n,) error that a pixel with several rays predicts for its neighbours, as for `raise_neighbour_errors`."""
     planes: Float
     """(n, 4) where centre rays are traced first, or (0, 4)."""
     middle: Float
     """(n,) where centre rays are traced first, or (0,)."""
-    dropped: list[int] = field(default_factory=list)
+    invalid: list[int] = field(default_factory=list)
 
     def predict_errors(self, start: int, stop: int) -> None:
-        """After every pixel has had its centre ray: the errors that this leaves."""
+        """Fill mean and error of pixels start..stop once every pixel has its centre ray."""
         around = self.planes, self.middle, self.mean, self.error
-        look_around(start, stop, self.pixels, self.camera.width, *around)
+        estimate_errors(start, stop, self.pixels, self.camera.width, *around)
 
-    def run(self, jobs: list[tuple[int, Places]], start: int, stop: int) -> None:
+    def run(self, jobs: list[tuple[int, Indices]], start: int, stop: int) -> None:
         for cells, chosen in jobs[start:stop]:
             self._trace(cells, chosen)
 
-    def _trace(self, cells: int, chosen: Places) -> None:
+    def _trace(self, cells: int, chosen: Indices) -> None:
         rays, n, pixels = self.world.rays, cells**2, self.pixels[chosen]
         count = len(pixels) * n
         view, surface = self.camera.view(self.T_world_camera), self.surface
@@ -214,8 +220,8 @@ class _Task:
         if aperture:
             planes = np.empty((count, 5))
             origins = np.empty((count, 3), np.float32)
-            written = (normalised, offsets, lens, origins, directions)
-            lens_rays(view, pair_table(), pixels, cells, self.seed, rays.centre, *written)
+            outputs = (normalised, offsets, lens, origins, directions)
+            lens_rays(view, pair_table(), pixels, cells, self.seed, rays.centre, *outputs)
             triangle, _ = rays.intersect(origins, directions, coherent=True)
         else:
             if cells == 1:
@@ -237,18 +243,18 @@ class _Task:
         )
         buffers = ShadowRays(rays.centre, rays.surface_offset, origins, towards, far, sample)
         cell_rays = CellRays(triangle, normalised, offsets, lens, cells)
-        shadows, dropped = shade(surface, view, cell_rays, sheet, buffers, values, planes)
-        self.dropped.append(dropped)
+        shadows, invalid = shade(surface, view, cell_rays, sheet, buffers, values, planes)
+        self.invalid.append(invalid)
         blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows], coherent=True)
         mean, error, jump = (np.empty(len(pixels)) for _ in range(3))
         if aperture:
             gather_aperture(values, planes, lens, view.lens[0], blocked, sample, shadows, cells, mean, error)
-            self.doubt[chosen] = APERTURE_ERROR * error * cells ** (0.5 * APERTURE_ORDER)
+            self.neighbour_error[chosen] = NEIGHBOUR_ERROR_RATIO * error * cells ** (0.5 * APERTURE_ORDER)
         elif cells == 1:
-            gather_first(values, blocked, sample, shadows, planes, mean)
+            gather_centre_rays(values, blocked, sample, shadows, planes, mean)
             self.planes[chosen], self.middle[chosen] = planes, mean
             return
         else:
             gather(values, blocked, sample, shadows, cells, mean, error, jump)
-            self.doubt[chosen] = EDGE_ERROR * jump
+            self.neighbour_error[chosen] = EDGE_ERROR * jump
         self.mean[chosen], self.error[chosen] = mean, error

@@ -17,7 +17,7 @@ from render.world.placed import PlacedScene
 from render.world.world import World
 
 QUICK_ERROR = 0.05
-"""Relative error of a first frame, and of what a pilot compares with: far below a pilot's own."""
+"""Relative error of a first frame, and of the direct light that a pilot's errors are compared with."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class DirectLight(LightGroup[GroupPlan]):
     """Light that met one surface, exact across the sheet, sampled across edges and shadows."""
 
     quick: bool = False
-    """To `QUICK_ERROR` only, for a first look."""
+    """Render to `QUICK_ERROR` only, for a first frame."""
 
     group = "direct"
     field = "laser_direct"
@@ -38,7 +38,7 @@ class DirectLight(LightGroup[GroupPlan]):
         return GroupPlan(self.expected(scene, settings))
 
     def work(self, scene: Scene, settings: RenderSettings) -> float:
-        """A strip of a twentieth of the image, four rays a pixel, more for a finer target."""
+        """Estimated rays: four a pixel for a line that covers a twentieth of the image, more for a finer target."""
         pixels, target = scene.camera.width * scene.camera.height, self._target(settings)
         return 0.2 * pixels * len(scene.lasers) * (1.0 + 0.2 * math.log2(max(1.0, QUICK_ERROR / target)))
 
@@ -68,6 +68,6 @@ def quality_of(laser: str, image: DirectImage, settings: RenderSettings) -> Grou
         settings.laser_error,
         image.samples,
         "samples",
-        invalid=image.dropped,
+        invalid=image.invalid,
         lit_pixels=image.pixels,
     )

@@ -1,7 +1,8 @@
-"""Which pixels a laser can reach directly: the triangles that meet its slab, clipped to it and drawn conservatively.
+"""Conservative rasterisation of a laser's sheet: the pixels that may see its direct light.
 
-The slab is the sheet out to `SHEET_SIGMAS`, within the fan. Triangles that do not face both camera and laser are left
-out; occlusion is not looked at, so the set is a superset. A thin lens spreads each point over its blur disc.
+Triangles are clipped to the slab, which is the sheet out to `SHEET_SIGMAS` within the fan, and their outlines are drawn
+conservatively. Triangles that do not face both camera and laser are culled; occlusion is ignored, so the set is a
+superset. A thin lens widens each outline by its blur disc.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ Int = NDArray[np.int32]
 
 TRIANGLES_A_CHUNK = 1 << 15
 MARGIN_PX = 1
+"""Pixels by which an outline is widened."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -53,7 +55,7 @@ def _clip(polygon: Float, count: int, plane: Float, out: Float) -> int:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _slab(planes: Float, T_camera_laser: Float, tangent: float, slope: float, offset: float) -> None:
-    """Half spaces (6, 4) in laser coordinates: |x| at most slope z + offset, within the fan, before both devices."""
+    """Half spaces (6, 4) in laser coordinates: |x| <= slope z + offset, within the fan, in front of both devices."""
     planes[:] = 0.0
     planes[0, 0], planes[1, 0] = -1.0, 1.0
     planes[0, 2] = planes[1, 2] = slope
@@ -67,7 +69,10 @@ def _slab(planes: Float, T_camera_laser: Float, tangent: float, slope: float, of
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _faces_both(corners: Float, camera: Float, aperture: float) -> bool:
-    """Camera and laser are on one side of a triangle, all (.., 3) in laser coordinates; the rim may see past it."""
+    """Camera and laser are on the same side of a triangle, all (.., 3) in laser coordinates.
+
+    aperture: its radius, m; some point of it being on the laser's side is enough.
+    """
     a, b, c = corners[0], corners[1], corners[2]
     n0 = (b[1] - a[1]) * (c[2] - a[2]) - (b[2] - a[2]) * (c[1] - a[1])
     n1 = (b[2] - a[2]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[2] - a[2])
@@ -81,7 +86,7 @@ def _faces_both(corners: Float, camera: Float, aperture: float) -> bool:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _clip_all(corners: Float, planes: Float, front: Float, back: Float) -> int:
-    """Clip corners (3, 3) by all planes -> front (12, 3), which takes turns with back; returns how many are left."""
+    """Clip corners (3, 3) by all planes -> front (12, 3), with back (12, 3) as scratch; returns how many are left."""
     count = len(corners)
     front[:count] = corners
     for plane in range(len(planes)):
@@ -130,7 +135,7 @@ def _draw_outline(
                 margin = MARGIN_PX + int(min(1e4, math.ceil(blur * abs(off_focus))))
             for y in range(max(row - margin, 0), min(row + margin, height - 1) + 1):
                 if y < top or y > bottom:
-                    # widen the range of rows, clearing what it takes in
+                    # widen the range of rows and empty the new ones
                     if bottom < 0:
                         top, bottom = y, y
                         left[y], right[y] = view.width, -1
@@ -158,7 +163,7 @@ def triangle_spans(  # noqa: PLR0913
 ) -> Int:
     """(n, 3) row, first and last column of spans where triangles start..stop may show direct light of the laser.
 
-    blur: px of the blur disc's radius for a difference of 1/m in 1 / depth; 0 for a pinhole.
+    blur: as `blur_scale` gives it.
     """
     spans = np.empty((256, 3), dtype=np.int32)
     found = 0
@@ -208,7 +213,7 @@ def triangle_spans(  # noqa: PLR0913
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def blur_scale(view: View, height: int) -> float:
-    """px of the blur disc's radius for a difference of 1/m in 1 / depth: at most, anywhere in the image."""
+    """Upper bound over the image of the blur disc's radius, px per 1/m of difference in 1 / depth; 0 for a pinhole."""
     if view.lens[0] == 0.0:
         return 0.0
     k, tilt = view.distortion, tilt_matrix(view.distortion[12], view.distortion[13])
@@ -222,9 +227,9 @@ def blur_scale(view: View, height: int) -> float:
                 _, _, xx, xy, yx, yy = distort(x, y, k, tilt)
                 stretch = max(stretch, math.sqrt(xx * xx + xy * xy + yx * yx + yy * yy))
     if distorted:
-        # between the samples
+        # margin for maxima between the samples
         stretch *= 1.1
-    # on a tilted plane of focus the disc's far side is a little larger
+    # with a tilted plane of focus the disc's far side is a little larger
     far_side = 1.0 / max(0.1, 1.0 - view.lens[0] * math.hypot(view.lens[2], view.lens[3]))
     skew = 1.0 + abs(view.intrinsics[4]) / view.intrinsics[0]
     return view.lens[0] * max(view.intrinsics[0], view.intrinsics[1]) * stretch * far_side * skew
@@ -234,7 +239,7 @@ def blur_scale(view: View, height: int) -> float:
 def covered_pixels(spans: Int, height: int, width: int) -> Int:
     """(n, 3) spans, in any order -> ascending flat indices of the pixels that they cover.
 
-    Row by row in a buffer of one row: an image of flags would cost more to clear and to read than all else here.
+    Row by row with flags for one row: clearing and reading flags for the whole image would cost more than all the rest.
     """
     n = len(spans)
     begin = np.zeros(height + 1, dtype=np.int64)
@@ -266,7 +271,7 @@ def covered_pixels(spans: Int, height: int, width: int) -> Int:
     return out[:k].copy()
 
 
-def reachable_pixels(
+def rasterise_sheet(
     world: World,
     camera: Camera,
     laser: LineLaser,
@@ -280,7 +285,7 @@ def reachable_pixels(
     blur = blur_scale(view, camera.height)
 
     height = camera.height
-    # of each chunk its own, so that threads do not meet
+    # one entry a chunk, so that threads write apart
     spans = [np.zeros((0, 3), np.int32)] * -(-len(world.triangles) // TRIANGLES_A_CHUNK)
 
     def work(start: int, stop: int) -> None:

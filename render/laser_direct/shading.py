@@ -1,8 +1,8 @@
-"""What each camera ray tells of the direct light of a laser: the kernels of `render.laser_direct.integrator`.
+"""Direct laser light along each camera ray: the shading kernels of `render.laser_direct.integrator`.
 
-Where a ray hits, the facet's plane tells how the sheet's coordinate q = x / sigma(z) changes over the ray's cell of its
-pixel, so the Gaussian across it is integrated in closed form instead of being sampled; visibility and albedo are
-sampled.
+The plane of the facet that a ray hits gives the gradient of the sheet's coordinate q = x / sigma(z) over the ray's cell
+of its pixel. The Gaussian across the sheet is therefore integrated over the cell in closed form; visibility and albedo
+are sampled.
 """
 
 from __future__ import annotations
@@ -31,17 +31,18 @@ Vector = tuple[float, float, float]
 
 
 class CellRays(NamedTuple):
-    """Camera rays, one through each of cells x cells cells of each pixel, and what they meet."""
+    """Camera rays, one through each of the cells x cells of each pixel, and the triangles that they hit."""
 
     triangle: Int
-    """(n,), -1: nothing."""
+    """(n,) triangle that the ray hits; -1: none."""
     normalised: Float
-    """(n, 2) coordinates in the camera."""
+    """(n, 2) normalised image coordinates without distortion; NaN: no ray."""
     offsets: Float32
-    """(n, 2) px from the middle of the cell."""
+    """(n, 2) px from the centre of the cell to the ray."""
     lens: Float
-    """(n, 2) points of the aperture; (0, 2): a pinhole."""
+    """(n, 2) points of the aperture, m; (0, 2) for a pinhole."""
     cells: int
+    """Number of cells along a side of the pixel."""
 
 
 class Sheet(NamedTuple):
@@ -49,37 +50,38 @@ class Sheet(NamedTuple):
 
     T_laser_world: Float
     centre: Float
-    """(3,) of the laser, world frame."""
+    """(3,) position of the laser, world frame, m."""
     beam: Float
-    """`render.laser.laser.LineLaser.packed`."""
+    """Parameters of the laser, as `render.laser.laser.LineLaser.packed` gives them."""
     weights: Float
-    """(3,) of the bands of a reflectance at its wavelength."""
+    """(3,) weights of R, G and B in a reflectance at the laser's wavelength."""
 
 
 class ShadowRays(NamedTuple):
-    """Where shadow rays are written, and from where they are counted."""
+    """Buffers that the shadow rays are written to, and the origin of their coordinates."""
 
     centre: Float
-    """(3,) of the world as embree has it."""
+    """(3,) origin of Embree's coordinates, world frame, m."""
     surface_offset: float
-    """m between a ray's origin and its surface."""
+    """Distance from a shadow ray's origin to its surface, m."""
     origins: Float32
-    """(n, 3) from `centre`."""
+    """(n, 3) origins relative to `centre`, m."""
     directions: Float32
+    """(n, 3) unit directions to the laser."""
     far: Float32
-    """(n,) m."""
+    """(n,) length of the shadow ray, m."""
     sample: Int
-    """(n,) whose each is: a number of a camera ray."""
+    """(n,) index of the camera ray each belongs to."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def eval_bsdf(
     surface: Surface, t: int, point: Float, normal: Float, to_camera: Float, to_light: Float, weights: Float
 ) -> float:
-    """f of the material at a point for world directions, at one wavelength; a blend by its mask's value. All (3,).
+    """BSDF f, 1/sr, of triangle t at a point for world directions, at one wavelength; all vectors (3,).
 
-    normal: the facet's, on the side of camera and light. f is that of `render.world.surface_interaction` where shading
-    differs.
+    normal: the facet's, on the side of camera and light. weights: of R, G and B. A blend is the mean of its materials,
+    weighted by its mask. With a shading normal, f holds the factor of `render.world.surface_interaction`.
     """
     rgb, f, o, i, frame = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
     slot, share, total = surface.object_id[t], 1.0, 0.0
@@ -110,7 +112,7 @@ def eval_bsdf(
         for axis in range(3):
             o[axis] = frame[axis, 0] * to_camera[0] + frame[axis, 1] * to_camera[1] + frame[axis, 2] * to_camera[2]
             i[axis] = frame[axis, 0] * to_light[0] + frame[axis, 1] * to_light[1] + frame[axis, 2] * to_light[2]
-        # both are above the facet; what is below the shading normal gets nothing
+        # both directions are above the facet; f is 0 where one is below the shading normal
         if o[2] <= 0.0 or i[2] <= 0.0:
             continue
         rgb[0] = rgb[1] = rgb[2] = rho
@@ -130,19 +132,19 @@ def minus(a: Vector, b: Vector) -> Vector:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def over(a: Vector, divisor: float) -> Vector:
+def divided(a: Vector, divisor: float) -> Vector:
     return a[0] / divisor, a[1] / divisor, a[2] / divisor
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def fill(array: Float, a: Vector) -> None:
+def store(array: Float, a: Vector) -> None:
     """Write a vector -> array (3,)."""
     array[0], array[1], array[2] = a
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def turned(matrix: Float, a: Vector) -> Vector:
-    """The direction a by a pose (4, 4)."""
+def rotated(matrix: Float, a: Vector) -> Vector:
+    """The direction a, rotated by a pose (4, 4)."""
     x, y, z = a
     return (
         matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
@@ -152,9 +154,9 @@ def turned(matrix: Float, a: Vector) -> Vector:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def placed(matrix: Float, a: Vector) -> Vector:
-    """The point a by a pose (4, 4)."""
-    x, y, z = turned(matrix, a)
+def transformed(matrix: Float, a: Vector) -> Vector:
+    """The point a, transformed by a pose (4, 4)."""
+    x, y, z = rotated(matrix, a)
     return x + matrix[0, 3], y + matrix[1, 3], z + matrix[2, 3]
 
 
@@ -168,7 +170,7 @@ def facet_plane(surface: Surface, t: int) -> tuple[Vector, Vector, float]:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def ray_slopes(view: View, tilt: Any, distorted: bool, x: float, y: float) -> tuple[float, float, float, float]:
-    """dx/du, dx/dv, dy/du, dy/dv of a ray's normalised coordinates."""
+    """dx/du, dx/dv, dy/du, dy/dv, 1/px: derivatives of a ray's normalised coordinates by its pixel coordinates."""
     intrinsics = view.intrinsics
     xu, xv = 1.0 / intrinsics[0], -intrinsics[4] / (intrinsics[0] * intrinsics[1])
     yu, yv = 0.0, 1.0 / intrinsics[1]
@@ -181,7 +183,7 @@ def ray_slopes(view: View, tilt: Any, distorted: bool, x: float, y: float) -> tu
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def middle_offset(du: float, dv: float, cell: int, cells: int) -> tuple[float, float]:
-    """px from the middle of its pixel to a ray that is (du, dv) from the middle of its cell, of cells x cells."""
+    """Offset, px, from the centre of a pixel of cells x cells to a ray that is (du, dv) from the centre of its cell."""
     return (cell % cells + 0.5) / cells - 0.5 + du, (cell // cells + 0.5) / cells - 0.5 + dv
 
 
@@ -190,32 +192,32 @@ def irradiance_without_gaussian(
     T_laser_world: Float, beam: Float, laser: Vector, density: float, normal: Vector, hit: SheetHit
 ) -> float:
     """P h / (z sigma) |n . (x sigma'/sigma, y/z, 1)| at a point in laser coordinates, W/m^2."""
-    n = turned(T_laser_world, normal)
+    n = rotated(T_laser_world, normal)
     tilted = n[0] * hit.q * hit.slope + n[1] * laser[1] / laser[2] + n[2]
     return beam[0] * density / (laser[2] * hit.sigma) * abs(tilted)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def towards_emitter(T_laser_world: Float, centre: Vector, shift: float, point: Vector) -> tuple[Vector, float]:
-    """Unit direction and distance, m, from a point to its place on the emitting segment, `shift` from its middle."""
+    """Unit direction and distance, m, from a point to the point of the emitting segment `shift` m from its middle."""
     w = T_laser_world
     light = minus((centre[0] + w[0, 0] * shift, centre[1] + w[0, 1] * shift, centre[2] + w[0, 2] * shift), point)
     distance = math.sqrt(dot(light, light))
-    return over(light, distance), distance
+    return divided(light, distance), distance
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def lens_ray_slopes(
     view: View, slopes: tuple[float, float, float, float], a: float, b: float
 ) -> tuple[float, float, float, float]:
-    """`ray_slopes` of a ray through the point (a, b) of the aperture, m: a tilted sensor's focus differs along it."""
+    """`ray_slopes` of a ray through the point (a, b) of the aperture, m: with a tilted sensor the focus varies."""
     xu, xv, yu, yv = slopes
     gu, gv = view.lens[2] * xu + view.lens[3] * yu, view.lens[2] * xv + view.lens[3] * yv
     return xu + gu * a, xv + gv * a, yu + gu * b, yv + gv * b
 
 
 def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
-    """The shading kernel; compiled apart for diffuse materials alone and for a pinhole, where it is much quicker."""
+    """The shading kernel, compiled separately for purely diffuse scenes and for pinholes, where it is much faster."""
 
     @numba.njit(nogil=True, cache=True, error_model="numpy")
     def shade(  # noqa: PLR0915
@@ -227,13 +229,13 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
         values: Float,
         planes: Float,
     ) -> tuple[int, int]:
-        """Unoccluded radiance of each ray's cell and whole pixel -> values (n, 2), and the shadow rays that decide.
+        """Unoccluded radiance of each ray's cell and predicted for its whole pixel -> values (n, 2); their shadow rays.
 
-        Returns how many shadow rays were written, and how many rays were left out since their radiance is no number,
-        infinite or negative. With an aperture planes (n, 5) take q in the middle of the pixel and its change with u, v,
-        a and b; without one planes (n, 4), unless empty, take what `render.laser_direct.centre_ray` needs.
+        Returns the number of shadow rays, and of invalid rays: those whose radiance is NaN, infinite or negative, which
+        get 0. With an aperture, planes (n, 5) take q at the pixel's centre and its derivatives by u, v, a and b;
+        without one planes (n, 4), unless empty, are filled as `render.laser_direct.centre_ray` describes.
         """
-        # to take an array out of a named tuple counts references: not once a ray
+        # taking an array out of a named tuple costs a reference count, so it is done once and not for every ray
         m, w, beam, weights = view.T_world_camera, sheet.T_laser_world, sheet.beam, sheet.weights
         triangle, normalised, offsets, lens, cells = rays
         centre, surface_offset, origins, directions, far, sample = shadows
@@ -242,22 +244,22 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
         laser_centre = sheet.centre[0], sheet.centre[1], sheet.centre[2]
         origin = m[0, 3], m[1, 3], m[2, 3]
         rgb, at, up, to_camera, towards = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-        count = dropped = 0
+        count = invalid = 0
         facet = -1
         corner = normal = origin
         area = height_laser = 0.0
         half = 0.5 / cells
-        looking = not aperture and planes.shape[0] > 0
+        centre_rays = not aperture and planes.shape[0] > 0
         for r in range(triangle.shape[0]):
             values[r, 0] = values[r, 1] = 0.0
-            if looking:
+            if centre_rays:
                 planes[r, 3] = 0.0
             t = triangle[r]
             x, y = normalised[r, 0], normalised[r, 1]
             if t < 0 or x != x:
                 continue
             if t != facet:
-                # rays of a pixel mostly meet one triangle
+                # most rays of a pixel hit the same triangle
                 facet = t
                 corner, normal, area = facet_plane(surface, t)
                 height_laser = dot(normal, minus(laser_centre, corner))
@@ -270,13 +272,13 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
                 continue
             side = 1.0 if height_camera > 0.0 else -1.0
             # the ray meets the facet's plane at o + s d
-            d = lens_direction(view, x, y, lens[r, 0], lens[r, 1]) if aperture else turned(m, (x, y, 1.0))
+            d = lens_direction(view, x, y, lens[r, 0], lens[r, 1]) if aperture else rotated(m, (x, y, 1.0))
             cosine = dot(normal, d)
             if cosine == 0.0:
                 continue
             s = -height_camera / cosine
             point = origin[0] + s * d[0], origin[1] + s * d[1], origin[2] + s * d[2]
-            laser = placed(w, point)
+            laser = transformed(w, point)
             if laser[2] <= 1e-9:
                 continue
             h = fan_density(laser[1] / laser[2], beam)
@@ -300,7 +302,7 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
                 middle = q - qu * pixel_u - qv * pixel_v - qa * a - qb * b
                 in_pixel = about_over_aperture(middle, qu * 0.5, qv * 0.5, view.lens[0] * math.hypot(qa, qb))
                 planes[r, 0], planes[r, 1], planes[r, 2], planes[r, 3], planes[r, 4] = middle, qu, qv, qa, qb
-            elif looking:
+            elif centre_rays:
                 in_pixel = in_cell
                 planes[r, 0], planes[r, 1], planes[r, 2] = q, qu, qv
                 planes[r, 3] = BEYOND if in_cell == 0.0 else 0.0
@@ -316,17 +318,17 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
                 slot_reflectance(surface, slot, t, point[0], point[1], point[2], rgb)
                 radiance = power / math.pi * (weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2])
             else:
-                fill(at, point)
-                fill(up, (side * normal[0], side * normal[1], side * normal[2]))
-                fill(to_camera, over(d, -math.sqrt(dot(d, d))))
-                fill(towards, to_light)
+                store(at, point)
+                store(up, (side * normal[0], side * normal[1], side * normal[2]))
+                store(to_camera, divided(d, -math.sqrt(dot(d, d))))
+                store(towards, to_light)
                 radiance = power * eval_bsdf(surface, t, at, up, to_camera, towards, weights)
             both = radiance * (in_cell + in_pixel)
             if not 0.0 < both < np.inf:
-                dropped += both != 0.0
+                invalid += both != 0.0
                 continue
             values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
-            if looking:
+            if centre_rays:
                 planes[r, 3] = radiance
             origins[count, 0] = point[0] - centre[0] + side * normal[0] * surface_offset
             origins[count, 1] = point[1] - centre[1] + side * normal[1] * surface_offset
@@ -334,7 +336,7 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
             directions[count, 0], directions[count, 1], directions[count, 2] = to_light
             far[count], sample[count] = distance, r
             count += 1
-        return count, dropped
+        return count, invalid
 
     return shade
 
@@ -354,8 +356,8 @@ def gather(
     error: Float,
     jump: Float,
 ) -> None:
-    """Sum the visible cells of each pixel -> mean (n,), the standard error that the predictions' spread implies, and
-    the range of these predictions.
+    """Average the visible cells of each pixel -> mean (n,), its standard error by the spread of the predictions, and
+    jump (n,), the range of these predictions.
     """
     for j in range(count):
         if occluded[j]:
@@ -371,19 +373,19 @@ def gather(
             low, high = min(low, values[r, 1]), max(high, values[r, 1])
         mean[i], jump[i] = total / n, high - low
         spread = max(second / n - (first / n) ** 2, 0.0) * n / (n - 1)
-        # an edge that cuts off a corner of area p crosses the cells of a length of 2 sqrt(p), of a variance of 1/6 each
+        # an edge that cuts off a corner of area p crosses cells along 2 sqrt(p) of pixel, each of variance 1/6
         spread = max(spread, jump[i] * math.sqrt(spread) / 3.0)
         # jittered sampling of an edge or a slope: the variance falls with the 3/2 power of the number of cells
         error[i] = math.sqrt(spread) / n**0.75
 
 
 @numba.njit(nogil=True, cache=True)
-def place(pixels: Int, mean: Float, image: Float32) -> int:
-    """Write each pixel's radiance (n,) into the flat image, 0 where it is none; returns in how many it is none."""
-    dropped = 0
+def write_pixels(pixels: Int, mean: Float, image: Float32) -> int:
+    """Write each pixel's radiance (n,) into the flat image, 0 where it is invalid; returns how many are invalid."""
+    invalid = 0
     for i in range(pixels.shape[0]):
         if 0.0 <= mean[i] < np.inf:
             image[pixels[i]] = mean[i]
         else:
-            dropped += 1
-    return dropped
+            invalid += 1
+    return invalid

@@ -1,17 +1,17 @@
-"""How surfaces scatter: evaluate, pdf and sample of whatever model a material is of; each has a file beside this one.
+"""BSDFs: evaluate, pdf and sample, dispatched to the material's model; each model has a file beside this one.
 
 Local frame: z is the normal. wo is the direction that a path comes from, wi the one it goes on to; both point away from
-the surface. A material is a row of numbers (`render.material.record`); with it comes its reflectance at the point, rgb:
-that of the diffuse part, or the tint of the specular one, for each band.
+the surface. A material is a row of numbers (`render.material.record`). Beside it comes rgb, its reflectance at the
+point for each band: of the diffuse lobe, or the tint of the specular one.
 
-Two-sided are LAMBERTIAN, CONDUCTOR, COATED and EMITTER: light on either side is treated alike and none passes; an
-EMITTER shines to z > 0 only. One-sided are the boundaries, DIELECTRIC and SUBSURFACE: z points out of the substance,
-so the frame must be built on the mesh's own normal, not on the one turned towards the ray. What happens between two
-boundaries of a SUBSURFACE is the integrator's.
+LAMBERTIAN, CONDUCTOR, COATED and EMITTER are two-sided: light on either side is scattered alike and none is
+transmitted; an EMITTER emits to z > 0 only. The boundaries, DIELECTRIC and SUBSURFACE, are one-sided: z points out of
+the substance, so the frame must be built on the mesh's own normal, not on the one that faces the ray. The random walk
+between two boundaries of a SUBSURFACE is the integrator's.
 
-`evaluate` is made of what is alike in all bands (`eval_lobes`) and of the rest (`eval_band`), which a path at one
-wavelength takes alone; both it and `pdf_lobes` take the numbers of the row that they need, as the roughness may come
-from elsewhere.
+`evaluate` consists of what is common to all bands (`eval_lobes`) and of what differs (`eval_band`), so that a path at
+one wavelength evaluates one band only. Both, and `pdf_lobes`, take single numbers of the row, since the roughness may
+come from an image instead.
 """
 
 from __future__ import annotations
@@ -74,25 +74,25 @@ Float = NDArray[np.float64]
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def is_diffuse(row: Float) -> bool:
-    """The material scatters as Lambert says."""
+    """The BSDF is Lambertian."""
     return row[KIND] == LAMBERTIAN or row[KIND] == EMITTER
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def is_boundary(row: Float) -> bool:
-    """Light passes through; z must point out of the substance."""
+    """The surface transmits light, so z must point out of the substance."""
     return row[KIND] == DIELECTRIC or row[KIND] == SUBSURFACE
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def is_specular_row(row: Float) -> bool:
-    """The material scatters into single directions only."""
+    """The BSDF is a sum of delta functions."""
     return is_specular_kind(row[KIND], row[ALPHA_X], row[ALPHA_Y])
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def is_specular_kind(kind: float, ax: float, ay: float) -> bool:
-    """A material of this kind and roughness scatters into single directions only."""
+    """The BSDF of a material of this kind and roughness is a sum of delta functions."""
     return kind in (CONDUCTOR, DIELECTRIC) and max(ax, ay) < SPECULAR_ROUGHNESS
 
 
@@ -100,7 +100,7 @@ def is_specular_kind(kind: float, ax: float, ay: float) -> bool:
 def evaluate(  # noqa: PLR0913
     row: Float, rgb: Float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, f: Float
 ) -> None:
-    """f(wo, wi) in 1/sr, without the cosine -> f (3,) for each band; 0 for the delta parts."""
+    """f(wo, wi) in 1/sr, without the cosine -> f (3,) for each band; 0 for delta functions."""
     specular, cosine, diffuse = eval_lobes(row[KIND], row[ALPHA_X], row[ALPHA_Y], row[INDEX], ox, oy, oz, ix, iy, iz)
     for band in range(f.shape[0]):
         n, k = row[METAL_N + band], row[METAL_K + band]
@@ -111,7 +111,7 @@ def evaluate(  # noqa: PLR0913
 def eval_lobes(  # noqa: PLR0913
     kind: float, ax: float, ay: float, eta: float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
 ) -> Lobes:
-    """What of f(wo, wi) is alike in all bands."""
+    """The factors of f(wo, wi) that are common to all bands."""
     if oz == 0.0 or iz == 0.0 or is_specular_kind(kind, ax, ay):
         return Lobes(0.0, 0.0, 0.0)
     m = Microsurface(ax, ay, eta)
@@ -131,7 +131,7 @@ def eval_lobes(  # noqa: PLR0913
 def eval_band(
     kind: float, specular: float, cosine: float, diffuse: float, reflectance: float, n: float, k: float, internal: float
 ) -> float:
-    """f(wo, wi) in one band, 1/sr, of what `eval_lobes` returned."""
+    """f(wo, wi) in one band, 1/sr, from the lobes that `eval_lobes` returned."""
     lobes = Lobes(specular, cosine, diffuse)
     if kind == CONDUCTOR:
         return conductor.evaluate_band(lobes, reflectance, n, k)
@@ -142,7 +142,7 @@ def eval_band(
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def pdf(row: Float, rgb: Float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
-    """pdf of `sample` for wi given wo, 1/sr; 0 for the delta parts."""
+    """pdf of `sample` for wi given wo, 1/sr; 0 for delta functions."""
     mean = (rgb[0] + rgb[1] + rgb[2]) / 3.0
     return pdf_lobes(row[KIND], row[ALPHA_X], row[ALPHA_Y], row[INDEX], mean, ox, oy, oz, ix, iy, iz)
 
@@ -161,7 +161,7 @@ def pdf_lobes(  # noqa: PLR0913
     iy: float,
     iz: float,
 ) -> float:
-    """pdf of `sample`, reflectance the mean over its bands."""
+    """pdf of `sample`, 1/sr, from single numbers of the row; reflectance: the mean over the bands."""
     if oz == 0.0 or iz == 0.0 or is_specular_kind(kind, ax, ay):
         return 0.0
     m = Microsurface(ax, ay, index)
@@ -192,8 +192,8 @@ def sample(  # noqa: PLR0913
 ) -> float:
     """Draw wi given wo -> wi (3,), weight (3,) or (1,) = f |cos wi| / pdf for each band.
 
-    choice decides which lobe, r1 and r2 where in it; all in [0, 1). Returns the pdf, 1/sr; -1 for a delta part (its
-    weight then holds its share), 0 when nothing is scattered.
+    choice selects the lobe, r1 and r2 the direction in it; all in [0, 1). Returns the pdf, 1/sr; -1 for a delta
+    function (the weight then includes its probability); 0 if nothing is scattered.
     """
     for band in range(weight.shape[0]):
         weight[band] = 0.0

@@ -7,8 +7,8 @@
     relief     -     normal map, bump map, none      fine shape that shading sees and the truth does not
 
 f = F D G2 / (4 cos_o cos_i) + T(cos_o) T(cos_i) albedo / (pi index^2 (1 - albedo r)): the light is refracted into the
-coat, reflected by the base, thrown back to it by the coat's inside (r, diffuse) any number of times, and refracted out
-(Wolff 1994; Mitsuba's rough plastic with `nonlinear`).
+coat, reflected by the base, reflected back to it inside the coat (r, its diffuse reflectance from within) any number
+of times, and refracted out (Wolff 1994; Mitsuba's rough plastic with `nonlinear`).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Coated(Model):
     relief: Relief = relief_field()
 
     def pack(self, bands_nm: Bands, least_alpha: float = 1.0, where: str = "material") -> Float:
-        """(ROW,) for kernels (`render.material.record`); least_alpha: of a roughness that is an image."""
+        """(ROW,) for kernels (`render.material.record`); least_alpha: the smallest value of a roughness image."""
         row = empty_row(COATED)
         row[ALPHA_X] = row[ALPHA_Y] = packed_alpha(self.roughness, least_alpha)
         row[INDEX], row[INTERNAL] = self.index, diffuse_reflectance(1.0 / self.index)
@@ -69,7 +69,7 @@ def evaluate(m: Microsurface, wo: Direction, wi: Direction) -> Lobes:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def evaluate_band(lobes: Lobes, reflectance: float, internal: float) -> float:
-    """f in one band, 1/sr: a coat sends part of the light back to its base, `internal` of it."""
+    """f in one band, 1/sr; internal: the coat's diffuse reflectance from within, which sums the inner reflections."""
     return lobes.specular + reflectance * lobes.diffuse / (1.0 - reflectance * internal)
 
 
@@ -97,7 +97,7 @@ def sample(m: Microsurface, reflectance: float, wo: Direction, numbers: Directio
         wi = cosine_hemisphere(numbers[1], numbers[2])
     if wi[2] <= 0.0:
         return NOTHING
-    density = pdf(m, reflectance, wo, wi)
-    if density <= 0.0:
+    pdf_of_wi = pdf(m, reflectance, wo, wi)
+    if pdf_of_wi <= 0.0:
         return NOTHING
-    return Sample(wi, density, evaluate(m, wo, wi), wi[2] / density)
+    return Sample(wi, pdf_of_wi, evaluate(m, wo, wi), wi[2] / pdf_of_wi)

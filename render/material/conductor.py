@@ -91,12 +91,12 @@ class Conductor(Model):
     def pack(self, bands_nm: Bands, least_alpha: float = 1.0, where: str = "material") -> Float:
         """(ROW,) for kernels (`render.material.record`). InputError: the metal is not known at a wavelength.
 
-        least_alpha: of a roughness that is an image; where: for messages.
+        least_alpha: the smallest value of a roughness image; where: the field, for messages.
         """
         row = empty_row(CONDUCTOR)
         row[ALPHA_X] = row[ALPHA_Y] = polished_alpha(self.roughness, least_alpha)
         if self.roughness_across is not None:
-            # a grain keeps its direction, however near the two are
+            # unequal alphas mark a grain, which must keep its direction even where both are given as equal
             row[ALPHA_X], row[ALPHA_Y] = max(row[ALPHA_X], POLISHED), self.roughness_across
             row[ALPHA_X] *= 1.0 if row[ALPHA_X] != row[ALPHA_Y] else 1.0 - 1e-9
         for band, wavelength_nm in enumerate(bands_nm):

@@ -9,7 +9,8 @@
     relief     -     normal map, bump map, none   fine shape that shading sees and the truth does not
 
 z points out of the substance, so the local frame must be built on the mesh's own normal, not on the one turned towards
-the ray. Refraction carries no (eta_o / eta_i)^2: what is transported is power, as both kinds of path need it here.
+the ray. Refraction has no factor (eta_o / eta_i)^2: the BSDF transports power, for paths from the camera and from
+lights alike.
 """
 
 from __future__ import annotations
@@ -82,11 +83,11 @@ class Glass(Model):
     def pack(self, bands_nm: Bands, least_alpha: float = 1.0, where: str = "material") -> Float:
         """(ROW,) for kernels (`render.material.record`). InputError: the substance is not known at a wavelength.
 
-        least_alpha: of a roughness that is an image; where: for messages.
+        least_alpha: the smallest value of a roughness image; where: the field, for messages.
         """
         row = empty_row(DIELECTRIC)
         row[ALPHA_X] = row[ALPHA_Y] = polished_alpha(self.roughness, least_alpha)
-        # one path carries three bands, so that it is bent as the middle one is
+        # one path carries three bands, so all are refracted by the index of the middle one
         row[INDEX] = substance_index(self.substance, bands_nm[1], where) if self.index is None else self.index
         return row
 
@@ -116,7 +117,7 @@ def substance_index(substance: str, wavelength_nm: float, where: str = "material
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def evaluate(m: Microsurface, wo: Direction, wi: Direction) -> Lobes:
-    """f of a rough boundary for directions on any side (Walter et al. 2007, eqs. 20, 21), all of it by facets."""
+    """f of a rough boundary for directions on any side (Walter et al. 2007, eqs. 20, 21), all in the specular lobe."""
     eta, o, i, h = boundary_facet(m.eta, wo, wi)
     oh, ih = dot(o, h), dot(i, h)
     if oh <= 0.0 or ih * i[2] <= 0.0:
@@ -148,10 +149,9 @@ def pdf(m: Microsurface, wo: Direction, wi: Direction) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def boundary_facet(index: float, wo: Direction, wi: Direction) -> tuple[float, Direction, Direction, Direction]:
-    """The facet of a boundary that reflects or refracts wo to wi, seen from wo's side.
+    """The microfacet of a boundary that reflects or refracts wo to wi, seen from wo's side.
 
-    Returns the index beyond it over that before, wo and wi turned so that wo is above, and its normal, 0 if there is
-    none.
+    Returns the relative index, wo and wi flipped so that wo is above, and the facet's normal (0: there is none).
     """
     eta, oz, iz = relative_index(index, wo), wo[2], wi[2]
     if oz < 0.0:

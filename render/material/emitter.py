@@ -1,11 +1,11 @@
-"""A surface that shines evenly to its front, and reflects diffusely on both sides.
+"""A surface that emits a constant radiance to its front, and reflects diffusely on both sides.
 
     parameter  unit         range                           what it is
     radiance   W/(m^2 sr)   0 to 1e9, RGB                   of the red, green and blue band, towards the normal's side
     albedo     -            0 to 1, RGB, image, from mesh   reflectance
     relief     -            normal map, bump map, none      fine shape that shading sees and the truth does not
 
-Its BSDF is that of `lambertian`. Its light is ambient light: `render.ambient.light_sampling` makes a lamp of it.
+Its BSDF is that of `lambertian`. Its light is ambient light: `render.ambient.light_sampling` samples it as a lamp.
 """
 
 from __future__ import annotations

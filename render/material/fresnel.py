@@ -9,7 +9,7 @@ import numba
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def fresnel_dielectric(cosine: float, eta: float) -> tuple[float, float]:
-    """Reflectance, and cosine of the refracted ray (0: total reflection), for light that meets a boundary.
+    """Reflectance, and cosine of the refracted ray (0: total internal reflection), for light that meets a boundary.
 
     cosine >= 0: of the angle of incidence; eta: refractive index beyond the boundary over that before it.
     """

@@ -4,7 +4,7 @@
     albedo     -     0 to 1, RGB, image, from mesh   reflectance
     relief     -     normal map, bump map, none      fine shape that shading sees and the truth does not
 
-f = albedo / pi, sampled by the cosine.
+f = albedo / pi, with cosine-weighted sampling.
 """
 
 from __future__ import annotations
@@ -51,13 +51,13 @@ def pdf(wo: Direction, wi: Direction) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def sample(numbers: Direction) -> Sample:
-    """Draw wi above the surface, by its cosine."""
+    """Draw wi from the cosine-weighted hemisphere."""
     wi = cosine_hemisphere(numbers[1], numbers[2])
     return Sample(wi, max(wi[2], 0.0) / math.pi, Lobes(0.0, 0.0, 1.0), 1.0)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def cosine_hemisphere(r1: float, r2: float) -> Direction:
-    """A direction of pdf cos / pi."""
+    """A direction with the pdf cos / pi, for r1, r2 in [0, 1)."""
     radius, angle = math.sqrt(r1), 2.0 * math.pi * r2
     return radius * math.cos(angle), radius * math.sin(angle), math.sqrt(max(0.0, 1.0 - r1))

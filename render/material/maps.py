@@ -1,4 +1,4 @@
-"""What an image may decide of a material: its albedo, its roughness, and fine relief."""
+"""Material parameters that an image may give: albedo, roughness, and relief (normal and bump maps)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ RGBReflectance = tuple[UnitInterval, UnitInterval, UnitInterval]
 Roughness = Annotated[float, Field(ge=0.01, le=1.0)]
 SmoothOrRough = Annotated[float, Field(ge=0.0, le=1.0)]
 POLISHED = 0.005
-"""A GGX alpha below this is taken for a perfectly smooth surface, a mirror."""
+"""A GGX alpha below this is treated as perfectly smooth: its BSDF is a delta function."""
 
 
 class Texture(Model):
@@ -81,11 +81,11 @@ def priority_field() -> Any:
 
 
 def packed_alpha(roughness: float | GreyTexture, least_alpha: float) -> float:
-    """The roughness that a row holds: least_alpha where it is an image."""
+    """The roughness in a material's row; least_alpha, its smallest value, where it is an image."""
     return least_alpha if isinstance(roughness, GreyTexture) else roughness
 
 
 def polished_alpha(roughness: float | GreyTexture, least_alpha: float) -> float:
-    """As `packed_alpha`, 0 for what is so smooth that it is a mirror."""
+    """As `packed_alpha`, but 0 below `POLISHED`."""
     alpha = packed_alpha(roughness, least_alpha)
     return alpha if alpha >= POLISHED else 0.0

@@ -1,7 +1,7 @@
-"""What an object is made of: one of the models beside this file, or a blend of two, told apart by `kind`.
+"""What an object is made of: one of the models beside this file, or a blend of two, distinguished by `kind`.
 
-Two-sided are the opaque ones: light on either side is treated alike. One-sided are glass and subsurface, whose normals
-point out of the substance, and the light of an emitter, which leaves where its normals point.
+Opaque materials are two-sided: light on either side is scattered alike. Glass and subsurface are one-sided: their
+normals point out of the substance. So is the light of an emitter, which leaves on the side its normals point to.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 BaseMaterial = Annotated[Lambertian | Conductor | Coated | Glass | Subsurface | Emitter, Field(discriminator="kind")]
-"""What a surface is made of at one point."""
+"""The material of a surface at one point: any model but a blend."""
 OpaqueMaterial = Annotated[Lambertian | Conductor | Coated, Field(discriminator="kind")]
 
 

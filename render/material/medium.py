@@ -1,4 +1,4 @@
-"""What every random walk through a medium shares: its length, and how a direction turns at a scattering."""
+"""What all random walks through a medium share: the limit of their length, and the phase function."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 MOST_STEPS = 4096
-"""Scatterings between two meetings with the boundary; a path that needs more is ended: e^-41 of them at 0.99 albedo."""
+"""Largest number of scatterings between two hits of the boundary. A longer walk is ended: at an albedo of 0.99 its
+throughput is e^-41.
+"""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def henyey_greenstein(g: float, u: float) -> float:
-    """Cosine of a scattering angle, drawn by u in [0, 1) (Henyey and Greenstein 1941; PBRT 4th ed., eq. 11.24)."""
+    """Cosine of a scattering angle for uniform u in [0, 1) (Henyey and Greenstein 1941; PBRT 4th ed., eq. 11.24)."""
     if abs(g) < 1e-3:
         return 1.0 - 2.0 * u
     part = (1.0 - g * g) / (1.0 - g + 2.0 * g * u)
@@ -23,7 +25,7 @@ def henyey_greenstein(g: float, u: float) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def turn(d: Float, x: float, y: float, z: float) -> None:
-    """Give the unit vector d (3,) the direction (x, y, z) that it has in a frame about d (Duff et al. 2017)."""
+    """Replace the unit vector d (3,) by the direction (x, y, z) of the local frame about d (Duff et al. 2017)."""
     n0, n1, n2 = d[0], d[1], d[2]
     sign = 1.0 if n2 >= 0.0 else -1.0
     a = -1.0 / (sign + n2)

@@ -1,6 +1,6 @@
-"""Reflection by microfacets: the GGX distribution, Smith's masking, and sampling of the normals that are visible.
+"""Reflection by microfacets: the GGX distribution, Smith's masking, and sampling of visible normals.
 
-wo, wi and the facets' normal h lie above the surface; `render.material.scattering` tells what they are.
+wo, wi and the facets' normal h lie above the surface; `render.material.scattering` defines them.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def half_vector(wo: Direction, wi: Direction) -> Direction:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def reflect(wo: Direction, h: Direction) -> Direction:
-    """wi by a mirror of normal h."""
+    """The mirror direction wi of wo about the normal h."""
     cosine = dot(wo, h)
     return 2.0 * cosine * h[0] - wo[0], 2.0 * cosine * h[1] - wo[1], 2.0 * cosine * h[2] - wo[2]
 
@@ -76,7 +76,7 @@ def visible_normal_pdf(m: Microsurface, wo: Direction, h: Direction) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def reflection(m: Microsurface, wo: Direction, wi: Direction) -> tuple[float, float]:
-    """f of facets that reflect all light, 1/sr, and the cosine of wo with their normal (Heitz 2014, eq. 99)."""
+    """f, 1/sr, with a Fresnel reflectance of 1, and the cosine of wo with the facets' normal (Heitz 2014, eq. 99)."""
     h = half_vector(wo, wi)
     masking = 1.0 + smith_lambda(m, wo) + smith_lambda(m, wi)
     return ggx(m, h) / (4.0 * wo[2] * wi[2] * masking), dot(wo, h)
@@ -92,6 +92,6 @@ def reflection_pdf(m: Microsurface, wo: Direction, wi: Direction) -> float:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def reflection_weight(m: Microsurface, wo: Direction, wi: Direction) -> float:
-    """f cos / pdf of facets that reflect all light: G2 / G1, heights correlated (Heitz 2018)."""
+    """f cos / pdf with a Fresnel reflectance of 1: G2 / G1, height-correlated (Heitz 2018)."""
     lambda_o, lambda_i = smith_lambda(m, wo), smith_lambda(m, wi)
     return (1.0 + lambda_o) / (1.0 + lambda_o + lambda_i)

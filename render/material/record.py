@@ -1,7 +1,7 @@
-"""A material as kernels read it: one row of numbers, laid out alike for every model.
+"""A material as kernels read it: one row of numbers with the same columns for every model.
 
-A model packs its row at three wavelengths (`pack`). The reflectance at a point comes beside it, since an image may
-decide that; so does the roughness, where an image decides it, in place of the row's.
+A model packs its row at three wavelengths (`pack`). The reflectance at a point is passed beside it, since it may come
+from an image; so is a roughness that comes from an image, in place of the row's.
 
     column       what it holds                                          of
     KIND         which model: one of the kinds below                    all
@@ -27,11 +27,11 @@ ROW = 21
 LAMBERTIAN, CONDUCTOR, DIELECTRIC, COATED, SUBSURFACE, EMITTER = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 
 SPECULAR_ROUGHNESS = 1e-4
-"""A GGX alpha below this makes a BSDF a delta function. Models that allow it pack 0 for what is polished."""
+"""A GGX alpha below this makes a BSDF a delta function. Models that allow it pack 0 below `maps.POLISHED`."""
 
 
 def empty_row(kind: float) -> NDArray[np.float64]:
-    """(ROW,) zeros, but for the kind."""
+    """(ROW,) zeros with the kind set."""
     row = np.zeros(ROW)
     row[KIND] = kind
     return row

@@ -1,4 +1,4 @@
-"""What the BSDF of every model is given, and what it returns: records of numbers, which cost nothing between kernels.
+"""Arguments and results of every model's BSDF, as records of numbers, which cost nothing between kernels.
 
 Local frame: z is the surface's normal. wo is the direction that a path comes from, wi the one it goes on to; both point
 away from the surface.
@@ -13,35 +13,39 @@ Direction = tuple[float, float, float]
 
 
 class Microsurface(NamedTuple):
-    """A rough boundary, as a record: named tuples of numbers cost nothing between kernels."""
+    """A rough boundary."""
 
     alpha_x: float
-    """GGX roughness along x."""
+    """GGX alpha along x."""
     alpha_y: float
+    """GGX alpha along y."""
     eta: float
-    """Refractive index below over that above; not used by metals."""
+    """Refractive index below the surface over that above; not used by metals."""
 
 
 class Lobes(NamedTuple):
-    """What of a BSDF f(wo, wi) is alike in all bands."""
+    """The factors of a BSDF f(wo, wi) that are common to all bands."""
 
     specular: float
-    """1/sr, by way of facets."""
+    """Microfacet lobe, 1/sr."""
     cosine: float
-    """Of wo with the facets' normal, for the Fresnel reflectance of each band."""
+    """Cosine of wo with the facets' normal, for the Fresnel reflectance of each band."""
     diffuse: float
-    """1/sr, of a base or a surface that scatters as Lambert says, where its reflectance is 1."""
+    """Lambertian lobe at a reflectance of 1, 1/sr."""
 
 
 class Sample(NamedTuple):
-    """A direction that was drawn, and the weight f |cos wi| / pdf of a path that follows it."""
+    """A sampled direction, and what gives the weight f |cos wi| / pdf of a path that follows it."""
 
     wi: Direction
+    """Sampled direction."""
     pdf: float
-    """1/sr; -1: of a delta function, which has none; 0: nothing is scattered."""
+    """pdf of wi, 1/sr; -1: wi is of a delta function; 0: nothing is scattered."""
     lobes: Lobes
+    """Lobes from which `eval_band` makes the weight of each band, up to `factor`."""
     factor: float
-    """On lobes: both together are the weight, as lobes alone are f."""
+    """Factor on what `eval_band` returns."""
 
 
 NOTHING = Sample((0.0, 0.0, 0.0), 0.0, Lobes(0.0, 0.0, 0.0), 0.0)
+"""The sample of a surface that scatters nothing."""

@@ -1,4 +1,4 @@
-"""From numbers for red, green and blue to one wavelength."""
+"""From values for red, green and blue to a value at one wavelength."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ Bands = tuple[float, float, float]
 """Three wavelengths, nm: those of the colour bands, or thrice a laser's."""
 
 BAND_CENTRES_NM = (610.0, 545.0, 465.0)
-"""Where the red, green and blue values of an albedo are taken to hold, nm."""
+"""Wavelengths, nm, at which the red, green and blue values of an albedo hold."""
 
 
 def per_band(value: float | tuple[float, float, float]) -> tuple[float, float, float]:
-    """R, G, B of what is given as such, or as one number for all."""
+    """R, G, B of a value that is given as such, or as one number for all three."""
     return value if isinstance(value, tuple) else (value, value, value)
 
 

@@ -1,4 +1,4 @@
-"""Wax, marble, nylon, skin: light walks at random below a rough boundary and leaves elsewhere. One-sided.
+"""Wax, marble, nylon, skin: light is scattered below a rough boundary and leaves elsewhere. One-sided.
 
     parameter          unit  range                        what it is
     index              -     1.01 to 3                    refractive index of the boundary
@@ -9,8 +9,8 @@
     priority           -     0 to 99                      which of two transparent bodies is where they overlap
     relief             -     normal map, bump map, none   fine shape that shading sees and the truth does not
 
-The boundary scatters as a rough `dielectric` does, so there is no BSDF here; between two of its surfaces light walks by
-`medium.py`, which is the integrators' doing.
+The boundary has the BSDF of a rough `dielectric`, so there is none here. The integrators trace the random walk between
+two hits of the boundary, by the phase function in `medium.py`.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ MeanFreePath = Annotated[float, Field(ge=1e-6, le=10.0)]
 
 
 class Subsurface(Model):
-    """Wax, marble, nylon, skin: light wanders below a rough boundary and leaves elsewhere. The mesh is closed.
+    """Wax, marble, nylon, skin: light is scattered below a rough boundary and leaves elsewhere. The mesh is closed.
 
-    One-sided as glass is. The boundary is never polished: light from inside could then not be connected to a camera
-    or a lamp outside, and would be found by chance alone.
+    One-sided as glass is. The boundary is never polished: vertices inside could then not be connected to a camera or a
+    lamp outside.
     """
 
     kind: Literal["subsurface"] = "subsurface"

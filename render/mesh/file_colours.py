@@ -17,7 +17,7 @@ Float32 = NDArray[np.float32]
 Colour = tuple[float, float, float]
 
 MAX_UV = 1e6
-"""Beyond, float32 holds no position within a texture."""
+"""Largest UV: beyond it float32 does not resolve a position within a texture."""
 PALETTE_WIDTH = 4096
 """A power of two, so that texel centres are exact in float32."""
 

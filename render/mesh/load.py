@@ -27,9 +27,9 @@ from render.scene.scene import SceneObject
 from render.scene.shape import UNITS, MeshFile, Parametric, Sphere, WeldTee
 
 MAX_EXTENT = 1e4
-"""m; farther from its origin a mesh keeps no micrometres in float32 rays."""
+"""Largest distance of a vertex from its origin, m: beyond it float32 rays lose the micrometres."""
 LARGE_EXTENT = 20.0
-"""m; a larger "metre" part is taken for millimetres."""
+"""Extent, m, above which a part given in metres is assumed to be in millimetres."""
 
 
 def load_mesh(item: SceneObject, root: Path) -> Mesh:
@@ -118,13 +118,13 @@ def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
 
 @lru_cache(maxsize=8)
 def _made(shape: Parametric, crease_angle: float, filled: str) -> Mesh:
-    """filled: whose material needs a closed surface; empty: it does not."""
+    """filled: name of an object whose material needs a closed surface; empty: it does not."""
     mesh = weld_tee_mesh(shape) if isinstance(shape, WeldTee) else primitive_mesh(shape)
     mesh = closed_outward(mesh, f"{filled}: shape") if filled else mesh
     if crease_angle == 0.0:
         return mesh
     if isinstance(shape, Sphere):
-        # those of the sphere itself, which the mean over facets is not
+        # the exact normals of the sphere, from which the mean over facets differs
         normals = (mesh.vertices / shape.radius)[mesh.triangles].astype(np.float32)
     else:
         normals = corner_normals(mesh.vertices, mesh.triangles, crease_angle)

@@ -1,4 +1,4 @@
-"""What a mesh file says of itself, held against its length before anything of that size is made."""
+"""The counts in a mesh file's header, checked against its length before memory of that size is allocated."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from render.base.errors import InputError
 
 MAX_FILE_BYTES = 2**29
 MAX_TEXT_BYTES = 2**28
-"""Of OBJ, OFF, glTF and the text kinds of PLY and STL, which take some ten times their size to read."""
+"""Limit of OBJ, OFF, glTF, and PLY and STL as text, which take some ten times their size in memory to read."""
 MAX_TRIANGLES = 20_000_000
 MAX_VERTICES = 3 * MAX_TRIANGLES
 MAX_DEPTH = 64
 MAX_PARTS = 10_000
-"""Nodes and materials of one file."""
+"""Largest number of nodes, and of materials, in one file."""
 GLTF_EXTENSIONS = ("KHR_materials", "KHR_lights", "EXT_texture_webp")
 """Required extensions that do not change the geometry or its UV."""
 GLTF_FLOAT = 5126

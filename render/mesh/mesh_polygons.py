@@ -23,9 +23,9 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 MAX_CORNERS = 5000
-"""Of a polygon that no fan covers: cutting takes a time that grows with their square."""
+"""Largest number of corners of a polygon that a fan does not triangulate: the time grows with its square."""
 FLATNESS = 0.01
-"""Of a polygon's size; farther from its plane, its shape depends on how it is cut."""
+"""Deviation from its plane, as a fraction of a polygon's size, above which its shape depends on the triangulation."""
 PLY_TYPES = {
     **{"i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint"},
     **{"f2": "float16", "f4": "float", "f8": "double", "i8": "int64", "u8": "uint64"},
@@ -54,11 +54,11 @@ class Cut:
     """Triangles of m polygons, polygon after polygon."""
 
     owner: Int
-    """(t,) the polygon that each is of."""
+    """(t,) polygon of each triangle."""
     corners: Int
-    """(t, 3) places in the flat list of all polygons' corners."""
+    """(t, 3) indices into the flat list of all polygons' corners."""
     plain: NDArray[np.bool_]
-    """(m,) whether they are the fan around the first corner."""
+    """(m,) whether a polygon's triangles are the fan around its first corner."""
 
 
 def cut(vertices: Float, flat: Int, sizes: Int, where: str) -> Cut:

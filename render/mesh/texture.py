@@ -15,10 +15,10 @@ from render.base.files import read_bytes
 Float32 = NDArray[np.float32]
 
 MAX_PIXELS = 25_000_000
-"""Of one image, and of all of a scene together; 0.3 GB once decoded, and twice that while a world is put together."""
+"""Limit of one image, and of all of a scene together: 0.3 GB once decoded, twice that while a world is built."""
 MAX_FILE_BYTES = 2**29
 CHUNK = 2**20
-"""Codes looked up at a time: NumPy indexes by a copy of 8 bytes a code."""
+"""Codes a table look-up: NumPy copies indices to 8 bytes a code."""
 ALLOWED = "a whole PNG, JPEG, TIFF, BMP or WebP image of 8 or 16 bit"
 
 

@@ -16,8 +16,8 @@ Int = NDArray[np.int32]
 def corner_normals(vertices: Float, triangles: Int, crease_angle: float) -> Float32:
     """(v, 3) m, (t, 3) -> (t, 3, 3) unit normals of each triangle's corners.
 
-    The mean over the triangles that meet there, each weighed by its angle (Thuermer, Wuethrich 1998), of those only
-    whose facets are within crease_angle (rad) of the corner's own. Vertices at one place count as one.
+    The mean of the facets that meet there, weighted by their angles (Thuermer, Wuethrich 1998), over those within
+    crease_angle (rad) of the corner's own facet. Vertices at the same position count as one.
     """
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     facets = np.cross(b - a, c - a)
@@ -64,5 +64,5 @@ def _gather(facets: Float, weights: Float, order: Int, starts: Int, least: float
                 mean /= max(math.sqrt(mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2), 1e-300)
             cosine = mean[0] * own[0] + mean[1] * own[1] + mean[2] * own[2]
             for axis in range(3):
-                # a normal that turns away from its own facet says nothing about it
+                # a mean that points away from its own facet is replaced by the facet's normal
                 normals[t, corner, axis] = mean[axis] if cosine > 0.0 else own[axis]

@@ -1,4 +1,4 @@
-"""Is a surface closed, and do its normals point outwards? Glass and media need both: they are what it encloses."""
+"""Whether a surface is closed with its normals outwards, as glass and media need, which fill what it encloses."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 GAP = 1e-6
-"""Vertices nearer than this share of the mesh's size count as one."""
+"""Distance, as a fraction of the mesh's size, below which vertices count as one."""
 
 
 def closed_outward(mesh: Mesh, where: str) -> Mesh:
@@ -45,13 +45,13 @@ def closed_outward(mesh: Mesh, where: str) -> Mesh:
 
 
 def signed_volume(vertices: Float, triangles: NDArray[np.int32]) -> float:
-    """m^3 that a closed surface encloses, negative where its normals point inwards."""
+    """Volume that a closed surface encloses, m^3; negative if its normals point inwards."""
     a, b, c = (vertices[triangles[:, k]] - vertices[0] for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
 def _loose_edges(triangles: NDArray[np.int32], points: Float) -> tuple[int, int, int]:
-    """How many edges are not of two triangles, of those how many are passed twice in one direction, and of all."""
+    """Numbers of edges: not shared by two triangles; shared by two of inconsistent winding; in all."""
     _, place = np.unique(points, axis=0, return_inverse=True)
     corners = place.reshape(-1)[triangles].astype(np.int64)
     start, end = corners.ravel(), corners[:, [1, 2, 0]].ravel()

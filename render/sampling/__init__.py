@@ -1,1 +1,1 @@
-"""Random numbers by counter, low-discrepancy points, Poisson counts."""
+"""Counter-based random numbers, low-discrepancy points, Poisson counts."""

@@ -1,10 +1,10 @@
-"""Pairs of low-discrepancy numbers: what a pixel's samples share out evenly among themselves.
+"""Low-discrepancy pairs: two dimensions of a pixel's samples, stratified over the unit square.
 
-The first 2^k pairs of a row are a (0, k, 2)-net: every cell of area 2^-k holds one (Sobol 1967, first two dimensions).
-Each row is Owen-scrambled and shuffled within its powers of two, so that rows know nothing of each other and every
-prefix is as even as its length allows. A pixel's pairs are a row chosen by chance, shifted by chance: each is uniform
-on the unit square by itself, and any two dimensions are independent of each other. Beyond a row's length the next row
-begins, chosen anew.
+The first 2^k pairs of a row are a (0, k, 2)-net: every elementary interval of area 2^-k holds one (Sobol 1967, first
+two dimensions). Each row is Owen-scrambled and shuffled within its powers of two, so that rows are independent and
+every prefix is as even as its length allows. A pixel's pairs are a random row with a random shift (Cranley-Patterson
+rotation): each is uniform on the unit square, and different dimensions are independent. After LENGTH samples another
+random row follows.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _S40, _S16 = np.uint64(40), np.uint64(16)
 
 @lru_cache(maxsize=1)
 def pair_table() -> Float32:
-    """(ROWS, LENGTH, 2) float32 in [0, 1)."""
+    """(ROWS, LENGTH, 2) float32 pairs in [0, 1)."""
     random = np.random.default_rng(20)
     x, y = _sobol_integers()
     order = _nested_shuffle(random)
@@ -54,7 +54,7 @@ def _sobol_integers() -> tuple[Int, Int]:
 
 
 def _nested_shuffle(random: np.random.Generator) -> Int:
-    """(ROWS, LENGTH) permutations that swap, or not, the halves of every aligned block (Owen 1995)."""
+    """(ROWS, LENGTH) permutations that randomly swap the halves of every aligned block (Owen 1995)."""
     order = np.tile(np.arange(LENGTH), (ROWS, 1))
     for level in range(LOG_LENGTH):
         halves = order.reshape(ROWS, 1 << level, 2, -1)
@@ -65,7 +65,7 @@ def _nested_shuffle(random: np.random.Generator) -> Int:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def pair_draw(seed: int, index: int, sample: int, dimension: int) -> np.uint64:
-    """The row and the shift of an index: the same for LENGTH samples in turn."""
+    """Random bits for the row and the shift of an index, the same for LENGTH consecutive samples."""
     return bits(seed, index, sample >> LOG_LENGTH, dimension)
 
 

@@ -1,10 +1,10 @@
 """Counter-based random numbers: (seed, index, sample, dimension) decides every number, so no thread or tile order can.
 
 Three rounds of a 64-bit mixer, one each for the seed, the index (pixel, path) and the pair (sample, dimension). Each
-round is a bijection of its counter, so that within one index no two draws can be equal by construction; between indices
-equal draws are as rare as chance has it. Counters are taken modulo 2^64, sample and dimension modulo 2^32.
+round is a bijection of its counter, so that no two draws of one index are equal; between indices collisions are as rare
+as with random numbers. Counters are taken modulo 2^64, sample and dimension modulo 2^32.
 
-    uniform     flat on [0, 1), 53 bits
+    uniform     uniform on [0, 1), 53 bits
     normal      standard normal, by the ziggurat: exact, one draw of bits in 98 %
     bits        the 64 raw bits
 """
@@ -40,7 +40,7 @@ _EDGES = _ziggurat_edges()
 
 
 def wrapped(seed: int) -> int:
-    """Any whole number as a seed that the kernels can take, which is below 2^63."""
+    """Any integer as a seed for the kernels, in [0, 2^63)."""
     return seed % 2**63
 
 
@@ -63,13 +63,13 @@ def bits(seed: int, index: int, sample: int, dimension: int) -> np.uint64:
 
 @numba.njit(nogil=True, cache=True, inline="always")
 def uniform(seed: int, index: int, sample: int, dimension: int) -> float:
-    """A float64 in [0, 1), flat."""
+    """A float64, uniform on [0, 1)."""
     return np.int64(bits(seed, index, sample, dimension) >> _S11) * 2.0**-53
 
 
 @numba.njit(nogil=True, cache=True)
 def _open_uniform(state: np.uint64) -> float:
-    """A float64 inside (0, 1), neither end included."""
+    """A float64, uniform on the open interval (0, 1)."""
     return (np.int64(state >> _S12) + 0.5) * 2.0**-52
 
 
@@ -77,7 +77,7 @@ def _open_uniform(state: np.uint64) -> float:
 def normal(seed: int, index: int, sample: int, dimension: int) -> float:
     """A float64 from the standard normal distribution (Marsaglia, Tsang 2000; in the form of Doornik 2005, ZIGNOR).
 
-    The few draws that need more bits continue with SplitMix64 from their own, so one set of counters is one number.
+    The 2 % of draws that need more bits continue with SplitMix64 from their own, so one set of counters is one number.
     """
     state = bits(seed, index, sample, dimension)
     while True:

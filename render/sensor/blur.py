@@ -24,14 +24,15 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 
 STEP = 0.1
-"""px; diameters of defocus are rounded to it."""
+"""Step, px, to which diameters of defocus are rounded."""
 LARGEST = 100.0
-"""px; a disc is not made larger."""
+"""Largest diameter of defocus, px, to which larger ones are clipped."""
 FINEST = 0.15
-"""px^2; up to this variance three taps a side do."""
+"""Variance, px^2, up to which the kernel is 3 x 3."""
 SAMPLES = 16
-"""Points along a pixel's side that find how much of it a disc covers."""
+"""Points along a pixel's side by which its coverage by a disc is integrated."""
 ROWS = 64
+"""Rows a chunk of work."""
 
 
 def disc_diameter(camera: Camera, depth_z: Float32) -> Float:
@@ -84,7 +85,7 @@ def _spread(  # noqa: PLR0913
     last: int,
     out: Float,
 ) -> None:
-    """Rows first..last - 1 of out: what all pixels within reach send there, in a fixed order."""
+    """Rows first..last - 1 of out: the light that all pixels within reach spread there, summed in a fixed order."""
     h, w = image.shape
     for y in range(max(0, first - largest), min(h, last + largest)):
         for x in range(w):
@@ -106,7 +107,7 @@ def disc_kernel(diameter: float) -> Float:
     if variance <= FINEST:
         line = np.array([0.5 * variance, 1.0 - variance, 0.5 * variance])
         return np.outer(line, line)
-    # pixels that a disc covers in part widen it: find the smaller disc that is right once it is covered
+    # partly covered pixels widen a disc: bisect for the smaller disc that has the variance once rasterised
     low, high = 0.0, diameter
     kernel = _covered(diameter)
     for _ in range(24):
@@ -119,7 +120,7 @@ def disc_kernel(diameter: float) -> Float:
 def _covered(diameter: float) -> Float:
     radius = math.ceil(0.5 * diameter + 0.5)
     fine = (np.arange((2 * radius + 1) * SAMPLES) + 0.5) / SAMPLES - 0.5 - radius
-    # along y in steps, along x exactly, so that the cover grows smoothly with the diameter
+    # sampled along y, exact along x, so that the coverage grows smoothly with the diameter
     half = np.sqrt(np.maximum(0.25 * diameter * diameter - fine * fine, 0.0))
     edge = np.arange(-radius, radius + 1) - 0.5
     inside = np.clip(np.minimum(half[:, None], edge + 1.0) - np.maximum(-half[:, None], edge), 0.0, 1.0)

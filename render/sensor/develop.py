@@ -7,9 +7,9 @@
     read-out    e    += the pixel's own offset (DSNU) + Gaussian read noise;  e <= full well
     numbers     DN    = round(K e + black level), clipped to 0 .. 2^bits - 1
 
-Shot noise, dark noise and read noise are new in every frame (seed and step); PRNU and DSNU belong to the sensor, so
-they have a stream of their own and are the same in every frame. Full well clips last, so a saturated pixel reads
-exactly `Image.saturation`.
+Shot noise, dark noise and read noise are drawn anew for every frame (seed and step); PRNU and DSNU belong to the
+sensor, so they have a seed of their own and are the same in every frame. Full well clips last, so a saturated pixel
+reads exactly `Image.saturation`.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _READ, _SHOT = 0, 1
 
 @dataclass(frozen=True)
 class Image:
-    """What the camera delivers: raw numbers (Bayer: the mosaic), and what is needed to read them as electrons."""
+    """The camera's output: raw digital numbers (Bayer: the mosaic), and the constants that turn them into electrons."""
 
     pixels: Pixels
     """(h, w) DN, uint8 for 8 bits and uint16 for more, not shifted."""
@@ -55,15 +55,15 @@ class Image:
     gain: float
     """EMVA's K, DN/e-: electrons = (DN - black_level) / gain."""
     black_level: float
-    """DN."""
+    """DN of a pixel without electrons."""
     saturation: float
-    """DN; a pixel at or above it only says "at least this much"."""
+    """DN at or above which a pixel is saturated: a lower bound of its signal only."""
     read_noise: float
-    """e-, standard deviation."""
+    """Standard deviation of the read noise, e-."""
     pattern: str | None
     """Bayer pattern of the first 2 x 2 pixels, None for mono."""
     exposure_time: float = 1.0
-    """s."""
+    """Exposure time, s."""
     shorter: tuple[Image, ...] = ()
     """Further exposures of the same scene, to be fused with this one."""
 
@@ -81,7 +81,8 @@ def develop(
     """The (h, w) image that the sensor takes of a frame; the same for any number of threads.
 
     laser_power: W for each laser in place of the scene's. noise off: the mean, without PRNU, DSNU and speckle, but
-    saturated and quantised. Raises InputError: the frame is not of this scene, or a power cannot be had from it.
+    saturated and quantised. Raises InputError: the frame is not of this scene, a power is out of range, or a laser that
+    was off in the render is given one.
     Source: EMVA 1288 release 4, section 2 (linear model) and 4 (spatial non-uniformity).
     """
     exposure = _Exposure(frame, scene, sensor, laser_power, threads, seed if noise else None)
@@ -263,7 +264,7 @@ def _add_ambient(mean: Float, radiance: Float32, response: Float, first_row: int
 
 @lru_cache(maxsize=2)
 def fixed_pattern(height: int, width: int, threads: int | None = None) -> Float32:
-    """(h, w, 2) standard normal numbers that belong to the sensor's pixels: for their gain and their offset."""
+    """(h, w, 2) standard normal numbers of the sensor's pixels, for PRNU and DSNU."""
     pattern = np.empty((height, width, 2), dtype=np.float32)
 
     def rows(start: int, stop: int) -> None:
@@ -295,9 +296,9 @@ def _read_out(
     noise: bool,
     numbers: NDArray[np.uint16],
 ) -> None:
-    """(n, w) mean photo-electrons -> (n, w) DN: the chain on top of this file, pixel by pixel.
+    """(n, w) mean photo-electrons -> (n, w) DN by the chain at the head of this file.
 
-    fixed (n, w, 2): each pixel's own gain and offset, in standard deviations.
+    fixed (n, w, 2): PRNU and DSNU of each pixel, in standard deviations.
     """
     dark, prnu, dsnu, read, full_well, gain, black, top = chain
     width = mean.shape[1]

@@ -1,4 +1,4 @@
-"""How many electrons a watt per square metre and steradian makes: optics, spectrum and quantum efficiency.
+"""The sensor's response: electrons for a radiance of 1 W/(m^2 sr), by optics, spectrum and quantum efficiency.
 
     irradiance of a pixel    E = pi L T cos^4(theta) / (4 N_w^2)          N_w the working f-number
     electrons                E A t integral(s(lambda) F(lambda) QE(lambda) lambda / (h c) dlambda)
@@ -26,7 +26,7 @@ Float32 = NDArray[np.float32]
 
 PLANCK, LIGHT_SPEED = 6.62607015e-34, 299792458.0
 BANDS_NM = ((600.0, 700.0), (500.0, 600.0), (400.0, 500.0))
-"""Of ambient R, G and B."""
+"""Bands of ambient R, G and B, nm."""
 
 _PHOTONS_PER_JOULE_NM = 1e-9 / (PLANCK * LIGHT_SPEED)
 _CHANNEL = {"R": 0, "G": 1, "B": 2}
@@ -56,7 +56,7 @@ def relative_illumination(camera: Camera, threads: int | None = None) -> Float32
     shape = (camera.height, camera.width)
     if not camera.lens.vignetting:
         return np.broadcast_to(np.float32(1.0), shape)
-    # pose and lens do not matter, so that moving the camera keeps what is known
+    # pose and lens do not matter and are reset, so that a moved camera finds the cached image
     return _cos4(camera.model_copy(update={"T_rig_camera": Pose(), "lens": Lens()}), threads)
 
 

@@ -39,7 +39,7 @@ CMOS = SpectralCurve(
     wavelength_nm=(350, 400, 450, 500, 525, 550, 600, 650, 700, 750, 800, 850, 900, 950, 1000),
     value=(0.1, 0.42, 0.6, 0.66, 0.67, 0.65, 0.57, 0.46, 0.34, 0.24, 0.16, 0.1, 0.06, 0.03, 0.01),
 )
-"""Quantum efficiency of a typical monochrome CMOS sensor: that of the ready-made projects."""
+"""Quantum efficiency of a typical monochrome CMOS sensor, used by the sample projects."""
 
 
 class Sensor(Model):
@@ -105,7 +105,7 @@ class Sensor(Model):
 
     @property
     def dn_per_electron(self) -> float:
-        """EMVA's K."""
+        """Overall system gain, EMVA's K, DN/e-."""
         if self.gain is not None:
             return self.gain
         return (2**self.bits - 1 - self.black_level) / self.full_well

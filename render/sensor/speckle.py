@@ -27,37 +27,39 @@ Float = NDArray[np.float64]
 Float32 = NDArray[np.float32]
 
 LARGEST_RADIUS = 12
-"""px; lags further out are left out, which only matters for grains of several pixels."""
+"""Largest lag of the correlation, px: it truncates grains of several pixels only."""
 NEGLIGIBLE = 2e-3
-"""Correlation below which a lag is left out."""
+"""Correlation below which a lag is truncated."""
 TABLE, LIMIT = 4097, 6.0
 """Entries of the quantile table, and the normal deviate at its ends."""
 ORDERS, NODES = 24, 128
+"""Terms of the Hermite series, and nodes of the quadrature of its coefficients."""
 CUTS = 2
-"""Parts of a pixel's side."""
+"""Subpixels along a pixel's side."""
 STEEPEST = 4.0
-"""Largest slope of the logarithm of the light, per pixel."""
+"""Largest slope of the logarithm of the light, 1/px, to which steeper ones are clipped."""
 SURFACE = 0x53504543
-"""Keeps the surface's numbers apart from the sensor's."""
+"""Seed of the surface's random numbers, to keep them independent of the sensor's."""
 _PATTERN = 16
+"""First random dimension; one a laser."""
 SPECTRUM = 513
 """Frequencies across the line at which a row's power spectrum is tabled."""
 
 
 @dataclass(frozen=True)
 class Speckle:
-    """How one laser's light scintillates on one sensor."""
+    """Statistics of one laser's speckle on one sensor."""
 
     contrast: float
-    """Standard deviation over mean of one pixel."""
+    """Standard deviation over mean of a pixel's intensity."""
     correlation: Float
-    """(2 r + 1, 2 r + 1) of the intensity between pixels, 1 in the middle."""
+    """(2 r + 1, 2 r + 1) correlation of the intensity between pixels, 1 in the middle."""
     taps: Float
     """(2 q + 1, 2 q + 1) filter that gives white normals the field's correlation; unit sum of squares."""
     quantile: Float
-    """(2, TABLE) intensity over its mean for normal deviates -LIMIT..LIMIT, and the same for twice the variance."""
+    """(2, TABLE) intensity over its mean for normal deviates -LIMIT..LIMIT; row 1 is for twice the variance."""
     evenness: float
-    """How much uneven light in a part of a pixel adds to its variance: 1 for a fine grain, 0 for a coarse one."""
+    """Weight with which uneven light within a subpixel raises its variance: 1 for a fine grain, 0 for a coarse one."""
 
 
 @lru_cache(maxsize=16)
@@ -146,7 +148,7 @@ def _covariance(grain: float) -> tuple[Float, float]:
     x = np.pi * np.hypot(offset[:, None], offset) / grain
     coherence = (2.0 * j1(x) / x) ** 2
     lags = np.arange(reach + 1)
-    # pairs of points in two pixels: the distance between them has a triangle for its density
+    # the distance between two points in two pixels has a triangular pdf
     near = np.maximum(1.0 - np.abs(offset - lags[:, None]), 0.0) + np.maximum(1.0 - np.abs(offset + lags[:, None]), 0.0)
     near /= steps
     quarter = near @ coherence @ near.T
@@ -160,7 +162,7 @@ def _covariance(grain: float) -> tuple[Float, float]:
 
 
 def _normal_correlation(correlation: Float, shape: float) -> Float:
-    """Correlation of the normals whose gamma transforms have the correlation asked for (Hermite series)."""
+    """Correlation of normals whose gamma transforms have the required correlation (Hermite series)."""
     from scipy.special import eval_hermitenorm, gammaincinv, ndtr
 
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
@@ -175,7 +177,7 @@ def _normal_correlation(correlation: Float, shape: float) -> Float:
 
 
 def _taps(correlation: Float) -> Float:
-    """Symmetric filter whose autocorrelation is the one given, cut where it no longer matters."""
+    """Symmetric filter with the given autocorrelation, truncated one lag beyond it."""
     radius = correlation.shape[0] // 2
     size = 8 * (radius + 2)
     grid = np.zeros((size, size))
@@ -216,7 +218,7 @@ def _slope(before: float, here: float, after: float) -> float:
 
 @numba.njit(nogil=True, cache=True)
 def _unevenness(slope: float) -> float:
-    """Mean square over squared mean of exp(slope x) over a part of a pixel."""
+    """Mean square over squared mean of exp(slope x) over a subpixel."""
     half = 0.5 * slope / CUTS
     return 1.0 if abs(half) < 1e-6 else half / math.tanh(half)
 
@@ -241,7 +243,7 @@ def _scintillate(  # noqa: PLR0913
     white = np.empty((CUTS * n + 2 * reach, CUTS * (last - first) + 2 * reach))
     for i in range(white.shape[0]):
         for j in range(white.shape[1]):
-            # beyond the image too, where rows are told apart by a stride wider than any image
+            # indices run beyond the image; the stride between rows is wider than any image and its margin
             row, column = CUTS * start - reach + i + 4096, CUTS * first - reach + j + 4096
             white[i, j] = normal(seed, np.int64(row) * 131072 + np.int64(column), step, dimension)
     scale = (quantile.shape[1] - 1) / (2.0 * LIMIT)

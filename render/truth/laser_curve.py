@@ -1,8 +1,8 @@
 """The exact laser line: the plane of the sheet cut with the triangles, in float64, and where it crosses each scan line.
 
-A triangle counts only where camera and laser are on the same side of it. The cut of an edge is always computed from its
-end behind the sheet to its end in front, so that two triangles that share the edge give the same bits, and a scan line
-through their common point is counted once.
+A triangle counts only if camera and laser are on the same side of it. The cut of an edge is always interpolated from
+its end behind the sheet to its end in front, so that two triangles that share the edge give the same bits, and a scan
+line through their common point is counted once.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int32]
 
 PIECE_PX = 8.0
-"""With distortion a segment is solved in pieces of this length, in which v is taken to be monotonic."""
+"""With distortion a segment is solved in pieces of this length, over which the scan line is assumed to be monotonic."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -141,7 +141,7 @@ def scan_line_crossings(  # noqa: PLR0915
             continue
         a, step = segments[s, 0], segments[s, 1] - segments[s, 0]
         t0, t1 = spans[s, 0], spans[s, 1]
-        # keep what is ahead of the camera
+        # clip to what is in front of the camera
         z0, z1 = a[2] + t0 * step[2], a[2] + t1 * step[2]
         if z0 <= NEAR and z1 <= NEAR:
             continue
@@ -212,7 +212,7 @@ def laser_curve(
     axis: Axis = "rows",
     threads: int | None = None,
 ) -> LaserCurve:
-    """The lit and seen line of one laser. Poses (4, 4)."""
+    """The part of one laser's line that is lit and visible to the camera. Poses (4, 4)."""
     side = sheet_side(world.vertices, invert(T_world_laser))
     crossing = crossing_triangles(side, world.triangles)
     segments, triangle = cut_triangles(
@@ -221,11 +221,11 @@ def laser_curve(
     corners = world.vertices[world.triangles[triangle]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
-    def clear(points: Float, facing: Float, towards: Float) -> NDArray[np.bool_]:
+    def sees(points: Float, facing: Float, towards: Float) -> NDArray[np.bool_]:
         return visible(world.rays, points, facing, towards, threads)
 
     curve = curve_of_cut(
-        segments, normals, world.object_id[triangle], camera, laser, T_world_camera, T_world_laser, axis, clear
+        segments, normals, world.object_id[triangle], camera, laser, T_world_camera, T_world_laser, axis, sees
     )
     return replace(curve, sheet_bias=sheet_bias(world, curve, camera, laser, T_world_camera, T_world_laser, threads))
 
@@ -239,11 +239,11 @@ def curve_of_cut(  # noqa: PLR0913
     T_world_camera: Float,
     T_world_laser: Float,
     axis: Axis,
-    clear: Callable[[Float, Float, Float], NDArray[np.bool_]],
+    sees: Callable[[Float, Float, Float], NDArray[np.bool_]],
 ) -> LaserCurve:
-    """The line that (m, 2, 3) cut segments, their (m, 3) facet normals (any length) and (m,) objects give, world frame.
+    """The line of (m, 2, 3) cut segments with their (m, 3) facet normals (any length) and (m,) objects, world frame.
 
-    clear(points, normals, towards) says, as `visible` does, which points see a target.
+    sees(points, normals, towards) returns, as `visible` does, which points see a target.
     """
     T_laser_world, T_camera_world = invert(T_world_laser), invert(T_world_camera)
     spans = clip_to_fan(segments, T_laser_world, laser.tan_half_fan)
@@ -259,7 +259,7 @@ def curve_of_cut(  # noqa: PLR0913
     facing /= np.linalg.norm(facing, axis=1, keepdims=True)
     to_camera, to_laser = T_world_camera[:3, 3] - points, T_world_laser[:3, 3] - points
     facing *= np.sign(np.einsum("ij,ij->i", facing, to_camera))[:, None]
-    seen = clear(points, facing, to_camera) & clear(points, facing, to_laser)
+    seen = sees(points, facing, to_camera) & sees(points, facing, to_laser)
     order = np.flatnonzero(seen)
     order = order[np.lexsort((values[order, 0], index[order]))]
     inside = spans[:, 0] < spans[:, 1]

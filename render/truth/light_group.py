@@ -1,4 +1,4 @@
-"""The exact truth of every pixel, which is made in turn with the light groups."""
+"""The exact truth of every pixel, as one of the parts of a frame that are rendered in turn."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class PixelTruth(LightGroup[GroupPlan]):
         return GroupPlan(self.expected(scene, settings))
 
     def work(self, scene: Scene, settings: RenderSettings) -> float:
-        """A ray a pixel."""
+        """Number of rays: one a pixel."""
         return float(scene.camera.width * scene.camera.height)
 
     def estimates(
         self, placed: PlacedScene, settings: RenderSettings, plan: GroupPlan, frame: Frame, run: Run
     ) -> Iterator[Estimate]:
-        """The only one is exact."""
+        """One estimate, which is exact."""
         yield Estimate(truth_images(placed.world, placed.camera, placed.T_world_camera, run))

@@ -34,7 +34,7 @@ def fill_truth(  # noqa: PLR0913
     normal: Float32,
     item: Int,
 ) -> None:
-    """Write the pixels start.. of the flat images (h w, ...) from their hits."""
+    """Write the pixels from `start` on of the flat images (h w, ...) from their hits: triangle (n,), -1 for none."""
     m = T_world_camera
     for r in range(triangle.shape[0]):
         i, t = start + r, triangle[r]

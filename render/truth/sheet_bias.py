@@ -1,13 +1,14 @@
-"""What the sheet's own width does to its line on a bent surface: the image of its Gaussian, and how far off the middle.
+"""The bias of the line's centre by the sheet's own width: where the surface is curved, the centroid of the light is not
+the image of the sheet's middle.
 
-A line is measured by the light of all of the sheet, but truth is where the middle of the sheet is. Along the scan line,
-with q(u) = x / sigma of the laser's frame on the surface that pixel u sees, and A(u) all else that the irradiance
-depends on (distance, fan, angle, shadow), the light is A exp(-q^2 / 2), and to the second order of the surface
+A line is measured by the light of the whole sheet, but the truth is where the sheet's middle is. Along the scan line,
+with q(u) = x / sigma in the laser's frame on the surface that pixel u sees, and A(u) all other factors of the
+irradiance (distance, fan, angle, shadow), the light is A exp(-q^2 / 2), and to second order in the surface
 
     bias = A' / (A q'^2) - 3 q'' / (2 q'^3)
 
-which is 0 on a plane but for the perspective. Here the Gaussian is followed through the surface as it is, at the
-quadrature nodes of STEP sigma, so that edges and shadows across the sheet count too. Reflectance does not.
+which is 0 on a plane but for the perspective. Here the Gaussian is integrated over the actual surface, by quadrature
+nodes STEP sigma apart, so that edges and shadows across the sheet are included. Reflectance is not.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ from render.world.world import World
 Float = NDArray[np.float64]
 Int = NDArray[np.int32]
 
-STEP, REACH = 0.5, 4.0
-"""Sigmas of the line between samples, and to the last: the trapezoidal rule is exact for a Gaussian at this step."""
-WIDEST = 50.0
-"""px; sigma of a line that is taken for no wider, where the sheet grazes the surface."""
+STEP, SAMPLED_SIGMAS = 0.5, 4.0
+"""Sigmas of the line between nodes, and to the last node: the trapezoidal rule is exact for a Gaussian at this step."""
+MAX_SIGMA_PX = 50.0
+"""Upper limit of the line's sigma, px, where the sheet grazes the surface."""
 
 
 def sheet_bias(
@@ -41,17 +42,17 @@ def sheet_bias(
     T_world_laser: Float,
     threads: int | None = None,
 ) -> Float:
-    """(n,) px along the scan line from each crossing to the centre of mass of its light. Poses (4, 4).
+    """(n,) px along the scan line from each crossing to the centroid of its light. Poses (4, 4).
 
-    0 where nothing is lit. Of two crossings on a scan line each has the half of what is between them.
+    0 where nothing is lit. Neighbouring crossings on a scan line are separated halfway between them.
     """
-    nodes = np.arange(-REACH, REACH + STEP / 2, STEP)
+    nodes = np.arange(-SAMPLED_SIGMAS, SAMPLED_SIGMAS + STEP / 2, STEP)
     count = len(curve.index)
     if count == 0 or len(world.triangles) == 0:
         return np.zeros(count)
     sigma = _line_sigma(world, curve, camera, laser, T_world_camera, T_world_laser)
-    half = np.minimum(REACH * sigma, _half_gap(curve))
-    offsets = (half / REACH)[:, None] * nodes
+    half = np.minimum(SAMPLED_SIGMAS * sigma, _half_gap(curve))
+    offsets = (half / SAMPLED_SIGMAS)[:, None] * nodes
     along = (curve.position[:, None] + offsets).ravel()
     points, normals, hit = _seen(world, camera, T_world_camera, _pixels(curve, along, len(nodes)))
     to_laser = T_world_laser[:3, 3] - points
@@ -72,7 +73,7 @@ def sheet_bias(
 def _line_sigma(
     world: World, curve: LaserCurve, camera: Camera, laser: LineLaser, T_world_camera: Float, T_world_laser: Float
 ) -> Float:
-    """(n,) px: sigma of the line along the scan line, were the surface its facet."""
+    """(n,) sigma of the line along the scan line, px, with the surface continued as the plane of its facet."""
     T_laser_world = invert(T_world_laser)
     points, normals, hit = _seen(world, camera, T_world_camera, _pixels(curve, curve.position, 1))
     middle = transform_points(T_laser_world, points)
@@ -80,36 +81,36 @@ def _line_sigma(
     for side in (-0.5, 0.5):
         rays = _directions(camera, T_world_camera, _pixels(curve, curve.position + side, 1))
         facing = np.einsum("ij,ij->i", normals, rays)
-        reach = np.einsum("ij,ij->i", normals, points - T_world_camera[:3, 3]) / np.where(facing == 0.0, np.nan, facing)
-        there = T_world_camera[:3, 3] + reach[:, None] * rays
-        across += np.sign(side) * transform_points(T_laser_world, there)[:, 0]
+        depth = np.einsum("ij,ij->i", normals, points - T_world_camera[:3, 3]) / np.where(facing == 0.0, np.nan, facing)
+        points_beside = T_world_camera[:3, 3] + depth[:, None] * rays
+        across += np.sign(side) * transform_points(T_laser_world, points_beside)[:, 0]
     sheet = laser.sigma(np.maximum(middle[:, 2], 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        sigma = np.where(hit, sheet / np.abs(across), WIDEST)
-    return np.asarray(np.nan_to_num(np.minimum(sigma, WIDEST), nan=WIDEST))
+        sigma = np.where(hit, sheet / np.abs(across), MAX_SIGMA_PX)
+    return np.asarray(np.nan_to_num(np.minimum(sigma, MAX_SIGMA_PX), nan=MAX_SIGMA_PX))
 
 
 def _half_gap(curve: LaserCurve) -> Float:
-    """(n,) px: half of the way to the nearest other crossing on the scan line; infinite: it is alone."""
+    """(n,) half the distance to the nearest other crossing on the scan line, px; infinite where there is none."""
     gap = np.where(np.diff(curve.index) == 0, np.diff(curve.position), np.inf)
     return 0.5 * np.minimum(np.append(gap, np.inf), np.insert(gap, 0, np.inf))
 
 
 def _pixels(curve: LaserCurve, along: Float, each: int) -> Float:
-    """(m, 2) pixels (u, v) on the scan lines of the crossings, each of which has so many in turn."""
+    """(m, 2) pixels (u, v) at the positions along (m,) of the crossings' scan lines, `each` of them a crossing."""
     line = np.repeat(curve.index.astype(np.float64), each)
     return np.stack([along, line] if curve.axis == "rows" else [line, along], axis=1)
 
 
 def _directions(camera: Camera, T_world_camera: Float, pixels: Float) -> Float:
-    """(m, 3) world, of length 1 along the camera's axis; NaN where the lens has none."""
+    """(m, 3) ray directions, world, of length 1 along the camera's axis; NaN where the distortion has no inverse."""
     normalised, valid = camera.normalise(pixels)
     rays = np.column_stack([np.where(valid[:, None], normalised, np.nan), np.ones(len(pixels))])
     return np.asarray(rays @ T_world_camera[:3, :3].T)
 
 
 def _seen(world: World, camera: Camera, T_world_camera: Float, pixels: Float) -> tuple[Float, Float, NDArray[np.bool_]]:
-    """What (m, 2) pixels see: points (m, 3), unit normals towards the camera (m, 3), world, and whether anything."""
+    """What (m, 2) pixels see, world: points (m, 3), unit normals towards the camera (m, 3), (m,) hit or not."""
     centre = T_world_camera[:3, 3]
     rays = _directions(camera, T_world_camera, pixels)
     known = np.isfinite(rays[:, 0])
@@ -121,6 +122,6 @@ def _seen(world: World, camera: Camera, T_world_camera: Float, pixels: Float) ->
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     facing = np.einsum("ij,ij->i", normals, rays)
     hit &= np.abs(facing) > 0.0
-    reach = np.einsum("ij,ij->i", normals, corners[:, 0] - centre) / np.where(hit, facing, 1.0)
-    points = centre + reach[:, None] * np.where(hit[:, None], rays, 0.0)
+    depth = np.einsum("ij,ij->i", normals, corners[:, 0] - centre) / np.where(hit, facing, 1.0)
+    points = centre + depth[:, None] * np.where(hit[:, None], rays, 0.0)
     return points, normals * -np.sign(np.where(hit, facing, -1.0))[:, None], hit

@@ -1,4 +1,4 @@
-"""What sees what: points on surfaces, and the straight way from them to a target."""
+"""Visibility: whether the segment from a point on a surface to a target is unoccluded."""
 
 from __future__ import annotations
 
@@ -21,10 +21,12 @@ def visible(
     distance = np.linalg.norm(towards, axis=1)
     directions = (towards / distance[:, None]).astype(np.float32)
     far = distance.astype(np.float32)
-    clear = np.empty(len(points), dtype=np.bool_)
+    unoccluded = np.empty(len(points), dtype=np.bool_)
 
     def work(start: int, stop: int) -> None:
-        clear[start:stop] = ~rays.occluded(origins[start:stop], directions[start:stop], far[start:stop], coherent=True)
+        unoccluded[start:stop] = ~rays.occluded(
+            origins[start:stop], directions[start:stop], far[start:stop], coherent=True
+        )
 
     map_chunks(work, len(points), CHUNK // 4, threads)
-    return clear
+    return unoccluded

@@ -1,4 +1,4 @@
-"""Embree answers "what does this ray hit"; the only file that knows Embree and embreex, the package that brings it.
+"""Ray queries by Embree; the only file that knows Embree and embreex, the package that brings it.
 
     scene = RayScene(vertices, triangles)                      # the tree is built here, by all threads
     triangle, distance = scene.intersect(origins, directions)  # first hits
@@ -35,14 +35,14 @@ Int32 = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 
 CHUNK = 1 << 16
-"""Rays a call: long enough to hide Python's share, short enough to share work and to cancel."""
+"""Rays a call: enough to hide Python's overhead, few enough to balance the threads and to cancel soon."""
 FAR = 1e37
-"""How far rays go that have no end."""
+"""Length of a ray without an end."""
 
 _VERSION, _NATIVE = 0, {16: 34, 8: 33, 4: 32}
-"""RTC_DEVICE_PROPERTY_VERSION, and RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED and so on."""
+"""RTC_DEVICE_PROPERTY_VERSION, and RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED, _RAY8_ and _RAY4_."""
 _TRIANGLES, _INDEX, _VERTEX, _UINT3, _FLOAT3, _ROBUST = 0, 0, 1, 0x5003, 0x9003, 1 << 2
-"""RTC_GEOMETRY_TYPE_, RTC_BUFFER_TYPE_INDEX, RTC_BUFFER_TYPE_, RTC_FORMAT_ and RTC_SCENE_FLAG_ so named."""
+"""RTC_GEOMETRY_TYPE_TRIANGLE, RTC_BUFFER_TYPE_INDEX, _VERTEX, RTC_FORMAT_UINT3, _FLOAT3, RTC_SCENE_FLAG_ROBUST."""
 _OUT_OF_MEMORY = 4
 """RTC_ERROR_OUT_OF_MEMORY."""
 
@@ -59,7 +59,7 @@ class RayScene:
         # one vertex more than there are, since Embree reads each of them as four floats
         shifted = np.zeros((len(vertices) + 1, 3), np.float32)
         np.subtract(vertices, self.centre, out=shifted[:-1], casting="same_kind")
-        # vertices, origin and traversal each round to 2^-24 of the extent; a ray from a surface starts this far off it
+        # vertices, ray origins and traversal each round to 2^-24 of the extent; 16 of these keep a ray off its surface
         self.surface_offset = 16.0 * 2.0**-24 * float(np.abs(shifted).max())
         self._tree = _tree(shifted, np.ascontiguousarray(triangles, dtype=np.int32))
         self._lock = threading.Lock()
@@ -71,7 +71,7 @@ class RayScene:
     ) -> tuple[Int32, Float32]:
         """(n, 3) origins (scene-centred), directions, (n,) far (changed in place) -> triangle or -1, distance.
 
-        coherent: each ray goes much as those before and after it, which is quicker. The same hits.
+        coherent: neighbouring rays have similar directions, which is faster; the hits are the same.
         ValueError: the rows differ.
         """
         _check(origins, directions, far)
@@ -81,7 +81,7 @@ class RayScene:
             return self._tree.intersect(origins, np.ascontiguousarray(directions), far, coherent), far
 
     def from_point(self, origin: NDArray[np.float64], directions: Float32) -> Int32:
-        """World origin (3,), (n, 3) directions, neighbours much alike -> (n,) first triangle or -1."""
+        """World origin (3,), (n, 3) directions, neighbours similar -> (n,) first triangle or -1."""
         start = (origin - self.centre).astype(np.float32)
         return self.intersect(np.broadcast_to(start, directions.shape), directions, coherent=True)[0]
 
@@ -105,11 +105,12 @@ class RayScene:
 
 
 class Tree:
-    """Embree's tree over one mesh, for packets of as many rays as the processor does at once.
+    """Embree's BVH over one mesh, queried by packets of the processor's width.
 
-    One tree, whatever moves: a tree to each object (instances, or Embree's builder of two levels) would spare the build
-    of what stands still, 0.3 s of a processor for a million triangles. But trees of two objects are searched one after
-    the other: incoherent shadow rays took 1.2 to 2.0 times as long in the templates `scan`, `sphere` and `glass_ball`.
+    One BVH holds all objects, moving or not. One an object (instances, or Embree's two-level builder) would save the
+    rebuild for those at rest, 0.3 s of CPU time for a million triangles. But the BVHs of two objects are traversed one
+    after the other: incoherent shadow rays took 1.2 to 2.0 times as long in the templates `scan`, `sphere` and
+    `glass_ball`.
     """
 
     def __init__(self, library: Library, shifted: Float32, triangles: Int32, width: int | None = None) -> None:
@@ -120,7 +121,7 @@ class Tree:
         functions, device = library.functions, library.device
         self._arrays = shifted, triangles
         scene = functions.rtcNewScene(device)
-        # what is built is given back with this object; nothing is when the program ends, with rays still under way
+        # the scene is released with this object, but not at the program's end, when rays may still be under way
         weakref.finalize(self, functions.rtcReleaseScene, scene).atexit = False
         # robust traversal: no ray slips between two triangles that share an edge
         functions.rtcSetSceneFlags(scene, _ROBUST)
@@ -142,7 +143,7 @@ class Tree:
     def intersect(self, origins: Float32, directions: Float32, far: Float32, coherent: bool) -> Int32:
         """(n, 3) origins and directions -> (n,) first triangle or -1; far (n,) becomes its distance."""
         triangle = np.empty(len(directions), np.int32)
-        # of one point; copied, since for what cannot be written to kernels would be compiled again
+        # a single shared origin; copied, since kernels would be compiled again for a read-only array
         origins = origins[:1].copy() if origins.strides[0] == 0 else np.ascontiguousarray(origins)
         intersect_packets(self._for(coherent), buffer(self._packets.width), origins, directions, far, triangle)
         return triangle
@@ -158,7 +159,7 @@ class Tree:
 
 
 class EmbreexTree:
-    """The same by embreex: one ray after the other, and a build that holds the interpreter."""
+    """As `Tree`, by embreex's own interface: single rays, and a build that holds the GIL."""
 
     def __init__(self, shifted: Float32, triangles: Int32) -> None:
         """As `Tree`."""
@@ -178,15 +179,16 @@ class EmbreexTree:
 
 
 class Library(NamedTuple):
-    """Embree, opened: its functions and the one device that all scenes are built on."""
+    """The opened Embree library: its functions, and the one device of all scenes."""
 
     functions: ctypes.CDLL
     device: int
+    """Handle of the device."""
     width: int
-    """Rays that the processor does at once: 4, 8 or 16."""
+    """Rays a packet that the processor supports natively: 4, 8 or 16."""
 
     def check(self) -> None:
-        """What went wrong in this thread since the last check: MemoryError, RuntimeError."""
+        """Raise the error of this thread since the last check: MemoryError, RuntimeError."""
         code = self.functions.rtcGetDeviceError(self.device)
         if code:
             text = self.functions.rtcGetErrorString(code).decode()
@@ -195,9 +197,9 @@ class Library(NamedTuple):
 
 @lru_cache(maxsize=1)
 def library() -> Library | None:
-    """Embree as embreex brings it; None: it cannot be opened, or is another one than version 4."""
+    """The Embree library in embreex's package; None: it cannot be opened, or is not of version 4."""
     word, number, size = ctypes.c_void_p, ctypes.c_uint, ctypes.c_size_t
-    # built for Windows, a module does not show the functions of the libraries that it is linked with
+    # on Windows a module does not re-export the functions of the libraries it is linked with
     beside = Path(embreex.__file__).parents[1] / "embreex.libs"
     names = [str(path) for path in beside.glob("embree4*.dll")] if sys.platform == "win32" else []
     try:
@@ -238,7 +240,7 @@ def _tree(shifted: Float32, triangles: Int32) -> Tree | EmbreexTree:
 
 @lru_cache(maxsize=1)
 def works() -> bool:
-    """The library finds what embreex finds: tried out once, on three triangles."""
+    """Whether the library returns the same hits as embreex, tested once on three triangles."""
     opened = library()
     if opened is None:
         return False
@@ -260,7 +262,7 @@ def _address(functions: ctypes.CDLL, name: str) -> int:
 
 
 def _check(origins: Float32, directions: Float32, far: Float32 | None) -> None:
-    """Rows that differ would be read out of bounds, so that is checked here."""
+    """ValueError: the shapes differ; Embree would read out of bounds."""
     n = len(origins)
     if origins.shape != (n, 3) or directions.shape != (n, 3) or (far is not None and far.shape != (n,)):
         far_shape = None if far is None else far.shape

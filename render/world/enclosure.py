@@ -16,11 +16,11 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int32]
 
 CLOSED = 0.9
-"""Open surfaces give fractions; a closed one gives a whole number."""
+"""Least winding number of a point inside a body: a closed surface gives an integer, an open one a fraction."""
 
 
 def objects_around(world: World, items: Iterable[int], point: Float) -> list[int]:
-    """Which of some objects have a closed surface that encloses the point (3,), world m."""
+    """Those of the objects `items` whose closed surface encloses the point (3,), world, m."""
     # only objects whose box holds the point can enclose it
     boxed = [item for item in items if _in_box(world, item, point)]
     around = []
@@ -43,6 +43,6 @@ def _in_box(world: World, item: int, point: Float) -> bool:
     used = world.triangles[world.object_id == item]
     if len(used) == 0:
         return False
-    # an object's vertices stand together
+    # an object's vertices are contiguous
     points = world.vertices[used.min() : used.max() + 1]
     return bool(np.all(points.min(axis=0) <= point) and np.all(points.max(axis=0) >= point))

@@ -1,9 +1,9 @@
-"""What a path is within where transparent bodies overlap: a bit for each, and the highest is the substance there.
+"""The interior list of a path: the overlapping transparent bodies that it is inside, one bit each.
 
-Schmidt and Budge (2002) carry a list of interiors with priorities. Here bodies are ranked by priority, so that the list
-is a number, `interior`: bit k stands for the body of rank k, and no list is too short. A boundary between two bodies is
-seen with the index of the one over that of the other; a boundary within a body of a higher rank is hidden: nothing is
-there, and paths and shadow rays go on through it.
+Schmidt and Budge (2002) carry a list of interiors with priorities. Here bodies are ranked by priority, and the list is
+an integer, `interior`, whose bit k is the body of rank k + 1; the highest bit is the substance at that point. At a
+boundary between two bodies the relative index is that of the one over that of the other. A boundary inside a body of a
+higher rank is hidden: paths and shadow rays pass through it unchanged.
 """
 
 from __future__ import annotations
@@ -29,21 +29,22 @@ Int = NDArray[np.int32]
 Long = NDArray[np.int64]
 
 RANK, RANKED = ROW, ROW + 1
-"""Columns behind a material's row: its body's rank from 1, 0 for one that overlaps none; in row k, the material of the
-body of rank k + 1."""
+"""Columns after a material's row. RANK: rank of its body from 1, or 0 if it overlaps none. RANKED, in row k: the
+material of the body of rank k + 1.
+"""
 COLUMNS = ROW + 2
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def bit_of(rows: Float, slot: int) -> int:
-    """The bit of a material's body; 0: it overlaps no other."""
+    """The bit of a material's body in an interior list; 0: it overlaps no other."""
     rank = int(rows[slot, RANK])
     return 1 << (rank - 1) if rank > 0 else 0
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def substance(rows: Float, interior: int) -> int:
-    """The material that a path is in; -1: none of those that overlap."""
+    """The material at the end of a path: that of the highest bit; -1: none of the overlapping bodies."""
     rank = -1
     while interior > 0:
         interior >>= 1
@@ -53,28 +54,28 @@ def substance(rows: Float, interior: int) -> int:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def medium_within(rows: Float, interior: int) -> int:
-    """The material that a path is in, if light scatters there; -1: it goes straight."""
+    """The material at the end of a path if it is a scattering medium; else -1."""
     slot = substance(rows, interior)
     return slot if slot >= 0 and rows[slot, 0] == SUBSURFACE else -1
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def index_beside(rows: Float, outside: int) -> float:
-    """Index of refraction on the outer side of a boundary; outside: what is there, without its own body."""
+    """Refractive index on the outer side of a boundary; outside: the interior list there, without the body itself."""
     slot = substance(rows, outside)
     return float(rows[slot, 3]) if slot >= 0 else 1.0
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def is_hidden(rows: Float, slot: int, interior: int) -> bool:
-    """A boundary of this material is within a body of a higher rank."""
+    """A boundary of this material is inside a body of a higher rank."""
     bit = bit_of(rows, slot)
     return bit > 0 and (interior & ~bit) > bit
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def hidden_hits(surface: Surface, triangle: Int, interior: Long) -> Long:
-    """(n,) hits, -1 for none, of rays within (n,) interiors -> (m,) those that met a hidden boundary."""
+    """(n,) hit triangles, -1 for none, of rays with (n,) interior lists -> (m,) indices of those that are hidden."""
     out, count = np.empty(triangle.shape[0], np.int64), 0
     for r in range(triangle.shape[0]):
         t = triangle[r]
@@ -86,9 +87,9 @@ def hidden_hits(surface: Surface, triangle: Int, interior: Long) -> Long:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def cross_boundary(surface: Surface, t: int, centre: Float, offset: float, origin: Any, direction: Any) -> int:
-    """Move a ray's origin (3,), from the centre, to the far side of triangle t; returns the bit that this changes.
+    """Move a ray's origin (3,), relative to `centre`, to the far side of triangle t; returns the bit that this changes.
 
-    Positive: the ray is now within the body; negative: it has left it.
+    Positive: the ray has entered the body; negative: it has left it.
     """
     a0, a1, a2, n0, n1, n2 = plane_of(surface, t)
     o0, o1, o2 = origin[0] + centre[0], origin[1] + centre[1], origin[2] + centre[2]
@@ -104,7 +105,7 @@ def cross_boundary(surface: Surface, t: int, centre: Float, offset: float, origi
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def changed(interior: int, bit: int) -> int:
-    """What a path is within after `cross_boundary`."""
+    """The interior list after `cross_boundary` returned this bit."""
     return interior | bit if bit > 0 else interior & ~(-bit)
 
 
@@ -112,7 +113,7 @@ def changed(interior: int, bit: int) -> int:
 def cross_all(
     surface: Surface, triangle: Int, centre: Float, offset: float, start: Float32, direction: Float32, interior: Long
 ) -> Float:
-    """Take rays (m, 3) to the far side of the triangles (m,) that they met; returns how far each has moved, (m,) m."""
+    """Move rays (m, 3) to the far side of the triangles (m,) that they hit; returns the distances moved, (m,) m."""
     moved = np.empty(triangle.shape[0])
     for r in range(triangle.shape[0]):
         o0, o1, o2 = float(start[r, 0]), float(start[r, 1]), float(start[r, 2])
@@ -127,7 +128,7 @@ def has_overlaps(surface: Surface) -> bool:
 
 
 def surroundings(world: World, surface: Surface, point: Float) -> tuple[int, float]:
-    """Where paths begin, (3,) world m: the interior there, and the refractive index."""
+    """Interior list and refractive index at the point where paths begin, (3,) world, m."""
     bodies = np.flatnonzero(np.isin(surface.rows[:, 0], (DIELECTRIC, SUBSURFACE)))
     around = objects_around(world, bodies.tolist(), point)
     interior = sum(bit_of(surface.rows, item) for item in around)
@@ -139,9 +140,9 @@ def surroundings(world: World, surface: Surface, point: Float) -> tuple[int, flo
 def pass_hidden(
     surface: Surface, rays: RayScene, origin: Float32, direction: Float32, triangle: Int, interior: Long
 ) -> None:
-    """Rays (n, 3), scene-centred, and what they met first (n,): where that is hidden, what they meet beyond it.
+    """Replace the hits (n,) of rays (n, 3), scene-centred, by their first hits that are not hidden.
 
-    triangle and interior (n,) are changed; origins stay, so that distances remain those of the whole way.
+    triangle and interior (n,) are changed in place; origins are not, so that distances stay those from the origin.
     """
     hidden = hidden_hits(surface, triangle, interior)
     start, towards = origin[hidden], direction[hidden]
@@ -164,9 +165,9 @@ def cross_hidden(
     interior: Long,
     centre: Float,
 ) -> Int:
-    """Take those of the rays `which` that met a hidden boundary from their origin to beyond it; returns them.
+    """Move those of the rays `which` that hit a hidden boundary beyond it; returns their indices.
 
-    Origin, from the centre (3,), and interior (n, ...) are changed.
+    origin, relative to `centre` (3,), and interior (n, ...) are changed in place.
     """
     hidden = which[hidden_hits(surface, triangle[which], interior[which])]
     start, within = origin[hidden], interior[hidden]
@@ -178,7 +179,7 @@ def cross_hidden(
 def occluded_by_visible(
     surface: Surface, rays: RayScene, origin: Float32, direction: Float32, far: Float32, interior: Long
 ) -> NDArray[np.bool_]:
-    """Shadow rays (n, 3), scene-centred, of length (n,), within (n,) interiors -> (n,) something not hidden is met."""
+    """Shadow rays (n, 3), scene-centred, of length (n,), with (n,) interior lists -> (n,) blocked by a visible hit."""
     blocked = rays.occluded(origin, direction, far.copy())
     at = np.flatnonzero(blocked)
     start, towards, left, within = origin[at], direction[at], far[at].astype(np.float64), interior[at]

@@ -1,4 +1,4 @@
-"""Collects materials, their images and what they are beside constants, while a world is put together."""
+"""Collects the materials of a world, with their images, shading normals and maps, while it is built."""
 
 from __future__ import annotations
 
@@ -29,12 +29,13 @@ from render.world.surface_interaction import BUMP_MAP, LEAST_COAT, NORMAL_MAP, R
 
 Float32 = NDArray[np.float32]
 Place = tuple[int, int, int]
-"""Start in the images, height, width; height 0 for none."""
+"""Start in the images, height, width of an image; height 0 for none."""
 NOWHERE = (0, 0, 0)
+"""Place of an image that a material does not have."""
 
 
 class MaterialAtlas:
-    """One entry a material in every list; `render.world.world.World` describes them. root: the project's folder."""
+    """Lists with one entry a material, as `render.world.world.World` describes them. root: the project's folder."""
 
     def __init__(self, root: Path | None) -> None:
         self.root = root
@@ -51,10 +52,10 @@ class MaterialAtlas:
         self.least_alpha: list[float] = []
         self.texels = 0
         self.known: dict[int, tuple[Float32, Place]] = {}
-        """By identity, and kept so that it stays one: objects share the image that they share."""
+        """Images already added, by their id; kept alive so that no id is used twice. Objects share the same image."""
 
     def add(self, material: BaseMaterial, mesh: Mesh, where: str) -> int:
-        """A material with the texture or colour that its mesh brings; returns its number.
+        """Add a material, with its mesh's texture or colour if it has one; returns its index.
 
         InputError: a map without UV, or a bad image.
         """
@@ -69,7 +70,7 @@ class MaterialAtlas:
         return len(self.materials) - 1
 
     def add_blend(self, index: int, item: SceneObject, mesh: Mesh) -> None:
-        """The second material and the mask of a blend. InputError: no UV, or a bad image."""
+        """Add the second material and the mask of a blend. InputError: no UV, or a bad image."""
         assert isinstance(item.material, Blend)
         where = f"object {item.name!r}: material"
         mask = self._load(item.material.mask, mesh, f"{where}.mask")
@@ -81,7 +82,7 @@ class MaterialAtlas:
         self.masks[index] = self.image(mask, f"{where}.mask")
 
     def image(self, image: Float32, where: str) -> Place:
-        """Append (h, w, 3), once; returns its place. InputError: more than MAX_PIXELS in all images together."""
+        """Append an image (h, w, 3) unless it is there; returns its place. InputError: more than MAX_PIXELS in all."""
         if id(image) in self.known:
             return self.known[id(image)][1]
         place = (self.texels, image.shape[0], image.shape[1])
@@ -92,7 +93,7 @@ class MaterialAtlas:
         return place
 
     def joined_images(self) -> Float32:
-        """(n,) all images, one after the other; a single one is not copied."""
+        """(n,) all images, concatenated; a single one is not copied."""
         if len(self.images) == 1:
             return self.images[0]
         return np.concatenate(self.images) if self.images else np.zeros(0, dtype=np.float32)
@@ -134,7 +135,7 @@ class MaterialAtlas:
 
 
 def centred(values: Float32) -> Float32:
-    """A normal map's codes / most -> such that 2 x - 1 is the component, 0 at the middle code: 128 of 255."""
+    """A normal map's values in [0, 1] -> x such that the component is 2 x - 1, and 0 at the middle code: 128 of 255."""
     eight = bool(np.abs(values * 255.0 - np.rint(values * 255.0)).max() < 1e-3)
     most = 255.0 if eight else 65535.0
     middle = (most + 1.0) / 2.0

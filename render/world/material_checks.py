@@ -1,4 +1,4 @@
-"""What materials and light cannot do together, found before any ray is traced: errors, and warnings worth reading."""
+"""Checks of materials and light before any ray is traced: errors for what cannot be rendered, and warnings."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Float = NDArray[np.float64]
 
 VISIBLE_PX = 0.1
 VISIBLE_ANGLE = math.radians(5.0)
-"""Facets that shading departs from by more than one of these are told."""
+"""Deviations of smooth shading from the facets, in px of the line and as an angle, above which a warning is given."""
 
 
 def check_materials(world: World, scene: Scene) -> None:
-    """InputError: what an object is made of is not known at the wavelength of a laser or of the ambient light, or two
-    transparent bodies are in one place.
+    """InputError: an object's material has no data at the wavelength of a laser or of the ambient light, or two
+    transparent bodies touch, or overlap without priorities.
     """
     _check_overlaps(world, scene)
     for i, laser in enumerate(scene.lasers):
@@ -72,12 +72,12 @@ def _check_overlaps(world: World, scene: Scene) -> None:
 
 
 def scene_warnings(world: World, scene: Scene, step: int = 0) -> tuple[str, ...]:
-    """What may make a sensible picture of the wrong thing, a sentence each that names the object."""
+    """Likely mistakes in a scene that renders without an error: one sentence each, naming the object."""
     return (*_light_warnings(world, scene, step), *_shading_warnings(world, scene, step))
 
 
 def has_ambient_source(scene: Scene) -> bool:
-    """There is a lamp, a sky or a shining object."""
+    """There is a lamp, an environment or an emitter."""
     shining = any(isinstance(item.material, Emitter) for item in scene.visible_objects)
     return bool(scene.lights) or any(scene.environment.radiance) or shining
 
@@ -95,7 +95,7 @@ def _light_warnings(world: World, scene: Scene, step: int) -> list[str]:
 
 
 def sheet_meets(world: World, laser: LineLaser, T_world_laser: Float) -> bool:
-    """Some triangle may be in a laser's sheet, within its fan and its power but 6e-7; false: certainly none is."""
+    """Whether a triangle may lie in a laser's sheet, out to `SHEET_SIGMAS`, and fan; conservative: False is certain."""
     x, y, z = transform_points(invert(T_world_laser), world.vertices).T
     _, waist, focus, rayleigh, edge = laser.packed()[:5]
     reach = SHEET_SIGMAS * (rayleigh * z if waist == 0.0 else waist * np.sqrt(1.0 + ((z - focus) / rayleigh) ** 2))
@@ -106,18 +106,18 @@ def sheet_meets(world: World, laser: LineLaser, T_world_laser: Float) -> bool:
 
 @dataclass(frozen=True)
 class Departure:
-    """How far smooth shading departs from the facets of one object, at worst."""
+    """Largest deviations of smooth shading from the facets of one object."""
 
     angle: float
-    """rad, between a facet's normal and the one it is shaded by."""
+    """Angle between a facet's normal and its shading normal, rad."""
     depth: float
-    """m, by which the curved surface that shading shows lies off the facet."""
+    """Distance from the facet to the curved surface that the shading suggests, m."""
     pixels: float
-    """By which that would shift the line of the farthest laser."""
+    """Shift of the line by that distance, for the laser with the longest baseline, px."""
 
 
 def departure(world: World, scene: Scene, index: int, step: int = 0) -> Departure | None:
-    """Of the visible object `index`, over its facets before the camera; None: it is shaded as it is."""
+    """Departure of the visible object `index`, over its facets that face the camera; None: it is flat-shaded."""
     mine = world.object_id == index
     if len(world.normals) == 0 or not mine.any() or not np.any(world.normals[mine][:1]):
         return None
@@ -132,7 +132,7 @@ def departure(world: World, scene: Scene, index: int, step: int = 0) -> Departur
     corners, turned, facet = corners[ahead], turned[ahead], facet[ahead]
     angle = np.arccos(np.clip(np.einsum("ijk,ik->ij", turned, facet), -1.0, 1.0)).max(axis=1)
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    # an arc that leaves its chord at this angle: the height of its middle
+    # sagitta of an arc that leaves its chord at this angle
     depth = 0.5 * longest * np.tan(0.5 * angle)
     baseline = max((float(np.linalg.norm(scene.T_camera_laser(i)[:3, 3])) for i in range(len(scene.lasers))), default=0)
     pixels = scene.camera.fx * baseline * depth / corners[:, :, 2].min(axis=1) ** 2

@@ -1,9 +1,8 @@
-"""Which transparent bodies overlap or touch, and which of them stands where: the one of the higher priority.
+"""Which transparent bodies overlap or touch, and their ranks: where bodies overlap, the highest priority counts.
 
-Where bodies overlap, as water does that is drawn a little into the wall of its glass, priorities say which substance
-is there (Schmidt and Budge 2002, "Simple nested dielectrics in ray traced images"). Only bodies that overlap another
-have a rank; all others are what they always were, and cost nothing. Touching surfaces are no arrangement at all: which
-of them a ray meets first is left to rounding.
+Where bodies overlap, as water drawn a little into the wall of its glass, priorities decide which substance is there
+(Schmidt and Budge 2002, "Simple nested dielectrics in ray traced images"). Only bodies that overlap another have a
+rank; the others cost nothing. Touching surfaces are refused, since rounding decides which of them a ray hits first.
 """
 
 from __future__ import annotations
@@ -27,27 +26,27 @@ Float32 = NDArray[np.float32]
 Int = NDArray[np.int32]
 
 MOST_BODIES = 62
-"""That overlap others in one scene: one bit each of what a path is within."""
+"""Largest number of overlapping bodies in a scene: one bit each of the interior list, an int64."""
 INSET = 0.02
-"""Share of the way to the middle of a triangle at which its corners are looked at."""
+"""Fraction of the way from a triangle's corners to its middle at which its contact with a body is tested."""
 PARALLEL = 1.0 - 1e-4
-"""Least cosine of two facets that touch; those that cross at a point do not."""
+"""Least cosine between the normals of two touching facets, which tells contact from crossing."""
 
 
 @dataclass(frozen=True)
 class Nesting:
-    """The transparent bodies, numbered as the objects, that share space with others."""
+    """The transparent bodies that overlap or touch others, by the index of their object."""
 
     overlapping: tuple[tuple[int, int], ...]
-    """Pairs, the first number the smaller."""
+    """Pairs of overlapping bodies, the smaller index first."""
     touching: tuple[tuple[int, int], ...]
-    """Pairs with facets that coincide, or lie nearer than rays can tell."""
+    """Pairs of bodies with facets that coincide, or lie nearer than the offset of rays."""
     ranked: tuple[int, ...]
-    """Those that overlap, from the lowest priority to the highest; what is last stands where several are."""
+    """The overlapping bodies in ascending priority: where several are, the last counts."""
 
 
 def nesting_of(world: World) -> Nesting:
-    """Of all pairs of bodies of glass or with a medium below their surface."""
+    """Overlaps and contacts of all pairs of transparent bodies: of glass or with a subsurface medium."""
     overlapping, touching = [], []
     boxes = {
         item: _corners(world, item)
@@ -55,7 +54,7 @@ def nesting_of(world: World) -> Nesting:
         if isinstance(material, Glass | Subsurface)
     }
     bodies: dict[int, _Body] = {}
-    # a little more than the offset of rays, which takes the whole scene's tree to ask for
+    # a little more than the offset of rays, which is known only once the whole scene's BVH is built
     margin = 2e-6 * float(np.ptp(world.vertices, axis=0).max()) if len(boxes) > 1 else 0.0
     for a, b in combinations(boxes, 2):
         if np.any(np.maximum(boxes[a][0], boxes[b][0]) > np.minimum(boxes[a][1], boxes[b][1]) + margin):
@@ -73,7 +72,7 @@ def nesting_of(world: World) -> Nesting:
 
 
 def priority_of(world: World, item: int) -> int:
-    """Of a transparent body; 0 for every other."""
+    """Priority of a transparent body; 0 for every other object."""
     material = world.materials[item]
     return material.priority if isinstance(material, Glass | Subsurface) else 0
 
@@ -133,7 +132,7 @@ class _Body:
 def _corners(world: World, item: int) -> tuple[Float, Float]:
     """Lowest and highest corner of an object's box."""
     used = world.triangles[world.object_id == item]
-    # an object's vertices stand together
+    # an object's vertices are contiguous
     points = world.vertices[used.min() : used.max() + 1]
     return points.min(axis=0), points.max(axis=0)
 

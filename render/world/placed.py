@@ -1,4 +1,4 @@
-"""A scene at one of its steps: what a light group is told of what is there."""
+"""A scene placed at one of its steps, as the light groups receive it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Is the scene one that a scanner could measure? Each impossible placement gets one clear message."""
+"""Checks of a scene's geometry: placements that cannot be rendered or triangulated, one message each."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from render.world.enclosure import objects_around
 from render.world.world import World
 
 CENTRE_TOLERANCE = 1e-6
-"""A plane nearer to the camera's centre than this (m) cannot be triangulated."""
+"""Least distance, m, of a laser's plane from the camera's centre at which it can be triangulated."""
 
 
 def check_placement(world: World, scene: Scene, step: int = 0) -> None:

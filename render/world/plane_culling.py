@@ -1,7 +1,7 @@
-"""Triangles in blocks with bounding boxes, so that cutting a million of them with a plane visits only those near it.
+"""Triangles in blocks with bounding boxes, so that the cut of a million of them with a plane visits only those near it.
 
-A block is a run of neighbours in the file's own order: most meshes keep near what is near, and one that does not only
-costs time.
+A block is a run of triangles in the file's order. Most files keep neighbours together; one that does not costs time,
+but gives the same result.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int32]
 
 BLOCK = 64
+"""Triangles a block."""
 
 
 @numba.njit(nogil=True, cache=True)
@@ -46,7 +47,7 @@ def crossing_in_blocks(vertices: Float, triangles: Int, boxes: Float, T_laser_ob
     for k in range(boxes.shape[0]):
         box = boxes[k]
         reach = abs(a) * box[3] + abs(b) * box[4] + abs(c) * box[5]
-        # far above what the sums can round to, far below any triangle
+        # a margin far above the rounding of the sums and far below the size of any triangle
         reach += 1e-12 * (abs(box[0]) + abs(box[1]) + abs(box[2]) + abs(d))
         if abs(a * box[0] + b * box[1] + c * box[2] + d) > reach:
             continue
@@ -55,7 +56,7 @@ def crossing_in_blocks(vertices: Float, triangles: Int, boxes: Float, T_laser_ob
         if count + BLOCK > capacity:
             capacity *= 2
             more = np.empty(capacity, dtype=np.int32)
-            # numba takes two seconds longer to compile a slice
+            # copied by a loop: a slice takes numba two seconds longer to compile
             for i in range(count):
                 more[i] = out[i]
             out = more

@@ -1,7 +1,7 @@
-"""Quick light for previews: a pixel's shape and laser light from one ray, on diffuse surfaces, without shadows.
+"""Shading of previews: headlight and laser light of a pixel from one ray, on diffuse surfaces, without shadows.
 
-The line across a pixel is integrated in closed form on the facet's plane, as in `render.laser_direct.integrator`, only
-coarser.
+The line across a pixel is integrated in closed form on the facet's plane, as in `render.laser_direct.integrator`, but
+more coarsely.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def shade_pixels(  # noqa: PLR0913
         cosine = abs(facing) / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
         for band in range(3):
             shade[i, band] = cosine * rgb[band]
-        # more than a pixel can cover on the facet
+        # upper bound of a pixel's extent on the facet
         reach = s * max(pixel[0], pixel[1]) * (1.0 + 1.0 / max(cosine, 1e-6))
         for k in range(beams.shape[0]):
             w, beam = T_laser_object[k], beams[k]

@@ -1,11 +1,11 @@
-"""What a ray meets at a point: the material, its reflectance and roughness there, and the frame that it is shaded in.
+"""The surface interaction at a point: material, reflectance and roughness there, and the shading frame.
 
-Where an object asks for it, the frame stands on another normal than the facet's: one interpolated between vertices, or
-tilted by a map. Such a normal may not let light through the surface: what is above it must be above the facet as well
-(`light_side`). It also makes scattering asymmetric, for which Veach (1997), 5.3, gives the remedy: with geometric
-cosines everywhere, the value of a BSDF is  f |n_s . w| / |n_g . w|,  w the direction that the light comes from.
+With smooth shading or a relief the frame is built on a shading normal: interpolated between vertices, or tilted by a
+map. It must not leak light through the surface: directions above it must be above the facet as well (`light_side`). It
+also makes scattering non-symmetric, for which Veach (1997), 5.3, gives the correction: with geometric cosines
+everywhere, the value of a BSDF is  f |n_s . w| / |n_g . w|,  w the direction that the light comes from.
 
-    path from the camera   weight of `sample` unchanged, as that has  f |n_s . i| / density
+    path from the camera   weight of `sample` unchanged, as that has  f |n_s . i| / pdf
     path from a light      weight of `sample` times  light_side(o) / light_side(i)
     connection             f times light_side(the light's direction), once; both directions on one side of both normals
 """
@@ -28,9 +28,9 @@ Int = NDArray[np.int32]
 SMOOTH_NORMALS, ROUGHNESS_MAP, NORMAL_MAP, BUMP_MAP = 1, 2, 4, 8
 """Flags of `Surface.detail`."""
 LEAST_COAT = 0.01
-"""Least roughness of a coat."""
+"""Least roughness of a coat, to which the values of a roughness map are clipped."""
 LEAST_COSINE = 0.05
-"""Of a shading normal with the facet's; one that leans farther is drawn back to this."""
+"""Least cosine of a shading normal with the facet's; one tilted further is clipped to this."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
@@ -48,10 +48,10 @@ def interaction(  # noqa: PLR0913
     alpha: Float,
     frame: Float,
 ) -> int:
-    """The material (a row of `surface.rows`) at the point p of triangle t, n its unit normal on either side.
+    """The material (index of a row of `surface.rows`) at the point p of triangle t, n its unit normal on either side.
 
     -> rgb (3,) reflectance; alpha (2,) roughness, in place of the row's; frame (3, 3) axes, one a row, the last the
-    shading normal, on n's side. choice: uniform in [0, 1), decides in a blend.
+    shading normal, on n's side. choice: uniform in [0, 1), selects one of a blend's materials.
     """
     slot = scattering(surface, t, p0, p1, p2, choice, rgb)
     row = surface.rows[slot]
@@ -65,7 +65,7 @@ def interaction(  # noqa: PLR0913
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def light_side(shading: float, geometric: float) -> float:
-    """|n_s . w| / |n_g . w| for a direction's two cosines; 0 where the normals disagree on its side."""
+    """|n_s . w| / |n_g . w| from a direction's two cosines; 0 where it is above one normal and below the other."""
     return shading / geometric if shading * geometric > 0.0 else 0.0
 
 
@@ -78,7 +78,7 @@ def map_value(surface: Surface, slot: int, which: int, u: float, v: float, rgb: 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def mapped_roughness(surface: Surface, slot: int, u: float, v: float, rgb: Float, alpha: Float) -> None:
-    """Roughness from its map -> alpha (2,); that across a grain stays."""
+    """Roughness from its map -> alpha (2,); with a grain, only along it."""
     map_value(surface, slot, 0, u, v, rgb)
     row = surface.rows[slot]
     value = (rgb[0] + rgb[1] + rgb[2]) / 3.0
@@ -92,7 +92,7 @@ def mapped_roughness(surface: Surface, slot: int, u: float, v: float, rgb: Float
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def bump_slopes(surface: Surface, slot: int, u: float, v: float, rgb: Float) -> tuple[float, float]:
-    """Change of the height (m) along u and v, by differences over a texel to each side."""
+    """Derivatives of the height, m, by u and v: central differences over a texel to each side."""
     du, dv = 1.0 / surface.maps[slot, 5], 1.0 / surface.maps[slot, 4]
     along = across = 0.0
     for sign in (1.0, -1.0):
@@ -118,7 +118,7 @@ def detailed(  # noqa: PLR0913, PLR0915
     alpha: Float,
     frame: Float,
 ) -> None:
-    """Roughness and frame of a material that has more than constants; arguments as of `interaction`."""
+    """Roughness and frame of a material with shading normals or maps; arguments as of `interaction`."""
     flags, row = surface.detail[slot], surface.rows[slot]
     v, uv, rgb = surface.vertices, surface.uv, np.empty(3)
     at_u = at_v = 0.0
@@ -130,7 +130,7 @@ def detailed(  # noqa: PLR0913, PLR0915
     ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
     ac0, ac1, ac2 = v[c, 0] - v[a, 0], v[c, 1] - v[a, 1], v[c, 2] - v[a, 2]
     q0, q1, q2 = p0 - v[a, 0], p1 - v[a, 1], p2 - v[a, 2]
-    # the frame is made on the winding's normal and turned to n's side at the end
+    # the frame is built on the winding's normal and flipped to n's side at the end
     outward = n0 * (ab1 * ac2 - ab2 * ac1) + n1 * (ab2 * ac0 - ab0 * ac2) + n2 * (ab0 * ac1 - ab1 * ac0)
     side = 1.0 if outward >= 0.0 else -1.0
     g0, g1, g2 = side * n0, side * n1, side * n2
@@ -162,7 +162,7 @@ def detailed(  # noqa: PLR0913, PLR0915
             along, across = 2.0 * rgb[0] - 1.0, 2.0 * rgb[1] - 1.0
             along, across = along * surface.relief[slot, 0], across * surface.relief[slot, 1]
             out = max(2.0 * rgb[2] - 1.0, 1e-3)
-            # u and v of the map run along dP/du and dP/dv, which are square to the other's gradient
+            # the map's u and v run along dP/du and dP/dv, each perpendicular to the other's gradient
             x0, x1, x2 = v1 * s2 - v2 * s1, v2 * s0 - v0 * s2, v0 * s1 - v1 * s0
             y0, y1, y2 = s1 * u2 - s2 * u1, s2 * u0 - s0 * u2, s0 * u1 - s1 * u0
             turned = 1.0 if x0 * u0 + x1 * u1 + x2 * u2 >= 0.0 else -1.0
@@ -181,7 +181,7 @@ def detailed(  # noqa: PLR0913, PLR0915
         s0, s1, s2 = s0 / length, s1 / length, s2 / length
     cosine = s0 * g0 + s1 * g1 + s2 * g2
     if cosine < LEAST_COSINE:
-        # keep the direction it leans to
+        # keep the direction of the tilt
         s0, s1, s2 = s0 - cosine * g0, s1 - cosine * g1, s2 - cosine * g2
         length = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
         lean = math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE) / length if length > 0.0 else 0.0

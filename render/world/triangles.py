@@ -1,4 +1,4 @@
-"""What kernels are given: the placed triangles with their reflectance, and the camera's view."""
+"""The placed triangles and materials as kernels read them: planes, UV, textures and local frames at a point."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class Surface(NamedTuple):
 
 
 def has_gloss(surface: Surface) -> bool:
-    """Some material scatters otherwise than Lambert says, or is shaded on another normal than its facet's."""
+    """Some material is not Lambertian, or has a shading normal that differs from its facet's."""
     plain = (surface.rows[:, KIND] == LAMBERTIAN) | (surface.rows[:, KIND] == EMITTER)
     return not bool(np.all(plain & (surface.detail == 0)))
 
 
 def has_medium(surface: Surface) -> bool:
-    """Light scatters within some object."""
+    """Some object holds a scattering medium."""
     return bool(np.any(surface.rows[:, KIND] == SUBSURFACE))
 
 
@@ -69,7 +69,7 @@ def plane_of(surface: Surface, t: int) -> tuple[float, float, float, float, floa
 def off_surface(
     p0: float, p1: float, p2: float, n0: float, n1: float, n2: float, side: float
 ) -> tuple[float, float, float]:
-    """The point p moved by `side`, m, along the normal n: where a ray begins that must not meet its own surface."""
+    """The point p moved by `side`, m, along the normal n: origin of a ray that must not hit its own surface."""
     return p0 + side * n0, p1 + side * n1, p2 + side * n2
 
 
@@ -83,10 +83,11 @@ def reflectance(surface: Surface, t: int, p0: float, p1: float, p2: float, rgb: 
 def scattering(surface: Surface, t: int, p0: float, p1: float, p2: float, choice: float, rgb: Float) -> int:
     """The material (a row of `surface.rows`) at the point p of triangle t, and its reflectance -> rgb (3,).
 
-    A blend is one of its two materials, the second with the mask's value as its chance; `choice` is uniform in [0, 1).
+    A blend is one of its two materials, the second with the mask's value as its probability; `choice` is uniform in
+    [0, 1).
     """
     slot = surface.object_id[t]
-    # one place to look textures up, for the mask first: a second would cost more than the texture itself
+    # one inlined lookup serves mask and albedo: a second would cost more than the lookup itself
     masked = surface.second[slot] >= 0
     while True:
         shape = surface.mask_shape if masked else surface.texture_shape

@@ -1,4 +1,4 @@
-"""The scene's triangles in world coordinates at one step: what every later stage computes on."""
+"""The scene's triangles and materials in world coordinates at one step, on which every later stage computes."""
 
 from __future__ import annotations
 
@@ -30,41 +30,41 @@ class World:
     """All triangles of the visible objects; object_id indexes `scene.visible_objects`."""
 
     vertices: Float
-    """(v, 3) m, world."""
+    """(v, 3) vertices, world, m."""
     triangles: Int
-    """(t, 3)."""
+    """(t, 3) vertex indices."""
     object_id: Int
-    """(t,)."""
+    """(t,) object of each triangle, which is also the index of its material."""
     uv: Float32
-    """(t, 3, 2), or (0, 3, 2) when no object has a texture."""
+    """(t, 3, 2) UV of each triangle's corners; (0, 3, 2) if no object has a texture."""
     albedo: Float
-    """(s, 3) RGB reflectance of each material; the first o are the objects' own, then the second parts of blends."""
+    """(s, 3) RGB reflectance of each material: of every object in its order, then the second materials of blends."""
     textures: Float32
-    """(n,) all textures, one after the other, RGB linear."""
+    """(n,) all images, concatenated, linear RGB."""
     texture_shape: Int
-    """(s, 3) start, height, width in `textures`; height 0 for none."""
+    """(s, 3) start, height, width of the albedo's image in `textures`; height 0 for none."""
     second: Int
-    """(s,) the material that a blend's mask brings in, -1 for none."""
+    """(s,) index of the material that a blend's mask selects where it is white; -1: no blend."""
     mask_shape: Int
-    """(s, 3) the blend's mask, as in `texture_shape`."""
+    """(s, 3) start, height, width of the blend's mask in `textures`; height 0 for none."""
     materials: tuple[BaseMaterial, ...]
-    """(s,) descriptions, blends taken apart."""
+    """(s,) descriptions of the materials, with each blend as two."""
     places: tuple[str, ...]
-    """(s,) whose each is, for messages."""
+    """(s,) object and field of each material, for messages."""
     normals: Float32
-    """(t, 3, 3) unit normals of the corners for shading, 0 where facets are shaded; (0, 3, 3) when all are."""
+    """(t, 3, 3) unit shading normals of the corners, 0 for flat shading; (0, 3, 3) if all triangles are flat."""
     detail: Int
-    """(s,) what there is beside constants: the flags of `render.world.surface_interaction`."""
+    """(s,) flags of `render.world.surface_interaction`: shading normals and maps that the material has."""
     maps: Int
-    """(s, 6) start, height, width of the roughness and of the relief in `textures`."""
+    """(s, 6) start, height, width of the roughness map and of the relief in `textures`."""
     relief: Float
-    """(s, 2) factors of the relief: its slopes along u and v, or its height in m."""
+    """(s, 2) factors of the relief: on its slopes along u and v, or its height in m."""
     least_alpha: Float
-    """(s,) least value of a roughness that is an image."""
+    """(s,) smallest value of a roughness map; 1 without one."""
 
     @cached_property
     def rays(self) -> RayScene:
-        """The scene for ray queries, built at first use."""
+        """The acceleration structure for ray queries, built at first use."""
         return RayScene(self.vertices, self.triangles)
 
     @cached_property
@@ -74,11 +74,11 @@ class World:
 
     @property
     def surface(self) -> Surface:
-        """The arrays, as the kernels take them, for ambient light."""
+        """The arrays as the kernels read them, with materials at the wavelengths of ambient light."""
         return self.surface_at(BAND_CENTRES_NM)
 
     def surface_at(self, bands_nm: tuple[float, float, float]) -> Surface:
-        """The arrays, as the kernels take them, with what the materials do to three wavelengths.
+        """The arrays as the kernels read them, with materials at three wavelengths, nm.
 
         InputError: a material is not known at one of them.
         """
@@ -116,7 +116,7 @@ def build_world(scene: Scene, root: Path, step: int = 0) -> World:
 
 
 def place_meshes(scene: Scene, meshes: list[Mesh], step: int = 0, root: Path | None = None) -> World:
-    """Meshes of `scene.visible_objects`, in that order -> one world. root: where images are."""
+    """Meshes of `scene.visible_objects`, in that order -> one world. root: the folder of the materials' images."""
     pairs = list(zip(scene.visible_objects, meshes, strict=True))
     atlas = MaterialAtlas(root)
     vertices, triangles, object_ids, uvs, normals = [], [], [], [], []

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from render.laser_direct.adaptive_sampling import MOST_CELLS, cells_needed, doubt_beside, graded
+from render.laser_direct.adaptive_sampling import MOST_CELLS, cells_needed, grade_neighbours, raise_neighbour_errors
 
 
 def ones(n: int) -> np.ndarray:
@@ -68,16 +68,16 @@ def test_neighbours_of_what_is_divided_are_divided_half_as_finely():
     cells = np.array([1, 1, 1, 1, 1, 1, 1, 8], np.int32)
     wanted = np.array([1, 1, 1, 1, 8, 1, 1, 8], np.int32)
     # the last has its eight already, so it asks nothing of others
-    assert graded(wanted, cells, pixels, width).tolist() == [4, 4, 4, 4, 8, 4, 1, 8]
-    assert graded(cells, cells, pixels, width).tolist() == cells.tolist()
+    assert grade_neighbours(wanted, cells, pixels, width).tolist() == [4, 4, 4, 4, 8, 4, 1, 8]
+    assert grade_neighbours(cells, cells, pixels, width).tolist() == cells.tolist()
 
 
 def test_beside_an_edge_pixels_with_few_rays_are_in_doubt():
     pixels = np.array([11, 12, 13, 22, 35], np.int32)
     error = np.array([0.0, 0.01, 0.5, 0.0, 0.0])
     cells = np.array([2, 4, 2, 1, 2], np.int32)
-    doubt = np.array([0.0, 0.64, 0.0, 0.0, 0.0])
-    doubt_beside(error, doubt, 4.0, np.zeros(5), 0.35, cells, pixels, 10)
+    predicted = np.array([0.0, 0.64, 0.0, 0.0, 0.0])
+    raise_neighbour_errors(error, predicted, 4.0, np.zeros(5), 0.35, cells, pixels, 10)
     # a pixel of one ray has been looked at with its neighbours before, and one further off is not concerned
     assert error == pytest.approx([0.16, 0.04, 0.5, 0.0, 0.0])
 
@@ -88,7 +88,7 @@ def test_an_edge_that_no_ray_met_may_lie_on_either_side_of_the_border():
     for cells in (2, 4, 8):
         pixels = np.array([11, 12, 31], np.int32)
         error, mean = np.zeros(3), np.array([2.0, 0.0, 1.0])
-        doubt_beside(error, np.zeros(3), 4.0, mean, 0.35, np.full(3, cells, np.int32), pixels, 10)
+        raise_neighbour_errors(error, np.zeros(3), 4.0, mean, 0.35, np.full(3, cells, np.int32), pixels, 10)
         assert error[0] == error[1] > 0.0 and error[2] == 0.0
         # the depth of the last row of cells, where alone an edge can hide
         depth = random.random(200_000) / cells

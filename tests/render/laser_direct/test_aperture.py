@@ -9,7 +9,7 @@ from render.laser.laser import Divergence
 from render.laser.sheet_integral import about_over_aperture, mean_over, mean_over_aperture
 from render.laser_direct import integrator
 from render.laser_direct.integrator import direct_image
-from render.laser_direct.rasterise import reachable_pixels
+from render.laser_direct.rasterise import rasterise_sheet
 from render.material.material import Conductor
 from render.mesh.primitives import primitive_mesh
 from render.run import Run
@@ -160,8 +160,8 @@ def test_threads_do_not_change_a_bit_and_the_blur_is_all_within_reach(monkeypatc
     _, parts = setting([sphere], camera)
     image = direct_image(*parts, run=Run(threads=1, seed=3)).radiance
     assert np.array_equal(direct_image(*parts, run=Run(threads=5, seed=3)).radiance, image)
-    reach = reachable_pixels(*parts)
-    monkeypatch.setattr(integrator, "reachable_pixels", lambda *a: np.arange(image.size, dtype=np.int32))
+    reach = rasterise_sheet(*parts)
+    monkeypatch.setattr(integrator, "rasterise_sheet", lambda *a: np.arange(image.size, dtype=np.int32))
     everywhere = direct_image(*parts, run=Run(seed=3)).radiance
     # beyond it are a few silhouettes, whose facets are prolonged through the sheet
     beyond = np.delete(everywhere.ravel(), reach)

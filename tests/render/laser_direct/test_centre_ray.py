@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from render.laser_direct.centre_ray import BEYOND, EDGE_SHARE, look_around
+from render.laser_direct.centre_ray import BEYOND, EDGE_SHARE, estimate_errors
 from render.laser_direct.integrator import direct_image
-from render.laser_direct.rasterise import reachable_pixels
+from render.laser_direct.rasterise import rasterise_sheet
 from render.mesh.primitives import primitive_mesh
 from render.run import Run
 from render.scene.shape import Box
@@ -21,9 +21,9 @@ def test_where_no_light_is_seen_nothing_is_read():
     planes[1] = 0.1, 2.0, 0.0, 5.0
     planes[[0, 2], 3] = 0.0
     middle, mean, error = np.array([0.0, 0.8, 0.0]), np.empty(3), np.empty(3)
-    look_around(0, 3, np.arange(10, 13, dtype=np.int32), 100, planes, middle, mean, error)
+    estimate_errors(0, 3, np.arange(10, 13, dtype=np.int32), 100, planes, middle, mean, error)
     assert mean[0] == mean[2] == 0.0 and mean[1] > 0.0
-    # beside the edge all three are in doubt
+    # beside the edge all three have an error
     assert np.all(error > 0.0) and np.isfinite(error).all()
 
 
@@ -31,20 +31,20 @@ def test_the_dark_beside_a_line_is_an_edge_unless_the_surface_goes_on_there():
     """Of two pixels in a row the first is lit; q grows by 4 from it to the next."""
     lit = 0.5, 4.0, 0.0, 2.0
 
-    def doubt_of(dark):
+    def error_of(dark):
         mean, error = np.empty(2), np.empty(2)
-        look_around(
+        estimate_errors(
             0, 2, np.arange(10, 12, dtype=np.int32), 100, np.array([lit, dark]), np.array([0.3, 0.0]), mean, error
         )
         return error
 
     jump = EDGE_SHARE * 0.3
     # where the sheet would reach and no light is seen: a shadow
-    np.testing.assert_allclose(doubt_of((4.5, 4.0, 0.0, 0.0)), jump)
+    np.testing.assert_allclose(error_of((4.5, 4.0, 0.0, 0.0)), jump)
     # beyond the sheet, on the same plane, on one that bends away, on another
-    np.testing.assert_allclose(doubt_of((4.5, 4.0, 0.0, BEYOND)), 0.0, atol=1e-15)
-    np.testing.assert_allclose(doubt_of((4.7, 4.0, 0.0, BEYOND)), 0.2 * jump)
-    np.testing.assert_allclose(doubt_of((9.0, 4.0, 0.0, BEYOND)), jump)
+    np.testing.assert_allclose(error_of((4.5, 4.0, 0.0, BEYOND)), 0.0, atol=1e-15)
+    np.testing.assert_allclose(error_of((4.7, 4.0, 0.0, BEYOND)), 0.2 * jump)
+    np.testing.assert_allclose(error_of((9.0, 4.0, 0.0, BEYOND)), jump)
 
 
 def slanted_plane():
@@ -55,7 +55,7 @@ def slanted_plane():
 
 def test_one_ray_a_pixel_is_enough_on_a_plane():
     image, fine = (direct_image(*slanted_plane(), target=target) for target in (2e-3, 1e-6))
-    assert image.samples == len(reachable_pixels(*slanted_plane(), None)) < fine.samples / 1000
+    assert image.samples == len(rasterise_sheet(*slanted_plane(), None)) < fine.samples / 1000
 
 
 def test_few_rays_meet_the_target_on_a_plane_and_say_so():

@@ -7,8 +7,8 @@ import pytest
 from render.laser.irradiance import irradiance_at
 from render.laser.laser import Waist
 from render.laser_direct.integrator import direct_image
-from render.laser_direct.rasterise import reachable_pixels
-from render.laser_direct.shading import place
+from render.laser_direct.rasterise import rasterise_sheet
+from render.laser_direct.shading import write_pixels
 from render.material.material import Lambertian
 from render.mesh.primitives import primitive_mesh
 from render.run import Run
@@ -129,19 +129,19 @@ def test_the_image_is_the_same_for_any_number_of_threads():
         assert np.array_equal(direct_image(*parts, run=Run(threads=threads, seed=3)).radiance, one)
 
 
-def test_reachable_pixels_cover_every_lit_pixel_and_little_else():
+def test_the_rasterised_sheet_covers_every_lit_pixel_and_little_else():
     _, parts = setting([SPHERE], paper_camera(0.5, (-0.3, 0.1, 1e-3, 2e-3)))
-    reachable = reachable_pixels(*parts)
+    reachable = rasterise_sheet(*parts)
     image = direct_image(*parts, target=1e-3).radiance
-    # a dense image of the same light, from a footprint that takes in everything
+    # a dense image of the same light, from a set that takes in every pixel
     from render.laser_direct import integrator
 
-    original = integrator.reachable_pixels
-    integrator.reachable_pixels = lambda *a: np.arange(image.size, dtype=np.int32)
+    original = integrator.rasterise_sheet
+    integrator.rasterise_sheet = lambda *a: np.arange(image.size, dtype=np.int32)
     try:
         everywhere = direct_image(*parts, target=1e-3).radiance
     finally:
-        integrator.reachable_pixels = original
+        integrator.rasterise_sheet = original
     assert np.array_equal(np.flatnonzero(everywhere), np.intersect1d(np.flatnonzero(everywhere), reachable))
     assert len(reachable) < 0.02 * image.size
     assert np.abs(everywhere - image).max() < 1e-2 * image.max()
@@ -163,10 +163,10 @@ def test_albedo_scales_the_line_and_follows_the_wavelength():
 
 
 @pytest.mark.parametrize("bad", (math.nan, math.inf, -1.0))
-def test_what_is_no_radiance_is_left_out_and_counted(bad):
+def test_what_is_no_radiance_is_invalid_and_counted(bad):
     _, parts = setting([plane_mesh((0.2, 0, 1), 0.9)])
     good = direct_image(*parts)
-    assert good.dropped == 0
+    assert good.invalid == 0
     # texels that no file could hold, in a tenth of the wall
     mesh = plane_mesh((0.2, 0, 1), 0.9)
     texture = np.full((10, 10, 3), 0.5, np.float32)
@@ -178,11 +178,11 @@ def test_what_is_no_radiance_is_left_out_and_counted(bad):
         texture_shape=np.array([[0, 10, 10]], np.int32),
     )
     image = direct_image(textured, *parts[1:])
-    assert image.dropped > 0 and math.isfinite(image.error)
+    assert image.invalid > 0 and math.isfinite(image.error)
     assert np.isfinite(image.radiance).all() and image.radiance.min() >= 0.0
     lit = good.radiance > 0.1 * good.radiance.max()
     kept = image.radiance[lit] > 0.0
     assert 0.5 < np.mean(kept) < 0.95
     mean, pixels = np.array([bad, 2.0]), np.array([1, 2], np.int32)
     flat = np.zeros(4, np.float32)
-    assert place(pixels, mean, flat) == 1 and flat.tolist() == [0.0, 0.0, 2.0, 0.0]
+    assert write_pixels(pixels, mean, flat) == 1 and flat.tolist() == [0.0, 0.0, 2.0, 0.0]
