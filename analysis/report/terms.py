@@ -1,4 +1,4 @@
-"""The terms of the predicted sigma, and how well each agrees with the true errors."""
+"""What the predicted sigma is made of, and how well each part of it holds against the truth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from analysis.report.units import NONE, count, micrometres, percent
 
 TERM_COLUMNS = ("n", "predicted sigma", "true RMSE", "within ±1 sigma", "within ±2 sigma")
 MEANS = (10, 100)
-"""Numbers of neighbouring scan lines over which means are taken."""
+"""Neighbouring scan lines."""
 
 
 def term_tables(report: ReportInput) -> list[tuple[str, list[tuple[str, list[str]]]]]:
