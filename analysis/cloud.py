@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from analysis.error import Errors
 from analysis.spool import Spool
 from analysis.triangulate import Points
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write, check_regular, read_bytes
 from render.base.pose import invert, transform_points
 from render.scene.scene import Scene
 
-Float = NDArray[np.float64]
 Column = NDArray[Any]
 Cloud = dict[str, Column]
 """Columns of equal length; the names of `UNITS`, float64 or int32."""

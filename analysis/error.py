@@ -11,11 +11,11 @@ from analysis.distance import signed_distance
 from analysis.line.result import Line
 from analysis.measures import Measures, measure, outliers
 from analysis.triangulate import Points
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.finite import check_finite
 from render.frame import LaserCurve
 
-Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 MATCH_SIGMAS = 2.0

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from render.base.arrays import Float
+
 Mask = NDArray[np.bool_]
 
 MAD_TO_SIGMA = 1.4826

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.result import Axis, Line
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.finite import check_finite
 from render.base.pose import transform_points
 from render.camera.camera import Camera
 from render.camera.distortion import distort, tilt_matrix
 
-Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 CALIBRATION = ("fx", "fy", "cx", "cy", "a", "b", "c", "d")

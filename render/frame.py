@@ -5,17 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from render.base.arrays import Float, Float32, Int
 from render.base.counts import Counts
 from render.base.finite import check_finite
 from render.importance import Importance
 from render.plan import GroupQuality, Plan
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 Axis = Literal["rows", "columns"]
 
 

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
+from render.base.arrays import Float, Float32
 
 
 @dataclass(frozen=True)

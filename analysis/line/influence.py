@@ -24,9 +24,8 @@ from analysis.line.detection.noise import NoiseModel
 from analysis.line.measure import METHODS, measure
 from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
+from render.base.arrays import Float, Float32
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 
 REACH, EDGE = 4.0, 1.5

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from analysis.line.detection.channel import Lines
 from analysis.line.methods.line_profile import profile
 from analysis.line.result import Flag, Line
-
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 RUN = 16
 """Neighbouring scan lines in a run."""

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from render.base.arrays import Float
+
 Axis = Literal["rows", "columns"]
 
 

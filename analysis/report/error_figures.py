@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from analysis.report.colour import ACCENT, DIVERGING, INK, MUTED, TRUTH, method_colour, method_name
 from analysis.report.model import FrameResult, ReportInput
 from analysis.report.style import WIDTH, figure, image_uri, png_uri, short
-
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 SCENE_ASPECT = 1.55
 """Width over height of the scene picture, at least."""

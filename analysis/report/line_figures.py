@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from analysis.report.colour import TRUTH, method_colour, method_name
 from analysis.report.model import Extraction, LaserResult
 from analysis.report.style import WIDTH, figure, png_uri
+from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.frame import LaserCurve
-
-Float = NDArray[np.float64]
 
 AXES_WIDTH = 6.2
 """inch, about: what labels leave of the page's width."""

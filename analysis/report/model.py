@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from analysis.error import Errors
 from analysis.line.result import Line
 from analysis.triangulate import Points
+from render.base.arrays import Float, Int
 from render.base.counts import Counts
 from render.frame import LaserCurve
 from render.plan import GroupQuality, Plan
@@ -20,8 +21,6 @@ from render.sensor.sensor import Sensor
 if TYPE_CHECKING:
     from analysis.report.record import ScanRecord
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 Tables = dict[str, dict[str, str]]
 """Table title -> label -> value, ready to read ("Exposure time" -> "1.00 ms")."""
 

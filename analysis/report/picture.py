@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.report.colour import ACCENT, DIVERGING, INK, SLATE, STEEL
 from analysis.report.view import SceneView, View
-
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 SIZE = (2400, 1500)
 TIME_LIMIT = 60.0

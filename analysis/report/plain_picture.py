@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from analysis.report.colour import ACCENT, DIVERGING, INK, SLATE, STEEL
 from analysis.report.style import figure
 from analysis.report.view import SceneView, View
-
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 MOST_TRIANGLES = 6000
 CELLS = 90

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.report.model import Extraction
-
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""The terms of the predicted sigma, and how well each agrees with the true errors."""
+"""What the predicted sigma is made of, and how well each part of it holds against the truth."""
 
 from __future__ import annotations
 

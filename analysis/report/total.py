@@ -12,8 +12,7 @@ from analysis.line.result import Flag
 from analysis.measures import Measures, measure
 from analysis.report.sample import Rows
 from analysis.report.sums import Moments, Sums
-
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 NARROW_PX = 0.4
 """Sigma of a line, px, below which the pixels undersample it."""

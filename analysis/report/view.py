@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from analysis.report.colour import wavelength_colour
 from analysis.report.model import FrameResult, ReportInput
+from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.frame import LaserCurve
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 
 FAN_RAYS = 160
 MOST_POINTS = 200_000

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.study.intervals import LEVEL, mean_interval
+from render.base.arrays import Float
 
-Float = NDArray[np.float64]
 Measured = Mapping[float, Float]
 """Repeats (n,) of the measure by the value of the parameter; NaN where a run measured nothing."""
 Ending = Literal["found", "holds", "fails"]

@@ -13,11 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.study.intervals import Interval, mean_interval
-
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 
 @dataclass(frozen=True)

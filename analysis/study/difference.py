@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from analysis.measures import robust_sigma
 from analysis.study.intervals import LEVEL
+from render.base.arrays import Float
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Statistic = Callable[[Float], float]
 

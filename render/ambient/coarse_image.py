@@ -23,12 +23,9 @@ from render.ambient.guided_interpolation import ON_EDGE, grid_of, interpolate, s
 from render.ambient.integrator import EVEN_SHARE, MOST_SHARE
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
+from render.base.arrays import Float, Float32, Int
 from render.run import Run
 from render.world.embree import CHUNK
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 COARSE_ERROR = 0.05
 """Relative RMS error that is enough where no error matters to what is measured: peaks are found there against the noise

@@ -12,17 +12,13 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from render.ambient.light_sampling import Lights, light_in_view
+from render.base.arrays import Float, Float32, Int
 from render.camera.rays import camera_rays
 from render.camera.view import View
 from render.world.embree import RayScene
 from render.world.triangles import Surface, plane_of, scattering
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 SEEN = 9
 NOTHING, NO_RAY, FIRST_LAMP = -1, -2, -3

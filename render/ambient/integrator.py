@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from render.ambient.path_state import CLAMPED, CUT, DROPPED
 from render.ambient.path_tracer import WAVE, CameraPaths, camera_paths
+from render.base.arrays import Float, Float32, Int
 from render.base.errors import Cancelled, InputError
 from render.base.threads import Cancel, map_chunks
 from render.camera.camera import Camera
@@ -24,10 +25,6 @@ from render.run import Arrays, Run
 from render.scene.scene import Scene
 from render.world.placed import PlacedScene
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 TILE = 16
 """Pixels a side of what gets samples together."""

@@ -14,15 +14,12 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Int
 from render.material.bsdf import EMITTED, EMITTER
 from render.scene.lights import PointLight
 from render.scene.scene import Scene
 from render.world.triangles import Surface
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 
 POINT, RECTANGLE, SHINING_OBJECT = 0.0, 1.0, 2.0
 ROW = 21

@@ -16,18 +16,14 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from render.ambient.coarse_image import CoarseImage
 from render.ambient.integrator import CONVERGENCE
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
+from render.base.arrays import Float, Int
 from render.importance import Importance
 from render.run import Run
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 MARGIN = 1.3
 """By which the variance of a scan line is to be less than allowed: it is known to about a sixth only."""

@@ -15,7 +15,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from render.ambient.light_sampling import (
     POINT,
@@ -27,15 +26,12 @@ from render.ambient.light_sampling import (
     sample_light,
 )
 from render.ambient.path_state import EACH_SURFACE, FIRST_SURFACE, PathState, ShadowRays, accumulate
+from render.base.arrays import Float, Float32, Int
 from render.material.bsdf import ROW, SUBSURFACE, evaluate, is_boundary, is_diffuse, is_specular_row, pdf, sample
 from render.sampling.low_discrepancy import pair
 from render.world.interior_list import bit_of, index_beside, medium_within
 from render.world.surface_interaction import interaction
 from render.world.triangles import Surface, scattering, to_world
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 ROULETTE_AFTER = 2
 """Surfaces met before a path may be ended by chance."""

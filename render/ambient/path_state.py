@@ -9,15 +9,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int, Long
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_point, lens_position
 from render.camera.view import View
 from render.sampling.low_discrepancy import LENGTH, pair, pair_at, pair_draw
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
-Long = NDArray[np.int64]
 
 ON_IMAGE, ON_LENS, FIRST_SURFACE, EACH_SURFACE = 0, 1, 2, 4
 """Dimensions of the sequence: two pairs for the camera, then four for each surface."""

@@ -6,12 +6,12 @@ import threading
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from render.ambient.light_sampling import Lights, pack_lights
 from render.ambient.path_kernels import shade_diffuse, shade_glossy
 from render.ambient.path_state import PathState, ShadowRays, accumulate_unoccluded, camera_rays
 from render.ambient.random_walk import random_walk_step
+from render.base.arrays import Float, Float32, Int
 from render.base.errors import Cancelled
 from render.base.threads import Cancel
 from render.camera.view import View
@@ -22,10 +22,6 @@ from render.world.embree import RayScene
 from render.world.interior_list import cross_hidden, has_overlaps, occluded_by_visible, pass_hidden, surroundings
 from render.world.triangles import Surface, has_gloss, has_medium
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 WAVE = 1 << 15
 """Rays: their states stay in the cache, and a pass through a room full of mirrors is cancelled in time."""

@@ -4,16 +4,11 @@ other."""
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from render.ambient.path_state import CUT
 from render.ambient.path_tracer import WAVE, CameraPaths
+from render.base.arrays import Float, Float32, Int
 from render.run import Run
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
-Long = NDArray[np.int64]
 
 ROUND = 1 << 10
 """Most samples of a half that a pixel is given at a time, so that no pixel fills a wave."""

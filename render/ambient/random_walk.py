@@ -11,16 +11,12 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
 from render.ambient.path_state import PathState
+from render.base.arrays import Float, Float32, Int
 from render.material.bsdf import ANISOTROPY, EXTINCTION, SCATTERED
 from render.material.medium import MOST_STEPS, henyey_greenstein, turn
 from render.sampling.random import uniform
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 FIRST_WALK_DIMENSION, NUMBERS = 1 << 20, 5
 """First of the random dimensions that walks use, and how many each step does."""

@@ -30,12 +30,10 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.camera.distortion import distort, fold_radius_at, undistort
 from render.camera.view import View
-
-Float = NDArray[np.float64]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

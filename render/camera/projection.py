@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.camera.distortion import distort, fold_radius_at
 from render.camera.view import View
-
-Float = NDArray[np.float64]
 
 NEAR = 1e-9
 """Depth, m, below which a point has no image."""

@@ -7,17 +7,13 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.camera.distortion import tilt_matrix, undistort
 from render.camera.lens import chief_ray, lens_direction, lens_point, lens_position
 from render.camera.view import View
 from render.sampling.low_discrepancy import ROWS
 from render.sampling.random import bits, uniform
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 LENS_DIMENSION = 1 << 20
 """First random dimension of the aperture, above those of the pixel's area."""

@@ -11,12 +11,10 @@ import math
 from typing import NamedTuple
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.laser.irradiance import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2
 
-Float = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 SERIES_LIMIT = 0.3

@@ -11,10 +11,8 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
+from render.base.arrays import Float, Int
 
 MOST_CELLS = 32
 """Largest number of cells a side."""

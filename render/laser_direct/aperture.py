@@ -14,10 +14,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Int
 from render.laser.sheet_integral import about_over_aperture, mean_over, mean_over_aperture
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

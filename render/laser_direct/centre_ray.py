@@ -14,10 +14,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Int
 from render.laser.irradiance import INV_SQRT_2PI
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 
 EDGE_SHARE = 0.3
 """RMS error, as a fraction of the jump, of taking a pixel's centre for its mean where an edge crosses it anywhere:

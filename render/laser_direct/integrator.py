@@ -18,6 +18,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.base.pose import invert
 from render.base.threads import map_chunks
 from render.camera.camera import Camera
@@ -44,9 +45,6 @@ from render.sampling.low_discrepancy import pair_table
 from render.world.triangles import Surface, has_gloss
 from render.world.world import World
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 Indices = NDArray[np.int64]
 
 RAYS_PER_JOB = 1 << 13

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Int
 from render.base.pose import invert
 from render.base.threads import map_chunks
 from render.camera.camera import Camera
@@ -25,9 +26,6 @@ from render.laser.irradiance import SHEET_SIGMAS, sheet_sigma
 from render.laser.laser import LineLaser
 from render.world.triangles import Surface
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 
 TRIANGLES_A_CHUNK = 1 << 15
 MARGIN_PX = 1

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.camera.distortion import distort, tilt_matrix
 from render.camera.lens import lens_direction, lens_position
 from render.camera.view import View
@@ -24,9 +25,6 @@ from render.material.bsdf import evaluate, is_diffuse
 from render.world.surface_interaction import detailed, light_side
 from render.world.triangles import Surface, facet_of, lookup, slot_reflectance, to_local
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 Vector = tuple[float, float, float]
 
 

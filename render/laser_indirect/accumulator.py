@@ -10,6 +10,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32
 from render.base.threads import map_chunks
 from render.importance import Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
@@ -23,8 +24,6 @@ from render.laser_indirect.guiding import (
 from render.laser_indirect.line_goal import LineErrors
 from render.laser_indirect.photon_emission import FanDistribution
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 WAVE = 4
 """Passes at a time, whatever the number of threads."""
 MOST_PASS = 1 << 15

@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Bool, Float, Int
 from render.base.errors import Cancelled
 from render.base.pose import invert
 from render.base.threads import Cancel
@@ -56,9 +56,6 @@ from render.world.interior_list import cross_hidden, has_overlaps, occluded_by_v
 from render.world.triangles import Surface
 from render.world.world import World
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
-Bool = NDArray[np.bool_]
 Vertices = tuple[int, Records, Records]
 """Depth, and the connectable vertices and paths of a chunk there."""
 

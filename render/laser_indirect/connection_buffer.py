@@ -7,15 +7,9 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Bool, Float, Float32, Int, Long
 from render.laser_indirect.path_vertex import PassContext, Record, cosine_to
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
-Long = NDArray[np.int64]
-Bool = NDArray[np.bool_]
 
 RIS_SAMPLE_WEIGHT = 32.0
 """Samples that a connection chosen by RIS counts for in the balance heuristic, per camera path.

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Bool, Float
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import lens_point, lens_position, lens_project
 from render.camera.view import View
@@ -41,9 +41,6 @@ from render.laser_indirect.path_vertex import (
 )
 from render.laser_indirect.photon_emission import FanDistribution, emitted_density
 from render.sampling.random import uniform
-
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 
 class CameraSampling(NamedTuple):

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, uniform_filter
 
+from render.base.arrays import Bool, Float, Float32, Int
 from render.base.threads import Cancel, map_chunks
 from render.camera.camera import Camera
 from render.laser_indirect.specular_edges import find_edges
@@ -22,11 +22,6 @@ from render.material.bsdf import is_specular_row
 from render.sampling.random import uniform
 from render.world.triangles import Surface
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
-Bool = NDArray[np.bool_]
 
 NO_PIXELS: Bool = np.zeros(0, np.bool_)
 """No pixel shows anything specular."""

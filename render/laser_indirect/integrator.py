@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Bool, Float, Float32
 from render.base.errors import Cancelled
 from render.base.threads import map_chunks, thread_count
 from render.camera.camera import Camera
@@ -42,10 +42,6 @@ from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, gui
 from render.run import Run
 from render.world.placed import PlacedLaser
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Bool = NDArray[np.bool_]
 
 LEAST_PASS = 1 << 12
 """Light paths in a pass of the first wave: at least, more in a large image; and half of its camera paths."""

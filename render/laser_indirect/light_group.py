@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float32
 from render.frame import Estimate, Frame
 from render.importance import Importance
 from render.laser_indirect.integrator import Aim, IndirectImage, indirect_images
@@ -20,8 +20,6 @@ from render.scene.scene import Scene
 from render.scene.settings import DepthGoal, RenderSettings
 from render.world.placed import PlacedScene
 from render.world.world import World
-
-Float32 = NDArray[np.float32]
 
 
 class IndirectLight(LightGroup[IndirectPlan]):

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, uniform_filter1d
 
+from render.base.arrays import Float, Float32
 from render.importance import CELL, Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 Weigh = Callable[[Float32], Importance]
 """Where errors matter, by the reflected light (h, w) of a laser so far."""

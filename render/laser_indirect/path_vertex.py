@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Int
 from render.laser_indirect.photon_emission import SEQUENCE
 from render.material.bsdf import SUBSURFACE, eval_band, eval_lobes, is_specular_kind, pdf_lobes, sample
 from render.sampling.random import uniform
@@ -21,8 +22,6 @@ from render.world.interior_list import bit_of, index_beside, medium_within
 from render.world.surface_interaction import interaction
 from render.world.triangles import Surface, off_surface, plane_of
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 Records = NDArray[np.void]
 Record = Any
 """One of `Records`: numba reads its fields in place."""

@@ -7,15 +7,12 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Long
 from render.base.pose import invert, transform_points
 from render.laser.irradiance import sheet_sigma
 from render.laser.laser import CONSTANT, GAUSSIAN, LineLaser
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Long = NDArray[np.int64]
 
 
 def _recurrence(dimensions: int) -> Float:

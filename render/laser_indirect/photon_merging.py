@@ -13,13 +13,10 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Long
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.path_vertex import SPECULAR_CHAIN, Record, Records, eval_bsdf, is_specular
-
-Float = NDArray[np.float64]
-Long = NDArray[np.int64]
 
 RADIUS_EXPONENT = 1.0 / 6.0
 """The radius falls as n^-(1/6) with the passes (Knaus and Zwicker 2011, alpha = 2/3)."""

@@ -9,17 +9,12 @@ from __future__ import annotations
 import math
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.laser_indirect.path_vertex import PassContext, Records
 from render.material.bsdf import ANISOTROPY, EXTINCTION, SCATTERED
 from render.material.medium import MOST_STEPS, henyey_greenstein, turn
 from render.sampling.random import uniform
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 FIRST_WALK_DIMENSION = 1000
 """First of the random dimensions that walks use, four a step."""

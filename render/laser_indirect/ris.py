@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Long
 from render.laser_indirect.connection_buffer import Connections, PassBuffer
 from render.laser_indirect.connections import towards
 from render.laser_indirect.guiding import BINS, TILE, Guide
@@ -33,8 +33,6 @@ from render.laser_indirect.path_vertex import (
 from render.sampling.random import uniform
 from render.world.triangles import off_surface
 
-Float = NDArray[np.float64]
-Long = NDArray[np.int64]
 MOST_CANDIDATES = 32
 GOLDEN_RATIO = 0.6180339887498949
 

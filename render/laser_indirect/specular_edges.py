@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Bool, Float
 from render.base.pose import invert, transform_points
 from render.camera.camera import Camera
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Bool = NDArray[np.bool_]
 
 MOST_POINTS = 1 << 12
 """On one edge."""

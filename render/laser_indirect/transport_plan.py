@@ -8,8 +8,8 @@ import operator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float32
 from render.importance import Importance
 from render.laser_indirect.integrator import indirect_shares
 from render.laser_indirect.line_goal import Projection
@@ -20,7 +20,6 @@ from render.run import Run
 from render.scene.settings import RenderSettings
 from render.world.placed import PlacedScene
 
-Float32 = NDArray[np.float32]
 PILOT_SEED = 7919
 
 

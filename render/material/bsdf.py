@@ -17,9 +17,8 @@ come from an image instead.
 from __future__ import annotations
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.material import coated, conductor, dielectric, lambertian
 from render.material.record import (
     ALPHA_X,
@@ -68,8 +67,6 @@ __all__ = [
     "pdf_lobes",
     "sample",
 ]
-
-Float = NDArray[np.float64]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

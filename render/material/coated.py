@@ -17,9 +17,8 @@ import math
 from typing import Literal
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.model import Model, quantity
 from render.material.fresnel import diffuse_reflectance, fresnel_dielectric
 from render.material.lambertian import cosine_hemisphere
@@ -36,8 +35,6 @@ from render.material.microfacet import reflect, reflection, reflection_pdf, samp
 from render.material.record import ALPHA_X, ALPHA_Y, COATED, INDEX, INTERNAL, empty_row
 from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Sample
 from render.material.spectrum import Bands
-
-Float = NDArray[np.float64]
 
 
 class Coated(Model):

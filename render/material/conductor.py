@@ -19,8 +19,8 @@ from typing import Any, Literal
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.model import Model, UnitInterval, quantity
 from render.material.fresnel import fresnel_conductor
@@ -51,8 +51,6 @@ from render.material.record import (
 )
 from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Sample
 from render.material.spectrum import Bands
-
-Float = NDArray[np.float64]
 
 METALS = Path(__file__).parents[2] / "assets" / "metals.json"
 Metal = Literal[

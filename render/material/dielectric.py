@@ -23,8 +23,8 @@ from typing import Any, Literal
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.model import Model, UnitInterval, quantity
 from render.material.fresnel import fresnel_dielectric
@@ -49,8 +49,6 @@ from render.material.microfacet import (
 from render.material.record import ALPHA_X, ALPHA_Y, DIELECTRIC, INDEX, empty_row
 from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Sample
 from render.material.spectrum import Bands
-
-Float = NDArray[np.float64]
 
 SUBSTANCES = Path(__file__).parents[2] / "assets" / "substances.json"
 Substance = Literal["BK7", "fused_silica", "SF11", "sapphire", "acrylic", "polycarbonate", "polystyrene", "water"]

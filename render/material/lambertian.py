@@ -13,16 +13,13 @@ import math
 from typing import Literal
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.model import Model
 from render.material.maps import Albedo, Relief, albedo_field, relief_field
 from render.material.record import LAMBERTIAN, empty_row
 from render.material.scattering import Direction, Lobes, Sample
 from render.material.spectrum import Bands
-
-Float = NDArray[np.float64]
 
 
 class Lambertian(Model):

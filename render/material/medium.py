@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numba
-import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 MOST_STEPS = 4096
 """Largest number of scatterings between two hits of the boundary. A longer walk is ended: at an albedo of 0.99 its

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float32
 from render.base.errors import InputError
 from render.mesh.texture import MAX_PIXELS, linear_reflectance
 
-Float32 = NDArray[np.float32]
 Colour = tuple[float, float, float]
 
 MAX_UV = 1e6

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.mesh.mesh_headers import EXPORT, PlyElement, bad_line, damaged, ply_header
 from render.mesh.polygons import ear_cut, fan, fan_covers
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 MAX_CORNERS = 5000

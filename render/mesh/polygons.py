@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from render.base.arrays import Float
+
 Int = NDArray[np.int64]
 
 TOLERANCE = 1e-6

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.mesh.mesh import Mesh
 from render.scene.shape import Box, Cylinder, Plane, Primitive, Sphere, StepBlock, VGroove
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float32
 from render.base.errors import InputError
 from render.base.files import read_bytes
-
-Float32 = NDArray[np.float32]
 
 MAX_PIXELS = 25_000_000
 """Limit of one image, and of all of a scene together: 0.3 GB once decoded, twice that while a world is built."""

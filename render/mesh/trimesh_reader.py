@@ -17,6 +17,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import inside, read_bytes
 from render.mesh.mesh_headers import (
@@ -32,8 +33,6 @@ from render.mesh.mesh_headers import (
 )
 from render.mesh.mesh_polygons import as_triangles, no_such_vertex
 from render.mesh.texture import image_size
-
-Float = NDArray[np.float64]
 
 EXTENSIONS = ("ply", "stl", "obj", "glb", "gltf", "off")
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".gif", ".tga")

@@ -6,11 +6,8 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
+from render.base.arrays import Float, Float32, Int
 
 
 def corner_normals(vertices: Float, triangles: Int, crease_angle: float) -> Float32:

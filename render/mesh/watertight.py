@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.mesh.mesh import Mesh
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 GAP = 1e-6

@@ -10,13 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.mesh.mesh import Mesh
 from render.mesh.primitives import corners_uv, mesh, prism
 from render.scene.shape import WeldTee
-
-Float = NDArray[np.float64]
 
 EMBEDDING = 0.02
 """Overlap of the parts, as a fraction of the least length it has to fit in."""

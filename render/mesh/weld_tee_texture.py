@@ -11,12 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.files import atomic_write
 from render.mesh.texture import linear_to_srgb
 from render.mesh.weld_tee import section
 from render.scene.shape import WeldTee
-
-Float = NDArray[np.float64]
 
 RUST = ((0.38, 0.23, 0.16), (0.26, 0.18, 0.14))
 """Linear reflectance of bright and dark rust."""

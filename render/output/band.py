@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.frame import Float32, Frame, Truth
 
-Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 HALF_WIDTH = 32

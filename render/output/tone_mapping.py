@@ -12,10 +12,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float32
 from render.base.threads import map_chunks
 
 Picture = NDArray[np.uint32]
-Float32 = NDArray[np.float32]
 ROWS = 64
 SMALLEST = 256
 """Px a side: pictures are not halved below it."""

@@ -15,9 +15,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float32
 from render.sampling.random import bits
 
-Float32 = NDArray[np.float32]
 Int = NDArray[np.int64]
 
 ROWS, LOG_LENGTH = 64, 10

@@ -16,12 +16,9 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.base.threads import map_chunks
 from render.camera.camera import Camera
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 STEP = 0.1
 """Step, px, to which diameters of defocus are rounded."""

@@ -23,6 +23,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32
 from render.base.errors import InputError
 from render.base.finite import check_finite
 from render.base.threads import map_chunks
@@ -35,8 +36,6 @@ from render.sensor.response import band_response, joules_per_radiance, laser_res
 from render.sensor.sensor import Sensor
 from render.sensor.speckle import Speckle, scintillate, speckle
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 PATTERN_SEED = 0x50524E55_44534E55

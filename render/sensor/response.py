@@ -14,15 +14,12 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32
 from render.base.pose import Pose
 from render.base.threads import map_chunks
 from render.camera.camera import Camera, Lens
 from render.sensor.sensor import BandPass, Sensor, SpectralCurve
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 
 PLANCK, LIGHT_SPEED = 6.62607015e-34, 299792458.0
 BANDS_NM = ((600.0, 700.0), (500.0, 600.0), (400.0, 500.0))

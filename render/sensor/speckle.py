@@ -19,12 +19,9 @@ from functools import lru_cache
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32
 from render.sampling.random import normal, wrapped
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 
 LARGEST_RADIUS = 12
 """Largest lag of the correlation, px: it truncates grains of several pixels only."""

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Int
 from render.base.pose import invert, transform_points
 from render.camera.camera import Camera
 from render.camera.distortion import tilt_matrix
@@ -25,9 +26,6 @@ from render.laser.laser import LineLaser
 from render.truth.sheet_bias import sheet_bias
 from render.truth.visibility import visible
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 
 PIECE_PX = 8.0
 """With distortion a segment is solved in pieces of this length, over which the scan line is assumed to be monotonic."""

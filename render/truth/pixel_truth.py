@@ -6,8 +6,8 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.camera.camera import Camera
 from render.camera.rays import camera_rays
 from render.frame import Truth
@@ -15,10 +15,6 @@ from render.run import Run
 from render.world.embree import CHUNK
 from render.world.triangles import Surface, facet_of
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

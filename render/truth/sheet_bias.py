@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.camera.camera import Camera
 from render.frame import LaserCurve
@@ -23,9 +24,6 @@ from render.laser.irradiance import irradiance_at
 from render.laser.laser import LineLaser
 from render.truth.visibility import visible
 from render.world.world import World
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 
 STEP, SAMPLED_SIGMAS = 0.5, 4.0
 """Sigmas of the line between nodes, and to the last node: the trapezoidal rule is exact for a Gaussian at this step."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.threads import map_chunks
 from render.world.embree import CHUNK, RayScene
-
-Float = NDArray[np.float64]
 
 
 def visible(

@@ -28,9 +28,9 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from render.base.arrays import Float32
 from render.world.ray_packets import Packets, buffer, intersect_packets, occluded_packets
 
-Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 

@@ -7,13 +7,12 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from render.base.arrays import Float, Int
 
 if TYPE_CHECKING:
     from render.world.world import World
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 
 CLOSED = 0.9
 """Least winding number of a point inside a body: a closed surface gives an integer, an open one a fraction."""

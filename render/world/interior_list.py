@@ -15,6 +15,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int, Long
 from render.material.bsdf import DIELECTRIC, ROW, SUBSURFACE
 from render.world.embree import RayScene
 from render.world.enclosure import objects_around
@@ -23,10 +24,6 @@ from render.world.triangles import Surface, off_surface, plane_of
 if TYPE_CHECKING:
     from render.world.world import World
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
-Long = NDArray[np.int64]
 
 RANK, RANKED = ROW, ROW + 1
 """Columns after a material's row. RANK: rank of its body from 1, or 0 if it overlaps none. RANKED, in row k: the

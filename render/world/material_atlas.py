@@ -6,8 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float32
 from render.base.errors import InputError
 from render.material.material import (
     BaseMaterial,
@@ -27,7 +27,6 @@ from render.mesh.texture import MAX_PIXELS
 from render.scene.scene import SceneObject
 from render.world.surface_interaction import BUMP_MAP, LEAST_COAT, NORMAL_MAP, ROUGHNESS_MAP, SMOOTH_NORMALS
 
-Float32 = NDArray[np.float32]
 Place = tuple[int, int, int]
 """Start in the images, height, width of an image; height 0 for none."""
 NOWHERE = (0, 0, 0)

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.pose import invert, transform_points
 from render.laser.irradiance import SHEET_SIGMAS
@@ -16,8 +16,6 @@ from render.material.material import Emitter
 from render.scene.scene import Scene
 from render.world.overlaps import MOST_BODIES, priority_of
 from render.world.world import World
-
-Float = NDArray[np.float64]
 
 VISIBLE_PX = 0.1
 VISIBLE_ANGLE = math.radians(5.0)

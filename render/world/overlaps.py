@@ -12,8 +12,8 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Int
 from render.material.material import Glass, Subsurface
 from render.world.embree import RayScene
 from render.world.enclosure import winding_number
@@ -21,9 +21,6 @@ from render.world.enclosure import winding_number
 if TYPE_CHECKING:
     from render.world.world import World
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 MOST_BODIES = 62
 """Largest number of overlapping bodies in a scene: one bit each of the interior list, an int64."""

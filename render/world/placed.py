@@ -5,15 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from render.base.arrays import Float
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser
 from render.scene.scene import Scene
 from render.world.world import World
-
-Float = NDArray[np.float64]
 
 
 class PlacedLaser(NamedTuple):

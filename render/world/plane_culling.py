@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
+from render.base.arrays import Float, Int
 
 BLOCK = 64
 """Triangles a block."""

@@ -10,14 +10,10 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.laser.irradiance import INV_SQRT_2PI, SHEET_SIGMAS, SQRT2, fan_density, sheet_sigma
 from render.world.triangles import Surface, reflectance
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

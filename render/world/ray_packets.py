@@ -14,7 +14,8 @@ import numpy as np
 from numba.core import types
 from numpy.typing import NDArray
 
-Float32 = NDArray[np.float32]
+from render.base.arrays import Float32
+
 Int32 = NDArray[np.int32]
 
 COHERENT, ALL_FEATURES = 1 << 16, 0xFFFFFFFF

@@ -16,14 +16,11 @@ import math
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.material.maps import POLISHED
 from render.material.record import ALPHA_X, ALPHA_Y, COATED, KIND
 from render.world.triangles import Surface, bilinear, scattering, to_local, uv_at
-
-Float = NDArray[np.float64]
-Int = NDArray[np.int32]
 
 SMOOTH_NORMALS, ROUGHNESS_MAP, NORMAL_MAP, BUMP_MAP = 1, 2, 4, 8
 """Flags of `Surface.detail`."""

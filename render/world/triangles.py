@@ -7,13 +7,9 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.material.record import ALPHA_X, ALPHA_Y, EMITTER, KIND, LAMBERTIAN, SUBSURFACE
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 
 class Surface(NamedTuple):

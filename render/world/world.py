@@ -7,8 +7,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.base.pose import transform_points
 from render.material.material import BaseMaterial, Blend
 from render.material.spectrum import BAND_CENTRES_NM
@@ -19,10 +19,6 @@ from render.world.interior_list import COLUMNS, RANK, RANKED
 from render.world.material_atlas import MaterialAtlas
 from render.world.overlaps import Nesting, nesting_of
 from render.world.triangles import Surface
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.model import Vector3
 from render.base.pose import Pose, invert
 from render.scene.motion import NoMotion
 from render.scene.scene import Scene
 from studio.project.document import FieldPath, value_at
 from studio.project.project import Project
-
-Float = NDArray[np.float64]
 
 RIG: FieldPath = ("scene", "rig")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 # RdBu of ColorBrewer (Harrower & Brewer 2003), reversed: what `analysis.report.colour.DIVERGING` names
 STOPS = np.array(

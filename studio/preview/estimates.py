@@ -9,8 +9,8 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser
@@ -19,8 +19,6 @@ from render.scene.lights import PointLight
 from render.sensor.response import band_response, joules_per_radiance, laser_response
 from render.sensor.sensor import Sensor
 from studio.preview.preview import Lit, Look
-
-Float = NDArray[np.float64]
 
 SHARP_PX = 1.0
 """A blur disc up to this diameter counts as in focus."""

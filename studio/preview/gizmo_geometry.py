@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.pose import rotation_matrix
 from studio.preview.view_camera import Eye
 
-Float = NDArray[np.float64]
 Kind = Literal["axis", "plane", "ring"]
 
 ARM_PX, RING_PX, PLANE_PX = 92.0, 74.0, 26.0

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32
 from render.camera.camera import Camera
 from render.frame import Frame, LaserCurve
 from render.output.light_record import plan_record
@@ -30,9 +31,6 @@ from render.world.placement_checks import check_placement
 from render.world.world import build_world
 from studio.preview.estimates import line_width_px
 from studio.project.project import Project
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 
 PROBE_ERROR = 0.05
 """Relative error of the light that is rendered to look at; ample for figures that are called about."""

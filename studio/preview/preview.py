@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.pose import Pose, invert, transform_points
 from render.camera.camera import Camera
@@ -32,7 +33,6 @@ from render.world.world import place_meshes
 from studio.preview.preview_image import PreviewImage, Speed, preview_image
 from studio.project.project import Project
 
-Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FAN_RAYS = 512

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float, Float32, Int
 from render.base.pose import invert, transform_points
 from render.base.threads import map_chunks, thread_count
 from render.camera.camera import Camera
@@ -25,9 +26,6 @@ from render.world.preview_shading import shade_pixels
 if TYPE_CHECKING:
     from studio.preview.preview import Placed
 
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Int = NDArray[np.int32]
 Clear = Callable[[Float, Float, Float], NDArray[np.bool_]]
 
 SCALES = (1.0, 0.5, 1 / 3, 0.25, 0.2, 1 / 6, 1 / 8, 0.1, 1 / 12, 1 / 16, 1 / 24, 1 / 32, 1 / 48, 1 / 64)

@@ -7,16 +7,13 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.camera.camera import Camera
 from studio.preview import estimates
 from studio.preview.inspection import working_range
 from studio.preview.preview import Look
 from studio.preview.scintillation import speckle_px
-
-Float = NDArray[np.float64]
-
 
 SPECKLED = 64
 """Places along the line at which the effect of speckle is worked out."""

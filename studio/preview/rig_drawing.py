@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.base.pose import transform_points
 from render.camera.camera import Camera
 from render.frame import LaserCurve
@@ -16,7 +17,6 @@ from render.scene.scene import Scene
 from studio.editing.placement import rounded, working_distance
 from studio.preview.preview import Fan
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 CLOSE_STEPS = 8.0

@@ -8,13 +8,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from render.base.arrays import Float
 from render.camera.camera import Camera
 from render.sensor.sensor import Sensor
 from render.sensor.speckle import speckle
-
-Float = NDArray[np.float64]
 
 WINDOW = 4.0
 """Sigmas of the line on either side that its pixels are taken from."""

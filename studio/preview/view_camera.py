@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 STEEPEST = 89.99
 """Degrees: straight down still has a direction to the right."""

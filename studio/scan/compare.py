@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.colour import DIVERGING
+from render.base.arrays import Float32
 from render.frame import Frame
 from render.output.tone_mapping import Picture, colour_table, grey, mapped, white_level
 from render.sensor.develop import Image
 
-Float32 = NDArray[np.float32]
 Quantity = Literal["image", "laser", "reflected", "ambient"]
 UNITS = {"image": "e-", "laser": "W/(m² sr)", "reflected": "W/(m² sr)", "ambient": "W/(m² sr)"}
 

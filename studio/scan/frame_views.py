@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.colour import wavelength_colour
+from render.base.arrays import Float32
 from render.frame import Frame
 from render.output.tone_mapping import Picture, colour, colour_table, grey, mapped, white_level
 from render.scene.scene import Scene
@@ -17,7 +18,6 @@ from studio.preview.preview_image import PreviewImage
 from studio.project.project import Project
 from studio.scan.stages import scaled
 
-Float32 = NDArray[np.float32]
 DEPTH_MAP = "viridis"
 SHAPE_BRIGHTNESS = 0.45
 """Of what a live picture shows beside the line."""

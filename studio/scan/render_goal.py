@@ -12,13 +12,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import correlate1d, median_filter
 
 from analysis.line.detection.matched_filter import BLOCK, NOISE_GAIN, TAPS
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.influence import influence
 from analysis.line.result import Line
+from render.base.arrays import Float, Float32
 from render.frame import Frame
 from render.importance import CELL, Importance
 from render.scene.settings import DepthGoal
@@ -26,9 +26,6 @@ from render.sensor.develop import Image, expected_electrons
 from render.sensor.response import band_response, joules_per_radiance, laser_response, relative_illumination
 from studio.project.project import Project
 from studio.scan.line_extraction import extract_line, noise_model
-
-Float = NDArray[np.float64]
-Float32 = NDArray[np.float32]
 
 CERTAIN = 3.0
 """Standard deviations of the render by which a response must stay away from what would change a row."""

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.error import Errors
 from analysis.measures import Measures
+from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.frame import LaserCurve
 from render.scene.scene import Scene
 from studio.scan.stages import Measurement
 
-Float = NDArray[np.float64]
 ErrorKind = Literal["depth", "surface", "position"]
 
 GAP = 4.0

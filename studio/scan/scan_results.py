@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.cloud import INTEGERS, Cloud, ply_pieces
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
@@ -25,8 +25,6 @@ from studio.scan.point_sample import PointSample
 from studio.scan.result_series import MEASURED, ErrorView
 from studio.scan.scan_folder import MANIFEST, PROJECT, ScanFolder, check_frame, check_kept, image_scale_of
 from studio.scan.stages import scaled, step_world
-
-Float = NDArray[np.float64]
 
 LARGEST = 1e12
 MOST_FILES = 50

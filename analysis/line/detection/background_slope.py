@@ -16,7 +16,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Float32 = NDArray[np.float32]
+from render.base.arrays import Float32
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.settings import ExtractionSettings
+from render.base.arrays import Float32
 from render.base.errors import InputError
 
-Float32 = NDArray[np.float32]
 Mask = NDArray[np.uint8]
 
 COLOURS = ("red", "green", "blue")

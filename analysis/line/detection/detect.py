@@ -26,8 +26,8 @@ from analysis.line.detection.matched_filter import (
     respond,
 )
 from analysis.line.result import Flag
+from render.base.arrays import Float32
 
-Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 

@@ -9,8 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING
+from render.base.arrays import Float32
 
-Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 

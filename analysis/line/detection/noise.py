@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import field_validator
 
+from render.base.arrays import Float
 from render.base.model import Model, quantity
-
-Float = NDArray[np.float64]
 
 FULL_SCALES = (255, 1023, 4095, 16383, 65535, 65472, 65520, 65532)
 """Highest numbers of 8 to 16 bit images, right- and left-justified."""

@@ -20,8 +20,8 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from analysis.line.result import Flag
+from render.base.arrays import Float32
 
-Float32 = NDArray[np.float32]
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 

@@ -8,9 +8,8 @@ well they agree (the same in Bayesian terms: Gelman et al., Bayesian Data Analys
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from render.base.arrays import Float
 
 NEIGHBOURS = 32
 """Scan lines on either side."""

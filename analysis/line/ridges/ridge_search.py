@@ -13,13 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING, SATURATED
 from analysis.line.methods.seed_loop import Array, Float32, Mask
 from analysis.line.methods.steger_2d import CUT, hessian, normal, taps, weight_noise
-
-Int = NDArray[np.int32]
+from render.base.arrays import Int
 
 TILE, EVERY = 32, 4
 """px; a side, and from sample to sample."""

@@ -31,9 +31,8 @@ from analysis.line.ridges.ridge_search import (
     tile_levels,
 )
 from analysis.line.settings import ExtractionSettings
+from render.base.arrays import Float
 from render.base.threads import map_chunks
-
-Float = NDArray[np.float64]
 
 ROWS = 128
 """At a time."""

@@ -17,8 +17,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from analysis.line.result import Flag, Line
+from render.base.arrays import Float
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 

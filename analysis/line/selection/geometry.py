@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.result import Line
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser, laser_plane
 
-Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 

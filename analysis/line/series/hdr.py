@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from analysis.line.detection.channel import check_image
 from analysis.line.detection.noise import NoiseModel
+from render.base.arrays import Float32
 from render.base.errors import InputError
-
-Float32 = NDArray[np.float32]
 
 SHORTEST, LONGEST, MOST_RATIO = 1e-30, 1e30, 1e15
 """Of exposure times in any unit; farther apart, their electrons leave the range of float32."""

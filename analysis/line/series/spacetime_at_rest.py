@@ -19,9 +19,8 @@ from analysis.line.detection.noise import NoiseModel
 from analysis.line.measure import measure
 from analysis.line.result import positioned
 from analysis.line.settings import ExtractionSettings
+from render.base.arrays import Float
 from render.base.errors import InputError
-
-Float = NDArray[np.float64]
 
 FEWEST = 8
 """Frames."""

@@ -32,11 +32,10 @@ from analysis.line.detection.noise import NoiseModel
 from analysis.line.methods.gaussian_fit import LIKELIHOOD, measure_gaussian
 from analysis.line.methods.seed_loop import COLUMNS, ROOM, Options, Pixels, seed_kernel
 from analysis.line.result import Flag, Line, positioned
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.threads import map_chunks
 from render.camera.camera import Camera
-
-Float = NDArray[np.float64]
 
 FEWEST = 6
 """Frames on either side of one, or as many as there are."""

@@ -12,10 +12,10 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout
 
 from analysis.line.result import Line
 from analysis.report.colour import TRUTH, method_colour, method_name
+from render.base.arrays import Float
 from render.frame import LaserCurve
 from studio.qt.core import theme
 
-Float = NDArray[np.float64]
 SYMBOLS_FROM = 6.0
 """Screen pixels a pixel from which single positions are marked."""
 BOX_PX = 52

@@ -13,13 +13,13 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QSpinBox, QVBoxLay
 from analysis.line.methods.line_profile import profile
 from analysis.line.result import Flag, Line
 from analysis.report.colour import TRUTH, method_colour, method_name
+from render.base.arrays import Float
 from render.frame import LaserCurve
 from render.sensor.develop import Image
 from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.scan.stages import Measurement
 
-Float = NDArray[np.float64]
 MARGIN_PX = 14.0
 """Shown on either side of the line, beside three times its width."""
 REASONS = {

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QWidget
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from analysis.cloud import Cloud, at_step, cloud
+from render.base.arrays import Float
 from studio.preview.diverging_colours import diverging
 from studio.qt.core import theme
 from studio.qt.core.session import Session
@@ -20,7 +21,6 @@ from studio.scan.redevelop import is_stale
 from studio.scan.remarks import best
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, symmetric_limit
 
-Float = NDArray[np.float64]
 POINT_PX, MARK_PX, NEAR_PX = 3.5, 9.0, 9.0
 OFFSET = -80.0
 """Of the depth buffer, so that a point a little below the surface is seen."""

@@ -9,9 +9,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
+from render.base.arrays import Float
 from studio.editing.targets import Target, target
 from studio.preview import gizmo_geometry
 from studio.preview.gizmo_geometry import HANDLES, Drag, Frame, Handle
@@ -19,8 +19,6 @@ from studio.qt.core.live_preview import Live
 from studio.qt.core.session import Session
 from studio.qt.viewport.view3d import View3D
 from studio.qt.viewport.viewport_scene import Lines
-
-Float = NDArray[np.float64]
 
 COLOURS = ("#e5534b", "#4aa851", "#3f86e8")
 """Of the axes x, y, z, as everywhere in 3D programs."""

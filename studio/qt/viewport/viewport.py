@@ -6,12 +6,12 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import QToolTip, QVBoxLayout, QWidget
 from vtkmodules.vtkRenderingCore import vtkActor, vtkCellPicker
 
+from render.base.arrays import Float
 from render.base.pose import transform_points
 from studio.editing.placement import working_distance
 from studio.preview.view_camera import STANDARD, through, turntable
@@ -23,8 +23,6 @@ from studio.qt.viewport.gizmo import Gizmo
 from studio.qt.viewport.view3d import View3D
 from studio.qt.viewport.viewport_bar import ViewportBar
 from studio.qt.viewport.viewport_scene import CAMERA, LASERS, ViewportScene, object_path
-
-Float = NDArray[np.float64]
 
 HOVER_MS = 120
 PICK_TOLERANCE = 0.006

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 from vtkmodules.vtkRenderingCore import vtkActor, vtkBillboardTextActor3D, vtkPolyDataMapper
 
 from analysis.report.colour import wavelength_colour
+from render.base.arrays import Float
 from render.base.pose import transform_points
 from studio.preview import rig_drawing
 from studio.preview.preview import Body, Look
@@ -21,7 +21,6 @@ from studio.project.document import FieldPath
 from studio.qt.core.theme import Colours, mixed
 from studio.qt.viewport.mesh_actor import mesh_actor
 
-Float = NDArray[np.float64]
 Colour = tuple[float, float, float]
 
 CAMERA: FieldPath = ("scene", "rig", "camera")
