@@ -26,9 +26,9 @@ Weigh = Callable[[Float32], Importance]
 
 POOLED = 25
 """Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one."""
-MARGIN = 1.5
+MARGIN = 2.0
 """On the deviation that a few passes tell: rare bright paths are in few of them, and narrow lines move unevenly."""
-UNMET = 0.02
+UNMET = 0.01
 """Share of the lit scan lines that may miss the goal: some meet a rare path that no estimate knows of."""
 LEAST_NEED = 0.02
 """Of the camera paths of a scan line that needs most: what every line gets beside it."""

@@ -45,7 +45,7 @@ def test_the_error_is_that_of_the_mean_of_all_passes(common: float) -> None:
     weight = np.linspace(-1.0, 1.0, 8)
     one = DEVIATION**2 * np.sum(weight**2) + common**2 * np.sum(weight[:4]) ** 2
     mean = np.sqrt(one * 4.0 * (1 + 1 + 4 + 16)) / weights
-    # of 25 rows with 12 degrees of freedom the variance is known to 8 %; the error is that of the second row of 100
+    # of 25 rows with 12 degrees of freedom the variance is known to 8 %; the error is that of the worst row of 100
     assert mean < errors.error(weights) / MARGIN < mean * 1.15
 
 
