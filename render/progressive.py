@@ -11,12 +11,13 @@ from concurrent.futures import Future, wait
 from dataclasses import replace
 from typing import Any
 
+from render.base.arrays import Float32
 from render.base.counts import EMBREE_SECONDS, RAYS
 from render.base.deadline import Deadline
 from render.base.errors import Cancelled
 from render.base.progress import Clock, StageProgress, WholeClock
 from render.base.threads import Cancel
-from render.frame import Axis, Float32, Frame, LaserCurve
+from render.frame import Axis, Frame, LaserCurve
 from render.laser_direct.light_group import QUICK_ERROR
 from render.light_group import LightGroup, chosen_plan, has_work
 from render.products import PRODUCTS, QUICK, ambient_look, expected_plan

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.base.arrays import Float
-from render.frame import Float32, Frame, Truth
+from render.base.arrays import Float, Float32
+from render.frame import Frame, Truth
 
 Mask = NDArray[np.bool_]
 

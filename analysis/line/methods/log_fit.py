@@ -16,9 +16,10 @@ from numba import njit
 
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, PLATEAU, REACH, WIDTH
 from analysis.line.methods.scintillation import write_sigma
-from analysis.line.methods.seed_loop import Array, Float32, Mask, Options, Pixels, peak_kernel
+from analysis.line.methods.seed_loop import Array, Mask, Options, Pixels, peak_kernel
 from analysis.line.methods.window import brightest, ground, pixel_variance, slope_variance
 from analysis.line.result import Flag
+from render.base.arrays import Float32
 
 CARUANA, GUO = range(2)
 """Variants."""

@@ -16,9 +16,10 @@ from numba import njit
 
 from analysis.line.detection.channel import MISSING, SATURATED
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, REACH, SLOPE, WIDTH
-from analysis.line.methods.seed_loop import CORRELATION_LENGTH, Array, Float32, Mask, Options, Pixels, peak_kernel
+from analysis.line.methods.seed_loop import CORRELATION_LENGTH, Array, Mask, Options, Pixels, peak_kernel
 from analysis.line.methods.window import ground, pixel_variance, write_peak
 from analysis.line.result import Flag
+from render.base.arrays import Float32
 
 WIDEST = 6.0
 """px; the filter's largest sigma, which decides how many scan lines beyond a chunk are read."""

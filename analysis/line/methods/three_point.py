@@ -16,9 +16,10 @@ import numpy as np
 from numba import njit
 
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, WIDTH
-from analysis.line.methods.seed_loop import Array, Float32, Options, Pixels, peak_kernel
+from analysis.line.methods.seed_loop import Array, Options, Pixels, peak_kernel
 from analysis.line.methods.window import any_saturated, brightest, load_window, position_sigma, write_peak
 from analysis.line.result import Flag
+from render.base.arrays import Float32
 
 MAXIMUM, LINEAR, PARABOLA, GAUSS = range(4)
 NARROWEST = 0.55

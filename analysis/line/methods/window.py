@@ -10,7 +10,8 @@ from numba import njit
 from analysis.line.detection.channel import MISSING, SATURATED
 from analysis.line.detection.detect import AMPLITUDE, BACKGROUND, CENTRE, PLATEAU, SLOPE, SLOPE_SIGMA, WIDTH
 from analysis.line.methods.scintillation import write_sigma
-from analysis.line.methods.seed_loop import Array, Float32, Mask, Pixels
+from analysis.line.methods.seed_loop import Array, Mask, Pixels
+from render.base.arrays import Float32
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

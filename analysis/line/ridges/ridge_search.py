@@ -15,9 +15,9 @@ import numpy as np
 from numba import njit
 
 from analysis.line.detection.channel import MISSING, SATURATED
-from analysis.line.methods.seed_loop import Array, Float32, Mask
+from analysis.line.methods.seed_loop import Array, Mask
 from analysis.line.methods.steger_2d import CUT, hessian, normal, taps, weight_noise
-from render.base.arrays import Int
+from render.base.arrays import Float32, Int
 
 TILE, EVERY = 32, 4
 """px; a side, and from sample to sample."""

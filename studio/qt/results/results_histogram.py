@@ -7,8 +7,9 @@ from typing import Any
 import pyqtgraph as pg
 
 from analysis.report.colour import method_colour
+from render.base.arrays import Float
 from studio.qt.results import plots
-from studio.scan.result_series import ErrorView, Float, histogram, symmetric_limit
+from studio.scan.result_series import ErrorView, histogram, symmetric_limit
 
 PLOTTED = 99.5
 """Percent of the errors within the axis."""

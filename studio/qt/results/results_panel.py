@@ -29,6 +29,7 @@ from PySide6.QtWidgets import (
 
 from analysis.report.colour import TRUTH, method_colour, method_name
 from analysis.report.units import digits
+from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
@@ -40,15 +41,7 @@ from studio.qt.results.results_steps import StepsPlot
 from studio.qt.results.scan_bar import ScanBar
 from studio.scan.redevelop import is_developed_otherwise
 from studio.scan.remarks import frame_remarks, scale_head, scale_notes
-from studio.scan.result_series import (
-    ERROR_VIEWS,
-    ErrorView,
-    Float,
-    error_values,
-    measured_series,
-    table,
-    true_series,
-)
+from studio.scan.result_series import ERROR_VIEWS, ErrorView, error_values, measured_series, table, true_series
 from studio.scan.scan_results import COLUMNS, ScanResults
 from studio.scan.stages import Measurement
 

@@ -9,9 +9,10 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Signal
 
 from analysis.report.colour import TRUTH, method_colour
+from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.results import plots
-from studio.scan.result_series import ErrorView, Float, Series, symmetric_limit
+from studio.scan.result_series import ErrorView, Series, symmetric_limit
 
 PLOTTED = 99.5
 """Percent of the errors within the axis."""

@@ -9,8 +9,9 @@ import pyqtgraph as pg
 from PySide6.QtCore import Signal
 
 from analysis.report.colour import method_colour
+from render.base.arrays import Float
 from studio.qt.results import plots
-from studio.scan.result_series import ErrorView, Float
+from studio.scan.result_series import ErrorView
 
 
 class StepsPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
