@@ -145,14 +145,18 @@ class GroupQuality:
     a standard deviation over that by the sensor's noise."""
     image_error: float | None = None
     """Of the line: the estimated relative RMS error of the image that it takes."""
+    image_target: float | None = None
+    """Image error at which it ends as well: light of which so much is known may be rendered no further."""
     coarse_error: float | None = None
     """Of ambient light that is rendered for the line: relative RMS error of what is interpolated, where no error
     matters, found on held-out pixels; None: nothing is."""
 
     @property
     def reached(self) -> bool:
-        """The error is at most the target; where it is not, the work or the time that was allowed ended it."""
-        return self.error <= self.target
+        """The error, or that of the image, is at most its target; else the work or the time that was allowed ended it.
+        """
+        image = self.image_error is not None and self.image_target is not None and self.image_error <= self.image_target
+        return self.error <= self.target or image
 
     @property
     def reason(self) -> Literal["target", "work", "unfinished"]:

@@ -70,7 +70,8 @@ def quality_text(quality: GroupQuality) -> str:
         )
         parts.append(f"{known}, goal {quality.target:.2g}")
         if quality.image_error is not None and math.isfinite(quality.image_error):
-            parts.append(f"image error {quality.image_error:.0%}")
+            end = "" if quality.image_target is None else f", which ends it at {quality.image_target:.0%}"
+            parts.append(f"image error {quality.image_error:.0%}{end}")
         if quality.coarse_error is not None:
             parts.append(f"elsewhere interpolated to {quality.coarse_error:.1%}")
     elif not math.isnan(quality.error):
@@ -92,7 +93,8 @@ def quality_text(quality: GroupQuality) -> str:
 def _all(plan: Plan) -> Iterator[tuple[bool, str]]:
     """Whether it is computed, and the sentence, of every step and every setting that bounds it."""
     if plan.goal is not None:
-        yield True, f"goal: reflected light ends where its noise moves the line by less than {plan.goal:g} of its sigma"
+        known = f"its noise moves the line by less than {plan.goal:g} of its sigma"
+        yield True, f"goal: reflected light ends where {known}, or where its image is known to the error asked of that"
     for step in plan.steps:
         if step.reason == "absent" and step.group == "indirect":
             continue  # nothing in the scene makes such light, or none that the pilot met

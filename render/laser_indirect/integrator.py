@@ -128,7 +128,7 @@ def indirect_images(
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
     An image at every doubling of the paths, and the final one. The error is that of the whole image: sqrt(sum of
-    variances / sum of squares); with an aim that of the measured line counts instead. `most_paths`, or the end of the
+    variances / sum of squares); with an aim it is enough that the measured line is known. `most_paths`, or the end of the
     time, ends it in any case. kinds: of light, besides
     plain interreflection (`render.laser_indirect.path_vertex`). clamp: most radiance of one pass in one pixel,
     W/(m^2 sr); biased. left: lasers that have their share of the time, with this one. What it goes on from gives the
@@ -152,7 +152,7 @@ def indirect_images(
         return IndirectImage(so_far.radiance(shape), so_far.error, *counts, cut, so_far.line_error)
 
     def unfinished() -> bool:
-        known = so_far.error <= target if aim is None else so_far.line_error <= 1.0
+        known = so_far.error <= target or (aim is not None and so_far.line_error <= 1.0)
         return not known and so_far.paths < most_paths
 
     shown = so_far.paths
@@ -169,7 +169,7 @@ def indirect_images(
         so_far.add(waves.buffers, wave_moments, clamp, run.threads)
         run.keep(so_far)
         # the error falls with the root of the paths, at least
-        over = so_far.error / target if aim is None else so_far.line_error
+        over = min(so_far.error / target, math.inf if aim is None else so_far.line_error)
         done = max(over**-2, so_far.paths / most_paths) if over > 0.0 else 1.0
         run.progress(min(0.99, done))
         if time_is_over():

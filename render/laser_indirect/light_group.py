@@ -113,6 +113,7 @@ def quality_of(
         settings.light_paths,
         of="image" if goal is None else "line",
         image_error=None if goal is None else image.error,
+        image_target=None if goal is None else settings.indirect_error,
         invalid=image.dropped,
         clamped=image.clamped if clamped else None,
         clamped_radiance=image.cut if clamped else None,

@@ -46,7 +46,7 @@ class RenderSettings(Model):
     indirect_error: float = quantity(
         0.1,
         label="Reflection error",
-        help="Target relative RMS error of the reflected light, without a goal.",
+        help="Relative RMS error of the reflected light at which it ends, with a goal as well.",
         gt=1e-4,
         le=1,
     )
