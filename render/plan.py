@@ -153,8 +153,7 @@ class GroupQuality:
 
     @property
     def reached(self) -> bool:
-        """The error, or that of the image, is at most its target; else the work or the time that was allowed ended it.
-        """
+        """The error or the image error is at most its target; else the work or the time that was allowed ended it."""
         image = self.image_error is not None and self.image_target is not None and self.image_error <= self.image_target
         return self.error <= self.target or image
 

@@ -128,10 +128,10 @@ def indirect_images(
     """Radiance of one laser's light after two or more surfaces, to a target relative RMS error. Raises Cancelled.
 
     An image at every doubling of the paths, and the final one. The error is that of the whole image: sqrt(sum of
-    variances / sum of squares); with an aim it is enough that the measured line is known. `most_paths`, or the end of the
-    time, ends it in any case. kinds: of light, besides
-    plain interreflection (`render.laser_indirect.path_vertex`). clamp: most radiance of one pass in one pixel,
-    W/(m^2 sr); biased. left: lasers that have their share of the time, with this one. What it goes on from gives the
+    variances / sum of squares); with an aim it is enough that the measured line is known. `most_paths`, or the end of
+    the time, ends it in any case. kinds: of light, besides plain interreflection (`render.laser_indirect.path_vertex`).
+    clamp: most radiance of one pass in one pixel, W/(m^2 sr); biased. left: lasers that have their share of the time,
+    with this one. What it goes on from gives the
     same image bit for bit as without interruption; what it keeps stays consistent when Cancelled is raised.
     """
     world, camera, laser, _, T_world_laser = placed

@@ -24,7 +24,8 @@ from analysis.line.detection.detect import (
 )
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE, profile
 from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
-from analysis.line.methods.narrow_line import NARROWEST, WIDEST, posterior
+from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width
+from analysis.line.methods.saturated_line import widen_saturated
 from analysis.line.methods.scintillation import position_variance, shared_variance
 from analysis.line.methods.seed_loop import (
     CORRELATION_LENGTH,
@@ -46,12 +47,9 @@ SMALL_STEP, ACCEPTED_STEP = 1e-5, 1e-3
 """Squared standard deviations: stop at the first; out of iterations the second will do (scoring is linear at worst)."""
 NARROWEST_SATURATED = 0.35
 """px; the wings of a narrower line are within a pixel."""
-COARSE, RESOLVED, FINE = 0.5, 0.3, 0.35
-"""px; a narrower line than the first, whose width may as well be below the second (2 sigma), is not a matter of a fit;
-if it is also narrower than the third on average over what its width may be, it is flagged."""
-GLOW, GLOW_BESIDE, GLOW_WIDTH = 0.005, 3.0, 4.0
-"""What a lens may put beside a saturated line, where nobody sees it: height of the peak, in sigmas its place and width.
-Taken as given, since the wings cannot tell it."""
+RESOLVED, FINE = 0.3, 0.35
+"""px; a line that is narrower than COARSE, and whose width may as well be below the first (2 sigma), is not a matter of
+a fit; if it is also narrower than the second on average over what its width may be, it is flagged."""
 SPECKLED = 0.06
 """px; variance by scintillation over the line's width from which few grains make up a line: an expansion in their
 contrast no longer holds. By seeded trials of f/5.6 to f/11 on lines of 0.8 to 4 px."""
@@ -252,21 +250,6 @@ def _is_coarse(pixel: Array, n: int, p: Array, options: Options, hessian: Array)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _weigh_of_known_width(pixel: Array, n: int, p: Array, shape: Array, weight: Array) -> None:
-    """How far the centre of a line p (4,) of known width moves for one electron more in each pixel -> weight (n,)."""
-    height, cross, place = 0.0, 0.0, 0.0
-    for i in range(n):
-        variance = max(p[0] * shape[0, i] + p[3] + pixel[FLOOR, i], 0.1 * pixel[FLOOR, i])
-        height += shape[0, i] * shape[0, i] / variance
-        cross += shape[0, i] * p[0] * shape[1, i] / variance
-        place += (p[0] * shape[1, i]) ** 2 / variance
-    determinant = max(height * place - cross * cross, 1e-300)
-    for i in range(n):
-        variance = max(p[0] * shape[0, i] + p[3] + pixel[FLOOR, i], 0.1 * pixel[FLOOR, i])
-        weight[i] = (height * p[0] * shape[1, i] - cross * shape[0, i]) / variance / determinant
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
 def _measure_narrow(
     pixels: Pixels, pixel: Array, n: int, p: Array, seed: Array, options: Options, shape: Array, out: Array
 ) -> int:
@@ -289,7 +272,7 @@ def _measure_narrow(
     out[5], out[CORRELATION_LENGTH] = chi2 / (n - 4), 1.0
     if pixels.covariances.shape[1] > 0 and mass > 0.0:
         # the position takes the centre of mass of so few pixels as their width lets it, or better
-        _weigh_of_known_width(pixel, n, p, shape, weight)
+        weigh_of_known_width(pixel, n, p, shape, weight)
         own, all_lines = shared_variance(weight, light, x, n, pixels.covariances, pixels.fineness, p[2], False)
         for i in range(n):
             weight[i] = (x[i] - p[1]) / mass
@@ -326,25 +309,6 @@ def _asymmetry(pixel: Array, n: int, p: Array, held: bool, shape: Array, hessian
     for j in range(4):
         square -= cross[j] * projected[j]
     return float(moment / math.sqrt(square)) if square > 0.0 else 0.0
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _widen_saturated(x: Array, n: int, p: Array, weight: Array, chi2: float, plateau: float, out: Array) -> None:
-    """What the wings of a saturated line cannot know -> sigma in out: the glow beside its hidden peak, and a misfit.
-
-    weight (n,): how far the centre moves for one electron more in the pixels x (n,). plateau: half its width, px, which
-    the line is within. That of a line that hardly reaches its neighbours is anywhere within a pixel.
-    """
-    moved = 0.0
-    for side in (-1.0, 1.0):
-        shift = 0.0
-        for i in range(n):
-            z = (x[i] - p[1] - side * GLOW_BESIDE * p[2]) / (GLOW_WIDTH * p[2])
-            shift += weight[i] * GLOW * p[0] * math.exp(-0.5 * z * z)
-        moved = max(moved, abs(shift))
-    coarse = 1.0 / 12.0 if p[2] < COARSE else 0.0
-    moved = min(moved, plateau / math.sqrt(3.0))
-    out[1] = math.sqrt(out[1] * out[1] * max(chi2, 1.0) + moved * moved + coarse)
 
 
 @peak_kernel
@@ -414,7 +378,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     if independent:
         out[5] = chi2 / (count - 4)
     if flag == Flag.SATURATED.value:
-        _widen_saturated(pixel[POSITION], count, p, weight, chi2 / max(count - 4, 1), seed[PLATEAU], out)
+        widen_saturated(pixel[POSITION], count, p, weight, chi2 / max(count - 4, 1), seed[PLATEAU], out)
     elif likelihood and not options.known_width and p[2] < WIDEST:
         unit[1], unit[2] = 0.0, 1.0
         if _solve(hessian, 0.0, unit, factor, row):

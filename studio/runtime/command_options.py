@@ -1,0 +1,96 @@
+"""Options that commands share. Only click is imported, so that --help answers at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from studio.runtime.command_line import FiniteRange
+
+
+def common(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options that every command has."""
+    for option in (
+        click.option("--debug", is_flag=True, expose_value=False, help="Show tracebacks."),
+        click.option("--quiet", "-q", is_flag=True, help="No progress."),
+        click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object."),
+    ):
+        command = option(command)
+    return command
+
+
+THREADS = click.option("--threads", type=click.IntRange(1, 1024), help="Threads  [default: all processors].")
+
+
+def working(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of the commands that compute and write."""
+    for option in (
+        click.option("--steps", type=click.IntRange(1), help="Only the first so many frames of a moving scan."),
+        click.option("--scale", type=FiniteRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
+        click.option(
+            "--time-limit",
+            type=FiniteRange(0.1, 1e9),
+            metavar="SECONDS",
+            help="Time for the light of each frame; it ends then, short of its errors. --resume goes on from there.",
+        ),
+        click.option(
+            "--frames",
+            type=click.Choice(["all", "band", "none"]),
+            default="all",
+            show_default=True,
+            help="What is kept of each frame: all; a band about the line, coarse elsewhere, without PNG; nothing.",
+        ),
+        click.option("--resume", is_flag=True, help="Go on where an earlier scan into the same folder ended."),
+        click.option("--seed", type=click.IntRange(0, 2**63 - 1), help="Random seed  [default: the project's]."),
+        THREADS,
+        click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/<name>]."),
+    ):
+        command = option(command)
+    return common(command)
+
+
+METHOD = click.option("--method", help="How the line is found; auto picks, an unknown name lists all.")
+SELECT = click.option(
+    "--select",
+    type=click.Choice(["strongest", "first", "last", "continuous"]),
+    help="Which peak of a scan line; continuous: the one on the smoothest chain of peaks.",
+)
+GEOMETRY = click.option(
+    "--geometry/--no-geometry", default=None, help="Only peaks that the laser can have made, in the working volume."
+)
+NEAREST = click.option("--nearest", type=FiniteRange(0.0, 1e4), help="Nearest depth of the working volume, m.")
+FARTHEST = click.option("--farthest", type=FiniteRange(1e-6, 1e4), help="Farthest depth of the working volume, m.")
+
+
+def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Settings of the line extraction in place of the project's."""
+    for option in (
+        click.option("--spacetime/--no-spacetime", default=None, help="Measure a moving scan along time."),
+        click.option(
+            "--exposure-ratio",
+            type=FiniteRange(1.0, 100.0, min_open=True),
+            help="Each exposure is so many times shorter than the one before.",
+        ),
+        click.option("--exposures", type=int, help="Exposures taken of each frame and fused."),
+        FARTHEST,
+        NEAREST,
+        GEOMETRY,
+        SELECT,
+        METHOD,
+    ):
+        command = option(command)
+    return command
+
+
+def repeating(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of the commands that run a project many times."""
+    for option in (
+        click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor]."),
+        click.option("--laser", type=click.IntRange(0), default=0, show_default=True, help="Which laser is measured."),
+        click.option("--scale", type=FiniteRange(0.01, 4.0), default=1.0, show_default=True, help="Image scale."),
+    ):
+        command = option(command)
+    return common(command)
