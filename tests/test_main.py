@@ -44,7 +44,10 @@ class TestHelp:
         imported = {line.rsplit("|", 1)[1].strip() for line in errors.splitlines() if line.startswith("import time:")}
         own = {name for name in imported if name.split(".")[0] in ("render", "analysis", "studio")}
         assert {name.split(".")[0] for name in imported} & HEAVY == set()
-        runtime = {"studio.runtime", *(f"studio.runtime.{name}" for name in ("command_line", "streams", "system"))}
+        runtime = {
+            "studio.runtime",
+            *(f"studio.runtime.{name}" for name in ("command_line", "command_options", "streams", "system")),
+        }
         assert "click" in imported and own == {"studio", *runtime}
 
     def test_help_with_json_is_json(self) -> None:

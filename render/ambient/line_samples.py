@@ -79,9 +79,9 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
     for _ in range(PASSES):
         count = _wanted(film, band)
         more = count - film.done[band.pixels]
-        left = most - film.total
-        if more.sum(dtype=np.int64) > left:
-            count = film.done[band.pixels] + (more * (max(left, 0) / more.sum(dtype=np.int64))).astype(np.int32)
+        left, asked = max(most - film.total, 0), more.sum(dtype=np.int64)
+        if asked > left:
+            count = film.done[band.pixels] + (more * (left / asked)).astype(np.int32)
             more = count - film.done[band.pixels]
         if not more.any():
             return

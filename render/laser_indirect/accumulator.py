@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -95,6 +96,8 @@ class Accumulator:
     """Radiance that the clamp took, weighted sum over pixels and passes."""
     line: LineErrors | None = None
     """Where errors matter, and what they come to there; None: everywhere alike."""
+    aimed: str = ""
+    """Digest of the weights that it was aimed by at first."""
     consistent: bool = True
     """False within `add`: an interruption there leaves half a wave in the sums."""
 
@@ -156,14 +159,16 @@ class Accumulator:
         self.consistent = True
 
     def aim_at(self, importance: Importance | None, laser: int) -> None:
-        """Know where errors matter from now on, if it was not known; None: everywhere alike."""
+        """Know where errors matter from now on, if it was not known or is another; None: everywhere alike."""
+        aimed = "" if importance is None else hashlib.sha256(importance.laser[laser].tobytes()).hexdigest()
         if importance is None:
             self.line = None
-        elif self.line is None:
+        elif self.line is None or self.aimed not in ("", aimed):
             self.line = LineErrors.of(importance, laser)
             sizes = (min(1 << max(wave - 1, 0), self.growth_limit) for wave in range(self.waves))
             weights = ((size**WAVE_WEIGHT_EXPONENT) ** 2 / size for size in sizes)
             self.line.all_waves = WAVE * sum(weights)
+        self.aimed = aimed
 
     def allocate(self, drawn: float) -> None:
         """Allocate the next wave's camera paths, where each pixel has had `drawn` times its `camera_paths` so far."""
@@ -188,6 +193,7 @@ class Accumulator:
             **{name: np.array(getattr(self, name)) for name in NUMBERS},
             **{name: getattr(self, name) for name in IMAGES},
             "fan": np.array([self.fan.low, self.fan.high, *self.fan.cumulative]),
+            "aimed": np.array(self.aimed),
             "guide_width": np.array(self.guide.width),
             "guide_row": self.guide.row,
             "guide": self.guide.cumulative,
@@ -203,7 +209,7 @@ class Accumulator:
         fan = FanDistribution(float(low), float(high), np.array(cumulative))
         guide = Guide(int(arrays["guide_width"].item()), arrays["guide_row"], arrays["guide"])
         line = LineErrors.of_arrays(arrays) if "line_weight" in arrays else None
-        return cls(**numbers, **images, fan=fan, guide=guide, line=line)
+        return cls(**numbers, **images, fan=fan, guide=guide, line=line, aimed=str(arrays["aimed"].item()))
 
 
 def sum_passes(

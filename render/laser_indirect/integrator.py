@@ -138,7 +138,7 @@ def indirect_images(
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     shape = (camera.height, camera.width)
     if high <= low:
-        yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0)
+        yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0, line_error=0.0)
         return
     waves = Waves(BdptPass.of(*placed, reach, run.seed, kinds), camera, run)
     time_is_over = run.time_is_over(left)

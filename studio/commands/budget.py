@@ -35,6 +35,7 @@ def budget_project(
             "laser": check_laser(project, laser),
             "repeats": repeats,
             "methods": [project.extraction.method],
+            "set": {"render.goal": None},  # one render for all that only the sensor makes
             "sweeps": [{"name": "Error budget", "sampling": "effects"}],
         }
     )

@@ -34,7 +34,7 @@ class RenderedFrame(Frame):
     >>> import studio as blazer
     >>> frame = blazer.render(blazer.Project.load("plane"), image_scale=0.05)
     >>> [(one.group, one.laser, one.reason) for one in frame.quality]
-    [('direct', 'laser', 'target'), ('ambient', None, 'work')]
+    [('direct', 'laser', 'target'), ('ambient', None, 'target')]
     >>> [step.name for step in frame.plan.of("indirect") if step.computed]
     []
     """

@@ -23,10 +23,14 @@ Record = dict[str, Any]
 def made_of(project: Project, marks: Mapping[str, str], inputs: Mapping[str, str]) -> Record:
     """For the sidecar: another frame is as good only where all of this is the same.
 
-    marks: of the render's state; inputs: SHA-256 of every input file by its path.
+    marks: of the render's state; inputs: SHA-256 of every input file by its path. With a goal in depth sensor and
+    extraction decide where light is rendered well.
     """
+    goal = project.render.goal
+    measured = {name: getattr(project, name).model_dump(mode="json") for name in ("sensor", "extraction")}
     return {
         **marks,
+        "measured_by": None if goal is None else measured,
         "targets": project.render.model_dump(mode="json"),
         "axis": project.extraction.axis,
         "seed": project.seed,

@@ -167,9 +167,12 @@ def _repeats(
 
 
 def _keys(project: Project, image_scale: float) -> tuple[str, str]:
+    """Of a cell, and of the render that it shares: with none where light is rendered for what one sensor measures."""
     data = project.model_dump(mode="json")
     del data["name"], data["schema_version"]
     whole = _digest({**data, "image_scale": image_scale})
+    if project.render.goal is not None:
+        return whole, whole
     sensor, extraction = data.pop("sensor"), data.pop("extraction")
     del sensor
     for laser in data["scene"]["rig"]["lasers"]:

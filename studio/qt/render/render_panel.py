@@ -28,7 +28,7 @@ from render.checkpoint import RenderState
 from render.frame import Frame
 from render.plan import Plan
 from render.products import expected_plan
-from render.run import Run
+from render.run import Memory, Run
 from render.world.world import World
 from studio.project.project import Project
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
@@ -62,6 +62,8 @@ class RenderPanel(QWidget):
         self._render: Render | None = None
         self._before: Render | None = None
         self._keep = False
+        self._memory = Memory()
+        """Ambient light of before, for renders that only the lasers tell apart."""
         self._warned: set[str] = set()
         """What was told of the render under way."""
         self._state = RenderState({})
@@ -81,11 +83,15 @@ class RenderPanel(QWidget):
         self.ambient_error.setSuffix(" %")
         self.ambient_error.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
         self.ambient_error.setToolTip("Relative RMS error of the ambient light at which it ends.")
+        self.goal = QDoubleSpinBox(decimals=2, minimum=0.0, maximum=10.0, singleStep=0.05)
+        self.goal.setSuffix(" sigma")
+        self.goal.setSpecialValueText("errors of the image")
+        self.goal.setToolTip("What the render's own noise may add to the line, over its sigma by the sensor's noise.")
         self.limit = QSpinBox(minimum=0, maximum=86400)
         self.limit.setSuffix(" s")
         self.limit.setSpecialValueText("none")
         self.limit.setToolTip("The best frame so far is kept when the time is over.")
-        for box in (self.laser_error, self.ambient_error, self.samples, self.limit):
+        for box in (self.laser_error, self.ambient_error, self.samples, self.goal, self.limit):
             box.setKeyboardTracking(False)
         self.transport = QComboBox()
         for value, text in TRANSPORT.items():
@@ -153,7 +159,8 @@ class RenderPanel(QWidget):
         refined, limit, self._state = self._refined, self.limit.value() or None, state
 
         def work(progress: Progress, cancelled: Cancel) -> None:
-            run = Run(cancelled=cancelled, keep_partial=lambda: self._keep, seconds=limit, checkpoint=state)
+            kept = lambda: self._keep  # noqa: E731
+            run = Run(cancelled=cancelled, keep_partial=kept, seconds=limit, checkpoint=state, memory=self._memory)
             render_frames(project, root, step, world, run, progress, refined.emit)
 
         self._job = self.runner.run(RENDER, "render", work)
@@ -192,6 +199,7 @@ class RenderPanel(QWidget):
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         for name, widget in (
             ("Light transport", self.transport),
+            ("Goal", self.goal),
             ("Laser error", self.laser_error),
             ("Ambient error", self.ambient_error),
             ("Ambient samples", self.samples),
@@ -236,6 +244,9 @@ class RenderPanel(QWidget):
         self.ambient_error.valueChanged.connect(
             lambda percent: session.set(("render", "ambient_error"), round(percent / 100, 8), "ambient error")
         )
+        self.goal.valueChanged.connect(
+            lambda depth: session.set(("render", "goal"), {"depth": round(depth, 2)} if depth else None, "goal")
+        )
         self.samples.valueChanged.connect(
             lambda count: session.set(("render", "ambient_samples"), count, "ambient samples")
         )
@@ -253,13 +264,16 @@ class RenderPanel(QWidget):
 
     def _follow_project(self) -> None:
         project = self.session.project
-        for box in (self.laser_error, self.ambient_error, self.samples):
+        goal = project.render.goal
+        for box in (self.laser_error, self.ambient_error, self.samples, self.goal):
             box.blockSignals(True)
+        self.goal.setValue(0.0 if goal is None else goal.depth)
+        self.ambient_error.setEnabled(goal is None)
         self.laser_error.setValue(100 * project.render.laser_error)
         self.ambient_error.setValue(100 * project.render.ambient_error)
         self.samples.setValue(project.render.ambient_samples)
         self.transport.setCurrentIndex(self.transport.findData(project.render.transport))
-        for box in (self.laser_error, self.ambient_error, self.samples):
+        for box in (self.laser_error, self.ambient_error, self.samples, self.goal):
             box.blockSignals(False)
         camera, chosen = project.scene.camera, max(0, self.scale.currentIndex())
         if self.scale.count() == 0:

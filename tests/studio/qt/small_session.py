@@ -10,6 +10,7 @@ from pytestqt.qtbot import QtBot
 
 from render.frame import Frame
 from render.render import render_world
+from render.run import Run
 from render.world.world import World, build_world
 from studio.project.document import Document
 from studio.project.project import Project
@@ -18,6 +19,7 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
 from studio.qt.image.camera_view import CameraView
 from studio.qt.render.develop_panel import DevelopPanel
+from studio.scan.render_goal import goal_of
 from studio.scan.stages import scaled
 
 FOLDER = template_folder("sphere")
@@ -34,7 +36,8 @@ def small_render() -> tuple[World, Frame]:
     project = small_project()
     world = build_world(project.scene, FOLDER)
     settings = project.render.model_copy(update={"ambient_samples": 4})
-    return world, render_world(world, project.scene, settings=settings, axis=project.extraction.axis)
+    run = Run(seed=project.seed, goal=goal_of(project))
+    return world, render_world(world, project.scene, settings=settings, axis=project.extraction.axis, run=run)
 
 
 def small_session(rendered: bool = False) -> Session:

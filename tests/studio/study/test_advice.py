@@ -117,7 +117,7 @@ def test_every_part_makes_a_project_that_is_allowed() -> None:
             assert project.replaced(part.values) != project
     cheapest = PLANE.replaced({"render.transport": "direct", "render.laser_error": 1.0, "render.indirect_error": 1.0,
                                "render.ambient_error": 1.0, "render.ambient_samples": 1, "render.max_bounces": 1,
-                               "render.light_paths": 1 << 20})  # fmt: skip
+                               "render.light_paths": 1 << 20, "render.goal": {"depth": 1.0}})  # fmt: skip
     assert parts_of(cheapest) == []
 
 

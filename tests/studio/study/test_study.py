@@ -83,17 +83,23 @@ def test_an_unknown_study_is_told_with_the_ready_made_ones() -> None:
 
 
 def test_cells_that_differ_in_sensor_or_method_share_a_render_and_no_key() -> None:
-    study = study_of(SWEEP, methods=("likelihood", "phase"))
+    study = study_of(SWEEP, methods=("likelihood", "phase"), set={"render.goal": None})
     cells = next_cells(study, bases_of(study), {})
     assert len({cell.key for cell in cells}) == len(cells) == 2 * 2 * 3
     assert len({cell.render_key for cell in cells}) == 3  # one a repeat: each has its own seed
+
+
+def test_light_that_is_rendered_for_one_sensor_is_shared_with_no_other() -> None:
+    study = study_of(SWEEP, methods=("likelihood", "phase"))
+    cells = next_cells(study, bases_of(study), {})
+    assert {cell.render_key for cell in cells} == {cell.key for cell in cells}
 
 
 def test_laser_power_is_scaled_and_the_scan_axis_is_not() -> None:
     power = {"name": "p", "vary": [{"field": "scene.rig.lasers[0].power", "values": [0.01, 0.02]}]}
     axis = {"name": "x", "vary": [{"field": "extraction.axis", "values": ["rows", "columns"]}]}
     for sweep, renders in ((power, 1), (axis, 2)):
-        study = study_of(sweep, repeats=1)
+        study = study_of(sweep, repeats=1, set={"render.goal": None})
         assert len({cell.render_key for cell in next_cells(study, bases_of(study), {})}) == renders
 
 

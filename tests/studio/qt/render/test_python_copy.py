@@ -15,6 +15,7 @@ from studio.qt.core.session import Render, Session
 from studio.qt.render import history
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.render.python_copy import copy_as_python
+from studio.scan.render_goal import goal_of
 from tests.studio.qt.render.test_develop_panel import settle
 from tests.studio.qt.small_session import FOLDER, small_project
 
@@ -24,7 +25,8 @@ def session():
     project = small_project().replaced({"render.ambient_samples": 1, "render.transport": "direct"})
     world = build_world(project.scene, FOLDER)
     settings, axis = project.render, project.extraction.axis
-    frame = render_world(world, project.scene, settings=settings, axis=axis, run=Run(seed=project.seed))
+    run = Run(seed=project.seed, goal=goal_of(project))
+    frame = render_world(world, project.scene, settings=settings, axis=axis, run=run)
     made = Session(Document(project, root=FOLDER))
     made.add_render(Render(1, project, world, frame))
     return made

@@ -44,6 +44,7 @@ def finish(qtbot, panel):
 def long_render(qtbot, panel):
     """A render that would take minutes, with its first frames there."""
     panel.session.set(("render", "ambient_samples"), 65536)
+    panel.session.set(("render", "goal"), None)
     panel.session.set(("render", "ambient_error"), 2e-4)
     press(qtbot, panel.start_button)
     session = panel.session
@@ -77,6 +78,7 @@ def test_cancel_forgets_the_render_and_shows_the_one_before(qtbot, panel):
     finish(qtbot, panel)
     before = panel.session.shown
     panel.session.set(("render", "ambient_samples"), 65536)
+    panel.session.set(("render", "goal"), None)
     panel.session.set(("render", "ambient_error"), 2e-4)
     press(qtbot, panel.start_button)
     qtbot.waitUntil(lambda: len(panel.session.renders) == 2)
@@ -106,6 +108,7 @@ def test_pause_holds_the_render_and_go_on_continues_it(qtbot, panel):
 
 def test_a_time_limit_keeps_what_there_is(qtbot, panel):
     panel.session.set(("render", "ambient_samples"), 65536)
+    panel.session.set(("render", "goal"), None)
     panel.session.set(("render", "ambient_error"), 2e-4)
     panel.limit.setValue(1)
     press(qtbot, panel.start_button)
@@ -201,6 +204,7 @@ def test_the_same_objects_are_not_loaded_twice(qtbot, panel):
 
 def test_two_renders_are_compared_by_wipe_and_difference(qtbot, panel):
     session = panel.session
+    session.set(("render", "goal"), None)  # how well the light is known would depend on the power
     press(qtbot, panel.start_button)
     finish(qtbot, panel)
     session.set(("scene", "rig", "lasers", 0, "power"), 0.5 * session.project.scene.lasers[0].power)
@@ -242,3 +246,15 @@ def test_what_inspect_warns_of_is_told_once_while_it_renders(qtbot, panel):
     finish(qtbot, panel)
     dark = [text for level, text in told if level == "warning" and "power is 0 W" in text]
     assert len(dark) == 1
+
+
+def test_the_goal_is_the_line_or_the_errors_of_the_image(panel: RenderPanel) -> None:
+    session = panel.session
+    assert panel.goal.value() == 0.1 and not panel.ambient_error.isEnabled()
+    panel.goal.setValue(0.0)
+    assert session.project.render.goal is None and panel.goal.text() == "errors of the image"
+    assert panel.ambient_error.isEnabled()
+    panel.goal.setValue(0.25)
+    assert session.project.render.goal is not None and session.project.render.goal.depth == 0.25
+    session.document.undo()
+    assert panel.goal.value() == 0.0

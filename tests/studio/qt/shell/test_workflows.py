@@ -141,6 +141,7 @@ def test_render_and_read_the_error(window: MainWindow, qtbot: QtBot) -> None:
 def test_cancel_a_render(window: MainWindow, qtbot: QtBot) -> None:
     session = window.session
     session.set(("render", "ambient_samples"), 65536)
+    session.set(("render", "goal"), None)
     session.set(("render", "ambient_error"), 2e-4)
     with qtbot.waitSignal(window.runner.started):
         qtbot.keyClick(window, Qt.Key.Key_F5)

@@ -121,7 +121,7 @@ class TestDraft:
     def test_the_estimate_counts_cells_and_what_shares_a_render(self, qtbot: QtBot, desk: Desk) -> None:
         desk.small([2.0, 4.0, 8.0])
         desk.work.change_sweep(methods=["likelihood", "centre_of_mass"])
-        desk.work.change(lambda draft: draft.update(repeats=2))
+        desk.work.change(lambda draft: draft.update(repeats=2, set={"render.goal": None}))
         qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.cells == 12)
         assert desk.work.estimate is not None
         assert desk.work.estimate.renders == 2 and desk.work.estimate.seconds is None
