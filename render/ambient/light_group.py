@@ -75,7 +75,7 @@ class AmbientLight(LightGroup[AmbientPlan]):
 
         def images(part: Run) -> Iterator[AmbientImage]:
             if importance is not None:
-                yield from measured_images(placed, importance, **how, run=part)
+                yield from measured_images(placed, importance, **how, target=target, run=part)
                 return
             made_of = seen_from(placed, target, *how.values(), run.seed)
             kept = run.recall(self.field, placed.world, made_of)

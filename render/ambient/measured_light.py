@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from render.ambient.coarse_image import CoarseImage, coarse_image
-from render.ambient.integrator import AmbientImage
-from render.ambient.line_samples import Band, band_of, line_deviations, sample_band
+from render.ambient.integrator import AmbientImage, ambient_images
+from render.ambient.line_samples import LINES_KNOWN, Band, band_of, is_out_of_reach, line_deviations, sample_band
 from render.ambient.path_state import CLAMPED, DROPPED
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
@@ -19,8 +19,6 @@ from render.world.placed import PlacedScene
 COARSE_SAMPLES, COARSE_SHARE = 0.5, 0.125
 """Most samples a pixel, and of those that are allowed, for the coarse image: where what it does not reach matters, the
 band is wider."""
-LINES_KNOWN = 0.95
-"""Share of the scan lines that are known at least as well as is told."""
 
 
 def measured_images(
@@ -30,12 +28,15 @@ def measured_images(
     most: int = 16,
     surfaces: int | None = 1,
     clamp: float | None = None,
+    target: float | None = None,
     run: Run = Run(),
 ) -> Iterator[AmbientImage]:
     """The coarse image, then the one whose scan lines are known, or on which `most` samples a pixel are spent.
 
-    As `ambient_images`; the error of the second is the deviation of its scan lines over the allowed one, which most of
-    them are below. Raises Cancelled. ValueError: the importance is of another image.
+    Where the lines' goal is far out of reach, the image is rendered in its place, to the relative error `target` where
+    that is given: it takes less time. As `ambient_images`; the error of the second is the deviation of its scan lines
+    over the allowed one, which most of them are below. Raises Cancelled. ValueError: the importance is of another
+    image.
     """
     camera, view = placed.camera, placed.camera.view(placed.T_world_camera)
     if importance.ambient.shape != (camera.height, camera.width):
@@ -51,7 +52,11 @@ def measured_images(
     film, band = PixelSamples(camera.width, camera.height), band_of(importance, coarse)
     yield _image(coarse, film, band, begun=False)
     if len(band.pixels):
-        sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
+        part, left = run.between(0.5, 1.0), budget - coarse.samples
+        if target is not None and is_out_of_reach(film, paths, band, left, part):
+            yield from ambient_images(placed, target=target, most=most, surfaces=surfaces, clamp=clamp, run=part)
+            return
+        sample_band(film, paths, band, left, part)
     yield _image(coarse, film, band)
 
 

@@ -30,7 +30,7 @@ MARGIN = 2.0
 """On the deviation that a few passes tell: rare bright paths are in few of them, and narrow lines move unevenly."""
 UNMET = 0.05
 """Share of the lit scan lines that may miss the goal: those about a bright corner would keep all others waiting. At the
-sample's full size 0.01 takes ten times the paths, for rows whose median is then known seventy times better than asked."""
+sample's full size 0.01 takes ten times the paths, and the median row is then known seventy times better than asked."""
 LEAST_NEED = 0.02
 """Of the camera paths of a scan line that needs most: what every line gets beside it."""
 LOOK_SIGMA = 2.0

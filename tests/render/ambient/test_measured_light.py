@@ -206,6 +206,14 @@ def test_no_more_samples_are_spent_than_are_allowed():
     assert image.samples <= 2.0 and image.error > 1.0
 
 
+def test_a_goal_that_no_samples_reach_is_given_up_for_that_of_the_image():
+    scene, world = box_on_a_wall()
+    placed, weight = PlacedScene(world, scene), band_weights(scene.camera.height, scene.camera.width, 1e4)
+    *_, given_up = measured_images(placed, Importance((), weight), most=8, target=0.05)
+    *_, image = ambient_images(placed, target=0.05, most=8)
+    assert given_up.coarse_error is None and np.array_equal(given_up.radiance, image.radiance)
+
+
 def test_what_the_coarse_image_knows_well_enough_is_not_sampled():
     scene, world = box_on_a_wall()
     placed, shape = PlacedScene(world, scene), (scene.camera.height, scene.camera.width)
