@@ -28,7 +28,7 @@ DATA: dict[str, Any] = {
     "base": "plane",
     "image_scale": 0.12,
     "repeats": 4,
-    "set": {"render.laser_error": 0.02, "render.ambient_samples": 1},
+    "set": {"render.laser_error": 0.02, "render.ambient_samples": 1, "render.goal": None},
     "sweeps": [{"name": "budget", "sampling": "effects"}],
 }
 
