@@ -9,9 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from render.base.arrays import Float, Float32
+from render.base.arrays import Float32
 
 
 @dataclass(frozen=True)
@@ -36,10 +34,3 @@ class Importance:
 
 CELL = 4
 """Pixels; about as many as peaks are looked for with."""
-
-
-def line_errors(weight: Float32, variance: Float32, axis: Literal["rows", "columns"] = "rows") -> Float:
-    """(n,) standard deviation of each scan line's measurement over the allowed one; from (h, w) weight, variance."""
-    along = 1 if axis == "rows" else 0
-    moments = np.sum(weight.astype(np.float64) ** 2 * variance, axis=along)
-    return np.asarray(np.sqrt(moments))

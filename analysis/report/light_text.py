@@ -94,7 +94,7 @@ def _all(plan: Plan) -> Iterator[tuple[bool, str]]:
     """Whether it is computed, and the sentence, of every step and every setting that bounds it."""
     if plan.goal is not None:
         known = f"its noise moves the line by less than {plan.goal:g} of its sigma"
-        yield True, f"goal: reflected light ends where {known}, or where its image is known to the error asked of that"
+        yield True, f"goal: reflected light ends where {known}, or where its image reaches the reflection error"
     for step in plan.steps:
         if step.reason == "absent" and step.group == "indirect":
             continue  # nothing in the scene makes such light, or none that the pilot met
