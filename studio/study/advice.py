@@ -78,7 +78,7 @@ class Tried:
 
     part: Part
     found: Change
-    taken: bool
+    taken: bool = False
 
 
 @dataclass(frozen=True)

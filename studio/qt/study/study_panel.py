@@ -18,8 +18,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QMenu,
-    QProgressBar,
-    QPushButton,
     QScrollArea,
     QSizePolicy,
     QSpinBox,
@@ -31,6 +29,7 @@ from render.base.threads import thread_count
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
+from studio.qt.core.widgets import flush, text_button, thin_bar
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
 from studio.runtime.jobs import Job, State
@@ -53,8 +52,7 @@ class StudyPanel(QWidget):
         self.work.attach(runner)
         self.name = QLineEdit(maxLength=100)
         self.name.setAccessibleName("Name of the study")
-        self.files = QPushButton("File")
-        self.files.setToolTip("Ready-made studies, files, and results of earlier runs")
+        self.files = text_button("File", "Ready-made studies, files, and results of earlier runs")
         menu = QMenu(self.files)
         menu.aboutToShow.connect(partial(self._fill_files, menu))
         self.files.setMenu(menu)
@@ -76,22 +74,17 @@ class StudyPanel(QWidget):
         self.repeats.setKeyboardTracking(False)
         self.scale.setKeyboardTracking(False)
         self.told = QLabel(wordWrap=True)
-        self.time = QPushButton("Time it")
-        self.time.setToolTip("Measure one cell of each sweep, to tell how long the study takes")
+        self.time = text_button("Time it", "Measure one cell of each sweep, to tell how long the study takes")
         self.problem = QLabel(wordWrap=True)
         self.problem.setObjectName("error")
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.folder = QLabel()
         self.folder.setObjectName("muted")
         self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.choose = QPushButton("Folder…")
-        self.choose.setToolTip("Where the results go; a study that is there goes on")
-        self.run = QPushButton("Run…")
-        self.run.setObjectName("primary")
-        self.stop = QPushButton("Stop")
-        self.stop.setToolTip("What is measured stays")
-        self.bar = QProgressBar(maximum=1000, textVisible=False)
-        self.bar.setMaximumHeight(10)
+        self.choose = text_button("Folder…", "Where the results go; a study that is there goes on")
+        self.run = text_button("Run…", name="primary")
+        self.stop = text_button("Stop", "What is measured stays")
+        self.bar = thin_bar()
         self.stage = QLabel()
         self.stage.setObjectName("muted")
         self._lay_out()
@@ -213,8 +206,8 @@ class StudyPanel(QWidget):
         self.stop.clicked.connect(work.stop)
         work.draft_changed.connect(self.refresh)
         work.estimated.connect(self._tell_estimate)
-        work.state_changed.connect(self._show_state)
-        work.found_changed.connect(self._show_state)
+        for changed in (work.state_changed, work.found_changed):
+            changed.connect(self._show_state)
         work.unseen.progress.connect(self._tell_timing)
         self.runner.progress.connect(self._tell_progress)
         self.session.document_replaced.connect(self.refresh)
@@ -317,9 +310,7 @@ class StudyPanel(QWidget):
         foot.addWidget(self.bar)
         foot.addWidget(self.stage)
         foot.addLayout(buttons)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
+        layout = flush(QVBoxLayout(self))
         layout.addWidget(area, 1)
         layout.addLayout(foot)
 

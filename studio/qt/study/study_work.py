@@ -45,6 +45,7 @@ class Ended:
 class StudyWork(QObject):
     """Never asks a person anything: what cannot be done is told in `problem`."""
 
+    _grew = Signal(object, object)
     draft_changed = Signal()
     estimated = Signal()
     """`estimate`, or `problem` in its place, or `failure` is another one."""
@@ -53,7 +54,6 @@ class StudyWork(QObject):
     """It runs, or no longer; the folder is another one."""
     asked_for = Signal()
     """A field joined the draft."""
-    _grew = Signal(object, object)
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)

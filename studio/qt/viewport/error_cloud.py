@@ -52,12 +52,12 @@ class ErrorCloud(QObject):
             view.renderer.AddActor(actor)
         self.bar = ColourBar(view)
         view.hovered.connect(self._hover)
-        session.renders_changed.connect(self.refresh)
-        session.measured.connect(self.refresh)
-        session.project_changed.connect(self._show_or_hide)
         session.hover_changed.connect(self._mark)
+        session.project_changed.connect(self._show_or_hide)
         session.step_changed.connect(self._follow_step)
         session.document_replaced.connect(self.clear)
+        for changed in (session.renders_changed, session.measured):
+            changed.connect(self.refresh)
         self.refresh()
 
     @property
