@@ -33,12 +33,13 @@ from studio.qt.core.widgets import flush, text_button, thin_bar
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
 from studio.runtime.jobs import Job, State
-from studio.study.draft import new_sweep
+from studio.study.draft import new_sweep, varies_nothing
 from studio.study.estimate import Estimate
 from studio.study.study import Study, ready_made
 
 NARROWEST = 300
 """px; every row has room for its values then."""
+EMPTY = "What it takes is told here as soon as every sweep varies a field."
 FILES = "Studies (*.json);;All files (*)"
 
 
@@ -213,13 +214,15 @@ class StudyPanel(QWidget):
         self.session.document_replaced.connect(self.refresh)
 
     def _tell_estimate(self) -> None:
-        work = self.work
+        work, empty = self.work, varies_nothing(self.work.draft)
         self.problem.setText(work.failure or work.problem)
         self.problem.setVisible(bool(self.problem.text()))
         if work.estimate is not None:
             self.told.setText(estimate_text(work.estimate, self._processors()))
         else:
-            self.told.setText("" if work.problem else "Working out what it takes…")
+            self.told.setText("" if work.problem else EMPTY if empty else "Working out what it takes…")
+        self.told.setObjectName("muted" if empty else "")
+        self.told.style().polish(self.told)
         self.told.setVisible(bool(self.told.text()))
         self.time.setVisible(work.estimate is not None and work.estimate.seconds is None and not work.running)
         self._show_state()
