@@ -43,9 +43,9 @@ DARK_AND_LIGHT = {
     "muted": ("#94a0ab", "#5d6974"),
     "line": ("#38414a", "#d3d9de"),
     "edge": ("#7c8894", "#6f7982"),
-    "accent": ("#2f9fc0", "#0b6e8a"),
+    "accent": ("#38a8ca", "#0b6e8a"),
     "on_accent": ("#06161c", "#ffffff"),
-    "warning": ("#e8b04a", "#9a6500"),
+    "warning": ("#e8b04a", "#966200"),
     "error": ("#f0736a", "#b3261e"),
     "good": ("#5fbf8f", "#1d7a4c"),
 }

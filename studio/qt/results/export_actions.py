@@ -101,7 +101,7 @@ class ExportActions(QObject):
         writer = writers[KINDS[key][2]]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
-            progress(path.name, 0.3)
+            progress(path.name, 0.0)  # how far it is, nobody knows
             return export.export_unless(cancelled, writer, path, what)
 
         notes = scale_notes(render.scanner_scale)
