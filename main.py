@@ -228,6 +228,7 @@ def inspect(project: Path | None, **options: Any) -> None:
 @click.argument("template", required=False)
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 @click.option("--force", is_flag=True, help="Overwrite files that are there.")
+@click.option("--sensor", metavar="NAME", help='With a preset\'s sensor, by a part of its name: "webcam", "phone", ...')
 @common
 def new(template: str | None, folder: Path | None, **options: Any) -> None:
     """Start a project from a template; without a template, list them."""

@@ -38,6 +38,7 @@ from render.material.material import (
     Texture,
 )
 from render.scene.shape import MeshFile
+from render.sensor.sensor import Processing
 
 MOST_STEPS = 24
 MEASURE_COLUMNS = ("n", "bias", "sigma", "RMSE", "robust sigma", "P95", "outliers", "lag 1", "within ±2 sigma")
@@ -157,8 +158,20 @@ def scene_tables(report: ReportInput) -> Tables:
             if sensor.band_pass is None
             else f"{sensor.band_pass.centre_nm:g} nm, {sensor.band_pass.width_nm:g} nm wide",
             "Defocus": f"by {sensor.defocus_by(lens.model)}",
+            **({} if sensor.processing is None else {"Processing": _processing(sensor.processing)}),
         }
     return tables | report.settings
+
+
+def _processing(how: Processing) -> str:
+    """What a camera does to its raw image, in words."""
+    done = [f"{how.tone} tone" if how.tone != "gamma" else f"gamma {how.gamma:g}"]
+    if how.denoise > 0.0:
+        done.append(f"denoised over {how.denoise:g} px")
+    if how.sharpening > 0.0:
+        done.append(f"sharpened by {how.sharpening:g} over {how.sharpening_radius:g} px")
+    done.append("8 bit" if how.jpeg_quality is None else f"JPEG {how.jpeg_quality}, {how.chroma}")
+    return ", ".join(done)
 
 
 def _material(material: Material) -> str:

@@ -193,7 +193,9 @@ def _encode_exr(layers: Layers) -> memoryview:
 def _encode_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
     import cv2
 
-    done, encoded = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])  # fast; noise hardly shrinks further
+    ordered = pixels if pixels.ndim == 2 else pixels[..., ::-1]
+    # fast; noise hardly shrinks further
+    done, encoded = cv2.imencode(".png", ordered, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     if not done:
         raise InputError("the image cannot be encoded as PNG", where="image", found=f"{pixels.shape} {pixels.dtype}")
     return encoded.tobytes()

@@ -203,7 +203,9 @@ def _plain(values: Any) -> Any:
 
 def _image_record(image: Image) -> Record:
     return {
-        "stored": "PNG, 16 bits a pixel where the sensor has more than 8; numbers not shifted; Bayer: raw mosaic",
+        "stored": "PNG, RGB: a photograph, its colours, tone and compression as the camera makes them"
+        if image.processed
+        else "PNG, 16 bits a pixel where the sensor has more than 8; numbers not shifted; Bayer: raw mosaic",
         "bits": image.bits,
         "gain": image.gain,
         "black_level": image.black_level,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -131,12 +132,51 @@ def _variance(kernel: Float) -> float:
     return float(kernel.sum(axis=0) @ x**2)
 
 
-def point_spread(image: Float32, sigma: float, halo: float, halo_sigma: float) -> Float32:
-    """(h, w) through (1 - halo) Gaussian(sigma) + halo Gaussian(halo_sigma), px."""
-    sharp = _gaussian(image, sigma)
-    if halo <= 0.0:
+class Spread(NamedTuple):
+    """A point spread of three Gaussians, sigmas in px; the core has what halo and scatter leave of the light."""
+
+    sigma: float
+    halo: float = 0.0
+    halo_sigma: float = 0.0
+    scatter: float = 0.0
+    scatter_sigma: float = 0.0
+
+
+def point_spread(image: Float32, spread: Spread) -> Float32:
+    """(h, w) through (1 - halo - scatter) Gaussian(sigma) + halo Gaussian(halo_sigma) + scatter Gaussian(...).
+
+    A core and two wider scales are the form of measured stray light (Zong, Brown, Johnson, Lykke and Ohno, Applied
+    Optics 45, 1111, 2006).
+    """
+    sharp = _gaussian(image, spread.sigma)
+    if spread.halo <= 0.0 and spread.scatter <= 0.0:
         return sharp
-    return np.asarray(np.float32(1.0 - halo) * sharp + np.float32(halo) * _gaussian(image, halo_sigma))
+    out = np.float32(1.0 - spread.halo - spread.scatter) * sharp
+    if spread.halo > 0.0:
+        out = out + np.float32(spread.halo) * _gaussian(image, spread.halo_sigma)
+    if spread.scatter > 0.0:
+        out = out + np.float32(spread.scatter) * _wide_gaussian(image, spread.scatter_sigma)
+    return np.asarray(out, np.float32)
+
+
+def _wide_gaussian(image: Float32, sigma: float) -> Float32:
+    """As `_gaussian`, by Fourier transforms, for kernels of hundreds of pixels."""
+    from scipy.signal import oaconvolve
+
+    taps = _taps(sigma)[1]
+    # beyond the image there is no light, so that a kernel may end where it has left it
+    kept = slice(max(0, len(taps) // 2 - max(image.shape)), len(taps) // 2 + max(image.shape) + 1)
+    part = oaconvolve(image.astype(np.float64), taps[kept][:, None], mode="same", axes=0)
+    return np.asarray(np.maximum(oaconvolve(part, taps[kept][None, :], mode="same", axes=1), 0.0), np.float32)
+
+
+def _taps(sigma: float) -> tuple[int, Float]:
+    """Radius, and the discrete Gaussian of unit sum to either side."""
+    from scipy.special import ive
+
+    radius = math.ceil(5.0 * sigma + 3.0)
+    taps = ive(np.abs(np.arange(-radius, radius + 1)), sigma * sigma)
+    return radius, (taps / taps.sum()).astype(np.float64)
 
 
 def _gaussian(image: Float32, sigma: float) -> Float32:
@@ -144,11 +184,8 @@ def _gaussian(image: Float32, sigma: float) -> Float32:
     if sigma <= 0.0:
         return image
     from scipy.ndimage import convolve1d
-    from scipy.special import ive
 
-    radius = math.ceil(5.0 * sigma + 3.0)
-    taps = ive(np.abs(np.arange(-radius, radius + 1)), sigma * sigma)
-    taps = (taps / taps.sum()).astype(np.float64)
+    radius, taps = _taps(sigma)
     rows, columns = np.nonzero((image > 0.0).any(axis=1))[0], np.nonzero((image > 0.0).any(axis=0))[0]
     if len(rows) == 0:
         return image

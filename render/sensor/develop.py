@@ -6,6 +6,7 @@
     charge      e     ~ Poisson(mu + dark current x exposure)
     read-out    e    += the pixel's own offset (DSNU) + Gaussian read noise;  e <= full well
     numbers     DN    = round(K e + black level), clipped to 0 .. 2^bits - 1
+    processing  what a webcam or a phone makes of them (`processing.py`); off unless the sensor has it
 
 Shot noise, dark noise and read noise are drawn anew for every frame (seed and step); PRNU and DSNU belong to the
 sensor, so they have a seed of their own and are the same in every frame. Full well clips last, so a saturated pixel
@@ -18,6 +19,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numba
 import numpy as np
@@ -31,9 +33,10 @@ from render.frame import Frame
 from render.sampling.poisson import poisson
 from render.sampling.random import normal, wrapped
 from render.scene.scene import Scene
-from render.sensor.blur import defocus, disc_diameter, point_spread
+from render.sensor.blur import Spread, defocus, disc_diameter, point_spread
+from render.sensor.processing import photograph
 from render.sensor.response import band_response, joules_per_radiance, laser_response, relative_illumination
-from render.sensor.sensor import Sensor
+from render.sensor.sensor import Processing, Sensor
 from render.sensor.speckle import Speckle, scintillate, speckle
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
@@ -46,10 +49,14 @@ _READ, _SHOT = 0, 1
 
 @dataclass(frozen=True)
 class Image:
-    """The camera's output: raw digital numbers (Bayer: the mosaic), and the constants that turn them into electrons."""
+    """The camera's output: raw digital numbers (Bayer: the mosaic), and the constants that turn them into electrons.
+
+    Of a sensor that processes its image a photograph, (h, w, 3) RGB where it has colours. What the tone curve and the
+    rest make of a number is not held: `gain` is that of white light before them.
+    """
 
     pixels: Pixels
-    """(h, w) DN, uint8 for 8 bits and uint16 for more, not shifted."""
+    """(h, w) DN, uint8 for 8 bits and uint16 for more, not shifted; or a photograph."""
     bits: int
     gain: float
     """EMVA's K, DN/e-: electrons = (DN - black_level) / gain."""
@@ -65,6 +72,13 @@ class Image:
     """Exposure time, s."""
     shorter: tuple[Image, ...] = ()
     """Further exposures of the same scene, to be fused with this one."""
+    processed: bool = False
+    """A photograph: its numbers are no electrons times a gain."""
+
+    @property
+    def grey(self) -> NDArray[Any]:
+        """(h, w) DN; of a photograph in colour the mean of its channels."""
+        return self.pixels if self.pixels.ndim == 2 else self.pixels.mean(axis=2, dtype=np.float32)
 
 
 def develop(
@@ -77,7 +91,7 @@ def develop(
     laser_power: Sequence[float] | None = None,
     noise: bool = True,
 ) -> Image:
-    """The (h, w) image that the sensor takes of a frame; the same for any number of threads.
+    """The (h, w) image, or photograph (h, w, 3), that the sensor takes of a frame; the same for any number of threads.
 
     laser_power: W for each laser in place of the scene's. noise off: the mean, without PRNU, DSNU and speckle, but
     saturated and quantised. Raises InputError: the frame is not of this scene, a power is out of range, or a laser that
@@ -114,9 +128,17 @@ def develop(
     map_chunks(rows, height, ROWS, threads)
     saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
     pattern = sensor.pattern if sensor.colour == "bayer" else None
-    return Image(
+    image = Image(
         pixels, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time
     )
+    return image if sensor.processing is None else _processed(image, sensor.processing)
+
+
+def _processed(raw: Image, how: Processing) -> Image:
+    """The photograph that the camera makes of a raw image."""
+    numbers = photograph(raw.pixels, raw.black_level, raw.saturation, raw.pattern, how)
+    gain = 255.0 * raw.gain / (raw.saturation - raw.black_level)
+    return Image(numbers, 8, gain, 0.0, 255.0, raw.read_noise, None, raw.exposure_time, processed=True)
 
 
 def expected_electrons(
@@ -210,16 +232,18 @@ class _Optics:
 
     def __call__(self, image: Float32) -> Float32:
         """(h, w) or (h, w, 3) radiance, as the lens throws it on the sensor."""
-        if image.ndim == 3 and not (self.diameter is not None or self.sensor.blur_sigma or self.sensor.halo):
+        sensor, pitch = self.sensor, self.camera.pixel_pitch
+        spreads = sensor.blur_sigma > 0.0 or sensor.halo > 0.0 or sensor.scatter > 0.0
+        if image.ndim == 3 and not (self.diameter is not None or spreads):
             return np.ascontiguousarray(image, dtype=np.float32)
         if image.ndim == 3:
             return np.stack([self(image[..., channel]) for channel in range(3)], axis=2)
         image = np.ascontiguousarray(image, dtype=np.float32)
         if self.diameter is not None:
             image = defocus(image, self.diameter, self.threads)
-        sigma, wide = self.sensor.blur_sigma / self.camera.pixel_pitch, self.sensor.halo_sigma / self.camera.pixel_pitch
-        if sigma > 0.0 or self.sensor.halo > 0.0:
-            image = point_spread(image, sigma, self.sensor.halo, wide)
+        if spreads:
+            halo, scatter = sensor.halo_sigma / pitch, sensor.scatter_sigma / pitch
+            image = point_spread(image, Spread(sensor.blur_sigma / pitch, sensor.halo, halo, sensor.scatter, scatter))
         return image
 
 

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from render.base.model import Model, UnitInterval, quantity
 
 Wavelength = Annotated[float, Field(ge=1.0, le=1e5)]
+ColourGain = Annotated[float, Field(ge=0.1, le=10.0)]
 PATTERNS = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 
 
@@ -33,6 +34,39 @@ class BandPass(Model):
     centre_nm: float = quantity(450.0, unit="nm", label="Centre", ge=200, le=2000)
     width_nm: float = quantity(20.0, unit="nm", label="Width", ge=1e-3, le=2000)
     transmission: UnitInterval = quantity(0.9, label="Transmission")
+
+
+class Processing(Model):
+    """What a webcam or a phone does to its raw image. Every stage is off as it stands, but colour and 8 bits."""
+
+    white_balance: tuple[ColourGain, ColourGain, ColourGain] = quantity(
+        (1.0, 1.0, 1.0), label="White balance", help="Gains of red, green and blue; what exceeds full scale is cut off."
+    )
+    demosaic: Literal["bilinear", "edge_aware"] = quantity(
+        "bilinear", label="Demosaicing", help="How a Bayer sensor's missing colours are filled."
+    )
+    denoise: float = quantity(
+        0.0, unit="px", label="Denoising", help="Sigma of a bilateral filter; 0: none.", ge=0, le=10
+    )
+    denoise_range: float = quantity(
+        0.02,
+        label="Denoising range",
+        help="Sigma in light, as a share of full scale, that counts as alike.",
+        gt=0,
+        le=1,
+    )
+    tone: Literal["linear", "gamma", "srgb"] = quantity("linear", label="Tone curve")
+    gamma: float = quantity(2.2, label="Gamma", help="Of the tone curve gamma.", ge=0.2, le=5)
+    sharpening: float = quantity(
+        0.0, label="Sharpening", help="Share of what a blur takes away that is added; 0: none.", ge=0, le=10
+    )
+    sharpening_radius: float = quantity(1.0, unit="px", label="Sharpening radius", help="Sigma.", ge=0.3, le=20)
+    jpeg_quality: int | None = quantity(
+        None, label="JPEG quality", help="Empty: not compressed. The image is stored as it is decoded.", ge=1, le=100
+    )
+    chroma: Literal["4:2:0", "4:2:2", "4:4:4"] = quantity(
+        "4:2:0", label="JPEG colour", help="At half the resolution in both directions, along rows, or in none."
+    )
 
 
 CMOS = SpectralCurve(
@@ -80,6 +114,15 @@ class Sensor(Model):
         0.0, label="Halo", help="Share of the light in a wide halo. Takes about 0.3 s a light."
     )
     halo_sigma: float = quantity(30e-6, unit="m", label="Halo width", help="Sigma on the sensor.", ge=1e-9, le=1e-2)
+    scatter: UnitInterval = quantity(
+        0.0,
+        label="Scatter",
+        help="Share of the light that dust, smears and cheap coatings spread far beyond the halo. Takes about a second "
+        "a light.",
+    )
+    scatter_sigma: float = quantity(
+        300e-6, unit="m", label="Scatter width", help="Sigma on the sensor.", ge=1e-9, le=1e-1
+    )
     defocus: bool = quantity(
         False,
         label="Defocus",
@@ -87,6 +130,20 @@ class Sensor(Model):
         "lens is rendered with its own and ignores this. Edges of depth are not mixed. "
         "Takes about 0.1 s for a line, seconds where light fills an image far out of focus.",
     )
+
+    processing: Processing | None = quantity(
+        None,
+        label="Image processing",
+        help="Of a webcam or a phone: the image is a photograph of 8 bits, in colour of a Bayer sensor, and its noise "
+        "is estimated as a photograph's is. Without it the image is raw.",
+    )
+
+    @model_validator(mode="after")
+    def _spread_is_a_share(self) -> Sensor:
+        if self.halo + self.scatter > 1.0:
+            found = f"halo {self.halo:g} and scatter {self.scatter:g} are more than all of the light"
+            raise ValueError(f"{found}; allowed: 1 together")
+        return self
 
     @model_validator(mode="after")
     def _curves_match_colour(self) -> Sensor:

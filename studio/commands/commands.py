@@ -49,8 +49,13 @@ def load_project(path: Path | None) -> tuple[Project, Path]:
     return Project.load(file), file.parent
 
 
-def start_project(template: str | None, folder: Path | None, *, force: bool, quiet: bool, as_json: bool) -> None:
-    """`new`: copy a template, or list them."""
+def start_project(
+    template: str | None, folder: Path | None, *, sensor: str | None, force: bool, quiet: bool, as_json: bool
+) -> None:
+    """`new`: copy a template, with another sensor if one is named, or list them."""
+    from studio.editing.presets import SENSOR, preset_named, with_preset
+
+    chosen = None if sensor is None else preset_named("sensors", sensor, "--sensor")
     if template is None:
         if as_json:
             print_json({"ok": True, "templates": DESCRIPTIONS})
@@ -58,6 +63,8 @@ def start_project(template: str | None, folder: Path | None, *, force: bool, qui
             print_table("Templates", list(DESCRIPTIONS.items()))
         return
     made = new_project(template, folder if folder is not None else Path(template), force=force)
+    if chosen is not None:
+        with_preset(Project.load(made.project), SENSOR, chosen).save(made.project)
     if as_json:
         print_json({"ok": True, "project": made.project, "files": list(made.files)})
     elif not quiet:

@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
+from render.base.errors import InputError
 from render.camera.camera import Camera, Lens
 from render.laser.laser import LineLaser
 from render.scene.scene import SceneObject
@@ -40,6 +41,21 @@ def presets(kind: PresetKind) -> tuple[Preset, ...]:
         Preset(entry["name"], entry["source"], {key: entry[key] for key in entry.keys() - {"name", "source"}})
         for entry in entries
     )
+
+
+def preset_named(kind: PresetKind, name: str, where: str) -> Preset:
+    """The preset of that name, or the only one that has it as a part; case does not matter. InputError: none, several.
+
+    where: what asked for it.
+    """
+    wanted = name.strip().lower()
+    found = [preset for preset in presets(kind) if preset.name.lower() == wanted]
+    found = found or [preset for preset in presets(kind) if wanted and wanted in preset.name.lower()]
+    if len(found) != 1:
+        allowed = ", ".join(preset.name for preset in found or presets(kind))
+        what = f"several {kind} have that in their name" if found else f"there is no such preset of {kind}"
+        raise InputError(what, where=where, found=name, allowed=allowed)
+    return found[0]
 
 
 def presets_for(project: Project, path: FieldPath) -> tuple[Preset, ...]:

@@ -45,7 +45,10 @@ class DevelopedImage(Image):
 
     @property
     def electrons(self) -> NDArray[Any]:
-        """(h, w) e-: (DN - black level) / gain."""
+        """(h, w) e-: (DN - black level) / gain. InputError: a photograph, which the camera has processed."""
+        if self.processed:
+            cure = "develop it with sensor.processing None"
+            raise InputError("the numbers of a photograph are no electrons", where="electrons", cure=cure)
         return (self.pixels - self.black_level) / self.gain
 
     def show(self, line: Line | None = None) -> Figure:
@@ -61,7 +64,7 @@ class DevelopedImage(Image):
         return np.array(self.pixels, dtype=dtype, copy=copy)
 
     def __repr__(self) -> str:
-        height, width = self.pixels.shape
+        height, width = self.pixels.shape[:2]
         most = int(self.pixels.max())
         return f"<DevelopedImage {width} x {height} px, {self.bits} bit, laser {self.laser}, brightest {most} DN>"
 

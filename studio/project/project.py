@@ -57,6 +57,16 @@ class Project(Model):
             raise ValueError(f"calibration has {given} covariances; allowed: none, or {lasers}, one for each laser")
         return self
 
+    @model_validator(mode="after")
+    def _only_raw_images_are_combined(self) -> Self:
+        if self.sensor.processing is not None and (self.extraction.exposures > 1 or self.extraction.spacetime):
+            asked = "along time" if self.extraction.spacetime else f"{self.extraction.exposures} exposures"
+            raise ValueError(
+                f"extraction asks for {asked}, which needs raw images, and sensor.processing makes photographs; "
+                "allowed: one of the two"
+            )
+        return self
+
     @property
     def folder(self) -> Path:
         """What the paths of meshes and textures start from: the file's folder, of a project made in Python ".".

@@ -90,7 +90,7 @@ def _array(quantity: Quantity, frame: Frame, images: list[Image]) -> Float32 | N
 
 def electrons(image: Image) -> Float32:
     """(h, w) e- of a developed image."""
-    return (image.pixels.astype(np.float32) - np.float32(image.black_level)) / np.float32(image.gain)
+    return (image.grey.astype(np.float32) - np.float32(image.black_level)) / np.float32(image.gain)
 
 
 def sum_of(arrays: list[NDArray[Any]]) -> Float32 | None:

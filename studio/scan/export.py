@@ -109,7 +109,8 @@ def export_image(path: Path, what: Exported) -> list[Path]:
     for i, image in enumerate(what.images):
         target = path if len(what.images) == 1 else path.with_stem(f"{path.stem}_{i + 1}")
         _spare_inputs(what, [target])
-        done, encoded = cv2.imencode(".png", image.pixels)
+        numbers = image.pixels if image.pixels.ndim == 2 else image.pixels[..., ::-1]
+        done, encoded = cv2.imencode(".png", numbers)
         if not done:
             raise InputError("the image cannot be encoded", where=str(target))
         with atomic_write(target) as temporary:

@@ -77,6 +77,8 @@ def picture(view: View, scene: Scene, frame: Frame, images: list[Image], bright:
         return None
     if view.kind == "image":
         image = images[view.laser]
+        if image.pixels.ndim == 3:  # as the camera hands it out
+            return colour(array.astype(np.float32), image.saturation, False)
         return grey(array, image.black_level, image.saturation, bright)
     if view.kind == "ambient":
         return colour(array, white_level(array[..., 1]), bright)
@@ -106,9 +108,12 @@ def at_pixel(scene: Scene, frame: Frame, images: list[Image], row: int, column: 
         return []
     rows = [("u, v", f"{column}, {row}")]
     for i, image in enumerate(images):
+        name = f"DN {scene.lasers[i].name}" if len(images) > 1 else "DN"
+        if image.processed:
+            rows.append((name, ", ".join(str(number) for number in np.atleast_1d(image.pixels[row, column]))))
+            continue
         number = int(image.pixels[row, column])
         electrons = (number - image.black_level) / image.gain
-        name = f"DN {scene.lasers[i].name}" if len(images) > 1 else "DN"
         full = ", saturated" if number >= image.saturation else f" ({electrons:,.0f} e-)"
         rows.append((name, f"{number}{full}"))
     for i, laser in enumerate(scene.lasers):

@@ -54,14 +54,16 @@ def extract_line(
 
     InputError: as `extract` and `fuse`.
     """
-    settings, noise = project.extraction, noise_model(image, project, laser)
+    settings = project.extraction
+    # what a camera has processed is a photograph like a stranger's, which tells its noise itself
+    noise = None if image.processed else noise_model(image, project, laser)
     if method == "likelihood" != settings.method:
         settings = settings.model_copy(update={"smoothing": 0.0})  # it needs independent pixels
     if image.pattern is not None and settings.pattern is None:
         settings = settings.model_copy(update={"pattern": image.pattern})
     pixels: NDArray[Any] = image.pixels
     variance = None
-    if image.shorter:
+    if image.shorter and noise is not None:
         series = (image, *image.shorter)
         fused = fuse([one.pixels for one in series], [one.exposure_time for one in series], noise)
         pixels, variance, noise = fused.electrons, fused.variance, fused.noise

@@ -53,7 +53,7 @@ def frame_result(
     for i, curve in enumerate(frame.curves):
         found = [measurements[method][i] for method in order if method in measurements]
         extractions = tuple(Extraction(one.line, one.points, one.errors) for one in found)
-        lasers.append(LaserResult(curve, extractions, images[i].pixels if i < len(images) else None))
+        lasers.append(LaserResult(curve, extractions, images[i].grey if i < len(images) else None))
     return FrameResult(
         frame.step, tuple(lasers), plan=frame.plan, quality=frame.quality, seconds=frame.seconds, counts=frame.counts
     )

@@ -49,7 +49,7 @@ def measure_frame(  # noqa: PLR0913
     lasers = []
     for i, image in enumerate(images):
         extractions = tuple(Extraction(found[i].line, found[i].points, found[i].errors) for found in by_method)
-        lasers.append(LaserResult(frame.curves[i], extractions, image.pixels if keep else None))
+        lasers.append(LaserResult(frame.curves[i], extractions, image.grey if keep else None))
     spent = {name: seconds - before.get(name, 0.0) for name, seconds in clock.seconds.items()}
     seconds = {**frame.seconds, **{name: value for name, value in spent.items() if value > 0.0}}
     return FrameResult(

@@ -41,16 +41,18 @@ CAUTIONS = {
 
 
 def scan_line(image: Image, axis: str, index: int) -> NDArray[Any]:
-    """(n,) DN of a row or column."""
-    return image.pixels[index] if axis == "rows" else image.pixels[:, index]
+    """(n,) DN of a row or column; of a photograph in colour the mean of its channels."""
+    return image.grey[index] if axis == "rows" else image.grey[:, index]
 
 
 def fitted_profile(line: Line, index: int, image: Image, x: Float, integrated: bool) -> list[Float]:
     """DN at positions x (n,) px of every peak that was fitted on a scan line; centre of mass has no profile.
 
+    None of a photograph either, whose numbers are no electrons times a gain.
+
     integrated: over a pixel centred at x, as the fit had it, so that the curve meets the pixels at their centres.
     """
-    if line.method == "centre_of_mass":
+    if line.method == "centre_of_mass" or image.processed:
         return []
     found = []
     for rank in np.flatnonzero(line.valid[index]):

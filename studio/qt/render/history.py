@@ -64,7 +64,7 @@ def thumbnail(render: Render) -> Picture | None:
     if not render.images:
         return None
     image = render.images[0]
-    pixels = image.pixels
+    pixels = image.grey
     stride = max(1, max(pixels.shape) // SAMPLED)
     pixels = pixels[::stride, ::stride]
     block = max(1, min(pixels.shape[1] // THUMBNAIL.width(), pixels.shape[0] // THUMBNAIL.height()))

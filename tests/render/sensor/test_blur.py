@@ -10,7 +10,7 @@ import pytest
 from render.base.errors import InputError
 from render.camera.camera import Camera
 from render.frame import Truth
-from render.sensor.blur import defocus, disc_diameter, disc_kernel, point_spread
+from render.sensor.blur import Spread, defocus, disc_diameter, disc_kernel, point_spread
 from render.sensor.develop import expected_electrons
 from tests.render.sensor.test_develop import HEIGHT, WIDTH, flat_frame, scene_of, sensor_of
 
@@ -31,13 +31,13 @@ def point(size=201):
 
 @pytest.mark.parametrize("sigma", [0.2, 0.5, 1.0, 3.0])
 def test_point_spread_keeps_light_and_has_the_lenss_variance(sigma):
-    out = point_spread(point(), sigma, 0.0, 5.0)
+    out = point_spread(point(), Spread(sigma))
     assert out.sum() == pytest.approx(1000.0, rel=1e-5)
     assert variance(out) == pytest.approx(sigma**2, rel=1e-3)
 
 
 def test_halo_takes_its_share_far_out():
-    out = point_spread(point(), 0.5, 0.1, 8.0)
+    out = point_spread(point(), Spread(0.5, 0.1, 8.0))
     assert variance(out) == pytest.approx(0.9 * 0.25 + 0.1 * 64.0, rel=1e-3)
     far = np.abs(np.arange(201) - 100) > 4
     assert 0.02 < out[:, far].sum() / 1000.0 < 0.1
