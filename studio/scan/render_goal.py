@@ -107,11 +107,14 @@ def _expected_image(project: Project, electrons: Float32) -> Image:
 
 
 def _sigma(line: Line, derivative: Float32, electrons: Float32, noise: NoiseModel, axis: int) -> Float:
-    """(n,) standard deviation of each scan line's position, px; infinite where there is none."""
-    told = np.where(line.valid, line.sigma_u, np.nan)
+    """(n,) standard deviation of each scan line's position, px; infinite where there is none.
+
+    At least what the noise of its own pixels makes of it: a line that is moved by more than it tells asks of no light
+    to be known better than the goal's share of that noise.
+    """
+    told = np.min(np.where(line.valid & np.isfinite(line.sigma_u), line.sigma_u, np.inf), axis=1)
     counted = np.sqrt(np.sum(derivative.astype(np.float64) ** 2 * (electrons + noise.floor), axis=axis))
-    least = np.min(np.where(np.isfinite(told), told, np.inf), axis=1)
-    sigma = np.where(np.isfinite(least), least, counted)
+    sigma = np.maximum(np.where(np.isfinite(told), told, 0.0), counted)
     return np.where(line.valid.any(axis=1) & (sigma > 0.0), sigma, np.inf)
 
 
