@@ -12,13 +12,14 @@ from studio.commands.commands import check_output, folder_name, never
 from studio.project.project import Project
 from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json
+from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
 from studio.scan.interrupt import stop_on_interrupt
 from studio.study.cells import Shard, check_size, next_cells
 from studio.study.labels import field_labels
 from studio.study.measuring import tasks
 from studio.study.page import sentences, write_page
-from studio.study.runner import Engine, run_study
+from studio.study.runner import run_study
 from studio.study.store import Store, described
 from studio.study.study import Study, ready_made
 from studio.study.tables import write_tables

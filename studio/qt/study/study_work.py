@@ -22,10 +22,10 @@ from studio.project.templates import DESCRIPTIONS, FOLDER
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Job, Progress, State
+from studio.runtime.workers import Engine
 from studio.study.draft import Data, finished, new_draft, path_text, suggested
 from studio.study.estimate import Costs, Estimate, costs, estimate
 from studio.study.folder_run import Found, in_window, opened, run_into
-from studio.study.runner import Engine
 from studio.study.study import Study, base_project
 
 LANE = "study"
