@@ -41,7 +41,7 @@ def run_file(
 ) -> None:
     """`study run`: measure what is missing, then write tables, charts and page."""
     study, root = Study.load(file)
-    part, bases = _shard(shard), study.bases(root)
+    part, bases = shard_of(shard), study.bases(root)
     folder = out if out is not None else Path("scan-output") / f"study-{folder_name(study.name)}"
     run_into(folder, study, bases, part, Engine(workers, scheduler), quiet=quiet, as_json=as_json)
 
@@ -120,8 +120,8 @@ def _write(folder: Path, study: Study, bases: dict[str, Project], store: Store, 
     print(f"{len(rows)} cells{left}\nwrote {page}\nwrote {written[0]}")
 
 
-def _shard(text: str) -> Shard:
-    """InputError: not like 3/40."""
+def shard_of(text: str) -> Shard:
+    """The part of the work that `--shard 3/40` means. InputError: not like that."""
     found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
     number, count = (int(found[1]), int(found[2])) if found else (0, 0)
     if not 1 <= number <= count:
