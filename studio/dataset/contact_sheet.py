@@ -21,20 +21,21 @@ SIDE = 200
 def write_contact_sheet(
     recipe: Recipe, root: Path, path: Path, *, scenes: int = SCENES, progress: Progress = lambda done, known: None
 ) -> Path:
-    """Write the PNG of the first `scenes` scenes; each is brightened by the root of its numbers, its line beside it.
+    """Write the PNG of the first `scenes` scenes; each is brightened by the root of its numbers, with the exact
+    line on the upper half.
 
     InputError: the recipe draws what is not allowed.
     """
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
     base = base_of(recipe, root)
     camera = base.scene.camera
     small = recipe.model_copy(update={"image_scale": min(recipe.image_scale, SIDE / max(camera.width, camera.height))})
     preview = Preview()
     rows = -(-scenes // COLUMNS)
-    figure = Figure(
-        figsize=(COLUMNS * 1.6, rows * 1.6 * camera.height / camera.width + 0.4 * rows), layout="constrained"
-    )
+    close = ConstrainedLayoutEngine(w_pad=0.01, h_pad=0.01, wspace=0.0, hspace=0.0)
+    figure = Figure(figsize=(COLUMNS * 1.6, rows * 1.6 * camera.height / camera.width + 0.4 * rows), layout=close)
     axes = np.atleast_1d(figure.subplots(rows, COLUMNS, squeeze=False)).ravel()
     for k in range(scenes):
         scene = drawn_scene(small, base, root, k, preview)
@@ -43,7 +44,8 @@ def write_contact_sheet(
         axes[k].imshow(np.sqrt(pixels / max(float(pixels.max()), 1.0)), cmap="gray", vmin=0.0, vmax=1.0)
         for curve in frame.curves:
             pair = (curve.position, curve.index) if curve.axis == "rows" else (curve.index, curve.position)
-            axes[k].plot(*pair, ".", markersize=0.6, color="#e69f00")
+            upper = slice(0, len(curve.index) // 2)  # the other half shows the line itself
+            axes[k].plot(pair[0][upper], pair[1][upper], ".", markersize=0.6, color="#e69f00")
         axes[k].set_title(f"{k}", fontsize=6, pad=1)
         progress(k + 1, scenes)
     for one in axes:
