@@ -267,6 +267,40 @@ def advise(project: Path | None, **options: Any) -> None:
     advise_project(project, **options)
 
 
+@cli.command()
+@click.argument("recipe", required=False, type=click.Path(path_type=Path))
+@click.option("--count", type=click.IntRange(1, 10_000_000), default=100, show_default=True, help="Scenes.")
+@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/dataset-<name>].")
+@click.option("--format", "formats", multiple=True, help="Labels for others' readers too; an unknown name lists all.")
+@click.option("--preview", is_flag=True, help="Only a contact sheet of the first 64 scenes, small.")
+@click.option(
+    "--from", "sources", multiple=True, type=click.Path(path_type=Path), help="Folder of another shard: take over."
+)
+@click.option("--shard", default="1/1", show_default=True, help="Only this part of the work: 3/40.")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://host:8786, in place of processes here.")
+@click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor].")
+@common
+def dataset(recipe: Path | None, preview: bool, out: Path | None, quiet: bool, as_json: bool, **options: Any) -> None:
+    """Labelled images of a recipe, or of a ready-made one by its name; without a recipe, list them.
+
+    The same command goes on after an interrupt or a kill, with more scenes where --count is raised.
+    """
+    _require_system()
+    from studio.commands.dataset import list_recipes, make_images, preview_recipe
+    from studio.runtime.workers import Engine
+
+    if recipe is None:
+        list_recipes(as_json=as_json)
+    elif preview:
+        preview_recipe(recipe, out=out, quiet=quiet, as_json=as_json)
+    else:
+        wanted = options["count"], options["shard"], options["sources"]
+        engine = Engine(options["workers"], options["scheduler"])
+        make_images(
+            recipe, wanted=wanted, out=out, formats=options["formats"], engine=engine, quiet=quiet, as_json=as_json
+        )
+
+
 @cli.group()
 def study() -> None:
     """Many runs with one question: speed against accuracy, where a method breaks; as a table and charts."""

@@ -23,10 +23,10 @@ from studio.project.templates import DESCRIPTIONS, FOLDER
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Job, Progress, State
+from studio.runtime.workers import Engine
 from studio.study.draft import Data, by_names, finished, new_draft, path_text, suggested, varies_nothing
 from studio.study.estimate import Costs, Estimate, costs, estimate
 from studio.study.folder_run import Found, in_window, opened, run_into
-from studio.study.runner import Engine
 from studio.study.study import Study, base_project
 
 LANE = "study"

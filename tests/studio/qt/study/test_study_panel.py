@@ -23,9 +23,9 @@ from studio.qt.scene.inspector import Inspector
 from studio.qt.study.charts_panel import ChartsPanel
 from studio.qt.study.study_panel import StudyPanel
 from studio.qt.study.study_work import StudyWork
+from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
 from studio.study.draft import VALUES
-from studio.study.runner import Engine
 from studio.study.store import FILE
 
 NOISE = ("sensor", "read_noise")
