@@ -9,7 +9,7 @@ import numpy as np
 from render.ambient.coarse_image import CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
 from render.ambient.line_samples import LINES_KNOWN, Band, band_of, is_out_of_reach, line_deviations, sample_band
-from render.ambient.path_state import CLAMPED, DROPPED
+from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
 from render.importance import Importance
@@ -79,7 +79,7 @@ def _image(coarse: CoarseImage, film: PixelSamples, band: Band, *, begun: bool =
         radiance,
         error,
         total / (radiance.shape[0] * radiance.shape[1]),
-        coarse.dropped + int(film.invalid_counts[DROPPED]),
+        coarse.dropped + int(film.invalid_counts[INVALID]),
         coarse.clamped + int(film.invalid_counts[CLAMPED]),
         (coarse.cut * coarse.samples + film.cut) / total,
         coarse.error,
