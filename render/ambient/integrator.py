@@ -100,6 +100,9 @@ def _passes(film: Film, paths: CameraPaths, target: float, most: int, run: Run) 
     if most == 1:
         yield film.add_samples(paths, np.broadcast_to([1, 0], (film.tiles, 2)), run)
         return
+    if most < 2 * PILOT:
+        # a third sample would be no half's
+        most = 2
     if film.errors:
         yield film.image(run.threads, run.cancelled)
     for level in range(1, min(PILOT, most // 2) + 1):

@@ -173,7 +173,7 @@ class Accumulator:
     def allocate(self, drawn: float) -> None:
         """Allocate the next wave's camera paths, where each pixel has had `drawn` times its `camera_paths` so far."""
         allocate_camera_paths(self.camera_radiance, self.guide.width, self.next_camera_paths, self.camera_paths, drawn)
-        if self.line is not None:
+        if self.line is not None and not self.line.out_of_reach:
             aim_camera_paths(self.camera_paths, self.line.aim, self.next_camera_paths)
         reserve_for_specular(self.camera_paths, self.specular, self.next_camera_paths)
 

@@ -76,6 +76,8 @@ class IndirectImage:
     """Radiance that the clamp took away, mean over the image."""
     line_error: float = math.inf
     """Deviation of the measured line over the allowed one; infinite: not known."""
+    out_of_reach: bool = False
+    """The line's goal would have taken far more paths than that of the image, or than are allowed."""
 
 
 @dataclass(frozen=True)
@@ -142,14 +144,21 @@ def indirect_images(
         return
     waves = Waves(BdptPass.of(*placed, reach, run.seed, kinds), camera, run)
     time_is_over = run.time_is_over(left)
-    so_far = run.restore(Accumulator.of_arrays) or waves.first_looks(placed, uniform_fan(low, high), kinds, aim)
+    so_far = run.restore(Accumulator.of_arrays)
+    if so_far is None:
+        so_far = waves.first_looks(placed, uniform_fan(low, high), kinds, aim, (target, most_paths))
     so_far.aim_at(None if aim is None else aim.importance, 0 if aim is None else aim.laser)
     wave_moments = attach_wave_moments(waves.buffers, so_far)
 
     def image() -> IndirectImage:
         counts = so_far.paths, round(so_far.invalid), round(so_far.clamped)
         clamped_radiance = so_far.clamped_radiance / so_far.weight / so_far.total.size
-        return IndirectImage(so_far.radiance(shape), so_far.error, *counts, clamped_radiance, so_far.line_error)
+        return IndirectImage(
+            so_far.radiance(shape), so_far.error, *counts, clamped_radiance, so_far.line_error, given_up()
+        )
+
+    def given_up() -> bool:
+        return so_far.line is not None and so_far.line.out_of_reach
 
     def unfinished() -> bool:
         known = so_far.error <= target or (aim is not None and so_far.line_error <= 1.0)
@@ -167,6 +176,8 @@ def indirect_images(
             sums = so_far.total, so_far.weight
             so_far.line = so_far.line.look(waves.buffers, sums, so_far.next_weight, aim.weigh, aim.laser)
         so_far.add(waves.buffers, wave_moments, clamp, run.threads)
+        if so_far.line is not None:
+            so_far.line.judge(so_far.line_error, so_far.error / target, so_far.paths, most_paths)
         run.keep(so_far)
         # the error falls with the root of the paths, at least
         over = min(so_far.error / target, math.inf if aim is None else so_far.line_error)
@@ -197,11 +208,13 @@ class Waves:
 
         map_chunks(work, PASSES_A_WAVE, 1, min(PASSES_A_WAVE, thread_count(run.threads)), run.cancelled)
 
-    def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None = None) -> Accumulator:
+    def first_looks(
+        self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None, ends: tuple[float, int]
+    ) -> Accumulator:
         """An empty accumulator that knows where laser and camera should look; the light of two looks is thrown away.
 
         The first finds, by light, where it arrives at all (what is behind glass only the camera finds), the second,
-        from there, which light matters.
+        from there, which light matters, and whether the line's goal is in reach before image error or paths `ends` it.
         """
         task, camera = self.task, self.camera
         specular = seen_specular(task, placed.world, camera, placed.T_world_camera)
@@ -210,9 +223,11 @@ class Waves:
         first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
         self.trace(0, first_look, behind)
         found = initialise_guiding(self.buffers, fan, camera, kinds, specular)
-        found.line = None if aim is None else LineErrors.of(aim.importance, aim.laser)
         wave_moments = attach_wave_moments(self.buffers, found)
         self.trace(PASSES_A_WAVE, sampling_of(found, LOOK_PATHS), behind)
+        if aim is not None:
+            found.line = LineErrors.of(aim.importance, aim.laser)
+            found.line.look_ahead(self.buffers, PASSES_A_WAVE * LOOK_PATHS, *ends)
         refine_guiding(found, self.buffers, wave_moments, camera)
         return found
 
@@ -247,7 +262,7 @@ def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: 
     allocate_camera_paths(
         camera_radiance, camera.width, first.next_camera_paths, first.camera_paths, float(PASSES_A_WAVE)
     )
-    if first.line is not None:
+    if first.line is not None and not first.line.out_of_reach:
         aim_camera_paths(first.camera_paths, first.line.aim, first.next_camera_paths)
     reserve_for_specular(first.camera_paths, first.specular, first.next_camera_paths)
 
