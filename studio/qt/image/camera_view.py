@@ -25,7 +25,7 @@ from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
-from studio.qt.core.widgets import flush, upper_and_lower
+from studio.qt.core.widgets import ElidedLabel, flush, upper_and_lower
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.line_overlay import LineOverlay
 from studio.qt.image.row_profile import RowProfile
@@ -57,7 +57,7 @@ class CameraView(QWidget):
         self.bright.setChecked(True)
         self.readout = QLabel()
         self.badge = QFrame()
-        self.badge_text = QLabel()
+        self.badge_text = ElidedLabel()
         self.lines = QWidget()
         self.render_button = QPushButton("Render")
         self.is_live = True
@@ -136,7 +136,6 @@ class CameraView(QWidget):
             bar.addWidget(button)
         badge = QHBoxLayout(self.badge)
         badge.setContentsMargins(8, 3, 4, 3)
-        self.badge_text.setMinimumWidth(1)  # a narrow panel may cut it off
         badge.addWidget(self.badge_text, 1)
         badge.addWidget(self.render_button)
         self.readout.setContentsMargins(8, 2, 8, 2)

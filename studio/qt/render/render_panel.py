@@ -106,7 +106,7 @@ class RenderPanel(QWidget):
         self.cancel_button = text_button("Cancel", "Stop and forget this render")
         self.bar = thin_bar()
         self.stage = QLabel()
-        self.errors = QLabel(textFormat=Qt.TextFormat.RichText)
+        self.errors = QLabel(textFormat=Qt.TextFormat.RichText, wordWrap=True)
         self.history = History(session)
         self._lay_out()
         self._connect()

@@ -29,7 +29,7 @@ from render.base.threads import thread_count
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import flush, text_button, thin_bar
+from studio.qt.core.widgets import ElidedLabel, flush, text_button, thin_bar
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
 from studio.runtime.jobs import Job, State
@@ -79,7 +79,7 @@ class StudyPanel(QWidget):
         self.problem = QLabel(wordWrap=True)
         self.problem.setObjectName("error")
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.folder = QLabel()
+        self.folder = ElidedLabel(Qt.TextElideMode.ElideMiddle)
         self.folder.setObjectName("muted")
         self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.choose = text_button("Folder…", "Where the results go; a study that is there goes on")
@@ -257,11 +257,7 @@ class StudyPanel(QWidget):
         if not running:
             self.bar.setValue(0)
             self.stage.clear()
-        text = str(work.folder) if work.folder is not None else "no folder yet"
-        self.folder.setText(
-            self.folder.fontMetrics().elidedText(text, Qt.TextElideMode.ElideMiddle, self.width() - 130)
-        )
-        self.folder.setToolTip(text)
+        self.folder.setText(str(work.folder) if work.folder is not None else "no folder yet")
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
