@@ -16,6 +16,7 @@ try:
 
     from studio.runtime.command_line import BAD_INPUT, Commands, FiniteRange
     from studio.runtime.command_options import (
+        COLOUR,
         FARTHEST,
         GEOMETRY,
         METHOD,
@@ -24,6 +25,7 @@ try:
         THREADS,
         common,
         measuring,
+        photographed,
         repeating,
         working,
     )
@@ -131,6 +133,9 @@ def render(project: Path | None, **options: Any) -> None:
 @click.option("--project", type=click.Path(path_type=Path), help="Project with camera, laser and settings.")
 @click.option("--laser", type=click.IntRange(0), default=0, show_default=True, help="Which laser made the line.")
 @click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5.")
+@click.option("--colour", type=COLOUR, help="The laser's, in photographs  [default: the project's].")
+@click.option("--shape", type=click.Choice(["plane", "sphere"]), help="That photographs show, for the report.")
+@photographed
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside the source].")
 @measuring
 @THREADS
@@ -138,7 +143,8 @@ def render(project: Path | None, **options: Any) -> None:
 def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
     """Points from rendered frames (a folder that `render` wrote), or from photographs with --project.
 
-    Several photographs are the steps of the project's motion, or, with --hdr, exposures of one scene.
+    Several photographs are the steps of the project's motion, or, with --hdr, exposures of one scene. They get a report
+    of their own: residuals to a straight line and a plane, noise, coverage, warnings and pictures.
     """
     _require_system()
     from studio.commands.commands import reconstruct_source
@@ -149,20 +155,12 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 @cli.command()
 @click.argument("images", nargs=-1, required=True, type=click.Path(path_type=Path))
 @METHOD
-@click.option(
-    "--laser", type=click.Choice(["auto", "mono", "red", "green", "blue"]), default="auto", help="Its colour."
-)
-@click.option("--axis", type=click.Choice(["rows", "columns"]), default="rows", show_default=True, help="Scan lines.")
-@click.option(
-    "--off",
-    type=click.Path(path_type=Path),
-    multiple=True,
-    help="Image with the laser off, to subtract: one for all, or one for each image, in order.",
-)
-@click.option("--pattern", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"]), help="Bayer pattern of raw images.")
+@click.option("--laser", "colour", type=COLOUR, help="Its colour  [default: auto].")
+@photographed
 @click.option("--peaks", type=int, default=1, show_default=True, help="Peaks kept on each scan line.")
 @SELECT
 @click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5. One table.")
+@click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table.")
 @click.option("--ridges", is_flag=True, help="Lines of any direction, as points with their normal (Steger in 2-D).")
 @click.option(
     "--spacetime", is_flag=True, help="The images are a sweep over a scene at rest: when it passes each pixel."

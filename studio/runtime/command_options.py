@@ -85,6 +85,36 @@ def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def photographed(command: Callable[..., Any]) -> Callable[..., Any]:
+    """What photographs say themselves, and a person may say instead."""
+    for option in (
+        click.option("--mask", type=click.Path(path_type=Path), help="Image that is black where not to look."),
+        click.option("--roi", metavar="X,Y,W,H", help="Part of the image to look at, px."),
+        click.option("--pattern", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"]), help="Bayer, of raw images."),
+        click.option(
+            "--off",
+            type=click.Path(path_type=Path),
+            multiple=True,
+            help="Image with the laser off, to subtract: one for all, or one for each, by name or in order.",
+        ),
+        click.option(
+            "--channel",
+            type=click.Choice(["auto", "mono", "luminance", "red", "green", "blue", "difference"]),
+            help="What is measured of colour images, else found; difference: the laser's colour less the others.",
+        ),
+        click.option(
+            "--axis",
+            type=click.Choice(["auto", "rows", "columns"]),
+            help="Scan lines: rows for an upright line, columns for a level one. Auto: by evidence.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+COLOUR = click.Choice(["auto", "mono", "red", "green", "blue"])
+
+
 def repeating(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of the commands that run a project many times."""
     for option in (
