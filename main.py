@@ -266,6 +266,61 @@ def advise(project: Path | None, **options: Any) -> None:
     advise_project(project, **options)
 
 
+@cli.command()
+@click.argument("what", metavar="WHAT")
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--board", default="checkerboard:13x9:25mm", show_default=True, help="Kind, counts and side; see board.")
+@click.option("--out", type=click.Path(path_type=Path), help="Calibration file  [default: FOLDER/calibration.json].")
+@click.option("--camera", type=click.Path(path_type=Path), help="Calibration file of the camera, for laser alone.")
+@click.option(
+    "--lens", type=click.Choice(["auto", "0", "4", "5", "8", "12", "14"]), default="auto", help="Distortion terms."
+)
+@click.option("--axis", type=click.Choice(["rows", "columns"]), default="rows", show_default=True, help="Scan lines.")
+@click.option(
+    "--channel", type=click.Choice(["auto", "mono", "red", "green", "blue"]), default="auto", help="The laser's colour."
+)
+@NEAREST
+@FARTHEST
+@click.option("--most-tilt", type=FiniteRange(5.0, 70.0), default=45.0, show_default=True, help="Of boards, degrees.")
+@click.option("--target-um", type=FiniteRange(0.01, 1e6), help="Depth error that is enough, um.")
+@click.option("--views", type=click.IntRange(3, 1000), default=20, show_default=True, help="Virtual ones.")
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, help="Of virtual views.")
+@click.option("--corner-sigma", type=FiniteRange(1e-4, 10.0), default=0.05, help="Of virtual corners, px.")
+@click.option("--line-sigma", type=FiniteRange(1e-4, 10.0), default=0.05, help="Of virtual lines, px.")
+@click.option(
+    "--export", type=click.Choice(["opencv", "ros", "kalibr", "mrcal"]), multiple=True, help="The camera for others."
+)
+@common
+def calibrate(what: str, folder: Path | None, **options: Any) -> None:
+    """Calibrate a camera, its lasers, or both: camera|laser|scanner FOLDER of photographs, or a PROJECT in silico.
+
+    Photographs of one pose are named NAME_off and NAME_on (NAME_laser0, NAME_laser1, ...), or NAME for both in one.
+    """
+    _require_system()
+    from studio.commands.calibrate import calibrate_command
+
+    if calibrate_command(what, folder, **options):
+        click.get_current_context().exit(BAD_INPUT)
+
+
+@cli.command()
+@click.argument("board", default="checkerboard:13x9:25mm")
+@click.option(
+    "--paper", type=click.Choice(["A4", "A3", "A2", "A1", "A0"]), help="Size  [default: the least that holds]."
+)
+@click.option(
+    "--contrast", type=FiniteRange(0.1, 1.0), default=1.0, help="1: black on white; 0.6 shows the line better."
+)
+@click.option("--out", type=click.Path(path_type=Path), help="PDF file  [default: named by the board].")
+@common
+def board(board: str, **options: Any) -> None:
+    """A board as a PDF to scale: checkerboard:13x9:25mm (inner corners), charuco:14x10:25mm:18mm (squares)."""
+    _require_system()
+    from studio.commands.board import print_board
+
+    print_board(board, **options)
+
+
 @cli.group()
 def study() -> None:
     """Many runs with one question: speed against accuracy, where a method breaks; as a table and charts."""
