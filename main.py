@@ -26,7 +26,10 @@ try:
         common,
         measuring,
         photographed,
+        real_views,
         repeating,
+        sharing,
+        virtual_views,
         working,
     )
     from studio.runtime.system import message, missing_needs, why_not_in_this_folder
@@ -274,29 +277,62 @@ def advise(project: Path | None, **options: Any) -> None:
 @click.option(
     "--from", "sources", multiple=True, type=click.Path(path_type=Path), help="Folder of another shard: take over."
 )
-@click.option("--shard", default="1/1", show_default=True, help="Only this part of the work: 3/40.")
-@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://host:8786, in place of processes here.")
-@click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor].")
+@sharing
 @common
-def dataset(recipe: Path | None, preview: bool, out: Path | None, quiet: bool, as_json: bool, **options: Any) -> None:
+def dataset(recipe: Path | None, **options: Any) -> None:
     """Labelled images of a recipe, or of a ready-made one by its name; without a recipe, list them.
 
     The same command goes on after an interrupt or a kill, with more scenes where --count is raised.
     """
     _require_system()
-    from studio.commands.dataset import list_recipes, make_images, preview_recipe
-    from studio.runtime.workers import Engine
+    from studio.commands.dataset import dataset_command
 
-    if recipe is None:
-        list_recipes(as_json=as_json)
-    elif preview:
-        preview_recipe(recipe, out=out, quiet=quiet, as_json=as_json)
-    else:
-        wanted = options["count"], options["shard"], options["sources"]
-        engine = Engine(options["workers"], options["scheduler"])
-        make_images(
-            recipe, wanted=wanted, out=out, formats=options["formats"], engine=engine, quiet=quiet, as_json=as_json
-        )
+    dataset_command(recipe, **options)
+
+
+@cli.command()
+@click.argument("what", metavar="WHAT")
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--board", default="checkerboard:13x9:25mm", show_default=True, help="Kind, counts and side; see board.")
+@click.option("--out", type=click.Path(path_type=Path), help="Calibration file  [default: FOLDER/calibration.json].")
+@real_views
+@NEAREST
+@FARTHEST
+@click.option("--most-tilt", type=FiniteRange(5.0, 70.0), default=45.0, show_default=True, help="Of boards, degrees.")
+@click.option("--target-um", type=FiniteRange(0.01, 1e6), help="Depth error that is enough, um.")
+@virtual_views
+@click.option(
+    "--export", type=click.Choice(["opencv", "ros", "kalibr", "mrcal"]), multiple=True, help="The camera for others."
+)
+@common
+def calibrate(what: str, folder: Path | None, **options: Any) -> None:
+    """Calibrate a camera, its lasers, or both: camera|laser|scanner FOLDER of photographs, or a PROJECT in silico.
+
+    Photographs of one pose are named NAME_off and NAME_on (NAME_laser0, NAME_laser1, ...), or NAME for both in one.
+    """
+    _require_system()
+    from studio.commands.calibrate import calibrate_command
+
+    if calibrate_command(what, folder, **options):
+        click.get_current_context().exit(BAD_INPUT)
+
+
+@cli.command()
+@click.argument("board", default="checkerboard:13x9:25mm")
+@click.option(
+    "--paper", type=click.Choice(["A4", "A3", "A2", "A1", "A0"]), help="Size  [default: the least that holds]."
+)
+@click.option(
+    "--contrast", type=FiniteRange(0.1, 1.0), default=1.0, help="1: black on white; 0.6 shows the line better."
+)
+@click.option("--out", type=click.Path(path_type=Path), help="PDF file  [default: named by the board].")
+@common
+def board(board: str, **options: Any) -> None:
+    """A board as a PDF to scale: checkerboard:13x9:25mm (inner corners), charuco:14x10:25mm:18mm (squares)."""
+    _require_system()
+    from studio.commands.board import print_board
+
+    print_board(board, **options)
 
 
 @cli.group()
@@ -316,9 +352,7 @@ def list_studies(**options: Any) -> None:
 @study.command("run")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/study-<name>].")
-@click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor].")
-@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://host:8786, in place of processes here.")
-@click.option("--shard", default="1/1", show_default=True, help="Only this part of the work: 3/40. Then: study merge.")
+@sharing
 @common
 def run_study(file: Path, **options: Any) -> None:
     """Run a study file, or a ready-made study by its name. The same command goes on after an interrupt or a kill."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from render.base.errors import Cancelled, InputError
 from studio.commands.commands import check_output, folder_name, never
@@ -18,6 +19,20 @@ from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json
 from studio.runtime.workers import Engine
 from studio.scan.interrupt import stop_on_interrupt
+
+
+def dataset_command(
+    file: Path | None, *, preview: bool, count: int, shard: str, sources: Sequence[Path], workers: int | None,
+    scheduler: str | None, **options: Any,
+) -> None:  # fmt: skip
+    """`dataset`: list the recipes, look at one, or make its images."""
+    if file is None:
+        list_recipes(as_json=options["as_json"])
+    elif preview:
+        del options["formats"]
+        preview_recipe(file, **options)
+    else:
+        make_images(file, wanted=(count, shard, sources), engine=Engine(workers, scheduler), **options)
 
 
 def list_recipes(*, as_json: bool) -> None:

@@ -124,3 +124,55 @@ def repeating(command: Callable[..., Any]) -> Callable[..., Any]:
     ):
         command = option(command)
     return common(command)
+
+
+def sharing(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of long work that processes, a cluster or several machines share."""
+    for option in (
+        click.option("--shard", default="1/1", show_default=True, help="Only this part of the work: 3/40."),
+        click.option(
+            "--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://host:8786, in place of processes here."
+        ),
+        click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor]."),
+    ):
+        command = option(command)
+    return command
+
+
+def virtual_views(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of a calibration in silico."""
+    sigma = FiniteRange(1e-4, 10.0)
+    for option in (
+        click.option("--line-sigma", type=sigma, default=0.05, help="Of virtual lines, px."),
+        click.option("--corner-sigma", type=sigma, default=0.05, help="Of virtual corners, px."),
+        click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, help="Of virtual views."),
+        click.option("--views", type=click.IntRange(3, 1000), default=20, show_default=True, help="Virtual ones."),
+    ):
+        command = option(command)
+    return command
+
+
+def real_views(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of a calibration from photographs."""
+    for option in (
+        click.option(
+            "--channel",
+            type=click.Choice(["auto", "mono", "red", "green", "blue"]),
+            default="auto",
+            help="The laser's colour.",
+        ),
+        click.option(
+            "--axis", type=click.Choice(["rows", "columns"]), default="rows", show_default=True, help="Scan lines."
+        ),
+        click.option(
+            "--lens",
+            type=click.Choice(["auto", "0", "4", "5", "8", "12", "14"]),
+            default="auto",
+            help="Distortion terms.",
+        ),
+        click.option(
+            "--camera", type=click.Path(path_type=Path), help="Calibration file of the camera, for laser alone."
+        ),
+    ):
+        command = option(command)
+    return command
