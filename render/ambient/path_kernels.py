@@ -26,7 +26,7 @@ from render.ambient.light_sampling import (
     sample_light,
     sample_rectangle_point,
 )
-from render.ambient.path_state import EACH_SURFACE, FIRST_SURFACE, PathState, ShadowRays, accumulate
+from render.ambient.path_state import EACH_SURFACE, FIRST_SURFACE, PathState, Samples, ShadowRays, accumulate
 from render.ambient.path_vertex import (
     Path,
     eval_bsdf,
@@ -66,16 +66,6 @@ class Bounce(NamedTuple):
     """After so many only lights are looked for."""
     clamp: float
     """Most radiance, W/(m^2 sr), of a contribution by way of two or more surfaces."""
-
-
-class Samples(NamedTuple):
-    """Where the paths' random numbers come from."""
-
-    table: Float32
-    """`render.sampling.low_discrepancy.pair_table`."""
-    seed: int
-    pixels: Int
-    """(m,) pixels of the chunk."""
 
 
 class Film(NamedTuple):

@@ -57,6 +57,16 @@ class ShadowRays(NamedTuple):
     interior: Long
 
 
+class Samples(NamedTuple):
+    """Where the paths' random numbers come from."""
+
+    table: Float32
+    """`render.sampling.low_discrepancy.pair_table`."""
+    seed: int
+    pixels: Int
+    """(m,) pixels of the chunk."""
+
+
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def camera_rays(
     view: View, table: Float32, seed: int, pixels: Int, first: Int, count: Int, centre: Float, paths: PathState

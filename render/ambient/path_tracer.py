@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from render.ambient.light_sampling import Lights, pack_lights
-from render.ambient.path_kernels import Bounce, Film, Samples, shade_diffuse, shade_glossy
-from render.ambient.path_state import PathState, ShadowRays, accumulate_unoccluded, camera_rays
+from render.ambient.path_kernels import Bounce, Film, shade_diffuse, shade_glossy
+from render.ambient.path_state import PathState, Samples, ShadowRays, accumulate_unoccluded, camera_rays
 from render.ambient.random_walk import random_walk_step
 from render.base.arrays import Float, Float32, Int
 from render.base.errors import Cancelled
@@ -70,7 +70,7 @@ class CameraPaths:
             side_by_side = depth == 0
             triangle, distance = rays.intersect(paths.origin[:n], paths.direction[:n], coherent=side_by_side)
             if media:
-                self._walk(paths, n, depth, pixels, triangle, distance, cancelled)
+                self._walk(paths, n, depth, samples, triangle, distance, cancelled)
             if nested:
                 ahead = paths.origin[:n], paths.direction[:n], triangle, paths.interior[:n]
                 pass_hidden(self.surface, rays, *ahead)
@@ -90,7 +90,7 @@ class CameraPaths:
         paths: PathState,
         n: int,
         depth: int,
-        pixels: Int,
+        samples: Samples,
         triangle: Int,
         distance: Float32,
         cancelled: Cancel | None,
@@ -100,9 +100,7 @@ class CameraPaths:
         distance, nested = distance[walking], has_overlaps(self.surface)
         for step in range(MOST_STEPS):
             before = walking.copy() if nested else walking
-            left = random_walk_step(
-                walking, distance, self.surface.rows, self.seed, pixels, depth, step, paths, triangle
-            )
+            left = random_walk_step(walking, distance, self.surface.rows, samples, depth, step, paths, triangle)
             walking = walking[:left]
             if nested:
                 # a flight that ends on a hidden boundary goes on beyond it, as if it had begun there

@@ -12,7 +12,7 @@ import math
 import numba
 import numpy as np
 
-from render.ambient.path_state import PathState
+from render.ambient.path_state import PathState, Samples
 from render.base.arrays import Float, Float32, Int
 from render.material.bsdf import ANISOTROPY, EXTINCTION, SCATTERED
 from render.material.medium import MOST_STEPS, henyey_greenstein, turn
@@ -23,12 +23,11 @@ FIRST_WALK_DIMENSION, NUMBERS = 1 << 20, 5
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def random_walk_step(  # noqa: PLR0913
+def random_walk_step(
     walking: Int,
     distance: Float32,
     rows: Float,
-    seed: int,
-    pixels: Int,
+    samples: Samples,
     depth: int,
     step: int,
     paths: PathState,
@@ -39,6 +38,7 @@ def random_walk_step(  # noqa: PLR0913
     distance (n,): to the boundary along each path's ray. Origin, direction and throughput in `paths` are moved; a path
     that is absorbed, or found no boundary, carries nothing and gets triangle -1. Returns how many stay.
     """
+    _, seed, pixels = samples
     left = 0
     d, w, extinction, pdf = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for place in range(walking.shape[0]):

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
@@ -17,6 +19,21 @@ from render.sampling.random import bits, uniform
 
 LENS_DIMENSION = 1 << 20
 """First random dimension of the aperture, above those of the pixel's area."""
+
+
+class LensRays(NamedTuple):
+    """Rays through an aperture, cells x cells for each pixel."""
+
+    normalised: Float
+    """(n, 2) slopes of the chief ray; NaN: no ray."""
+    offsets: Float32
+    """(n, 2) px from the centre of the cell."""
+    lens: Float
+    """(n, 2) point (a, b) of the aperture, m."""
+    origins: Float32
+    """(n, 3) m."""
+    directions: Float32
+    """(n, 3) world, of length 1 along the axis."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -87,28 +104,16 @@ def _net_point(table: Float32, draw: np.uint64, number: int) -> tuple[float, flo
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def lens_rays(  # noqa: PLR0913
-    view: View,
-    table: Float32,
-    pixels: Int,
-    cells: int,
-    seed: int,
-    centre: Float,
-    normalised: Float,
-    offsets: Float32,
-    lens: Float,
-    origins: Float32,
-    directions: Float32,
-) -> None:
-    """As `camera_rays`, jittered, each ray through its own point of the aperture; (n cells^2, ...) throughout.
+def lens_rays(view: View, table: Float32, pixels: Int, cells: int, seed: int, centre: Float, rays: LensRays) -> None:
+    """As `camera_rays`, jittered, each ray through its own point of the aperture -> rays.
 
     The points are a row of `table`, `pair_table`, in the Morton order of the cells (Ahmed and Wonka 2020): any quad of
     neighbouring cells, or of such quads, has a (0, 2)-net of them.
 
-    Fills normalised (.., 2) slopes of the chief ray (NaN: no ray), offsets (.., 2) px, lens (.., 2) the point (a, b) m,
-    origins (.., 3), from `centre` as embree's scene is, and directions (.., 3), world, of length 1 along the axis.
-    In float64 the ray is `lens_position(view, a, b)`, `lens_direction(view, x, y, a, b)`.
+    centre (3,): that the origins are relative to, as those of Embree's scene are. In float64 the ray is
+    `lens_position(view, a, b)`, `lens_direction(view, x, y, a, b)`.
     """
+    normalised, offsets, lens, origins, directions = rays
     k = view.distortion
     tilt = tilt_matrix(k[12], k[13])
     distorted = bool(np.any(k))

@@ -12,7 +12,7 @@ import math
 import numba
 import numpy as np
 
-from render.base.arrays import Float, Int
+from render.base.arrays import Float, Int, Long
 
 MOST_CELLS = 32
 """Largest number of cells a side."""
@@ -88,6 +88,23 @@ def _level_at(bin_: int, threshold: int, level: int, most: int) -> int:
     return min(1 + (threshold - 1 - bin_) // _BINS_PER_LEVEL, level + most, _LEVELS - 1)
 
 
+@numba.njit(nogil=True, cache=True, forceinline=True)
+def neighbours_in_row(pixels: Int, start: Long, i: int, row: int, width: int) -> tuple[int, int, int]:
+    """Of pixel i of ascending flat indices, its neighbours in the row before (0), its own (1) or the row after (2).
+
+    The index of the leftmost place, and the range of `pixels` there. start (3,): where the range of each row began at
+    the pixel before; as pixels ascend these only ascend, and are moved on.
+    """
+    low = pixels[i] + (row - 1) * width - 1
+    first = start[row]
+    while first < len(pixels) and pixels[first] < low:
+        first += 1
+    start[row] = stop = first
+    while stop < len(pixels) and pixels[stop] <= low + 2:
+        stop += 1
+    return low, first, stop
+
+
 @numba.njit(nogil=True, cache=True)
 def grade_neighbours(wanted: Int, cells: Int, pixels: Int, width: int) -> Int:
     """(n,) wanted cells of ascending flat pixel indices (n,) -> the same, with at least half as many in the neighbours
@@ -98,20 +115,14 @@ def grade_neighbours(wanted: Int, cells: Int, pixels: Int, width: int) -> Int:
     """
     n = len(pixels)
     out = wanted.copy()
-    # where the neighbours begin in the row before, the pixel's own and the row after; these indices only ascend
     start = np.zeros(3, np.int64)
     for i in range(n):
         if wanted[i] <= cells[i]:
             continue
         for row in range(3):
-            low = pixels[i] + (row - 1) * width - 1
-            j = start[row]
-            while j < n and pixels[j] < low:
-                j += 1
-            start[row] = j
-            while j < n and pixels[j] <= low + 2:
+            _, first, stop = neighbours_in_row(pixels, start, i, row, width)
+            for j in range(first, stop):
                 out[j] = max(out[j], wanted[i] // 2)
-                j += 1
     return out
 
 
@@ -132,12 +143,8 @@ def raise_neighbour_errors(
         if neighbour_error[i] <= 0.0 and mean[i] <= 0.0:
             continue
         for row in range(3):
-            low = pixels[i] + (row - 1) * width - 1
-            j = start[row]
-            while j < n and pixels[j] < low:
-                j += 1
-            start[row] = j
-            while j < n and pixels[j] <= low + 2:
+            low, first, stop = neighbours_in_row(pixels, start, i, row, width)
+            for j in range(first, stop):
                 if cells[j] > 1:
                     error[j] = max(error[j], neighbour_error[i] * float(cells[j]) ** (-0.5 * order))
                 if mean[j] == 0.0 and mean[i] > 0.0 and (row == 1 or pixels[j] == low + 1):
@@ -145,4 +152,3 @@ def raise_neighbour_errors(
                         error[j] = max(error[j], border * mean[i] / float(cells[j]) ** 2)
                     if cells[i] > 1:
                         error[i] = max(error[i], border * mean[i] / float(cells[i]) ** 2)
-                j += 1

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from render.base.arrays import Float, Int
 from render.laser.irradiance import INV_SQRT_2PI
+from render.laser_direct.adaptive_sampling import neighbours_in_row
 
 EDGE_SHARE = 0.3
 """RMS error, as a fraction of the jump, of taking a pixel's centre for its mean where an edge crosses it anywhere:
@@ -42,8 +43,6 @@ def estimate_errors(
     0 where no light is seen, and q and its derivatives are then undefined; or BEYOND. middle (n,): the radiance times
     the Gaussian's mean over the pixel.
     """
-    n = len(pixels)
-    # where the neighbours begin in the row before, the pixel's own and the row after; these indices only ascend
     walk = np.empty(3, np.int64)
     for row in range(3):
         walk[row] = np.searchsorted(pixels, pixels[start] + (row - 1) * width - 1)
@@ -64,12 +63,8 @@ def estimate_errors(
             # in the sheet's middle the slope vanishes, and the curvature decides
             slope = max(slope, 0.25 * share)
         for row in range(3):
-            low = pixels[i] + (row - 1) * width - 1
-            j = walk[row]
-            while j < n and pixels[j] < low:
-                j += 1
-            walk[row] = j
-            while j < n and pixels[j] <= low + 2:
+            low, first, end = neighbours_in_row(pixels, walk, i, row, width)
+            for j in range(first, end):
                 other = planes[j, 3]
                 predicted = planes[j, 0] + planes[j, 1] * (low + 1 - pixels[j]) + planes[j, 2] * (1 - row)
                 if peak > 0.0 and other > 0.0:
@@ -82,7 +77,6 @@ def estimate_errors(
                     # a dark neighbour outside the sheet is no edge where the same surface continues there
                     beyond = min(peak, other) == BEYOND
                     worst = max(worst, max(middle[i], middle[j]) * (min(abs(predicted - q), 1.0) if beyond else 1.0))
-                j += 1
         error[i] = EDGE_SHARE * worst
         # first moment of the Gaussian over the pixel, with the pixel's box replaced by a Gaussian of equal variance
         mean[i] = middle[i]

@@ -22,7 +22,7 @@ from render.base.arrays import Float, Float32, Int
 from render.base.pose import invert
 from render.base.threads import map_chunks
 from render.camera.camera import Camera
-from render.camera.rays import camera_rays, lens_rays
+from render.camera.rays import LensRays, camera_rays, lens_rays
 from render.laser.laser import LineLaser
 from render.laser_direct.adaptive_sampling import cells_needed, grade_neighbours, raise_neighbour_errors
 from render.laser_direct.aperture import gather_aperture
@@ -218,8 +218,8 @@ class _Task:
         if aperture:
             planes = np.empty((count, 5))
             origins = np.empty((count, 3), np.float32)
-            outputs = (normalised, offsets, lens, origins, directions)
-            lens_rays(view, pair_table(), pixels, cells, self.seed, rays.centre, *outputs)
+            outputs = LensRays(normalised, offsets, lens, origins, directions)
+            lens_rays(view, pair_table(), pixels, cells, self.seed, rays.centre, outputs)
             triangle, _ = rays.intersect(origins, directions, coherent=True)
         else:
             if cells == 1:

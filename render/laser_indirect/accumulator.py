@@ -33,10 +33,11 @@ MOST_CAMERA_PASS = 1 << 18
 MOST_DOUBLINGS = 2
 """Times that light paths are doubled where camera paths can reach nothing, and would be idle."""
 LEAST_SHARE = 0.1
-"""Least share of the effort that camera paths get where the camera sees glass, behind which light tracing is blind."""
+"""Least share of the effort that camera paths get where the camera sees glass, behind which light tracing is blind.
+Chosen, not tuned."""
 WAVE_WEIGHT_EXPONENT = 1.5
 """A wave weighs as its size to this power. 1 is the least variance of waves that sample alike; later ones are better
-guided, so more."""
+guided, so more. Chosen, not tuned."""
 PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
 IMAGES = ("specular", "camera_paths", "guide_moments", "total", "camera_radiance")

@@ -16,7 +16,6 @@ from render.base.arrays import Bool, Float, Int
 from render.base.errors import Cancelled
 from render.base.pose import invert
 from render.base.threads import Cancel
-from render.camera.camera import Camera
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_position
 from render.camera.view import View
@@ -35,6 +34,7 @@ from render.laser_indirect.connections import (
 )
 from render.laser_indirect.guiding import Guide, any_specular, draw_camera_paths
 from render.laser_indirect.path_vertex import (
+    ALL_KINDS,
     CAUSTIC,
     MOST_BOUNCES,
     PATH,
@@ -53,6 +53,7 @@ from render.material.material import reflectance_weights
 from render.material.medium import MOST_STEPS
 from render.sampling.random import uniform, wrapped
 from render.world.interior_list import cross_hidden, has_overlaps, occluded_by_visible, pass_hidden, surroundings
+from render.world.placed import PlacedLaser
 from render.world.triangles import Surface
 from render.world.world import World
 
@@ -64,7 +65,9 @@ CHUNK_PATHS = 1 << 13
 CANDIDATES, LATER_CANDIDATES = 8, 2
 """Light vertices of the first surface weighed against each other, at the camera's first surface and those after it."""
 CAMERA_SEED = 0x5DEECE66D
+"""Parts the random numbers of camera paths from those of light paths."""
 KINDS = 5
+"""Sums of a pass: of each combination of the bits CAUSTIC and SUBSURFACE_LIGHT, and of SPECULAR_CHAIN by itself."""
 
 
 @dataclass(frozen=True)
@@ -96,24 +99,15 @@ class BdptPass:
     """Middle distance of the part from the laser, m."""
     seed: int
     kinds: int
-    """Of light that is wanted, besides plain interreflection."""
+    """Kinds of light that are traced besides plain interreflection (`render.laser_indirect.path_vertex`)."""
     specular: bool
     """Some material is a mirror or clear glass."""
     interiors: tuple[int, int]
     """The overlapping bodies that the laser and the camera are within (`render.world.interior_list`)."""
 
     @classmethod
-    def of(
-        cls,
-        world: World,
-        camera: Camera,
-        laser: LineLaser,
-        T_world_camera: Float,
-        T_world_laser: Float,
-        reference_distance: float,
-        seed: int,
-        kinds: int,
-    ) -> BdptPass:
+    def of(cls, placed: PlacedLaser, reference_distance: float, seed: int, kinds: int = ALL_KINDS) -> BdptPass:
+        world, camera, laser, T_world_camera, T_world_laser = placed
         surface = world.surface_at((laser.wavelength_nm,) * 3)
         return cls(
             world=world,
@@ -289,7 +283,7 @@ class BdptPass:
             interior = paths["interior"].copy()
             pass_hidden(self.surface, rays, (origin - rays.centre).astype(np.float32), towards, triangle, interior)
             paths["interior"] = interior
-        n = intersect(self.surface, self.weights, context, depth, origin, direction, triangle, paths, vertices)
+        n = intersect(self.surface, context, depth, origin, direction, triangle, paths, vertices)
         return vertices[:n], paths[:n]
 
     def splat(self, connections: Connections, connected: int, scale: float, buffer: PassBuffer) -> None:
@@ -313,7 +307,7 @@ class BdptPass:
 
     def _context(self, seed: int) -> PassContext:
         rays = self.world.rays
-        return PassContext(self.surface.rows, seed, self.kinds, rays.centre, rays.surface_offset)
+        return PassContext(self.surface.rows, self.weights, seed, self.kinds, rays.centre, rays.surface_offset)
 
     def _camera(self, sampling: Sampling) -> CameraSampling:
         return CameraSampling(self.view, self.height, sampling.camera_paths, sampling.light_paths)

@@ -31,21 +31,26 @@ TILE, BINS = 8, 128
 COARSE = 4
 """Pixels a side of the cells in which the radiance about a pixel is averaged."""
 WINDOWS = ((3, 0.7), (9, 0.2), (27, 0.1))
-"""Sides, in cells, of the neighbourhoods whose mean predicts a pixel without paths of its own, and their weights."""
+"""Sides, in cells, of the neighbourhoods whose mean predicts a pixel without paths of its own, and their weights.
+Chosen, not tuned."""
 PRIOR_PATHS = 1.0
-"""Camera paths that the prediction by the neighbourhood is worth: with as many of its own a pixel counts half."""
+"""Camera paths that the prediction by the neighbourhood is worth: with as many of its own a pixel counts half. Chosen,
+not tuned."""
 DIMINISHING_RETURN = 0.15
-"""Worth of a pixel's second and further path in a pass beside its first: they only lessen the variance within it."""
+"""What a pixel's second and further path in a pass count beside its first, as they only lessen the variance within the
+pixel. Chosen, not tuned."""
 LEAST, MOST_CAMERA_PATHS = 1e-8, 64.0
 """Cells with less than this share of all light get no camera paths; most camera paths of a pixel in a pass."""
 SPECULAR_RESERVE = 0.1
-"""Share of the camera paths kept for specular pixels, alike: no light path tells what is behind them."""
+"""Share of the camera paths kept for specular pixels, alike: no light path tells what is behind them. Chosen, not
+tuned."""
 SPECULAR_RAY_SPACING = 4
 """Pixels between the rays that look for specular surfaces."""
 CELL_ROWS, GUIDE_ROWS, PIXELS_A_CHUNK = 16, 1024, 1 << 18
 """Rows of cells, of the guide, and pixels that a thread does at a time."""
 LEAST_PATHS_TO_LEARN, GUIDE_UNIFORM_FRACTION = 1.0, 0.2
-"""Fewest camera paths of a tile in a pass for a row of its own; the share of a row that stays uniform."""
+"""Fewest camera paths of a tile in a pass for a row of its own; the share of a row that stays uniform. Chosen, not
+tuned."""
 
 
 class Guide(NamedTuple):

@@ -37,7 +37,7 @@ from render.laser_indirect.guiding import (
     update_guide,
 )
 from render.laser_indirect.line_goal import Effect, LineErrors, Projection, Weigh
-from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
+from render.laser_indirect.path_vertex import ALL_KINDS, CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN
 from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
 from render.run import Run
 from render.world.placed import PlacedLaser
@@ -47,7 +47,6 @@ LEAST_PASS = 1 << 12
 """Light paths in a pass of the first wave: at least, more in a large image; and half of its camera paths."""
 LOOK_PATHS = 1 << 11
 PILOT_PATHS = 1 << 13
-ALL_KINDS = CAUSTIC | SUBSURFACE_LIGHT | SPECULAR_CHAIN
 
 CUMULATIVE_KINDS = {
     "interreflection": INTERREFLECTION,
@@ -142,7 +141,7 @@ def indirect_images(
     if high <= low:
         yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0, line_error=0.0)
         return
-    waves = Waves(BdptPass.of(*placed, reach, run.seed, kinds), camera, run)
+    waves = Waves(BdptPass.of(placed, reach, run.seed, kinds), camera, run)
     time_is_over = run.time_is_over(left)
     so_far = run.restore(Accumulator.of_arrays)
     if so_far is None:
@@ -312,7 +311,8 @@ def indirect_pilot(
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     if high <= low:
         return IndirectPilot((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
-    task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, run.seed, ALL_KINDS)
+    placed = PlacedLaser(world, camera, laser, T_world_camera, T_world_laser)
+    task = BdptPass.of(placed, reach, run.seed)
     specular = seen_specular(task, world, camera, T_world_camera)
     fan, guide, sums = uniform_fan(low, high), no_guide(camera), []
     buffer = empty_buffer(camera.width * camera.height)

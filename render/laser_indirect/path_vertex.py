@@ -76,6 +76,7 @@ PATH = np.dtype(
 )
 INTERREFLECTION, CAUSTIC, SUBSURFACE_LIGHT, SPECULAR_CHAIN = 0, 1, 2, 4
 """Kinds of light, as bits: none; through clear glass or off a mirror; through a medium; found by merging alone."""
+ALL_KINDS = CAUSTIC | SUBSURFACE_LIGHT | SPECULAR_CHAIN
 INNER, OUTER = 1, 2
 """Sides of a surface, as bits: behind its shading normal, and before it."""
 MOST_BOUNCES = 64
@@ -90,6 +91,8 @@ class PassContext(NamedTuple):
 
     rows: Float
     """(materials, .) `render.material.bsdf`."""
+    weights: Float
+    """(3,) of the RGB reflectance at the wavelength."""
     seed: int
     kinds: int
     """Of light that is wanted besides plain interreflection; paths of other kinds end."""
@@ -100,9 +103,8 @@ class PassContext(NamedTuple):
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def intersect(  # noqa: PLR0913
+def intersect(
     surface: Surface,
-    weights: Float,
     context: PassContext,
     depth: int,
     origin: Float,
@@ -113,7 +115,7 @@ def intersect(  # noqa: PLR0913
 ) -> int:
     """Where rays (n, 3) hit their triangle (-1: none) -> vertices; paths are moved up to match. Returns their number.
 
-    weights (3,): of the RGB reflectance at the wavelength. Takes the partial MIS sums from solid angle to area.
+    Takes the partial MIS sums from solid angle to area.
     """
     rgb, alpha, frame = np.empty(3), np.empty(2), np.empty((3, 3))
     hits = 0
@@ -140,7 +142,7 @@ def intersect(  # noqa: PLR0913
         if v.wo[2] * cosine >= 0.0:
             continue
         v.material = material
-        v.reflectance = weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
+        v.reflectance = dot(vector(context.weights), vector(rgb))
         v.alpha[0], v.alpha[1] = alpha[0], alpha[1]
         v.index = context.rows[material, INDEX]
         v.turbid = INNER if context.rows[material, KIND] == SUBSURFACE else 0

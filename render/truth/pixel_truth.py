@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -17,21 +18,23 @@ from render.world.triangles import Surface, facet_of
 from render.world.world import World
 
 
+class FlatTruth(NamedTuple):
+    """The images of a `Truth`, (h w, ...)."""
+
+    depth_z: Float32
+    depth_range: Float32
+    position: Float32
+    normal: Float32
+    object_id: Int
+
+
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def fill_truth(  # noqa: PLR0913
-    surface: Surface,
-    T_world_camera: Float,
-    start: int,
-    triangle: Int,
-    normalised: Float,
-    depth_z: Float32,
-    depth_range: Float32,
-    position: Float32,
-    normal: Float32,
-    item: Int,
+def fill_truth(
+    surface: Surface, T_world_camera: Float, start: int, triangle: Int, normalised: Float, images: FlatTruth
 ) -> None:
-    """Write the pixels from `start` on of the flat images (h w, ...) from their hits: triangle (n,), -1 for none."""
+    """Write the pixels from `start` on of the images from their hits: triangle (n,), -1 for none."""
     m = T_world_camera
+    depth_z, depth_range, position, normal, item = images
     for r in range(triangle.shape[0]):
         i, t = start + r, triangle[r]
         x, y = normalised[r, 0], normalised[r, 1]
@@ -75,8 +78,8 @@ def truth_images(
         directions = np.empty((count, 3), np.float32)
         camera_rays(view, np.arange(start, stop, dtype=np.int32), 1, 0, False, normalised, offsets, directions)
         triangle = rays.from_point(T_world_camera[:3, 3], directions)
-        images = (depth_z, depth_range, position, normal, item)
-        fill_truth(surface, T_world_camera, start, triangle, normalised, *images)
+        images = FlatTruth(depth_z, depth_range, position, normal, item)
+        fill_truth(surface, T_world_camera, start, triangle, normalised, images)
 
     run.map(work, n, CHUNK)
     shape = (camera.height, camera.width)

@@ -8,7 +8,7 @@ from render.base.pose import Pose
 from render.camera.camera import Lens
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_point, lens_position, lens_project
-from render.camera.rays import camera_rays, lens_rays
+from render.camera.rays import LensRays, camera_rays, lens_rays
 from render.sampling.low_discrepancy import pair, pair_table
 from tests.render.scenes import paper_camera
 
@@ -175,7 +175,7 @@ def test_cells_of_a_pixel_share_the_aperture_evenly_also_by_quarters():
     by_seed = []
     for seed in range(20):
         look = (np.zeros(3), slopes, offsets, lens, origins, directions)
-        lens_rays(camera.view(POSE), pair_table(), pixels, cells, seed, *look)
+        lens_rays(camera.view(POSE), pair_table(), pixels, cells, seed, look[0], LensRays(*look[1:]))
         points = (lens / camera.aperture_radius).reshape(cells, cells, 2)
         quarters = [points[i : i + 8, j : j + 8].reshape(-1, 2).mean(axis=0) for i in (0, 8) for j in (0, 8)]
         by_seed.append(np.array(quarters))
@@ -192,7 +192,7 @@ def test_lens_rays_without_an_aperture_are_the_pinholes():
     camera_rays(camera.view(POSE), pixels, 2, 9, True, slopes, offsets, directions)
     found = [np.empty((n, 2)), np.empty((n, 2), np.float32), np.empty((n, 2))]
     origins, towards = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
-    lens_rays(camera.view(POSE), pair_table(), pixels, 2, 9, centre, *found, origins, towards)
+    lens_rays(camera.view(POSE), pair_table(), pixels, 2, 9, centre, LensRays(*found, origins, towards))
     assert np.array_equal(found[0], slopes) and np.array_equal(found[1], offsets)
     assert np.abs(towards - directions).max() < 1e-6 and not found[2].any()
     assert np.allclose(origins, POSE[:3, 3] - centre, atol=1e-6)

@@ -8,7 +8,7 @@ from render.laser.laser import Divergence, LineLaser
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.bdpt_pass import BdptPass, Sampling
 from render.laser_indirect.guiding import no_guide
-from render.laser_indirect.integrator import ALL_KINDS, empty_buffer, indirect_image, indirect_pilot
+from render.laser_indirect.integrator import empty_buffer, indirect_image, indirect_pilot
 from render.laser_indirect.light_group import IndirectLight
 from render.laser_indirect.photon_emission import (
     fan_integral,
@@ -26,7 +26,7 @@ from render.render import render_world
 from render.run import Run
 from render.scene.settings import RenderSettings
 from render.scene.shape import Box, Sphere, VGroove
-from render.world.placed import PlacedScene
+from render.world.placed import PlacedLaser, PlacedScene
 from tests.render.scenes import moved, paper_camera, paper_laser, plane_mesh, scene_of, world_of
 
 
@@ -244,7 +244,7 @@ def flux_of(parts, camera_paths, passes=16):
     """Mean radiance over the image and its standard error, with `camera_paths` camera paths a pass."""
     world, camera, laser, T_world_camera, T_world_laser = parts
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
-    task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, 3, ALL_KINDS)
+    task = BdptPass.of(PlacedLaser(world, camera, laser, T_world_camera, T_world_laser), reach, 3)
     pixels = camera.width * camera.height
     expected, active = np.full(pixels, camera_paths / pixels), np.arange(pixels if camera_paths else 0, dtype=np.int32)
     sampling = Sampling(1 << 14, uniform_fan(low, high), expected, active, no_guide(camera))
@@ -279,7 +279,7 @@ def test_a_deep_medium_reflects_as_chandrasekhar_says(albedo):
     beam = laser.model_copy(update={"fan_angle": 0.1})
     low, high, reach = visible_fan_range(world, beam, T_world_laser)
     assert (low, high) == pytest.approx((0.0, 1.0))
-    task = BdptPass.of(world, camera, beam, T_world_camera, T_world_laser, reach, 3, ALL_KINDS)
+    task = BdptPass.of(PlacedLaser(world, camera, beam, T_world_camera, T_world_laser), reach, 3)
     pixels, paths = camera.width * camera.height, 1 << 13
     nowhere = np.zeros(pixels), np.zeros(0, np.int32)
     sampling = Sampling(paths, uniform_fan(low, high), *nowhere, no_guide(camera))
