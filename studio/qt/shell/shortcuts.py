@@ -14,19 +14,19 @@ from studio.qt.core.actions import COMMANDS, VIEW_KEYS, Command
 MOUSE = (
     ("Drag", "turn the 3D view"),
     ("Shift+drag, middle drag", "shift it"),
-    ("Wheel", "nearer or farther; in pictures and plots: zoom"),
-    ("Click", "select; in a plot: keep the scan line"),
-    ("Double-click", "frame what is selected; in a plot: show everything"),
-    ("Hover", "the same scan line in every view"),
+    ("Wheel", "zoom"),
+    ("Click", "select; in a plot: keep the row"),
+    ("Double-click", "frame the part; a plot: all of it"),
+    ("Hover", "the same row in every view"),
     ("Drag on a number", "change it; with Shift finer, with Ctrl coarser"),
 )
 FIELDS = (
     ("Return", "take it over"),
-    ("Esc", "the value as it was; end a drag, a menu, the tour"),
+    ("Esc", "the value as it was; end a drag, a menu"),
     ("Up, Down", "a step; with Shift a tenth of it"),
 )
 LISTS = (("Return", "frame the part"), ("F2", "name a part or a render"), ("Del", "remove a part or a render"))
-COLUMNS = (("File", "Render", "Fields"), ("Edit", "Scene", "Lists", "Help"), ("View", "Measure", "3D view"), ("Mouse",))
+COLUMNS = (("File", "Render"), ("Edit", "Scene", "Lists", "Help"), ("View", "Measure", "3D view"), ("Mouse", "Fields"))
 
 
 class CheatSheet(QDialog):
@@ -54,7 +54,7 @@ def page() -> str:
             groups.setdefault(command.menu.split("/")[0], []).append((keys, text))
     groups |= {"Mouse": list(MOUSE), "Fields": list(FIELDS), "Lists": list(LISTS), "3D view": list(VIEW_KEYS.items())}
     cells = "".join(
-        f"<td style='padding-right: 28px'>{''.join(_group(name, groups[name]) for name in column)}</td>"
+        f"<td style='padding-right: 16px'>{''.join(_group(name, groups[name]) for name in column)}</td>"
         for column in COLUMNS
     )
     return f"<table><tr>{cells}</tr></table>"

@@ -21,7 +21,7 @@ from studio.scan.redevelop import is_stale
 from studio.scan.remarks import best
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, symmetric_limit
 
-POINT_PX, RIM_PX, MARK_PX, NEAR_PX = 3.5, 6.5, 9.0, 9.0
+POINT_PX, RIM_PX, MARK_PX, NEAR_PX = 3.5, 5.5, 9.0, 9.0
 OFFSET, RIM_OFFSET = -80.0, -60.0
 """Of the depth buffer, so that a point a little below the surface is seen, and its rim behind it."""
 RIM = (0.16, 0.18, 0.21)

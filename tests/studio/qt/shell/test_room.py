@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, 
 
 from studio.project.document import FieldPath
 from studio.qt.core.session import Render
+from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.window import MainWindow
 from studio.qt.shell.workspaces import WORKSPACES
 from tests.studio.qt.small_session import small_project, small_render
@@ -99,3 +100,8 @@ def test_no_text_of_any_panel_is_cut_off(window: MainWindow, screen: tuple[int, 
         window.rearrange()
     window.resize(before)
     assert not found, "\n".join(f"{where}: {text}" for where, texts in found.items() for text in texts)
+
+
+def test_the_cheat_sheet_fits_on_a_small_screen(window: MainWindow) -> None:
+    wanted = CheatSheet(window).sizeHint()
+    assert wanted.width() <= 1366 - 32 and wanted.height() <= 768 - BAR
