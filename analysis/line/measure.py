@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.detection.channel import MISSING, Lines, smoothed_covariances, smoothing_correlation
-from analysis.line.detection.detect import PRIOR_BEND, PRIOR_SLOPE, SEED_COLUMNS, Limits, detect
+from analysis.line.detection.detect import PRIOR, PRIOR_WIDTHS, SEED_COLUMNS, Limits, detect
 from analysis.line.detection.matched_filter import response_gain
 from analysis.line.methods.blais_rioux import measure_zero_crossing
 from analysis.line.methods.centre_of_mass import measure_centroid
@@ -19,7 +19,7 @@ from analysis.line.methods.gaussian_fit import LEAST_SQUARES, LIKELIHOOD, measur
 from analysis.line.methods.half_energy import measure_half_energy
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.phase import measure_phase
-from analysis.line.methods.seed_loop import COLUMNS, CORRELATION_LENGTH, ROOM, WIDTH_SLOPE, Options, Pixels, seed_kernel
+from analysis.line.methods.seed_loop import COLUMNS, CORRELATION_LENGTH, ROOM, TOLD, Options, Pixels, seed_kernel
 from analysis.line.methods.shared_width import width_priors
 from analysis.line.methods.steger_2d import HALO, NORMAL_CENTROID, RIDGE, fill_gaps, measure_ridge
 from analysis.line.methods.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, measure_three_pixels
@@ -108,7 +108,7 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
         found = np.empty((stop - start, settings.peaks), np.uint8)
         detect(signal[own], mask[own], floor[own], limits, seeds, found)
         if priors is not None:
-            seeds[..., PRIOR_SLOPE : PRIOR_BEND + 1] = priors[start:stop]
+            seeds[..., PRIOR:] = priors[start:stop]
         if halo and (mask & MISSING).any():
             signal = fill_gaps(signal, mask)
         room = np.full((ROOM, signal.shape[1]), np.nan)  # what is read before it is written shows
@@ -119,9 +119,9 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
 
     map_chunks(work, lines.count, TALL_CHUNK if halo else CHUNK, threads)
     if not options.known_width:
-        shared = [width_priors(out[:, k, WIDTH_SLOPE : WIDTH_SLOPE + 2]) for k in range(settings.peaks)]
+        shared = [width_priors(out[:, k, TOLD:], out[:, k, 0], out[:, k, 1]) for k in range(settings.peaks)]
         if any(one is not None for one in shared):
-            none = np.zeros((lines.count, 2))
+            none = np.zeros((lines.count, len(PRIOR_WIDTHS)))
             priors = np.stack([none if one is None else one for one in shared], axis=1)
             map_chunks(lambda start, stop: work(start, stop, priors), lines.count, CHUNK, threads)
     # a position that says less than a guess along the whole scan line is none

@@ -31,11 +31,14 @@ from render.base.arrays import Float32
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-CENTRE, WIDTH, AMPLITUDE, BACKGROUND, REACH, PLATEAU, SLOPE, SLOPE_SIGMA, PRIOR_SLOPE, PRIOR_BEND = range(10)
+CENTRE, WIDTH, AMPLITUDE, BACKGROUND, REACH, PLATEAU, SLOPE, SLOPE_SIGMA, PRIOR = range(9)
 """Columns of a seed: px, px, e-, e-, px half-way to the nearest other peak, half width in px of a saturated plateau;
-slope of the background along the scan line and its standard deviation, e-/px; k and q of a prior exp(k s + q s^2) of a
-narrow line's width s, 0 where nothing is known (`methods.shared_width`)."""
-SEED_COLUMNS = 10
+slope of the background along the scan line and its standard deviation, e-/px; from PRIOR on the logarithm of how likely
+a narrow line is as wide as each of PRIOR_WIDTHS, all 0 where nothing is known (`methods.shared_width`)."""
+PRIOR_WIDTHS = np.concatenate((0.02 + 0.03 * np.arange(17), np.array((0.56, 0.64, 0.72, 0.8))))
+"""px. The narrowest is no line that a lens draws on small pixels, but a sheet may be as thin on large ones, as in an
+image that is reduced to a quarter."""
+SEED_COLUMNS = PRIOR + len(PRIOR_WIDTHS)
 
 NEIGHBOUR = 0.05
 """Fraction of a peak's response from which another peak limits its window of pixels."""
@@ -166,7 +169,7 @@ def _measure(
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: Array, flags: Mask) -> None:
-    """Scan lines (n, w) in electrons -> seeds (n, k, 10) and flags (n, k), strongest first.
+    """Scan lines (n, w) in electrons -> seeds (n, k, SEED_COLUMNS) and flags (n, k), strongest first.
 
     floor (n, w) or (n, 1): variance of a pixel without signal, e-^2.
     """
@@ -225,5 +228,5 @@ def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: A
             if slope != 0.0:  # on it the blocks' median is the level beside the line
                 flags[y, taken] = _measure(line, response, mask[y], pixel, beside, dark, limits, seed)
             seed[SLOPE], seed[SLOPE_SIGMA] = slope, slope_sigma
-            seed[PRIOR_SLOPE], seed[PRIOR_BEND] = 0.0, 0.0
+            seed[PRIOR:] = 0.0
             taken += 1

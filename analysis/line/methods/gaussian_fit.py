@@ -16,8 +16,8 @@ from analysis.line.detection.detect import (
     BACKGROUND,
     CENTRE,
     PLATEAU,
-    PRIOR_BEND,
-    PRIOR_SLOPE,
+    PRIOR,
+    PRIOR_WIDTHS,
     REACH,
     SLOPE,
     WIDTH,
@@ -25,12 +25,11 @@ from analysis.line.detection.detect import (
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE, profile
 from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
 from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width
-from analysis.line.methods.saturated_line import widen_saturated
+from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, measure_with_glow, widen_saturated
 from analysis.line.methods.scintillation import position_variance, shared_variance
 from analysis.line.methods.seed_loop import (
     CORRELATION_LENGTH,
-    WIDTH_BEND,
-    WIDTH_SLOPE,
+    TOLD,
     Array,
     Options,
     Pixels,
@@ -45,10 +44,8 @@ LEAST_SQUARES, LIKELIHOOD = range(2)
 ITERATIONS = 30
 SMALL_STEP, ACCEPTED_STEP = 1e-5, 1e-3
 """Squared standard deviations: stop at the first; out of iterations the second will do (scoring is linear at worst)."""
-NARROWEST_SATURATED = 0.35
-"""px; the wings of a narrower line are within a pixel."""
 RESOLVED, FINE = 0.3, 0.35
-"""px; a line that is narrower than COARSE, and whose width may as well be below the first (2 sigma), is not a matter of
+"""px; a line that is narrower than COARSE, and whose width may as well be below the first (4 sigma), is not a matter of
 a fit; if it is also narrower than the second on average over what its width may be, it is flagged."""
 SPECKLED = 0.06
 """px; variance by scintillation over the line's width from which few grains make up a line: an expansion in their
@@ -246,22 +243,23 @@ def _is_coarse(pixel: Array, n: int, p: Array, options: Options, hessian: Array)
         return True
     # of least squares the Hessian is that of pixels of unit variance
     variance = 1.0 if options.variant == LIKELIHOOD else 0.5 * p[0] + max(p[3], 0.0) + pixel[FLOOR, n // 2]
-    return bool(p[2] - 2.0 * math.sqrt(row[2] * variance) < RESOLVED)
+    return bool(p[2] - 4.0 * math.sqrt(row[2] * variance) < RESOLVED)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _measure_narrow(
     pixels: Pixels, pixel: Array, n: int, p: Array, seed: Array, options: Options, shape: Array, out: Array
 ) -> int:
-    """The posterior of a line that may be too narrow for its pixels (4, n) -> out (9,); returns UNRESOLVED if it is."""
+    """The posterior of a line that may be too narrow for its pixels (4, n) -> out; returns UNRESOLVED if it is."""
     x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
-    width = seed[PRIOR_SLOPE : PRIOR_BEND + 1].copy()
-    out[1] = posterior(pixel, n, p, options.known_width, options.integrated, shape, width)
+    told = np.empty((2, PRIOR_WIDTHS.shape[0]))
+    told[:] = np.nan
+    out[1] = posterior(pixel, n, p, options.known_width, options.integrated, shape, seed[PRIOR:], told)
     if not math.isfinite(p[1]) or not math.isfinite(out[1]):
         out[:] = np.nan
         return Flag.NOT_CONVERGED.value
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
-    out[WIDTH_SLOPE], out[WIDTH_BEND] = width[0], width[1]
+    out[TOLD:] = told.ravel()
     chi2 = mass = 0.0
     light, weight = np.empty(n), np.empty(n)
     for i in range(n):
@@ -283,6 +281,26 @@ def _measure_narrow(
         out[1] = math.sqrt(count + shared)
         out[CORRELATION_LENGTH] = (count + mean) / max(count + shared, 1e-300)
     return Flag.UNRESOLVED.value if p[2] < FINE else Flag.OK.value
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _measure_saturated(
+    pixels: Pixels, y: int, seed: Array, n: int, p: Array, chi2: float, options: Options, out: Array
+) -> None:
+    """What glow there may be beside a saturated line p (4,), fitted alone to n pixels of pixels.room -> out."""
+    pixel = pixels.room[:4]
+    widen_saturated(pixel[POSITION], n, p, pixels.room[4], chi2 / max(n - 4, 1), seed[PLATEAU], out)
+    if options.variant == LIKELIHOOD and pixels.correlation.shape[0] == 1 and p[2] >= COARSE:
+        half = math.ceil(min(seed[PLATEAU] + AROUND * p[2] + 1.5, seed[REACH], 6.0 * options.max_width))
+        measure_with_glow(pixels, seed, _gather(pixels, y, seed, seed[CENTRE], half, pixel), p, options, out)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _tell_width(width: float, variance: float, out: Array) -> None:
+    """What a fit says of a line's width, for its neighbours."""
+    count = PRIOR_WIDTHS.shape[0]
+    for j in range(count):
+        out[TOLD + j] = out[TOLD + count + j] = -0.5 * (PRIOR_WIDTHS[j] - width) ** 2 / variance
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -339,7 +357,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     if flag == Flag.OK.value and min(p[2], seed[WIDTH]) < COARSE:
         if not converged:
             p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
-        if not converged or seed[PRIOR_BEND] < 0.0 or _is_coarse(pixel, count, p, options, hessian):
+        if not converged or seed[PRIOR] != 0.0 or _is_coarse(pixel, count, p, options, hessian):
             return _measure_narrow(pixels, pixel, count, p, seed, options, shape, out)
     independent = pixels.correlation.shape[0] == 1
     scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
@@ -378,11 +396,11 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     if independent:
         out[5] = chi2 / (count - 4)
     if flag == Flag.SATURATED.value:
-        widen_saturated(pixel[POSITION], count, p, weight, chi2 / max(count - 4, 1), seed[PLATEAU], out)
+        _measure_saturated(pixels, y, seed, count, p, chi2, options, out)
     elif likelihood and not options.known_width and p[2] < WIDEST:
         unit[1], unit[2] = 0.0, 1.0
         if _solve(hessian, 0.0, unit, factor, row):
-            out[WIDTH_SLOPE], out[WIDTH_BEND] = p[2] / row[2], -0.5 / row[2]
+            _tell_width(p[2], row[2], out)
     if flag == Flag.OK.value and speckled > SPECKLED * p[2]:
         return Flag.SPECKLED.value
     if not judged:

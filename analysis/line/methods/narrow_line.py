@@ -1,12 +1,12 @@
 """The position of a line that is too narrow for its pixels: mean and standard deviation of the posterior.
 
-    p(c, s | y)  ~  L(y | A(c, s), c, s, b) / sqrt(I_AA)  exp(k s + q s^2)    c within a pixel of the fit, s from 0.2 px
+    p(c, s | y)  ~  L(y | A(c, s), c, s, b) s / sqrt(I_AA)  p(s)    c within a pixel of the fit, s from 0.02 px
 
 A line that hardly reaches the pixels beside its own leaves the likelihood flat over a part of the pixel, and its width
 decides how far: no Gaussian about the maximum describes that (Winick, JOSA A 3, 1986: the bound diverges below 0.3 px).
-The amplitude is profiled out, Laplace's factor standing for its share of the volume. The prior is even in c; in s it is
-even on the first look (k = q = 0), and on the second what the neighbouring scan lines say of the width that they share
-(`shared_width`).
+The light, A s, is profiled out, Laplace's factor standing for its share of the volume. The prior is even in the light
+and in c; in s it is even on the first look, and on the second what the neighbouring scan lines say of the width that
+they share (`shared_width`).
 """
 
 from __future__ import annotations
@@ -16,21 +16,22 @@ import math
 import numpy as np
 from numba import njit
 
+from analysis.line.detection.detect import PRIOR_WIDTHS
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, ROOT_HALF, ROOT_HALF_PI, profile
 from analysis.line.methods.seed_loop import Array
 
 NARROWEST = 0.2
-"""px; no lens draws a narrower line: that is Airy's disc of f/2.8 on pixels of 3 um."""
+"""px; the narrowest line that is fitted: of a narrower one hardly a pixel tells where it is."""
 COARSE = 0.5
 """px; a narrower line may not let a fit say how wide it is."""
-CENTRES, WIDTHS = 13, 7
-"""Points of the grid; 41 x 13 change sigma by less than 2 %."""
-FIRST_CENTRES, FIRST_WIDTHS = 13, 3
-"""Of the first, wide grid, which only finds where the second one belongs."""
-LOOKS, RESOLVED = 4, 0.5
-"""Grids at most, and variance over squared step from which one resolves the posterior."""
+CENTRES, WIDTHS = 13, 9
+"""Points of a grid."""
+LOOKS, RESOLVED, RESOLVED_PLACE = 4, 0.5, 2.0
+"""Grids at most, and variance over squared step from which one resolves the posterior of the width and of the place."""
 FARTHEST = 0.8
 """px on either side of where the fit, or the seed, has the centre."""
+BESIDE = 0.1
+"""px; a line of the next width on the grid is no farther off."""
 WIDEST = 0.8
 """px; a wider line is resolved."""
 STEEP = 5.5
@@ -77,7 +78,7 @@ def _log_likelihood(x: Array, y: Array, floor: Array, n: int, p: Array, integrat
             moment += weight * g * (y[i] - p[3])
             information += weight * g * g
         p[0] = max(moment / max(information, 1e-300), 0.0)
-    total = -0.5 * math.log(max(information, 1e-300))
+    total = math.log(p[2]) - 0.5 * math.log(max(information, 1e-300))
     for i in range(first, last):
         m = max(p[0] * shape[i] + p[3] + floor[i], 0.1 * floor[i])
         total += (y[i] + floor[i]) * math.log(m) - m - dark[i]
@@ -85,104 +86,117 @@ def _log_likelihood(x: Array, y: Array, floor: Array, n: int, p: Array, integrat
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _parabola(s: Array, mass: Array, n: int, told: Array) -> None:
-    """The logarithm of mass (n,) at widths s (n,) as k s + q s^2 and a constant, by weighted least squares -> told."""
-    told[:] = 0.0
-    total = mean = 0.0
-    for j in range(n):
-        total += mass[j]
-        mean += mass[j] * s[j]
-    mean /= total
-    moments, right = np.zeros(5), np.zeros(3)
-    for j in range(n):
-        weight, t = mass[j] / total, (s[j] - mean) / (s[n - 1] - s[0])
-        if weight < 1e-9:
-            continue
-        value, power = math.log(weight), 1.0
-        for k in range(5):
-            moments[k] += weight * power
-            if k < 3:
-                right[k] += weight * power * value
-            power *= t
-    a, b, c, d, e = moments[0], moments[1], moments[2], moments[3], moments[4]
-    determinant = a * (c * e - d * d) - b * (b * e - c * d) + c * (b * d - c * c)
-    if not determinant > 1e-12:
-        return
-    slope = a * (right[1] * e - d * right[2]) - right[0] * (b * e - c * d) + c * (b * right[2] - right[1] * c)
-    bend = a * (c * right[2] - right[1] * d) - b * (b * right[2] - right[1] * c) + right[0] * (b * d - c * c)
-    scale = s[n - 1] - s[0]
-    slope, bend = slope / determinant / scale, bend / determinant / (scale * scale)
-    told[0], told[1] = slope - 2.0 * bend * mean, bend
+def _over_places(
+    pixel: Array, n: int, p: Array, low: float, high: float, integrated: bool, room: Array
+) -> tuple[float, float, float, float]:
+    """Of a line as wide as p[2] between two places: logarithm of the likelihood at the best place and over all of them,
+    mean and variance of the place. p (4,), amplitude and background, is changed; room as in `_log_likelihood`."""
+    x, y, floor, log = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR], np.empty(CENTRES)
+    amplitude, first, last = p[0], low, high
+    best = total = mean = variance = step = 0.0
+    for attempt in range(LOOKS):  # over all that is possible, then over where it is likely
+        step, best = (high - low) / (CENTRES - 1), -np.inf
+        for i in range(CENTRES):
+            p[0], p[1] = amplitude, low + i * step
+            log[i] = _log_likelihood(x, y, floor, n, p, integrated, room)
+            best = max(best, log[i])
+        total = mean = variance = 0.0
+        for i in range(CENTRES):
+            weight, apart = math.exp(log[i] - best), low + i * step - first
+            total += weight
+            mean += weight * apart
+            variance += weight * apart * apart
+        mean /= total
+        # a cell of the grid is as wide as its step: its own variance keeps a narrow peak from vanishing
+        variance = max(variance / total - mean * mean, 0.0) + step * step / 12.0
+        if attempt == LOOKS - 1 or variance > RESOLVED_PLACE * step * step:
+            break
+        reach = 4.0 * math.sqrt(variance)
+        low, high = max(first + mean - reach, first), min(first + mean + reach, last)
+    return best, best + math.log(total * step), first + mean, variance
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def posterior(pixel: Array, n: int, p: Array, known_width: bool, integrated: bool, shape: Array, told: Array) -> float:
+def _prior_at(prior: Array, s: float) -> float:
+    """The prior (m,) of PRIOR_WIDTHS at a width between two of them."""
+    j = 0
+    while j < prior.shape[0] - 2 and PRIOR_WIDTHS[j + 1] < s:
+        j += 1
+    t = (s - PRIOR_WIDTHS[j]) / (PRIOR_WIDTHS[j + 1] - PRIOR_WIDTHS[j])
+    return float(prior[j] + t * (prior[j + 1] - prior[j]))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _over_widths(
+    pixel: Array, n: int, p: Array, widths: Array, prior: Array, integrated: bool, room: Array, told: Array
+) -> tuple[float, float, float, float]:
+    """Mean and variance of the place, and of the width, over some widths (m,); told (2, m): `_over_places` of each."""
+    m, centre = widths.shape[0], p[1]
+    place, spread, log = np.empty(m), np.empty(m), np.empty(m)
+    trial = p.copy()
+    best = -np.inf
+    low, high = centre - FARTHEST, centre + FARTHEST
+    for j in range(m - 1, -1, -1):  # a narrower line is near where the wider one is, at a place that is more exact
+        trial[0], trial[2] = p[0], widths[j]
+        told[0, j], told[1, j], place[j], spread[j] = _over_places(pixel, n, trial, low, high, integrated, room)
+        reach = 4.0 * math.sqrt(spread[j]) + BESIDE
+        low, high = max(place[j] - reach, centre - FARTHEST), min(place[j] + reach, centre + FARTHEST)
+        left, right = widths[max(j - 1, 0)], widths[min(j + 1, m - 1)]
+        log[j] = told[1, j] + _prior_at(prior, widths[j]) + math.log(right - left)
+        best = max(best, log[j])
+    total = mean = square = mean_s = square_s = 0.0
+    for j in range(m):
+        weight, apart = math.exp(log[j] - best), place[j] - centre
+        total += weight
+        mean += weight * apart
+        square += weight * (apart * apart + spread[j])
+        mean_s += weight * widths[j]
+        square_s += weight * widths[j] * widths[j]
+    mean, mean_s = mean / total, mean_s / total
+    variance, variance_s = square / total - mean * mean, square_s / total - mean_s * mean_s
+    return centre + mean, max(variance, 0.0), mean_s, max(variance_s, 0.0)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def posterior(
+    pixel: Array, n: int, p: Array, known_width: bool, integrated: bool, shape: Array, prior: Array, told: Array
+) -> float:
     """Pixels (4, n) of a fit p (4,), amplitude, centre, width, background -> sigma_u.
 
     p becomes the posterior's mean; the background stays. known_width: p[2] is held. shape (3, n): the profile on
-    return. told (2,): k and q of the prior; of an even one, what the pixels say instead on return.
+    return. prior (m,): logarithm of the prior at PRIOR_WIDTHS. told (2, m): what the pixels say of each, at the best
+    place and over all.
     """
-    x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
-    amplitude, middle, even = p[0], p[1], told[0] == 0.0 and told[1] == 0.0
-    trial, log, widths, mass = np.empty(4), np.empty((WIDTHS, CENTRES)), np.empty(WIDTHS), np.empty(WIDTHS)
+    floor = pixel[FLOOR]
     for i in range(n):
         m = max(p[3] + floor[i], 0.1 * floor[i])
-        shape[1, i] = (y[i] + floor[i]) * math.log(m) - m
-    low_width, high = p[2], WIDEST
-    if not known_width:
-        low_width = NARROWEST
-        if told[1] < 0.0:
-            spread = math.sqrt(-0.5 / told[1])
-            low_width = min(max(-0.5 * told[0] / told[1] - 3.0 * spread, NARROWEST), WIDEST - 0.1)
-            high = min(max(-0.5 * told[0] / told[1] + 3.0 * spread, low_width + 0.02), WIDEST)
-    reach, span, low = FARTHEST, high - low_width, middle - FARTHEST
-    columns, rows = FIRST_CENTRES, 1 if known_width else FIRST_WIDTHS
-    mean_c = mean_s = var_c = var_s = 0.0
-    for attempt in range(LOOKS):  # over all that is possible, then over where it is likely
-        step, step_s = 2.0 * reach / (columns - 1), span / (rows - 1) if rows > 1 else 0.0
-        best = -np.inf
-        for j in range(rows):
-            widths[j] = low_width + j * step_s
-            for i in range(columns):
-                trial[0], trial[1], trial[2], trial[3] = amplitude, low + i * step, widths[j], p[3]
-                log[j, i] = _log_likelihood(x, y, floor, n, trial, integrated, shape)
-                log[j, i] += (told[0] + told[1] * widths[j]) * widths[j]
-                best = max(best, log[j, i])
-        total = mean_c = mean_s = var_c = var_s = 0.0
-        for j in range(rows):
-            mass[j] = 0.0
-            for i in range(columns):
-                weight = math.exp(log[j, i] - best)
-                c = low + i * step
-                mass[j] += weight
-                mean_c += weight * c
-                var_c += weight * c * c
-            total += mass[j]
-            mean_s += mass[j] * widths[j]
-            var_s += mass[j] * widths[j] * widths[j]
-        mean_c, mean_s = mean_c / total, mean_s / total
-        # a cell of the grid is as wide as its step: its own variance keeps a narrow peak from vanishing
-        var_c = max(var_c / total - mean_c * mean_c, 0.0) + step * step / 12.0
-        var_s = max(var_s / total - mean_s * mean_s, 0.0)
-        fine = var_c > RESOLVED * step * step and (rows == 1 or var_s > RESOLVED * step_s * step_s)
-        if attempt == LOOKS - 1 or (attempt > 0 and fine):
-            break
-        reach = min(4.0 * math.sqrt(var_c), reach)
-        low = mean_c - reach
-        if rows > 1:
-            spread = math.sqrt(var_s) + step_s / math.sqrt(12.0)
-            high = min(mean_s + 3.0 * spread, high)
-            low_width = max(mean_s - 3.0 * spread, low_width)
-            span, rows = high - low_width, WIDTHS
-        columns = CENTRES
-    if even and rows > 1:
-        _parabola(widths, mass, rows, told)
-    p[1], p[2] = mean_c, mean_s
-    trial[0], trial[1], trial[2], trial[3] = amplitude, mean_c, mean_s, p[3]
-    _log_likelihood(x, y, floor, n, trial, integrated, shape)
+        shape[1, i] = (pixel[ELECTRONS, i] + floor[i]) * math.log(m) - m
+    trial = p.copy()
+    if known_width:
+        _, _, p[1], variance = _over_places(pixel, n, trial, p[1] - FARTHEST, p[1] + FARTHEST, integrated, shape)
+    else:
+        mean, variance, width, spread = _over_widths(pixel, n, p, PRIOR_WIDTHS, prior, integrated, shape, told)
+        highest = 0.0
+        for j in range(PRIOR_WIDTHS.shape[0]):
+            highest = max(highest, told[0, j]) if j > 0 else told[0, j]
+        for j in range(PRIOR_WIDTHS.shape[0]):
+            told[0, j], told[1, j] = told[0, j] - highest, told[1, j] - highest
+        step, fine, unused = PRIOR_WIDTHS[1] - PRIOR_WIDTHS[0], np.empty(WIDTHS), np.empty((2, WIDTHS))
+        for _ in range(LOOKS):
+            if spread > RESOLVED * step * step:
+                break
+            reach = 4.0 * math.sqrt(spread + step * step / 12.0)
+            low = max(width - reach, PRIOR_WIDTHS[0])
+            step = (width + reach - low) / (WIDTHS - 1)
+            for j in range(WIDTHS):
+                fine[j] = low + j * step
+            mean, variance, width, spread = _over_widths(pixel, n, p, fine, prior, integrated, shape, unused)
+        p[1], p[2] = mean, width
+    trial[0], trial[1], trial[2] = p[0], p[1], p[2]
+    _log_likelihood(pixel[POSITION], pixel[ELECTRONS], floor, n, trial, integrated, shape)
     p[0] = trial[0]
-    profile(x, n, mean_c, mean_s, integrated, shape)
-    return math.sqrt(var_c)
+    profile(pixel[POSITION], n, p[1], p[2], integrated, shape)
+    return math.sqrt(variance)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

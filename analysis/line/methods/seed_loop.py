@@ -2,10 +2,10 @@
 
     measure(pixels, y, seed, flag, options, out) -> flag
 
-pixels holds the scan line y and those around it, seed (10,) where `detect` saw a peak and how wide and high it is, flag
-what it said of it (OK or SATURATED). The kernel writes out (9,): u, sigma_u, width, amplitude, background, chi2,
-correlation length, and what the pixels of a narrow line say of its width (`shared_width`), NaN where it has none, and
-returns the flag that the peak keeps. An out without a position stays NaN.
+pixels holds the scan line y and those around it, seed where `detect` saw a peak and how wide and high it is, flag
+what it said of it (OK or SATURATED). The kernel writes out (COLUMNS,): u, sigma_u, width, amplitude, background,
+chi2, correlation length, and what the pixels of a narrow line say of its width (`shared_width`), NaN where it has none,
+and returns the flag that the peak keeps. An out without a position stays NaN.
 """
 
 from __future__ import annotations
@@ -19,16 +19,18 @@ from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from analysis.line.detection.detect import PRIOR_WIDTHS
 from analysis.line.result import Flag
 from render.base.arrays import Float32
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-COLUMNS = 9
+CORRELATION_LENGTH, TOLD = 6, 7
+"""Columns of out: scan lines; from TOLD on the logarithm of the likelihood of each of PRIOR_WIDTHS at the place that is
+likeliest, and then that over all places."""
+COLUMNS = TOLD + 2 * len(PRIOR_WIDTHS)
 """Of out."""
-CORRELATION_LENGTH, WIDTH_SLOPE, WIDTH_BEND = 6, 7, 8
-"""The last of them: scan lines; k and q of exp(k s + q s^2), what the pixels of a narrow line say of its width s."""
 ROOM = 11
 """Scan lines of scratch that a method may use."""
 
@@ -81,7 +83,8 @@ peak_kernel = register_jitable(error_model="numpy", forceinline=True)
 
 @cache
 def seed_kernel(measure: Callable[..., int]) -> Callable[[Pixels, Array, Mask, Options, Array], None]:
-    """The kernel of one peak -> that of all seeds (n, k, 10): flags (n, k) are updated, out (n, k, 9) is written."""
+    """The kernel of one peak -> that of all seeds (n, k, SEED_COLUMNS): flags (n, k) are updated, out (n, k, COLUMNS)
+    is written."""
 
     @njit(nogil=True, cache=True, error_model="numpy")
     def run(pixels: Pixels, seeds: Array, flags: Mask, options: Options, out: Array) -> None:

@@ -1,14 +1,22 @@
 """The width that a narrow line has in common with its neighbours, as a prior for those that hardly tell it.
 
-The pixels of scan line j say of the width s  exp(k_j s + q_j s^2)  (`narrow_line.py`). Where neighbours hold the same
-width the product over them says it best, the line's own part left out; how much better than one alone depends on how
-well they agree (the same in Bayesian terms: Gelman et al., Bayesian Data Analysis, 5.4, with the spread as given).
+The pixels of scan line j tell how likely the width s is at the place c that suits it best, P_j(s), and over all places
+in the pixel, M_j(s) (`narrow_line.py`). Where neighbours hold the same width the product over them says it best, the
+line's own part left out. Places that are as many as the lines tell the width by how often the line is split between
+two pixels, as in M; at one place that all have in common this would be counted over and over, and only P is each
+line's own:
+
+    log p(s)  =  sum_j  log P_j + t (log M_j - log P_j)        t: places among the lines over their number
+
+How much better that is than one line alone depends on how well they agree (the same in Bayesian terms: Gelman et al.,
+Bayesian Data Analysis, 5.4, with the spread as given).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from analysis.line.detection.detect import PRIOR_WIDTHS
 from render.base.arrays import Float
 
 NEIGHBOURS = 32
@@ -16,44 +24,75 @@ NEIGHBOURS = 32
 FEWEST = 8
 STRANGE = 4.0
 """Standard deviations from which a scan line does not share its neighbours' width."""
-SPREAD = 0.02
+SPREAD = 0.015
 """px; neighbours differ by as much."""
 SURE = 0.02
 """px; a line that tells its own width better needs no neighbours."""
 WIDEST = 0.5
 """px; a wider line is resolved by itself."""
+STEPS = np.gradient(PRIOR_WIDTHS)
+STEP = 3.0
+"""Standard deviations from which a line is at another place in its pixel than the one before."""
+LEAST = 1e-30
+"""Relative density of a width that the neighbours rule out."""
 
 
-def width_priors(told: Float) -> Float | None:
-    """k, q by scan line (n, 2), NaN where there is no narrow line -> those of its neighbours (n, 2), 0 where a scan
-    line needs none or does not share theirs; None: none needs any."""
-    known = np.isfinite(told).all(axis=1)
+def width_priors(told: Float, u: Float, sigma_u: Float) -> Float | None:
+    """What scan lines tell of their width (n, 2 m), NaN where there is no narrow line, and their positions and sigmas
+    (n,), px -> the logarithm of the density of each of the m PRIOR_WIDTHS by a line's neighbours, all 0 where a line
+    needs none or does not share theirs; None: none needs any."""
+    known = np.isfinite(told).all(axis=1) & np.isfinite(u) & np.isfinite(sigma_u)
     if known.sum() < FEWEST:
         return None
-    own_k, own_q = np.where(known, told[:, 0], 0.0), np.where(known, told[:, 1], 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        variance = np.where(own_q < 0.0, -0.5 / own_q, np.inf)
-        alike = known
-        for _ in range(2):
-            k, q, count = (_of_neighbours(np.where(alike, v, 0.0)) for v in (own_k, own_q, np.ones(len(told))))
-            sharp = (q < 0.0) & (count >= FEWEST)
-            shared = np.where(sharp, -0.5 * k / q, np.nan)
-            apart = (own_k * variance - shared) ** 2 / variance
-            # those that scatter more than their pixels say, by speckle, say less
-            usual = apart[np.isfinite(apart) & np.isfinite(variance)]
-            scatter = max(float(np.median(usual)) / 0.455, 1.0) if len(usual) else 1.0
-            alike = known & ~(apart > STRANGE**2 * scatter)
-    spread = np.where(sharp, scatter * -0.5 / np.where(sharp, q, -1.0), 1.0) + SPREAD**2
-    needed = known & alike & sharp & (shared < WIDEST) & (variance * scatter > SURE**2)
+    best, mass = np.split(np.where(known[:, None], told, 0.0), 2, axis=1)
+    own, variance = _moments(mass)
+    moved = _new_places(np.where(known, u, np.nan), sigma_u)
+    alike = known
+    for _ in range(2):
+        at_best, places = (_of_neighbours(np.where(alike[:, None], part, 0.0)) for part in (best, mass - best))
+        count = _of_neighbours(alike.astype(np.float64))
+        independent = 1.0 + _of_neighbours(moved)
+        total = at_best + np.minimum(independent / np.maximum(count, 1.0), 1.0)[:, None] * places
+        shared, _ = _moments(total)
+        enough = known & (count >= FEWEST)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            apart = (own - shared) ** 2 / variance
+        # those that scatter more than their pixels say, by speckle, say less
+        usual = apart[enough & np.isfinite(apart)]
+        scatter = max(float(np.median(usual)) / 0.455, 1.0) if len(usual) else 1.0
+        alike = known & ~(apart > STRANGE**2 * scatter)
+    needed = enough & alike & (shared < WIDEST) & (variance * scatter > SURE**2)
     if not needed.any():
         return None
-    return np.where(needed[:, None], np.stack([shared / spread, -0.5 / spread], axis=1), 0.0)
+    density = np.exp((total - total.max(axis=1, keepdims=True)) / scatter) * STEPS
+    apart = (PRIOR_WIDTHS[:, None] - PRIOR_WIDTHS) / SPREAD
+    density = density / density.sum(axis=1, keepdims=True) @ np.exp(-0.5 * apart**2)
+    return np.where(needed[:, None], np.log(density + LEAST), 0.0)
+
+
+def _moments(log: Float) -> tuple[Float, Float]:
+    """Mean and variance, px and px^2, of the width by the logarithm of its density (n, m)."""
+    density = np.exp(log - log.max(axis=1, keepdims=True)) * STEPS
+    density /= density.sum(axis=1, keepdims=True)
+    mean = density @ PRIOR_WIDTHS
+    return mean, np.maximum(density @ PRIOR_WIDTHS**2 - mean**2, 1e-12)
+
+
+def _new_places(u: Float, sigma_u: Float) -> Float:
+    """How far each line's place in its pixel differs from that of the one before: 1 on average if by chance.
+
+    Twelve times the squared distance, the shorter way round, where it is no matter of noise.
+    """
+    step = np.diff(u, prepend=np.nan)
+    apart = (step - np.rint(step)) ** 2
+    noise = sigma_u**2 + np.append(np.nan, sigma_u[:-1]) ** 2
+    return np.where(apart > STEP**2 * noise, 12.0 * apart, 0.0)
 
 
 def _of_neighbours(values: Float) -> Float:
-    """(n,) -> sums over the neighbours of each, itself left out."""
-    padded = np.pad(values, NEIGHBOURS)
-    total = np.zeros(len(values))
+    """(n, ..) -> sums over the neighbours of each, itself left out."""
+    padded = np.pad(values, [(NEIGHBOURS, NEIGHBOURS)] + [(0, 0)] * (values.ndim - 1))
+    total = np.zeros_like(values)
     for distance in range(1, NEIGHBOURS + 1):  # both sides at once: upside down it is the same to the last bit
         total += padded[NEIGHBOURS - distance :][: len(values)] + padded[NEIGHBOURS + distance :][: len(values)]
     return total

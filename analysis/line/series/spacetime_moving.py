@@ -21,8 +21,7 @@ from analysis.line.detection.detect import (
     BACKGROUND,
     CENTRE,
     PLATEAU,
-    PRIOR_BEND,
-    PRIOR_SLOPE,
+    PRIOR,
     SEED_COLUMNS,
     SLOPE,
     SLOPE_SIGMA,
@@ -219,7 +218,7 @@ def _fit(lines: Lines, share: Float, at: int, spread: float, threads: int | None
         seeds[:, 0, CENTRE], seeds[:, 0, WIDTH], seeds[:, 0, BACKGROUND] = top, spread, base
         seeds[:, 0, AMPLITUDE] = np.maximum(signal[np.arange(len(top)), top] - base, 1.0)
         seeds[:, 0, PLATEAU] = seeds[:, 0, SLOPE] = seeds[:, 0, SLOPE_SIGMA] = 0.0
-        seeds[:, 0, PRIOR_SLOPE] = seeds[:, 0, PRIOR_BEND] = 0.0
+        seeds[:, 0, PRIOR:] = 0.0
         full = (mask & SATURATED).any(axis=1)
         edge = (top <= 0) | (top >= count - 1) | ~np.isfinite(near.max(axis=1))
         flags[start:stop, 0] = np.where(edge, Flag.AT_BORDER, np.where(full, Flag.SATURATED, Flag.OK))
