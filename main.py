@@ -16,6 +16,7 @@ try:
 
     from studio.runtime.command_line import BAD_INPUT, Commands, FiniteRange
     from studio.runtime.command_options import (
+        COLOUR,
         FARTHEST,
         GEOMETRY,
         METHOD,
@@ -24,7 +25,11 @@ try:
         THREADS,
         common,
         measuring,
+        photographed,
+        real_views,
         repeating,
+        sharing,
+        virtual_views,
         working,
     )
     from studio.runtime.system import message, missing_needs, why_not_in_this_folder
@@ -131,6 +136,9 @@ def render(project: Path | None, **options: Any) -> None:
 @click.option("--project", type=click.Path(path_type=Path), help="Project with camera, laser and settings.")
 @click.option("--laser", type=click.IntRange(0), default=0, show_default=True, help="Which laser made the line.")
 @click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5.")
+@click.option("--colour", type=COLOUR, help="The laser's, in photographs  [default: the project's].")
+@click.option("--shape", type=click.Choice(["plane", "sphere"]), help="That photographs show, for the report.")
+@photographed
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside the source].")
 @measuring
 @THREADS
@@ -138,7 +146,8 @@ def render(project: Path | None, **options: Any) -> None:
 def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
     """Points from rendered frames (a folder that `render` wrote), or from photographs with --project.
 
-    Several photographs are the steps of the project's motion, or, with --hdr, exposures of one scene.
+    Several photographs are the steps of the project's motion, or, with --hdr, exposures of one scene. They get a report
+    of their own: residuals to a straight line and a plane, noise, coverage, warnings and pictures.
     """
     _require_system()
     from studio.commands.commands import reconstruct_source
@@ -149,20 +158,12 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 @cli.command()
 @click.argument("images", nargs=-1, required=True, type=click.Path(path_type=Path))
 @METHOD
-@click.option(
-    "--laser", type=click.Choice(["auto", "mono", "red", "green", "blue"]), default="auto", help="Its colour."
-)
-@click.option("--axis", type=click.Choice(["rows", "columns"]), default="rows", show_default=True, help="Scan lines.")
-@click.option(
-    "--off",
-    type=click.Path(path_type=Path),
-    multiple=True,
-    help="Image with the laser off, to subtract: one for all, or one for each image, in order.",
-)
-@click.option("--pattern", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"]), help="Bayer pattern of raw images.")
+@click.option("--laser", "colour", type=COLOUR, help="Its colour  [default: auto].")
+@photographed
 @click.option("--peaks", type=int, default=1, show_default=True, help="Peaks kept on each scan line.")
 @SELECT
 @click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5. One table.")
+@click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table.")
 @click.option("--ridges", is_flag=True, help="Lines of any direction, as points with their normal (Steger in 2-D).")
 @click.option(
     "--spacetime", is_flag=True, help="The images are a sweep over a scene at rest: when it passes each pixel."
@@ -267,6 +268,73 @@ def advise(project: Path | None, **options: Any) -> None:
     advise_project(project, **options)
 
 
+@cli.command()
+@click.argument("recipe", required=False, type=click.Path(path_type=Path))
+@click.option("--count", type=click.IntRange(1, 10_000_000), default=100, show_default=True, help="Scenes.")
+@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/dataset-<name>].")
+@click.option("--format", "formats", multiple=True, help="Labels for others' readers too; an unknown name lists all.")
+@click.option("--preview", is_flag=True, help="Only a contact sheet of the first 64 scenes, small.")
+@click.option(
+    "--from", "sources", multiple=True, type=click.Path(path_type=Path), help="Folder of another shard: take over."
+)
+@sharing
+@common
+def dataset(recipe: Path | None, **options: Any) -> None:
+    """Labelled images of a recipe, or of a ready-made one by its name; without a recipe, list them.
+
+    The same command goes on after an interrupt or a kill, with more scenes where --count is raised.
+    """
+    _require_system()
+    from studio.commands.dataset import dataset_command
+
+    dataset_command(recipe, **options)
+
+
+@cli.command()
+@click.argument("what", metavar="WHAT")
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--board", default="checkerboard:13x9:25mm", show_default=True, help="Kind, counts and side; see board.")
+@click.option("--out", type=click.Path(path_type=Path), help="Calibration file  [default: FOLDER/calibration.json].")
+@real_views
+@NEAREST
+@FARTHEST
+@click.option("--most-tilt", type=FiniteRange(5.0, 70.0), default=45.0, show_default=True, help="Of boards, degrees.")
+@click.option("--target-um", type=FiniteRange(0.01, 1e6), help="Depth error that is enough, um.")
+@virtual_views
+@click.option(
+    "--export", type=click.Choice(["opencv", "ros", "kalibr", "mrcal"]), multiple=True, help="The camera for others."
+)
+@common
+def calibrate(what: str, folder: Path | None, **options: Any) -> None:
+    """Calibrate a camera, its lasers, or both: camera|laser|scanner FOLDER of photographs, or a PROJECT in silico.
+
+    Photographs of one pose are named NAME_off and NAME_on (NAME_laser0, NAME_laser1, ...), or NAME for both in one.
+    """
+    _require_system()
+    from studio.commands.calibrate import calibrate_command
+
+    if calibrate_command(what, folder, **options):
+        click.get_current_context().exit(BAD_INPUT)
+
+
+@cli.command()
+@click.argument("board", default="checkerboard:13x9:25mm")
+@click.option(
+    "--paper", type=click.Choice(["A4", "A3", "A2", "A1", "A0"]), help="Size  [default: the least that holds]."
+)
+@click.option(
+    "--contrast", type=FiniteRange(0.1, 1.0), default=1.0, help="1: black on white; 0.6 shows the line better."
+)
+@click.option("--out", type=click.Path(path_type=Path), help="PDF file  [default: named by the board].")
+@common
+def board(board: str, **options: Any) -> None:
+    """A board as a PDF to scale: checkerboard:13x9:25mm (inner corners), charuco:14x10:25mm:18mm (squares)."""
+    _require_system()
+    from studio.commands.board import print_board
+
+    print_board(board, **options)
+
+
 @cli.group()
 def study() -> None:
     """Many runs with one question: speed against accuracy, where a method breaks; as a table and charts."""
@@ -284,9 +352,7 @@ def list_studies(**options: Any) -> None:
 @study.command("run")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/study-<name>].")
-@click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor].")
-@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://host:8786, in place of processes here.")
-@click.option("--shard", default="1/1", show_default=True, help="Only this part of the work: 3/40. Then: study merge.")
+@sharing
 @common
 def run_study(file: Path, **options: Any) -> None:
     """Run a study file, or a ready-made study by its name. The same command goes on after an interrupt or a kill."""

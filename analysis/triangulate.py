@@ -14,6 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.calibration.lens import distort as distort_array
 from analysis.line.result import Axis, Line
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -25,7 +26,10 @@ from render.camera.distortion import distort, tilt_matrix
 Mask = NDArray[np.bool_]
 
 CALIBRATION = ("fx", "fy", "cx", "cy", "a", "b", "c", "d")
-"""Parameters of a calibration covariance, in this order; (a, b, c, d) is the laser plane."""
+"""Parameters of a calibration covariance, in this order; (a, b, c, d) is the laser plane.
+
+The camera's distortion coefficients may follow.
+"""
 SMALLEST_BASELINE = 1e-6
 """A plane nearer than 1 um to the camera's centre: every ray meets it there, so that nothing is measured."""
 
@@ -123,7 +127,7 @@ def triangulate(
     """Points of a line's valid peaks.
 
     plane (4,) laser plane (a, b, c, d) in the camera frame, of any scale; T_rig_camera, T_world_camera (4, 4);
-    calibration_covariance (8, 8) of `CALIBRATION` (px, m), or None.
+    calibration_covariance (8, 8) of `CALIBRATION` (px, m), with the distortion's (8 + terms, 8 + terms), or None.
 
     InputError: the plane is not finite, has no normal, or passes through the camera's centre; a point is not finite.
     """
@@ -169,15 +173,23 @@ def triangulate(
 
 
 def calibration_jacobian(camera: Camera, pixel: Float, q: Float, point: Float, facing: Float, dpoint: Float) -> Float:
-    """(m, 3, 8) dP/d(CALIBRATION); pixel (m, 2), q, point (m, 3), facing n . q (m,), dpoint dP/d(u, v) (m, 3, 2)."""
+    """(m, 3, 8 + terms) dP/d(CALIBRATION, distortion).
+
+    pixel (m, 2), q, point (m, 3), facing n . q (m,), dpoint dP/d(u, v) (m, 3, 2).
+    """
     y = (pixel[:, 1] - camera.cy) / camera.fy
     x = (pixel[:, 0] - camera.cx - camera.skew * y) / camera.fx
-    jacobian = np.empty((len(pixel), 3, len(CALIBRATION)))
+    jacobian = np.empty((len(pixel), 3, len(CALIBRATION) + len(camera.distortion)))
     # a parameter that shifts the model's pixel by s acts like a pixel measured s lower
     jacobian[:, :, 0], jacobian[:, :, 1] = -dpoint[:, :, 0] * x[:, None], -dpoint[:, :, 1] * y[:, None]
     jacobian[:, :, 2], jacobian[:, :, 3] = -dpoint[:, :, 0], -dpoint[:, :, 1]
     jacobian[:, :, 4:7] = -point[:, :, None] * (q / facing[:, None])[:, None, :]
     jacobian[:, :, 7] = -q / facing[:, None]
+    if camera.distortion:
+        known = np.where(np.isnan(q[:, :2]), 0.0, q[:, :2])
+        _, _, by_coefficient = distort_array(known, np.array(camera.distortion))
+        forward = np.array([[camera.fx, camera.skew], [0.0, camera.fy]])
+        jacobian[:, :, 8:] = -dpoint @ (forward @ by_coefficient)
     return jacobian
 
 
@@ -185,9 +197,10 @@ def _systematic(
     camera: Camera, pixel: Float, q: Float, point: Float, facing: Float, dpoint: Float, covariance: Float
 ) -> Float:
     covariance = np.asarray(covariance, dtype=np.float64)
-    if covariance.shape != (8, 8):
-        raise ValueError(f"calibration_covariance has shape {covariance.shape}; allowed: (8, 8)")
-    jacobian = calibration_jacobian(camera, pixel, q, point, facing, dpoint)
+    size, whole = len(CALIBRATION), len(CALIBRATION) + len(camera.distortion)
+    if covariance.shape not in ((size, size), (whole, whole)):
+        raise ValueError(f"calibration_covariance has shape {covariance.shape}; allowed: ({size}, {size})")
+    jacobian = calibration_jacobian(camera, pixel, q, point, facing, dpoint)[:, :, : len(covariance)]
     return np.asarray(jacobian @ covariance @ jacobian.transpose(0, 2, 1))
 
 

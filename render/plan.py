@@ -147,6 +147,9 @@ class GroupQuality:
     """Of the line: the estimated relative RMS error of the image that it takes."""
     image_target: float | None = None
     """Image error at which it ends as well: light of which so much is known may be rendered no further."""
+    out_of_reach: bool = False
+    """Of the line: its goal would have taken far more work than is allowed, or than the error of the image, which was
+    rendered in its place."""
     coarse_error: float | None = None
     """Of ambient light that is rendered for the line: relative RMS error of what is interpolated, where no error
     matters, found on held-out pixels; None: nothing is."""

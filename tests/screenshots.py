@@ -24,9 +24,15 @@ from virtual_display import display
 ROOT = Path(__file__).resolve().parents[1]
 if TYPE_CHECKING:
     from studio.qt.shell.window import MainWindow
+    from studio.qt.study.study_work import StudyWork
 
 SIZE = (1440, 900)
-README = {"setup_dark": "setup.png", "render_dark": "render.png", "measure_light": "measure.png"}
+README = {
+    "setup_dark": "setup.png",
+    "render_dark": "render.png",
+    "measure_light": "measure.png",
+    "study_light": "study_window.png",
+}
 README_WIDTH = 1120
 LASER, OBJECT = ("scene", "rig", "lasers", 0), ("scene", "objects", 0)
 
@@ -35,16 +41,20 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--readme", action="store_true")
+    parser.add_argument("--only-study", action="store_true", help="of the Study workspace alone")
     parser.add_argument("--scale", type=float, default=0.5, help="image scale of the render")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     with display(), tempfile.TemporaryDirectory() as home:
         os.environ.update(XDG_CONFIG_HOME=f"{home}/config", XDG_STATE_HOME=f"{home}/state")
-        take(options.folder, options.scale, options.readme)
+        folder = options.folder.resolve()
+        os.chdir(home)  # the picture shows no more of the study's folder than its name
+        take(folder, options.scale, options.readme, Path("read noise"), only_study=options.only_study)
     return 0
 
 
-def take(folder: Path, scale: float, readme: bool) -> None:
+def take(folder: Path, scale: float, readme: bool, results: Path, *, only_study: bool) -> None:
+    """results: a folder for those of a study."""
     from studio.qt.shell import app as desktop
     from studio.qt.shell.app import application, start
     from studio.qt.shell.shortcuts import CheatSheet
@@ -80,6 +90,22 @@ def take(folder: Path, scale: float, readme: bool) -> None:
     if window.tour is not None:
         window.tour.end()
     session = window.session
+    window.switch_to("study")
+    shoot("study_empty")
+    study = ask_a_question(window, results)
+    settle(1.0)  # until what it takes is worked out
+    shoot("study_asked")
+    study.start()
+    wait(lambda: not study.running and study.found is not None)
+    window.panels["charts"].table.setCurrentCell(0, 0)  # type: ignore[attr-defined]
+    for theme in ("dark", "light"):
+        window.choose_theme(theme)
+        shoot(f"study_{theme}")
+    if only_study:
+        window.files.count_as_saved(window.session.project)
+        window.close()
+        app.processEvents()
+        return
     window.switch_to("setup")
     session.select(LASER)
     settle()
@@ -119,6 +145,21 @@ def take(folder: Path, scale: float, readme: bool) -> None:
     window.files.count_as_saved(window.session.project)
     window.close()
     app.processEvents()
+
+
+def ask_a_question(window: MainWindow, results: Path) -> StudyWork:
+    """How much read noise each of four methods bears; one render serves all cells."""
+    from studio.qt.core.session import one_of
+    from studio.qt.study.study_work import StudyWork
+
+    study = one_of(StudyWork, window.session)
+    noise = {"field": "sensor.read_noise", "values": [2.0, 5.0, 10.0, 20.0, 50.0, 100.0]}
+    methods = ["likelihood", "gaussian", "centre_of_mass", "parabola"]
+    study.change(lambda draft: draft.update(name="Read noise", repeats=4, set={"render.goal": None}))
+    study.change_sweep(name="Read noise", vary=[noise], methods=methods, measure="depth_rmse")
+    results.mkdir()
+    study.choose_folder(results)
+    return study
 
 
 def worst_row(window: MainWindow) -> int | None:

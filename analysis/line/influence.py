@@ -35,7 +35,7 @@ WIDEST = 64
 STEP = 0.01
 """Of the line's amplitude: the differences' step."""
 TRIED = 64
-"""Scan lines on which differences are taken; others take their nearest one's, moved to their own place."""
+"""Scan lines on which differences are taken; others take their nearest one's, at their own place and brightness."""
 
 
 def influence(
@@ -61,8 +61,11 @@ def influence(
         if len(rest):
             alone = _alone(lines, chosen)
             tried = rest[np.unique(np.linspace(0, len(rest) - 1, TRIED).astype(int))] if alone else rest
-            measured = difference_influence(lines, line, chosen, tried, k, threads)
-            _scatter(found, rest, *_of_nearest(line.u[rest, k], rest, line.u[tried, k], tried, *measured))
+            place, measured = difference_influence(lines, line, chosen, tried, k, threads)
+            # what is twice as bright is moved by twice the light
+            measured *= line.amplitude[tried, k][:, None]
+            first, weight = _of_nearest(line.u[rest, k], rest, line.u[tried, k], tried, place, measured)
+            _scatter(found, rest, first, weight / line.amplitude[rest, k][:, None])
     return found if line.axis == "rows" else np.ascontiguousarray(found.swapaxes(0, 1))
 
 

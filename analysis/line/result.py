@@ -47,6 +47,8 @@ class Flag(IntEnum):
     """The profile is not that of a line, nor of two; sigma_u holds what that may cost."""
     SPECKLED = 15
     """A few grains of speckle make up the line, and one may be taken for all of it; sigma_u is up to 40 % small."""
+    UNSURE = 16
+    """sigma_u is above the line's own width: where the line is, the pixels do not say."""
 
 
 CAUTIOUS = (Flag.SATURATED, Flag.UNRESOLVED, Flag.BLENDED, Flag.MISFIT, Flag.SPECKLED)

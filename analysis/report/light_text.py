@@ -68,7 +68,7 @@ def quality_text(quality: GroupQuality) -> str:
         known = (
             f"noise moves the line by {quality.error:.2g} sigma" if math.isfinite(quality.error) else "line not known"
         )
-        parts.append(f"{known}, goal {quality.target:.2g}")
+        parts.append(f"{known}, goal {quality.target:.2g}{' out of reach' if quality.out_of_reach else ''}")
         if quality.image_error is not None and math.isfinite(quality.image_error):
             end = "" if quality.image_target is None else f", which ends it at {quality.image_target:.0%}"
             parts.append(f"image error {quality.image_error:.0%}{end}")

@@ -48,7 +48,7 @@ def write_report(folder: Path | str, report: ReportInput) -> tuple[Path, Path]:
     with atomic_write(html) as temporary:
         temporary.write_text(page, encoding="utf-8")
     with atomic_write(pdf) as temporary:
-        _write_pdf(page, temporary)
+        write_pdf(page, temporary)
     return html, pdf
 
 
@@ -195,7 +195,8 @@ def _repeat(report: ReportInput) -> list[tuple[str, str]]:
     return [*seed, *report.versions.items()]
 
 
-def _write_pdf(page: str, path: Path) -> None:
+def write_pdf(page: str, path: Path) -> None:
+    """A page, whole in itself, as PDF."""
     import logging
 
     from weasyprint import HTML

@@ -74,7 +74,7 @@ def fill_seen(
             if cosine > 0.0:
                 n0, n1, n2 = -n0, -n1, -n2
         if lights.rectangles > 0:
-            k = light_in_view(lights.rows, eye[0], eye[1], eye[2], d0, d1, d2, distance)
+            k = light_in_view(lights.rows, (eye[0], eye[1], eye[2]), (d0, d1, d2), distance)
             if k >= 0:
                 item[r] = FIRST_LAMP - k
                 continue

@@ -15,8 +15,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from render.ambient.path_state import CLAMPED, CUT, DROPPED
-from render.ambient.path_tracer import WAVE, CameraPaths, camera_paths
+from render.ambient.path_state import CLAMPED, CLAMPED_RADIANCE, INVALID
+from render.ambient.path_tracer import WAVEFRONT, CameraPaths, camera_paths
 from render.base.arrays import Float, Float32, Int
 from render.base.errors import Cancelled, InputError
 from render.base.threads import Cancel, map_chunks
@@ -54,11 +54,11 @@ class AmbientImage:
     """Estimated relative RMS error of the image; NaN after a single sample, which has no spread."""
     samples: float
     """On a pixel, on average."""
-    dropped: int
+    invalid: int
     """Contributions that were NaN, infinite or negative, and were dropped."""
     clamped: int
     """Contributions that the clamp lowered."""
-    cut: float
+    clamped_radiance: float
     """Radiance that the clamp took away, mean over the image."""
     coarse_error: float | None = None
     """Relative RMS error of what was interpolated where no error matters, on held-out pixels; None: nothing was.
@@ -100,6 +100,9 @@ def _passes(film: Film, paths: CameraPaths, target: float, most: int, run: Run) 
     if most == 1:
         yield film.add_samples(paths, np.broadcast_to([1, 0], (film.tiles, 2)), run)
         return
+    if most < 2 * PILOT:
+        # a third sample would be no half's
+        most = 2
     if film.errors:
         yield film.image(run.threads, run.cancelled)
     for level in range(1, min(PILOT, most // 2) + 1):
@@ -152,20 +155,21 @@ class Film:
         self.done = np.zeros((self.tiles, 2), np.int32)
         self.spread = np.zeros((self.tiles, 2))
         """Of each tile and half, sum of the squared differences of a pixel's first and second sample."""
-        self.cut = np.zeros((self.tiles, 2))
+        self.clamped_radiance = np.zeros((self.tiles, 2))
         """Of each tile and half, the sum of what the clamp took."""
-        self.invalid_counts = np.zeros(2)
+        self.counts = np.zeros(2)
+        """Invalid and clamped contributions."""
         self.errors: list[float] = []
         """After each pass."""
 
     def arrays(self) -> Arrays:
         """As a file holds it."""
-        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "cut", "invalid_counts")}
+        kept = {name: getattr(self, name) for name in ("sums", "done", "spread", "clamped_radiance", "counts")}
         return {**kept, "errors": np.array(self.errors, dtype=np.float64)}
 
     def load(self, arrays: Arrays) -> None:
         """Go on from `arrays`. InputError: they are not of this image."""
-        for name in ("sums", "done", "spread", "cut", "invalid_counts"):
+        for name in ("sums", "done", "spread", "clamped_radiance", "counts"):
             mine, found = getattr(self, name), arrays.get(name)
             if found is None or found.shape != mine.shape or found.dtype != mine.dtype:
                 raise InputError("the saved ambient light is damaged", where=name, found=getattr(found, "shape", None))
@@ -176,12 +180,12 @@ class Film:
         """Add samples until each tile has count (tiles, 2) of both halves. Raises Cancelled."""
         more = np.maximum(count - self.done, 0).astype(np.int32)
         pixels_of = self._size_of(np.arange(self.tiles))
-        chunks = _chunks(more.sum(axis=1) * pixels_of, WAVE)
-        counts = np.zeros((len(chunks), 2))
+        chunks = _chunks(more.sum(axis=1) * pixels_of, WAVEFRONT)
+        found = np.zeros((len(chunks), 2))
 
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
-                self._trace_tiles(paths, chunks[number], more, counts[number], run.cancelled)
+                self._trace_tiles(paths, chunks[number], more, found[number], run.cancelled)
 
         group = max(1, len(chunks)) if run.checkpoint is None else GROUP
         try:
@@ -192,7 +196,7 @@ class Film:
                 run.keep(self)
         finally:
             # in the order of the chunks, whichever thread was first
-            self.invalid_counts = self.invalid_counts + counts.sum(axis=0)
+            self.counts = self.counts + found.sum(axis=0)
         image = self.image(run.threads, run.cancelled)
         self.errors.append(image.error)
         run.keep(self)
@@ -217,9 +221,9 @@ class Film:
             image,
             error if halves else math.nan,
             samples,
-            int(self.invalid_counts[DROPPED]),
-            int(self.invalid_counts[CLAMPED]),
-            float((self.cut / np.maximum(self.done, 1)).sum() / 2 / pixels_of.sum()),
+            int(self.counts[INVALID]),
+            int(self.counts[CLAMPED]),
+            float((self.clamped_radiance / np.maximum(self.done, 1)).sum() / 2 / pixels_of.sum()),
         )
 
     def shares(self) -> Float:
@@ -230,21 +234,19 @@ class Film:
         relative = np.where(mean > 0.0, deviation / np.where(mean > 0.0, mean, 1.0), 1.0)
         return np.asarray(EVEN_SHARE + (1.0 - EVEN_SHARE) * np.minimum(relative, MOST_SHARE))
 
-    def _trace_tiles(
-        self, paths: CameraPaths, tiles: Int, more: Int, invalid_counts: Float, cancelled: Cancel | None
-    ) -> None:
+    def _trace_tiles(self, paths: CameraPaths, tiles: Int, more: Int, counts: Float, cancelled: Cancel | None) -> None:
         pixels, place = self._pixels_of(tiles)
         first, count = self.done[tiles][place], more[tiles][place]
         sums = np.zeros((2 * len(pixels), 4))
-        # a single tile may need more than a wave
-        step = max(1, WAVE // max(2 * len(pixels), 1)) if len(tiles) == 1 else int(count.max())
+        # a single tile may need more than a wavefront
+        step = max(1, WAVEFRONT // max(2 * len(pixels), 1)) if len(tiles) == 1 else int(count.max())
         for begin in range(0, int(count.max()), step):
             some = np.clip(count - begin, 0, step).astype(np.int32)
-            paths.add(pixels, (first + begin).astype(np.int32), some, sums, invalid_counts, cancelled)
+            paths.add(pixels, (first + begin).astype(np.int32), some, sums, counts, cancelled)
         new = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32)
-        if sums[:, CUT].any():
+        if sums[:, CLAMPED_RADIANCE].any():
             for half in range(2):
-                self.cut[tiles, half] += np.bincount(place, sums[half::2, CUT], len(tiles))
+                self.clamped_radiance[tiles, half] += np.bincount(place, sums[half::2, CLAMPED_RADIANCE], len(tiles))
         if np.all(first == 1) and np.all(count == 1):
             squares = np.sum((new.astype(np.float64) - self.sums[pixels]) ** 2, axis=2)
             for half in range(2):

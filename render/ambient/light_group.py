@@ -103,8 +103,8 @@ def quality_of(image: AmbientImage, settings: RenderSettings) -> GroupQuality:
         "samples a pixel",
         settings.ambient_samples,
         of="image" if goal is None else "line",
-        invalid=image.dropped,
+        invalid=image.invalid,
         clamped=image.clamped if clamped else None,
-        clamped_radiance=image.cut if clamped else None,
+        clamped_radiance=image.clamped_radiance if clamped else None,
         coarse_error=image.coarse_error,
     )

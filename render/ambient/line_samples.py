@@ -12,6 +12,7 @@ the values that are averaged there. How many samples a line gets follows, like i
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numba
@@ -74,6 +75,14 @@ def band_of(importance: Importance, coarse: CoarseImage) -> Band:
     width = weight.shape[1]
     line = pixels // width if importance.axis == "rows" else pixels % width
     return Band(pixels, weight.ravel()[pixels].astype(np.float64), line, place)
+
+
+def foreseen_samples(band: Band, coarse: CoarseImage) -> float:
+    """About how many samples it takes until most scan lines are known, before any of them is sampled."""
+    deviation = coarse.deviation * coarse.radiance.max(axis=2).ravel()[band.pixels]
+    needed = _line_sums(band, band.weight * deviation.astype(np.float64)) ** 2
+    needed = np.sort(needed[needed > 0.0])
+    return float(needed[: math.ceil(LINES_KNOWN * len(needed))].sum())
 
 
 def is_out_of_reach(film: PixelSamples, paths: CameraPaths, band: Band, most: int, run: Run) -> bool:

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from render.ambient.coarse_image import CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
-from render.ambient.line_samples import LINES_KNOWN, Band, band_of, is_out_of_reach, line_deviations, sample_band
-from render.ambient.path_state import CLAMPED, DROPPED
+from render.ambient.line_samples import (
+    FAR,
+    LINES_KNOWN,
+    PILOT,
+    Band,
+    band_of,
+    foreseen_samples,
+    is_out_of_reach,
+    line_deviations,
+    sample_band,
+)
+from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
 from render.importance import Importance
@@ -19,6 +30,8 @@ from render.world.placed import PlacedScene
 COARSE_SAMPLES, COARSE_SHARE = 0.5, 0.125
 """Most samples a pixel, and of those that are allowed, for the coarse image: where what it does not reach matters, the
 band is wider."""
+LEAST_SAMPLES = 2 * PILOT
+"""Samples a pixel with which lines can be looked at."""
 
 
 def measured_images(
@@ -34,13 +47,17 @@ def measured_images(
     """The coarse image, then the one whose scan lines are known, or on which `most` samples a pixel are spent.
 
     Where the lines' goal is far out of reach, the image is rendered in its place, to the relative error `target` where
-    that is given: it takes less time. As `ambient_images`; the error of the second is the deviation of its scan lines
-    over the allowed one, which most of them are below. Raises Cancelled. ValueError: the importance is of another
-    image.
+    that is given: it takes less time. So it is where `most` leaves no room for a first look at the lines. As
+    `ambient_images`; the error of the second is the deviation of its scan lines over the allowed one, which most of
+    them are below. Raises Cancelled. ValueError: the importance is of another image.
     """
     camera, view = placed.camera, placed.camera.view(placed.T_world_camera)
     if importance.ambient.shape != (camera.height, camera.width):
         raise ValueError(f"weights {importance.ambient.shape} of an image of {camera.height} x {camera.width}")
+    instead: dict[str, Any] = {"most": most, "surfaces": surfaces, "clamp": clamp}
+    if most < LEAST_SAMPLES:
+        yield from ambient_images(placed, target=0.0 if target is None else target, **instead, run=run)
+        return
     paths = camera_paths(placed.world, placed.scene, view, surfaces=surfaces, clamp=clamp, seed=run.seed)
     budget = most * camera.width * camera.height
     made_of = seen_from(placed, most, surfaces, clamp, run.seed)
@@ -53,8 +70,11 @@ def measured_images(
     yield _image(coarse, film, band, begun=False)
     if len(band.pixels):
         part, left = run.between(0.5, 1.0), budget - coarse.samples
-        if target is not None and is_out_of_reach(film, paths, band, left, part):
-            yield from ambient_images(placed, target=target, most=most, surfaces=surfaces, clamp=clamp, run=part)
+        hopeless = target is not None and (
+            foreseen_samples(band, coarse) > FAR * left or is_out_of_reach(film, paths, band, left, part)
+        )
+        if target is not None and hopeless:
+            yield from ambient_images(placed, target=target, **instead, run=part)
             return
         sample_band(film, paths, band, left, part)
     yield _image(coarse, film, band)
@@ -79,7 +99,7 @@ def _image(coarse: CoarseImage, film: PixelSamples, band: Band, *, begun: bool =
         radiance,
         error,
         total / (radiance.shape[0] * radiance.shape[1]),
-        coarse.dropped + int(film.invalid_counts[DROPPED]),
+        coarse.dropped + int(film.invalid_counts[INVALID]),
         coarse.clamped + int(film.invalid_counts[CLAMPED]),
         (coarse.cut * coarse.samples + film.cut) / total,
         coarse.error,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.arrays import Float, Float32, Int, Long
+from render.base.vectors import Vector, row_vector, store_row
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_point, lens_position
 from render.camera.view import View
@@ -17,9 +18,9 @@ from render.sampling.low_discrepancy import LENGTH, pair, pair_at, pair_draw
 
 ON_IMAGE, ON_LENS, FIRST_SURFACE, EACH_SURFACE = 0, 1, 2, 4
 """Dimensions of the sequence: two pairs for the camera, then four for each surface."""
-DROPPED, CLAMPED = 0, 1
-"""A tally (2,): contributions that were no number, infinite or negative; those clamped."""
-CUT = 3
+INVALID, CLAMPED = 0, 1
+"""Counts (2,): contributions that were NaN, infinite or negative, which are dropped; those that were clamped."""
+CLAMPED_RADIANCE = 3
 """Sums (.., 4): R, G, B, and the mean of what the clamp took of them."""
 
 
@@ -30,10 +31,11 @@ class PathState(NamedTuple):
     """(n, 3) m, from the centre of the scene."""
     direction: Float32
     """(n, 3) unit."""
-    weight: Float32
+    throughput: Float32
     """(n, 3) what a radiance seen by the ray adds to its pixel."""
-    bsdf_density: Float32
-    """(n,) with which the direction was drawn, 1/sr; -1: a single direction, or the camera's."""
+    bsdf_pdf: Float32
+    """(n,) with which the direction was drawn, 1/sr; -1: no light could have been sampled in its place, as for a
+    single direction, the camera's, or one within a medium."""
     pixel_slot: Int
     """(n,) twice the pixel's place in the chunk, and the half of its samples (0 or 1)."""
     sample: Int
@@ -45,7 +47,7 @@ class PathState(NamedTuple):
 
 
 class ShadowRays(NamedTuple):
-    """Rays that add `light` (.., 3) to their owner's pixel if nothing is met before `far`."""
+    """Rays that add `light` (.., 3) to their path's pixel if nothing is met before `far`."""
 
     origin: Float32
     direction: Float32
@@ -59,7 +61,7 @@ class ShadowRays(NamedTuple):
 def camera_rays(
     view: View, table: Float32, seed: int, pixels: Int, first: Int, count: Int, centre: Float, paths: PathState
 ) -> int:
-    """Rays of samples first .. first + count of both halves, (m, 2), of pixels (m,) -> wave. Returns how many."""
+    """Rays of samples first .. first + count of both halves, (m, 2), of pixels (m,) -> paths. Returns how many."""
     k = view.distortion
     tilt, distorted = tilt_matrix(k[12], k[13]), bool(np.any(k))
     fx, fy, cx, cy, skew = view.intrinsics
@@ -86,29 +88,26 @@ def camera_rays(
                 o0, o1, o2 = lens_position(view, a, b)
                 d0, d1, d2 = lens_direction(view, x, y, a, b)
                 scale = 1.0 / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-                paths.origin[n, 0], paths.origin[n, 1], paths.origin[n, 2] = (
-                    o0 - centre[0],
-                    o1 - centre[1],
-                    o2 - centre[2],
-                )
-                paths.direction[n, 0], paths.direction[n, 1], paths.direction[n, 2] = scale * d0, scale * d1, scale * d2
-                paths.weight[n, 0] = paths.weight[n, 1] = paths.weight[n, 2] = 1.0
-                paths.bsdf_density[n], paths.pixel_slot[n], paths.sample[n], paths.medium[n] = -1.0, 2 * i + half, s, 0
+                store_row(paths.origin, n, (o0 - centre[0], o1 - centre[1], o2 - centre[2]))
+                store_row(paths.direction, n, (scale * d0, scale * d1, scale * d2))
+                store_row(paths.throughput, n, (1.0, 1.0, 1.0))
+                paths.bsdf_pdf[n], paths.pixel_slot[n], paths.sample[n], paths.medium[n] = -1.0, 2 * i + half, s, 0
                 n += 1
     return n
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def accumulate(sums: Float, invalid_counts: Float, pixel_slot: int, clamp: float, r: float, g: float, b: float) -> None:
-    """Add a contribution to its owner; what is no number, infinite or negative is dropped and counted."""
+def accumulate(sums: Float, counts: Float, pixel_slot: int, clamp: float, light: Vector) -> None:
+    """Add a contribution in R, G, B to its pixel; what is NaN, infinite or negative is dropped and counted."""
+    r, g, b = light
     if not (r >= 0.0 and g >= 0.0 and b >= 0.0 and r + g + b < np.inf):
-        invalid_counts[DROPPED] += 1.0
+        counts[INVALID] += 1.0
         return
     largest = max(r, g, b)
     if largest > clamp:
         scale = clamp / largest
-        invalid_counts[CLAMPED] += 1.0
-        sums[pixel_slot, CUT] += (1.0 - scale) * (r + g + b) / 3.0
+        counts[CLAMPED] += 1.0
+        sums[pixel_slot, CLAMPED_RADIANCE] += (1.0 - scale) * (r + g + b) / 3.0
         r, g, b = scale * r, scale * g, scale * b
     sums[pixel_slot, 0] += r
     sums[pixel_slot, 1] += g
@@ -117,10 +116,9 @@ def accumulate(sums: Float, invalid_counts: Float, pixel_slot: int, clamp: float
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def accumulate_unoccluded(
-    shadow_rays: ShadowRays, occluded: NDArray[np.bool_], clamp: float, sums: Float, invalid_counts: Float
+    shadow_rays: ShadowRays, occluded: NDArray[np.bool_], clamp: float, sums: Float, counts: Float
 ) -> None:
-    """Add what every clear shadow ray sees to its owner (.., 4)."""
+    """Add what every unoccluded shadow ray sees to its pixel: sums (.., 4), counts (2,)."""
     for j in range(occluded.shape[0]):
         if not occluded[j]:
-            light = shadow_rays.light[j]
-            accumulate(sums, invalid_counts, shadow_rays.pixel_slot[j], clamp, light[0], light[1], light[2])
+            accumulate(sums, counts, shadow_rays.pixel_slot[j], clamp, row_vector(shadow_rays.light, j))

@@ -1,4 +1,4 @@
-"""Paths from the camera through a scene, in waves: intersect, shade, connect, until none is left."""
+"""Paths from the camera through a scene, in wavefronts: intersect, shade, connect, until none is left."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from render.ambient.light_sampling import Lights, pack_lights
-from render.ambient.path_kernels import shade_diffuse, shade_glossy
+from render.ambient.path_kernels import Bounce, Film, Samples, shade_diffuse, shade_glossy
 from render.ambient.path_state import PathState, ShadowRays, accumulate_unoccluded, camera_rays
 from render.ambient.random_walk import random_walk_step
 from render.base.arrays import Float, Float32, Int
@@ -23,8 +23,9 @@ from render.world.interior_list import cross_hidden, has_overlaps, occluded_by_v
 from render.world.triangles import Surface, has_gloss, has_medium
 from render.world.world import World
 
-WAVE = 1 << 15
-"""Rays: their states stay in the cache, and a pass through a room full of mirrors is cancelled in time."""
+WAVEFRONT = 1 << 15
+"""Most paths that go together: their states stay in the cache, and a room full of mirrors is left in time when
+cancelled. Chosen, not tuned."""
 UNBOUNDED = 1 << 30
 
 
@@ -35,7 +36,6 @@ class CameraPaths:
     surface: Surface
     rays: RayScene
     lights: Lights
-    environment: Float
     view: View
     surfaces: int
     """The most that light may meet, counted as in `render.ambient.path_kernels`."""
@@ -48,22 +48,20 @@ class CameraPaths:
     """What radiance gains where the camera is: the square of the refractive index there."""
     _scratch: threading.local = field(default_factory=threading.local, repr=False, compare=False)
 
-    def add(
-        self, pixels: Int, first: Int, count: Int, sums: Float, invalid_counts: Float, cancelled: Cancel | None
-    ) -> None:
-        """Samples first .. first + count, (m, 2) for both halves, of the pixels (m,), at most WAVE in all.
+    def add(self, pixels: Int, first: Int, count: Int, sums: Float, counts: Float, cancelled: Cancel | None) -> None:
+        """Samples first .. first + count, (m, 2) for both halves, of the pixels (m,), at most WAVEFRONT in all.
 
-        Their radiance is added to sums (2 m, 4), halves side by side. Raises Cancelled.
+        Their radiance is added to sums and counts as in `Film`. Raises Cancelled.
         """
         paths, shadow_rays = self._arrays()
         rays, glossy, media = self.rays, has_gloss(self.surface), has_medium(self.surface)
         shade = shade_glossy if glossy else shade_diffuse
-        table = pair_table()
-        n = camera_rays(self.view, table, self.seed, pixels, first, count, rays.centre, paths)
+        samples, film = Samples(pair_table(), self.seed, pixels), Film(sums, counts)
+        n = camera_rays(self.view, samples.table, self.seed, pixels, first, count, rays.centre, paths)
         nested = has_overlaps(self.surface)
         paths.interior[:n] = self.interior
         if self.immersed != 1.0:
-            paths.weight[:n] *= self.immersed
+            paths.throughput[:n] *= self.immersed
         depth = 0
         while n > 0:
             if cancelled is not None and cancelled():
@@ -76,31 +74,15 @@ class CameraPaths:
             if nested:
                 ahead = paths.origin[:n], paths.direction[:n], triangle, paths.interior[:n]
                 pass_hidden(self.surface, rays, *ahead)
-            n, asked = shade(
-                self.surface,
-                self.lights,
-                self.environment,
-                table,
-                self.seed,
-                pixels,
-                rays.centre,
-                rays.surface_offset,
-                depth,
-                self.surfaces,
-                self.clamp,
-                triangle,
-                paths,
-                shadow_rays,
-                sums,
-                invalid_counts,
-            )
-            if asked:
-                ends = shadow_rays.origin[:asked], shadow_rays.direction[:asked], shadow_rays.far[:asked]
+            bounce = Bounce(rays.centre, rays.surface_offset, depth, self.surfaces, self.clamp)
+            n, connected = shade(self.surface, self.lights, bounce, samples, triangle, paths, shadow_rays, film)
+            if connected:
+                ends = shadow_rays.origin[:connected], shadow_rays.direction[:connected], shadow_rays.far[:connected]
                 if nested:
-                    blocked = occluded_by_visible(self.surface, rays, *ends, shadow_rays.interior[:asked])
+                    blocked = occluded_by_visible(self.surface, rays, *ends, shadow_rays.interior[:connected])
                 else:
                     blocked = rays.occluded(*ends, coherent=side_by_side)
-                accumulate_unoccluded(shadow_rays, blocked, self.clamp if depth > 0 else np.inf, sums, invalid_counts)
+                accumulate_unoccluded(shadow_rays, blocked, self.clamp if depth > 0 else np.inf, sums, counts)
             depth += 1
 
     def _walk(
@@ -137,16 +119,16 @@ class CameraPaths:
         """Of this thread: fresh ones would cost as much as tracing, in pages that the system must clear."""
         arrays: tuple[PathState, ShadowRays] | None = getattr(self._scratch, "arrays", None)
         if arrays is None:
-            m = 2 * WAVE
+            m = 2 * WAVEFRONT
             paths = PathState(
-                origin=np.empty((WAVE, 3), np.float32),
-                direction=np.empty((WAVE, 3), np.float32),
-                weight=np.empty((WAVE, 3), np.float32),
-                bsdf_density=np.empty(WAVE, np.float32),
-                pixel_slot=np.empty(WAVE, np.int32),
-                sample=np.empty(WAVE, np.int32),
-                medium=np.empty(WAVE, np.int32),
-                interior=np.empty(WAVE, np.int64),
+                origin=np.empty((WAVEFRONT, 3), np.float32),
+                direction=np.empty((WAVEFRONT, 3), np.float32),
+                throughput=np.empty((WAVEFRONT, 3), np.float32),
+                bsdf_pdf=np.empty(WAVEFRONT, np.float32),
+                pixel_slot=np.empty(WAVEFRONT, np.int32),
+                sample=np.empty(WAVEFRONT, np.int32),
+                medium=np.empty(WAVEFRONT, np.int32),
+                interior=np.empty(WAVEFRONT, np.int64),
             )
             shadow_rays = ShadowRays(
                 origin=np.empty((m, 3), np.float32),
@@ -176,7 +158,6 @@ def camera_paths(
         surface,
         world.rays,
         pack_lights(scene, surface),
-        np.array(scene.environment.radiance, dtype=np.float64),
         view,
         UNBOUNDED if surfaces is None else surfaces,
         np.inf if clamp is None else clamp,

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.ambient.path_state import CUT
-from render.ambient.path_tracer import WAVE, CameraPaths
+from render.ambient.path_state import CLAMPED_RADIANCE
+from render.ambient.path_tracer import WAVEFRONT, CameraPaths
 from render.base.arrays import Float, Float32, Int
 from render.run import Run
 
@@ -47,7 +47,7 @@ class PixelSamples:
 
     def _add_round(self, paths: CameraPaths, pixels: Int, more: Int, run: Run) -> None:
         rays = more.sum(axis=1, dtype=np.int64)
-        chunk = (np.cumsum(rays) - rays) // (WAVE - 2 * ROUND)
+        chunk = (np.cumsum(rays) - rays) // (WAVEFRONT - 2 * ROUND)
         edges = np.append(np.flatnonzero(np.diff(chunk, prepend=-1)), len(pixels))
         counts, cut = np.zeros((len(edges) - 1, 2)), np.zeros(len(edges) - 1)
 
@@ -71,4 +71,4 @@ class PixelSamples:
         self.spread[pixels] = np.where(both[..., None], variance, self.spread[pixels])
         self.sums[pixels] = old + new
         self.done[pixels] = first + more
-        return float(sums[:, CUT].sum())
+        return float(sums[:, CLAMPED_RADIANCE].sum())

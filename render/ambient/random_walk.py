@@ -36,8 +36,8 @@ def random_walk_step(  # noqa: PLR0913
 ) -> int:
     """One flight of each path in `walking` (n,): those that scatter before the boundary stay in it, in front.
 
-    distance (n,): to the boundary along each path's ray. Origin, direction and weight in `paths` are moved; a path that
-    is absorbed, or found no boundary, weighs nothing and gets triangle -1. Returns how many stay.
+    distance (n,): to the boundary along each path's ray. Origin, direction and throughput in `paths` are moved; a path
+    that is absorbed, or found no boundary, carries nothing and gets triangle -1. Returns how many stay.
     """
     left = 0
     d, w, extinction, pdf = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -51,11 +51,11 @@ def random_walk_step(  # noqa: PLR0913
         row = rows[paths.medium[r] - 1]
         total = 0.0
         for band in range(3):
-            w[band], extinction[band] = paths.weight[r, band], row[EXTINCTION + band]
+            w[band], extinction[band] = paths.throughput[r, band], row[EXTINCTION + band]
             total += w[band]
         if triangle[r] < 0 or total <= 0.0 or step == MOST_STEPS - 1:
             triangle[r] = -1
-            paths.weight[r, 0] = paths.weight[r, 1] = paths.weight[r, 2] = 0.0
+            paths.throughput[r, 0] = paths.throughput[r, 1] = paths.throughput[r, 2] = 0.0
             continue
         number, chosen = uniform(seed, index, s, first) * total, 0
         while chosen < 2 and (number >= w[chosen] or w[chosen] == 0.0):
@@ -77,7 +77,7 @@ def random_walk_step(  # noqa: PLR0913
             survival = min(1.0, largest)
             if uniform(seed, index, s, first + 4) >= survival:
                 triangle[r] = -1
-                paths.weight[r, 0] = paths.weight[r, 1] = paths.weight[r, 2] = 0.0
+                paths.throughput[r, 0] = paths.throughput[r, 1] = paths.throughput[r, 2] = 0.0
                 continue
             for band in range(3):
                 w[band] /= survival
@@ -92,5 +92,5 @@ def random_walk_step(  # noqa: PLR0913
             walking[left] = r
             left += 1
         for band in range(3):
-            paths.weight[r, band] = w[band]
+            paths.throughput[r, band] = w[band]
     return left

@@ -15,6 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.arrays import Float, Float32, Int
+from render.base.vectors import (
+    Vector,
+    divided,
+    dot,
+    length,
+    minus,
+    plus,
+    rotated,
+    scaled,
+    store_row,
+    transformed,
+    vector,
+)
 from render.camera.distortion import distort, tilt_matrix
 from render.camera.lens import lens_direction, lens_position
 from render.camera.view import View
@@ -24,8 +37,6 @@ from render.laser_direct.centre_ray import BEYOND
 from render.material.bsdf import evaluate, is_diffuse
 from render.world.surface_interaction import detailed, light_side
 from render.world.triangles import Surface, facet_of, lookup, slot_reflectance, to_local
-
-Vector = tuple[float, float, float]
 
 
 class CellRays(NamedTuple):
@@ -74,88 +85,44 @@ class ShadowRays(NamedTuple):
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def eval_bsdf(
-    surface: Surface, t: int, point: Float, normal: Float, to_camera: Float, to_light: Float, weights: Float
+    surface: Surface, t: int, point: Vector, normal: Vector, to_camera: Vector, to_light: Vector, weights: Float
 ) -> float:
-    """BSDF f, 1/sr, of triangle t at a point for world directions, at one wavelength; all vectors (3,).
+    """BSDF f, 1/sr, of triangle t at a point for world directions, at one wavelength.
 
-    normal: the facet's, on the side of camera and light. weights: of R, G and B. A blend is the mean of its materials,
-    weighted by its mask. With a shading normal, f holds the factor of `render.world.surface_interaction`.
+    normal: the facet's, on the side of camera and light. weights (3,): of R, G and B. A blend is the mean of its
+    materials, weighted by its mask. With a shading normal, f holds the factor of `render.world.surface_interaction`.
     """
-    rgb, f, o, i, frame = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
-    slot, share, total = surface.object_id[t], 1.0, 0.0
+    rgb, frame = np.empty(3), np.empty((3, 3))
+    slot, fraction, total = surface.object_id[t], 1.0, 0.0
     over = surface.second[slot]
     if over >= 0:
         mask = surface.mask_shape
-        lookup(surface, mask[slot, 0], mask[slot, 1], mask[slot, 2], t, point[0], point[1], point[2], rgb)
-        share = 1.0 - rgb[0]
-    facing = normal[0] * to_light[0] + normal[1] * to_light[1] + normal[2] * to_light[2]
+        lookup(surface, (mask[slot, 0], mask[slot, 1], mask[slot, 2]), t, point, rgb)
+        fraction = 1.0 - rgb[0]
+    facing = dot(normal, to_light)
     for part in range(2 if over >= 0 else 1):
         if part == 1:
-            slot, share = over, 1.0 - share
-        if share <= 0.0:
+            slot, fraction = over, 1.0 - fraction
+        if fraction <= 0.0:
             continue
         slot_reflectance(surface, slot, t, point[0], point[1], point[2], rgb)
         rho = weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
         row = surface.rows[slot]
         detail = surface.detail[slot] != 0
         if is_diffuse(row) and not detail:
-            total += share * rho / math.pi
+            total += fraction * rho / math.pi
             continue
         if detail:
-            p0, p1, p2 = point[0], point[1], point[2]
             row = row.copy()
-            detailed(surface, t, slot, p0, p1, p2, normal[0], normal[1], normal[2], row[1:3], frame)
+            detailed(surface, t, slot, point, normal, row[1:3], frame)
         else:
             to_local(surface, t, row, normal[0], normal[1], normal[2], frame)
-        for axis in range(3):
-            o[axis] = frame[axis, 0] * to_camera[0] + frame[axis, 1] * to_camera[1] + frame[axis, 2] * to_camera[2]
-            i[axis] = frame[axis, 0] * to_light[0] + frame[axis, 1] * to_light[1] + frame[axis, 2] * to_light[2]
+        wo, wi = rotated(frame, to_camera), rotated(frame, to_light)
         # both directions are above the facet; f is 0 where one is below the shading normal
-        if o[2] <= 0.0 or i[2] <= 0.0:
+        if wo[2] <= 0.0 or wi[2] <= 0.0:
             continue
-        rgb[0] = rgb[1] = rgb[2] = rho
-        evaluate(row, rgb, o[0], o[1], o[2], i[0], i[1], i[2], f)
-        total += share * f[0] * light_side(i[2], facing)
+        total += fraction * evaluate(row, (rho, rho, rho), wo, wi)[0] * light_side(wi[2], facing)
     return total
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def divided(a: Vector, divisor: float) -> Vector:
-    return a[0] / divisor, a[1] / divisor, a[2] / divisor
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def store(array: Float, a: Vector) -> None:
-    """Write a vector -> array (3,)."""
-    array[0], array[1], array[2] = a
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def rotated(matrix: Float, a: Vector) -> Vector:
-    """The direction a, rotated by a pose (4, 4)."""
-    x, y, z = a
-    return (
-        matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z,
-        matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z,
-        matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z,
-    )
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def transformed(matrix: Float, a: Vector) -> Vector:
-    """The point a, transformed by a pose (4, 4)."""
-    x, y, z = rotated(matrix, a)
-    return x + matrix[0, 3], y + matrix[1, 3], z + matrix[2, 3]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
@@ -200,7 +167,7 @@ def towards_emitter(T_laser_world: Float, centre: Vector, shift: float, point: V
     """Unit direction and distance, m, from a point to the point of the emitting segment `shift` m from its middle."""
     w = T_laser_world
     light = minus((centre[0] + w[0, 0] * shift, centre[1] + w[0, 1] * shift, centre[2] + w[0, 2] * shift), point)
-    distance = math.sqrt(dot(light, light))
+    distance = length(light)
     return divided(light, distance), distance
 
 
@@ -239,9 +206,9 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
         centre, surface_offset, origins, directions, far, sample = shadows
         tilt, distorted = tilt_matrix(view.distortion[12], view.distortion[13]), bool(np.any(view.distortion))
         emitter, _ = sheet_sigma(0.0, beam)
-        laser_centre = sheet.centre[0], sheet.centre[1], sheet.centre[2]
+        laser_centre = vector(sheet.centre)
         origin = m[0, 3], m[1, 3], m[2, 3]
-        rgb, at, up, to_camera, towards = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+        rgb = np.empty(3)
         count = invalid = 0
         facet = -1
         corner = normal = origin
@@ -316,11 +283,8 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
                 slot_reflectance(surface, slot, t, point[0], point[1], point[2], rgb)
                 radiance = power / math.pi * (weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2])
             else:
-                store(at, point)
-                store(up, (side * normal[0], side * normal[1], side * normal[2]))
-                store(to_camera, divided(d, -math.sqrt(dot(d, d))))
-                store(towards, to_light)
-                radiance = power * eval_bsdf(surface, t, at, up, to_camera, towards, weights)
+                up, to_camera = scaled(side, normal), divided(d, -length(d))
+                radiance = power * eval_bsdf(surface, t, point, up, to_camera, to_light, weights)
             both = radiance * (in_cell + in_pixel)
             if not 0.0 < both < np.inf:
                 invalid += both != 0.0
@@ -328,10 +292,9 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
             values[r, 0], values[r, 1] = radiance * in_cell, radiance * in_pixel
             if centre_rays:
                 planes[r, 3] = radiance
-            origins[count, 0] = point[0] - centre[0] + side * normal[0] * surface_offset
-            origins[count, 1] = point[1] - centre[1] + side * normal[1] * surface_offset
-            origins[count, 2] = point[2] - centre[2] + side * normal[2] * surface_offset
-            directions[count, 0], directions[count, 1], directions[count, 2] = to_light
+            off = scaled(surface_offset, scaled(side, normal))
+            store_row(origins, count, plus(minus(point, vector(centre)), off))
+            store_row(directions, count, to_light)
             far[count], sample[count] = distance, r
             count += 1
         return count, invalid

@@ -25,8 +25,8 @@ from render.laser_indirect.guiding import (
 from render.laser_indirect.line_goal import LineErrors
 from render.laser_indirect.photon_emission import FanDistribution
 
-WAVE = 4
-"""Passes at a time, whatever the number of threads."""
+PASSES_A_WAVE = 4
+"""Whatever the number of threads."""
 MOST_PASS = 1 << 15
 MOST_CAMERA_PASS = 1 << 18
 """Most paths of a pass: a cancelled render loses at most one wave."""
@@ -42,7 +42,7 @@ Arrays = dict[str, NDArray[Any]]
 IMAGES = ("specular", "camera_paths", "guide_moments", "total", "camera_radiance")
 NUMBERS = (
     *("kinds", "size", "growth_limit", "camera_share", "squares", "waves", "passes", "weight", "paths"),
-    *("variance_sum", "error", "dropped", "clamped", "clamped_radiance"),
+    *("variance_sum", "error", "invalid", "clamped", "clamped_radiance"),
 )
 """Fields of an accumulator that a checkpoint keeps, beside its fan and its guide."""
 
@@ -88,7 +88,7 @@ class Accumulator:
     """Variance of `total`, summed over the pixels."""
     error: float = math.inf
     """Relative RMS error of the image so far: sqrt(sum of variances / sum of squares)."""
-    dropped: float = 0.0
+    invalid: float = 0.0
     """Contributions that were NaN, infinite or negative, and were left out."""
     clamped: float = 0.0
     """Pixels of passes that the clamp has lowered."""
@@ -141,8 +141,8 @@ class Accumulator:
         self.clamped += clamped
         self.clamped_radiance += weight * clamped_radiance
         for buffer in buffers:
-            self.dropped += float(buffer.dropped[0])
-            buffer.dropped[0] = 0.0
+            self.invalid += float(buffer.invalid[0])
+            buffer.invalid[0] = 0.0
         self.paths += passes * self.next_paths
         self.waves += 1
         self.passes += passes * growth
@@ -167,13 +167,13 @@ class Accumulator:
             self.line = LineErrors.of(importance, laser)
             sizes = (min(1 << max(wave - 1, 0), self.growth_limit) for wave in range(self.waves))
             weights = ((size**WAVE_WEIGHT_EXPONENT) ** 2 / size for size in sizes)
-            self.line.all_waves = WAVE * sum(weights)
+            self.line.all_waves = PASSES_A_WAVE * sum(weights)
         self.aimed = aimed
 
     def allocate(self, drawn: float) -> None:
         """Allocate the next wave's camera paths, where each pixel has had `drawn` times its `camera_paths` so far."""
         allocate_camera_paths(self.camera_radiance, self.guide.width, self.next_camera_paths, self.camera_paths, drawn)
-        if self.line is not None:
+        if self.line is not None and not self.line.out_of_reach:
             aim_camera_paths(self.camera_paths, self.line.aim, self.next_camera_paths)
         reserve_for_specular(self.camera_paths, self.specular, self.next_camera_paths)
 

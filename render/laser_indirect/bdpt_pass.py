@@ -139,22 +139,23 @@ class BdptPass:
         sampling: Sampling,
         buffer: PassBuffer,
         cancelled: Cancel | None = None,
-        reachable_pixels: Bool | None = None,
+        specular_pixels: Bool | None = None,
     ) -> None:
         """Pass `number`, into `buffer`. Raises Cancelled.
 
-        reachable_pixels (pixels,): where the camera sees mirrors or glass, to mark what camera paths may reach there.
+        specular_pixels (pixels,): where the camera sees mirrors or clear glass; `buffer.camera_radiance` is then filled
+        there, roughly, for the camera paths of later passes. None: it is not.
         """
         seed = wrapped(self.seed * 1_000_003 + number)
         pixels, starts = draw_camera_paths(sampling.camera_paths, sampling.active, seed ^ CAMERA_SEED)
-        keep = len(pixels) > 0 or reachable_pixels is not None
+        keep = len(pixels) > 0 or specular_pixels is not None
         found: list[Vertices] = []
         for first in range(0, sampling.light_paths, CHUNK_PATHS):
             count = min(CHUNK_PATHS, sampling.light_paths - first)
             found += self.trace_light_paths(seed, first, count, sampling, buffer, keep, cancelled)
-        for _, vertices, paths in found if reachable_pixels is not None else ():
+        for _, vertices, paths in found if specular_pixels is not None else ():
             _stop(cancelled)
-            mark_reachable(vertices, paths, self._camera(sampling), reachable_pixels, buffer)
+            mark_reachable(vertices, paths, self._camera(sampling), specular_pixels, buffer)
         if not len(pixels):
             return
         _stop(cancelled)

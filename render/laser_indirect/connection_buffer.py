@@ -9,6 +9,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float, Float32, Int, Long
+from render.base.vectors import Vector, along, minus, store_row, vector
 from render.laser_indirect.path_vertex import PassContext, Record, cosine_to
 
 RIS_SAMPLE_WEIGHT = 32.0
@@ -52,8 +53,8 @@ class PassBuffer(NamedTuple):
     """(FAN_BINS,) sum of the squared contributions of light from each bin of the fan."""
     wave_moments: Float
     """(rows of the guide, BINS) sum of the squared target weights that `connect_by_ris` met."""
-    dropped: Float
-    """(1,) contributions that were NaN, infinite or negative, and were left out."""
+    invalid: Float
+    """(1,) contributions that were NaN, infinite or negative, which are dropped."""
     touched: Bool
     """(pixels / BLOCK,) where there may be something in `image` or `camera_radiance`."""
 
@@ -78,17 +79,14 @@ def set_shadow_ray(
     connections: Connections,
     j: int,
     v: Record,
-    d0: float,
-    d1: float,
-    d2: float,
+    direction: Vector,
     distance: float,
     context: PassContext,
 ) -> None:
-    """Shadow ray of connection j from vertex v along the unit direction d."""
-    side = context.ray_epsilon if cosine_to(v, d0, d1, d2) > 0.0 else -context.ray_epsilon
-    for axis in range(3):
-        connections.origin[j, axis] = v.p[axis] - context.centre[axis] + side * v.n[axis]
-    connections.direction[j, 0], connections.direction[j, 1], connections.direction[j, 2] = d0, d1, d2
+    """Shadow ray of connection j from vertex v along a unit direction."""
+    side = context.ray_epsilon if cosine_to(v, direction) > 0.0 else -context.ray_epsilon
+    store_row(connections.origin, j, along(minus(vector(v.p), vector(context.centre)), side, vector(v.n)))
+    store_row(connections.direction, j, direction)
     connections.distance[j] = distance
 
 
@@ -100,7 +98,7 @@ def splat_unoccluded(connections: Connections, occluded: Bool, count: int, scale
             continue
         contribution = connections.contribution[j] * scale
         if not 0.0 <= contribution < math.inf:
-            buffer.dropped[0] += 1.0
+            buffer.invalid[0] += 1.0
             continue
         pixel = connections.pixel[j]
         buffer.image[pixel] += contribution

@@ -22,6 +22,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float
+from render.base.vectors import Vector, divided, length, minus, rotated, transformed, vector
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import lens_point, lens_position, lens_project
 from render.camera.view import View
@@ -87,27 +88,23 @@ def connect_to_camera(
         pixel, area = pixel_of(view, tilt, distorted, sampling.height, v, a, b)
         if pixel < 0:
             continue
-        e0, e1, e2, distance = towards(v, *lens_position(view, a, b))
-        out = cosine_to(v, e0, e1, e2)
-        i0, i1, i2 = to_shading(v, e0, e1, e2)
-        if out * i2 <= 0.0:
-            continue
-        o0, o1, o2 = v.wo[0], v.wo[1], v.wo[2]
-        f = eval_bsdf(v, rows, o0, o1, o2, i0, i1, i2)
+        direction, distance = towards(v, lens_position(view, a, b))
+        cosine, wi, wo = cosine_to(v, direction), to_shading(v, direction), vector(v.wo)
+        f = 0.0 if cosine * wi[2] <= 0.0 else eval_bsdf(v, rows, wo, wi)
         if f <= 0.0:
             continue
-        camera_pdf = area * abs(out)
+        camera_pdf = area * abs(cosine)
         mis_weight = 1.0
         reachable = path.dvcm > 0.0 or path.dvc > 0.0
         if sampling.camera_paths[pixel] > 0.0 and reachable:
-            reverse_pdf = bsdf_pdf(v, rows, i0, i1, i2, o0, o1, o2)
+            reverse_pdf = bsdf_pdf(v, rows, wi, wo)
             others = camera_pdf * (path.dvcm + reverse_pdf * path.dvc)
             mis_weight = 1.0 / (1.0 + RIS_SAMPLE_WEIGHT * sampling.camera_paths[pixel] / sampling.light_paths * others)
         connections.pixel[n], connections.kind[n], connections.fan_bin[n] = pixel, path.kind, path.fan_bin
         connections.reachable_from_camera[n] = reachable
         connections.contribution[n] = path.throughput * f * camera_pdf * mis_weight * shading_normal_factor(v)
-        set_shadow_ray(connections, n, v, e0, e1, e2, distance, context)
-        connections.interior[n] = interior_beyond(v, path, rows, i2)
+        set_shadow_ray(connections, n, v, direction, distance, context)
+        connections.interior[n] = interior_beyond(v, path, rows, wi[2])
         n += 1
     return n
 
@@ -118,9 +115,11 @@ def connect_to_laser(
 ) -> int:
     """Connect camera vertices (n,) to the laser -> connections. Returns their number."""
     m, rows = laser.T_laser_world, context.rows
-    l0 = -(m[0, 0] * m[0, 3] + m[1, 0] * m[1, 3] + m[2, 0] * m[2, 3])
-    l1 = -(m[0, 1] * m[0, 3] + m[1, 1] * m[1, 3] + m[2, 1] * m[2, 3])
-    l2 = -(m[0, 2] * m[0, 3] + m[1, 2] * m[1, 3] + m[2, 2] * m[2, 3])
+    position = (
+        -(m[0, 0] * m[0, 3] + m[1, 0] * m[1, 3] + m[2, 0] * m[2, 3]),
+        -(m[0, 1] * m[0, 3] + m[1, 1] * m[1, 3] + m[2, 1] * m[2, 3]),
+        -(m[0, 2] * m[0, 3] + m[1, 2] * m[1, 3] + m[2, 2] * m[2, 3]),
+    )
     n = 0
     for r in range(vertices.shape[0]):
         v, path = vertices[r], paths[r]
@@ -129,22 +128,18 @@ def connect_to_laser(
             continue
         if is_specular(v, rows):
             continue
-        e0, e1, e2, distance = towards(v, l0, l1, l2)
-        out = cosine_to(v, e0, e1, e2)
-        i0, i1, i2 = to_shading(v, e0, e1, e2)
-        if out * i2 <= 0.0:
-            continue
-        o0, o1, o2 = v.wo[0], v.wo[1], v.wo[2]
-        f = eval_bsdf(v, rows, i0, i1, i2, o0, o1, o2)
+        direction, distance = towards(v, position)
+        cosine, wi, wo = cosine_to(v, direction), to_shading(v, direction), vector(v.wo)
+        f = 0.0 if cosine * wi[2] <= 0.0 else eval_bsdf(v, rows, wi, wo)
         if f <= 0.0:
             continue
-        others = photon_pdf * (path.dvcm + bsdf_pdf(v, rows, i0, i1, i2, o0, o1, o2) * path.dvc)
+        others = photon_pdf * (path.dvcm + bsdf_pdf(v, rows, wi, wo) * path.dvc)
         mis_divisor = 1.0 + RIS_SAMPLE_WEIGHT * others
         connections.pixel[n], connections.kind[n], connections.fan_bin[n] = path.pixel, path.kind, -1
         connections.reachable_from_camera[n] = True
-        connections.contribution[n] = path.throughput * f * light * abs(i2 / out) / mis_divisor
-        set_shadow_ray(connections, n, v, e0, e1, e2, distance, context)
-        connections.interior[n] = interior_beyond(v, path, rows, i2)
+        connections.contribution[n] = path.throughput * f * light * abs(wi[2] / cosine) / mis_divisor
+        set_shadow_ray(connections, n, v, direction, distance, context)
+        connections.interior[n] = interior_beyond(v, path, rows, wi[2])
         n += 1
     return n
 
@@ -169,11 +164,10 @@ def init_camera_mis(vertices: Records, paths: Records, sampling: CameraSampling,
         v, path = vertices[r], paths[r]
         a, b = path_lens_point(view, seed, path.index)
         _, _, area = lens_project(view, tilt, distorted, v.p[0], v.p[1], v.p[2], a, b)
-        c0, c1, c2 = lens_position(view, a, b)
-        e0, e1, e2 = c0 - v.p[0], c1 - v.p[1], c2 - v.p[2]
-        camera_pdf = area * abs(cosine_to(v, e0, e1, e2)) / math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
-        tries = RIS_SAMPLE_WEIGHT * sampling.camera_paths[path.pixel]
-        path.dvcm = sampling.light_paths / (tries * camera_pdf) if camera_pdf > 0.0 else 0.0
+        to_lens = minus(lens_position(view, a, b), vector(v.p))
+        camera_pdf = area * abs(cosine_to(v, to_lens)) / length(to_lens)
+        connection_samples = RIS_SAMPLE_WEIGHT * sampling.camera_paths[path.pixel]
+        path.dvcm = sampling.light_paths / (connection_samples * camera_pdf) if camera_pdf > 0.0 else 0.0
         path.dvc = 0.0
 
 
@@ -213,11 +207,11 @@ def connectable(vertices: Records, paths: Records, rows: Float) -> tuple[Records
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def towards(v: Record, c0: float, c1: float, c2: float) -> tuple[float, float, float, float]:
-    """Unit direction from a vertex to the point c, and its distance, m."""
-    e0, e1, e2 = c0 - v.p[0], c1 - v.p[1], c2 - v.p[2]
-    distance = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
-    return e0 / distance, e1 / distance, e2 / distance, distance
+def towards(v: Record, point: Vector) -> tuple[Vector, float]:
+    """Unit direction from a vertex to a point, and its distance, m."""
+    to = minus(point, vector(v.p))
+    distance = length(to)
+    return divided(to, distance), distance
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -233,12 +227,7 @@ def pixel_of(view: View, tilt: Float, distorted: bool, height: int, v: Record, a
 def laser_irradiance(v: Record, laser: LaserSampling) -> tuple[float, float]:
     """Irradiance (W/m^2, on the geometric normal) of a vertex by the laser, and the pdf (1/m^2) of photons there."""
     m = laser.T_laser_world
-    x = m[0, 0] * v.p[0] + m[0, 1] * v.p[1] + m[0, 2] * v.p[2] + m[0, 3]
-    y = m[1, 0] * v.p[0] + m[1, 1] * v.p[1] + m[1, 2] * v.p[2] + m[1, 3]
-    z = m[2, 0] * v.p[0] + m[2, 1] * v.p[1] + m[2, 2] * v.p[2] + m[2, 3]
-    nx = m[0, 0] * v.n[0] + m[0, 1] * v.n[1] + m[0, 2] * v.n[2]
-    ny = m[1, 0] * v.n[0] + m[1, 1] * v.n[1] + m[1, 2] * v.n[2]
-    nz = m[2, 0] * v.n[0] + m[2, 1] * v.n[1] + m[2, 2] * v.n[2]
+    (x, y, z), (nx, ny, nz) = transformed(m, vector(v.p)), rotated(m, vector(v.n))
     value = irradiance(x, y, z, nx, ny, nz, laser.beam)
     return value, value / laser.beam[0] * emitted_density(y / z, laser.fan, laser.beam) if value > 0.0 else 0.0
 

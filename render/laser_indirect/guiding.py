@@ -129,7 +129,7 @@ def predict_radiance(
     start: int,
     stop: int,
 ) -> None:
-    """Radiance that is expected of each pixel, by its own and its cell's neighbourhood -> samples (pixels,).
+    """Radiance that is expected of each pixel, by its own and its cell's neighbourhood -> camera_paths (pixels,).
 
     In rows start .. stop of cells.
     """
@@ -146,7 +146,7 @@ def predict_radiance(
 
 
 def scale(camera_paths: Float, active: Int, count: float, threads: int | None = None) -> None:
-    """Scale samples (pixels,) to `count` in all, whereby what exceeds 1 grows more slowly."""
+    """Scale camera paths (pixels,) to `count` in all, whereby what exceeds 1 grows more slowly."""
     sums = np.zeros(-(-len(active) // PIXELS_A_CHUNK))
 
     def total(factor: float) -> float:
@@ -161,7 +161,7 @@ def scale(camera_paths: Float, active: Int, count: float, threads: int | None = 
 
 @numba.njit(nogil=True, cache=True)
 def sum_scaled(camera_paths: Float, active: Int, factor: float, sums: Float, start: int, stop: int) -> None:
-    """The sum over looked_at[start .. stop], scaled, or as it is where the factor is 0, into the chunk's place."""
+    """The sum over active[start .. stop], scaled, or as it is where the factor is 0, into the chunk's place."""
     total = 0.0
     for i in range(start, stop):
         value = camera_paths[active[i]] * (factor if factor > 0.0 else 1.0)
@@ -171,7 +171,7 @@ def sum_scaled(camera_paths: Float, active: Int, factor: float, sums: Float, sta
 
 @numba.njit(nogil=True, cache=True)
 def set_scaled(camera_paths: Float, active: Int, factor: float, start: int, stop: int) -> None:
-    """Scale the pixels looked_at[start .. stop]."""
+    """Scale the pixels active[start .. stop]."""
     for i in range(start, stop):
         value = factor * camera_paths[active[i]]
         camera_paths[active[i]] = min(
@@ -184,7 +184,7 @@ def any_specular(surface: Surface) -> bool:
     return any(is_specular_row(row) for row in surface.rows)
 
 
-def specular_pixels(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> Bool:
+def find_specular_pixels(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> Bool:
     """(pixels,) whether the camera sees a mirror or clear glass, to the nearest few pixels."""
     v, u = np.mgrid[0 : camera.height : SPECULAR_RAY_SPACING, 0 : camera.width : SPECULAR_RAY_SPACING]
     rays, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float64))

@@ -21,7 +21,7 @@ from render.base.threads import map_chunks, thread_count
 from render.camera.camera import Camera
 from render.importance import Importance
 from render.laser.laser import LineLaser
-from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, WAVE, Accumulator, sum_passes
+from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, PASSES_A_WAVE, Accumulator, sum_passes
 from render.laser_indirect.bdpt_pass import KINDS, BdptPass, Sampling
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
@@ -30,10 +30,10 @@ from render.laser_indirect.guiding import (
     active_pixels,
     aim_camera_paths,
     allocate_camera_paths,
+    find_specular_pixels,
     first_guide,
     no_guide,
     reserve_for_specular,
-    specular_pixels,
     update_guide,
 )
 from render.laser_indirect.line_goal import Effect, LineErrors, Projection, Weigh
@@ -49,13 +49,13 @@ LOOK_PATHS = 1 << 11
 PILOT_PATHS = 1 << 13
 ALL_KINDS = CAUSTIC | SUBSURFACE_LIGHT | SPECULAR_CHAIN
 
-STEPS = {
+CUMULATIVE_KINDS = {
     "interreflection": INTERREFLECTION,
     "caustic": CAUSTIC,
     "specular_chain": CAUSTIC | SPECULAR_CHAIN,
     "subsurface": ALL_KINDS,
 }
-"""Kinds of light, each beside those before it, by the name of its share."""
+"""By field of `IndirectPilot`: its kind of light and all those before it."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,16 @@ class IndirectImage:
     """Estimated relative RMS error."""
     paths: int
     """From the laser."""
-    dropped: int = 0
+    invalid: int = 0
     """Contributions that were NaN, infinite or negative, and were dropped."""
     clamped: int = 0
     """Pixels of passes that the clamp lowered."""
-    cut: float = 0.0
+    clamped_radiance: float = 0.0
     """Radiance that the clamp took away, mean over the image."""
     line_error: float = math.inf
     """Deviation of the measured line over the allowed one; infinite: not known."""
+    out_of_reach: bool = False
+    """The line's goal would have taken far more paths than that of the image, or than are allowed."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +92,8 @@ class Aim:
 
 
 @dataclass(frozen=True)
-class Shares:
-    """Radiance summed over the image, with its standard error, of each kind of indirect light."""
+class IndirectPilot:
+    """What a pilot found: radiance summed over the image, with its standard error, of each kind of indirect light."""
 
     interreflection: tuple[float, float]
     """Over two or more surfaces, none of them a mirror, clear glass or a medium."""
@@ -142,14 +144,21 @@ def indirect_images(
         return
     waves = Waves(BdptPass.of(*placed, reach, run.seed, kinds), camera, run)
     time_is_over = run.time_is_over(left)
-    so_far = run.restore(Accumulator.of_arrays) or waves.first_looks(placed, uniform_fan(low, high), kinds, aim)
+    so_far = run.restore(Accumulator.of_arrays)
+    if so_far is None:
+        so_far = waves.first_looks(placed, uniform_fan(low, high), kinds, aim, (target, most_paths))
     so_far.aim_at(None if aim is None else aim.importance, 0 if aim is None else aim.laser)
     wave_moments = attach_wave_moments(waves.buffers, so_far)
 
     def image() -> IndirectImage:
-        counts = so_far.paths, round(so_far.dropped), round(so_far.clamped)
-        cut = so_far.clamped_radiance / so_far.weight / so_far.total.size
-        return IndirectImage(so_far.radiance(shape), so_far.error, *counts, cut, so_far.line_error)
+        counts = so_far.paths, round(so_far.invalid), round(so_far.clamped)
+        clamped_radiance = so_far.clamped_radiance / so_far.weight / so_far.total.size
+        return IndirectImage(
+            so_far.radiance(shape), so_far.error, *counts, clamped_radiance, so_far.line_error, given_up()
+        )
+
+    def given_up() -> bool:
+        return so_far.line is not None and so_far.line.out_of_reach
 
     def unfinished() -> bool:
         known = so_far.error <= target or (aim is not None and so_far.line_error <= 1.0)
@@ -158,7 +167,7 @@ def indirect_images(
     shown = so_far.paths
     while unfinished():
         try:
-            waves.trace(WAVE * (2 + so_far.waves), sampling_of(so_far, so_far.next_paths))
+            waves.trace(PASSES_A_WAVE * (2 + so_far.waves), sampling_of(so_far, so_far.next_paths))
         except Cancelled:
             if so_far.passes and run.keep_partial():
                 yield image()
@@ -167,6 +176,8 @@ def indirect_images(
             sums = so_far.total, so_far.weight
             so_far.line = so_far.line.look(waves.buffers, sums, so_far.next_weight, aim.weigh, aim.laser)
         so_far.add(waves.buffers, wave_moments, clamp, run.threads)
+        if so_far.line is not None:
+            so_far.line.judge(so_far.line_error, so_far.error / target, so_far.paths, most_paths)
         run.keep(so_far)
         # the error falls with the root of the paths, at least
         over = min(so_far.error / target, math.inf if aim is None else so_far.line_error)
@@ -185,34 +196,38 @@ class Waves:
 
     def __init__(self, task: BdptPass, camera: Camera, run: Run) -> None:
         self.task, self.camera, self.run = task, camera, run
-        self.buffers = [empty_buffer(camera.width * camera.height) for _ in range(WAVE)]
+        self.buffers = [empty_buffer(camera.width * camera.height) for _ in range(PASSES_A_WAVE)]
 
-    def trace(self, first: int, sampling: Sampling, reachable_pixels: Bool | None = None) -> None:
-        """Passes first .. first + WAVE. Raises Cancelled."""
+    def trace(self, first: int, sampling: Sampling, specular: Bool | None = None) -> None:
+        """Passes first .. first + PASSES_A_WAVE; specular: as for `BdptPass.run`. Raises Cancelled."""
         run = self.run
 
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
-                self.task.run(first + number, sampling, self.buffers[number], run.cancelled, reachable_pixels)
+                self.task.run(first + number, sampling, self.buffers[number], run.cancelled, specular)
 
-        map_chunks(work, WAVE, 1, min(WAVE, thread_count(run.threads)), run.cancelled)
+        map_chunks(work, PASSES_A_WAVE, 1, min(PASSES_A_WAVE, thread_count(run.threads)), run.cancelled)
 
-    def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None = None) -> Accumulator:
+    def first_looks(
+        self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None, ends: tuple[float, int]
+    ) -> Accumulator:
         """An empty accumulator that knows where laser and camera should look; the light of two looks is thrown away.
 
         The first finds, by light, where it arrives at all (what is behind glass only the camera finds), the second,
-        from there, which light matters.
+        from there, which light matters, and whether the line's goal is in reach before image error or paths `ends` it.
         """
         task, camera = self.task, self.camera
         specular = seen_specular(task, placed.world, camera, placed.T_world_camera)
-        reachable_pixels = specular if task.specular else None
+        behind = specular if task.specular else None
         camera_paths = first_camera_paths(specular, camera, 8 * LOOK_PATHS)
         first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
-        self.trace(0, first_look, reachable_pixels)
+        self.trace(0, first_look, behind)
         found = initialise_guiding(self.buffers, fan, camera, kinds, specular)
-        found.line = None if aim is None else LineErrors.of(aim.importance, aim.laser)
         wave_moments = attach_wave_moments(self.buffers, found)
-        self.trace(WAVE, sampling_of(found, LOOK_PATHS), reachable_pixels)
+        self.trace(PASSES_A_WAVE, sampling_of(found, LOOK_PATHS), behind)
+        if aim is not None:
+            found.line = LineErrors.of(aim.importance, aim.laser)
+            found.line.look_ahead(self.buffers, PASSES_A_WAVE * LOOK_PATHS, *ends)
         refine_guiding(found, self.buffers, wave_moments, camera)
         return found
 
@@ -244,15 +259,17 @@ def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: 
         first.camera_radiance[:] = camera_radiance
     # a wide glow is best known by passes with a path for each of its pixels
     first.growth_limit = max((MOST_CAMERA_PASS // 2 if first.camera_share > 0.5 else MOST_PASS) // first.size, 1)
-    allocate_camera_paths(camera_radiance, camera.width, first.next_camera_paths, first.camera_paths, float(WAVE))
-    if first.line is not None:
+    allocate_camera_paths(
+        camera_radiance, camera.width, first.next_camera_paths, first.camera_paths, float(PASSES_A_WAVE)
+    )
+    if first.line is not None and not first.line.out_of_reach:
         aim_camera_paths(first.camera_paths, first.line.aim, first.next_camera_paths)
     reserve_for_specular(first.camera_paths, first.specular, first.next_camera_paths)
 
 
 def arrived_paths(camera_radiance: Float32) -> Float:
     """(pixels,) roughly how many light paths of a first look came to each."""
-    return camera_radiance.astype(np.float64) * (WAVE * LOOK_PATHS / max(float(camera_radiance.sum()), 1e-300))
+    return camera_radiance.astype(np.float64) * (PASSES_A_WAVE * LOOK_PATHS / max(float(camera_radiance.sum()), 1e-300))
 
 
 def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
@@ -260,7 +277,7 @@ def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
     camera_radiance = np.zeros_like(buffers[0].camera_radiance)
     light, by_camera, *_ = sum_passes(buffers, np.zeros(len(camera_radiance)), camera_radiance)
     for buffer in buffers:
-        buffer.dropped[:] = 0.0
+        buffer.invalid[:] = 0.0
     return min(by_camera / light, 1.0) if light > 0.0 else 1.0, camera_radiance
 
 
@@ -272,12 +289,12 @@ def sampling_of(so_far: Accumulator, light_paths: int) -> Sampling:
 
 def attach_wave_moments(buffers: list[PassBuffer], so_far: Accumulator) -> Float:
     """Give each buffer, in place, its part of the array that is returned."""
-    wave_moments = np.zeros((WAVE, *so_far.guide_moments.shape))
+    wave_moments = np.zeros((PASSES_A_WAVE, *so_far.guide_moments.shape))
     buffers[:] = [buffer._replace(wave_moments=wave_moments[i]) for i, buffer in enumerate(buffers)]
     return wave_moments
 
 
-def indirect_shares(
+def indirect_pilot(
     world: World,
     camera: Camera,
     laser: LineLaser,
@@ -287,14 +304,14 @@ def indirect_shares(
     passes: int = 4,
     projection: Projection | None = None,
     run: Run = Run(),
-) -> Shares:
+) -> IndirectPilot:
     """A pilot of a few short passes: what each kind of indirect light brings. Raises Cancelled.
 
     projection: where errors of this laser's light matter, for the effects.
     """
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     if high <= low:
-        return Shares((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+        return IndirectPilot((0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
     task = BdptPass.of(world, camera, laser, T_world_camera, T_world_laser, reach, run.seed, ALL_KINDS)
     specular = seen_specular(task, world, camera, T_world_camera)
     fan, guide, sums = uniform_fan(low, high), no_guide(camera), []
@@ -320,12 +337,12 @@ def indirect_shares(
             effect.add(buffer)
     mean, error = np.mean(sums, axis=0), np.std(sums, axis=0, ddof=1) / math.sqrt(passes)
     pairs = [(float(m), float(e)) for m, e in zip(mean, error, strict=True)]
-    found = Shares(pairs[0], pairs[1], pairs[2], pairs[3])
+    found = IndirectPilot(pairs[0], pairs[1], pairs[2], pairs[3])
     if effect is None:
         return found
-    present = [name for name, flux in zip(STEPS, mean, strict=True) if flux > 0.0]
+    present = [name for name, flux in zip(CUMULATIVE_KINDS, mean, strict=True) if flux > 0.0]
     if len(present) <= 1:
-        return replace(found, effects={name: effect.most() if name in present else 0.0 for name in STEPS})
+        return replace(found, effects={name: effect.most() if name in present else 0.0 for name in CUMULATIVE_KINDS})
     return replace(found, effects=_effects(task, sampling, passes, effect, run))
 
 
@@ -335,7 +352,7 @@ def _effects(task: BdptPass, sampling: Sampling, passes: int, last: Effect, run:
     last: of all kinds. Raises Cancelled.
     """
     effects, before = {}, None
-    for name, kinds in STEPS.items():
+    for name, kinds in CUMULATIVE_KINDS.items():
         with_it = last if kinds == ALL_KINDS else Effect(last.projection)
         specular = task.specular and bool(kinds & CAUSTIC)
         for number in range(passes if kinds != ALL_KINDS else 0):
@@ -349,7 +366,7 @@ def _effects(task: BdptPass, sampling: Sampling, passes: int, last: Effect, run:
 
 def seen_specular(task: BdptPass, world: World, camera: Camera, T_world_camera: Float) -> Bool:
     """(pixels,) where the camera sees a mirror or clear glass whose light is wanted; (0,): there is none."""
-    return specular_pixels(world, task.surface, camera, T_world_camera) if task.specular else NO_PIXELS
+    return find_specular_pixels(world, task.surface, camera, T_world_camera) if task.specular else NO_PIXELS
 
 
 def empty_buffer(pixels: int) -> PassBuffer:

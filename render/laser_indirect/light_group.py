@@ -114,8 +114,9 @@ def quality_of(
         of="image" if goal is None else "line",
         image_error=None if goal is None else image.error,
         image_target=None if goal is None else settings.indirect_error,
-        invalid=image.dropped,
+        out_of_reach=image.out_of_reach,
+        invalid=image.invalid,
         clamped=image.clamped if clamped else None,
-        clamped_radiance=image.cut if clamped else None,
+        clamped_radiance=image.clamped_radiance if clamped else None,
         share=float(image.radiance.sum(dtype=np.float64)) / known if known > 0.0 else None,
     )

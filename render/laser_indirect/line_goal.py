@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, uniform_filter1d
+from scipy.ndimage import gaussian_filter
 
 from render.base.arrays import Float, Float32
 from render.importance import CELL, Importance
@@ -25,12 +25,16 @@ Weigh = Callable[[Float32], Importance]
 """Where errors matter, by the reflected light (h, w) of a laser so far."""
 
 POOLED = 25
-"""Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one."""
+"""Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one. In the
+first wave neighbours, later those that were known alike before: a few bad ones would else speak for all about them."""
 MARGIN = 2.0
 """On the deviation that a few passes tell: rare bright paths are in few of them, and narrow lines move unevenly."""
 UNMET = 0.05
 """Share of the lit scan lines that may miss the goal: those about a bright corner would keep all others waiting. At the
 sample's full size 0.01 takes ten times the paths, and the median row is then known seventy times better than asked."""
+FAR = 8.0
+"""Times the light paths after which the render ends in any case: more of them put the goal out of reach. Guided by it
+the variance falls sooner than the first passes say, as much as tenfold where rows glitter."""
 LEAST_NEED = 0.02
 """Of the camera paths of a scan line that needs most: what every line gets beside it."""
 LOOK_SIGMA = 2.0
@@ -99,14 +103,18 @@ class LineErrors:
     projection: Projection
     shape: tuple[int, int]
     moved: Float
-    """(lines,) variance of the weighted sum of the passes."""
+    """(lines,) variance of the weighted sum of the passes, over lines that are alike."""
+    alone: Float
+    """(lines,) the same of each line alone, on whatever weights: it says which are alike."""
     risen: Float32
-    """(blocks, BLOCK / CELL) likewise."""
+    """(blocks, BLOCK / CELL) of the sum of what counts beside the line."""
     waves: int = 0
     measured: float = 0.0
     """What the waves add to the variance whose spread was taken, in that of a pass of unit size and weight."""
     all_waves: float = 0.0
     """The same of all waves; some were projected onto other weights."""
+    out_of_reach: bool = False
+    """The goal would take far more than is allowed: the errors of the image are the goal."""
 
     @property
     def aim(self) -> Float32:
@@ -115,9 +123,8 @@ class LineErrors:
         Lines that all had the same share of the paths need them in proportion to their variance.
         """
         lit = self.projection.lit
-        variance = pooled(self.moved, lit)
-        most = float(np.quantile(variance[lit], 1.0 - UNMET)) if lit.any() else 0.0
-        need = np.clip(variance / most, LEAST_NEED, 1.0) if most > 0.0 else np.ones(len(lit))
+        most = _all_but_unmet(self.moved[lit])
+        need = np.clip(self.moved / most, LEAST_NEED, 1.0) if most > 0.0 else np.ones(len(lit))
         return self.projection.aim(self.shape[0] * self.shape[1], need)
 
     @classmethod
@@ -125,8 +132,8 @@ class LineErrors:
         """Before the first wave."""
         projection = Projection.of(importance, laser)
         height, width = importance.laser[laser].shape
-        moved, risen = np.zeros(len(projection.lit)), np.zeros((len(projection.peaks), BLOCK // CELL), np.float32)
-        return cls(projection, (height, width), moved, risen)
+        lines, risen = len(projection.lit), np.zeros((len(projection.peaks), BLOCK // CELL), np.float32)
+        return cls(projection, (height, width), np.zeros(lines), np.zeros(lines), risen)
 
     def look(
         self, buffers: list[PassBuffer], so_far: tuple[Float, float], weight: float, weigh: Weigh, laser: int
@@ -135,7 +142,7 @@ class LineErrors:
 
         so_far: (pixels,) weighted sum of passes, and the sum of their weights; weight: of each of the wave's.
         """
-        if self.waves not in LOOKS:
+        if self.waves not in LOOKS or self.out_of_reach:
             return self
         light = so_far[0].copy()
         for buffer in buffers:
@@ -143,16 +150,19 @@ class LineErrors:
         light /= so_far[1] + weight * len(buffers)
         seen = gaussian_filter(light.astype(np.float32).reshape(self.shape), LOOK_SIGMA)
         found = LineErrors.of(weigh(seen), laser)
-        found.waves, found.all_waves = self.waves, self.all_waves
+        found.waves, found.all_waves, found.alone = self.waves, self.all_waves, self.alone
         return found
 
     def add(self, buffers: list[PassBuffer], weight: float, size: float) -> None:
         """Take the spread of a wave's passes; weight: of each of them; size: of a pass, in that of the first wave."""
         passes = len(buffers)
-        share = weight**2 * passes / size
-        self.waves, self.measured, self.all_waves = self.waves + 1, self.measured + share, self.all_waves + share
+        share, lit = weight**2 * passes / size, self.projection.lit
         moves = np.stack([self.projection.moves(buffer.image) for buffer in buffers])
-        self.moved += weight**2 * passes * np.var(moves, axis=0, ddof=1)
+        moved = weight**2 * passes * np.var(moves, axis=0, ddof=1)
+        # which lines are alike is known without this wave, so that their mean is what it should be
+        self.moved += pooled_alike(moved, self.alone, lit) if self.waves else pooled(moved, lit)
+        self.alone = self.alone + moved
+        self.waves, self.measured, self.all_waves = self.waves + 1, self.measured + share, self.all_waves + share
         if len(self.projection.peaks):
             touched = np.flatnonzero(np.any([buffer.touched for buffer in buffers], axis=0))
             rises = np.stack([self.projection.rises(buffer.image, touched) for buffer in buffers])
@@ -163,13 +173,29 @@ class LineErrors:
         if not self.measured:
             return math.inf
         scale = self.all_waves / self.measured / weights**2
-        lit = self.projection.lit
-        lines = scale * pooled(self.moved, lit)[lit]
         rows = np.zeros(self.shape[0])
         if len(self.risen):
-            np.maximum.at(rows, self.projection.block_row, scale * self.risen.max(axis=1))
-        found = [float(np.quantile(one, 1.0 - UNMET)) for one in (lines, rows) if len(one)]
-        return MARGIN * math.sqrt(max(found, default=0.0))
+            np.maximum.at(rows, self.projection.block_row, self.risen.max(axis=1))
+        worst = max(_all_but_unmet(self.moved[self.projection.lit]), _all_but_unmet(rows))
+        return MARGIN * math.sqrt(scale * worst)
+
+    def judge(self, error: float, image_error: float, paths: int, most: float) -> None:
+        """Whether the goal is out of reach, from how far it and that of the image are exceeded after so many light
+        paths; the render ends by the image's error or after `most`."""
+        end = min(most, paths * image_error**2)
+        self.out_of_reach |= math.isfinite(error) and paths * error**2 > FAR * end
+
+    def look_ahead(self, buffers: list[PassBuffer], paths: int, target: float, most: int) -> None:
+        """The same from the passes of a first look, in all of so many paths, which count for nothing else."""
+        look = LineErrors(self.projection, self.shape, np.zeros_like(self.moved), self.alone, self.risen.copy())
+        look.add(buffers, 1.0, 1.0)
+        images = np.stack([buffer.image for buffer in buffers])
+        variance, square = (
+            float(images.var(axis=0, ddof=1).sum()) / len(images),
+            float((images.mean(axis=0) ** 2).sum()),
+        )
+        error = math.sqrt(variance / max(square - variance, 1e-3 * square)) if square > 0.0 else 0.0
+        self.judge(look.error(float(len(buffers))), error / target, paths, most)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What a checkpoint keeps."""
@@ -180,8 +206,9 @@ class LineErrors:
             "line_weight": weight,
             "line_peaks": np.zeros((0, 0), np.float32) if peaks is None else peaks,
             "line_moved": self.moved,
+            "line_alone": self.alone,
             "line_risen": self.risen,
-            "line_numbers": np.array([self.waves, self.measured, self.all_waves]),
+            "line_numbers": np.array([self.waves, self.measured, self.all_waves, self.out_of_reach]),
         }
 
     @classmethod
@@ -190,10 +217,11 @@ class LineErrors:
         weight, peaks, moved = arrays["line_weight"], arrays["line_peaks"], arrays["line_moved"]
         axis: Literal["rows", "columns"] = "rows" if len(moved) == len(weight) else "columns"
         importance = Importance((weight,), weight, axis, (peaks,) if peaks.size else ())
-        waves, measured, all_waves = arrays["line_numbers"].tolist()
+        waves, measured, all_waves, out_of_reach = arrays["line_numbers"].tolist()
         found = cls.of(importance, 0)
-        found.moved, found.risen = moved.copy(), arrays["line_risen"].copy()
+        found.moved, found.alone, found.risen = moved.copy(), arrays["line_alone"].copy(), arrays["line_risen"].copy()
         found.waves, found.measured, found.all_waves = int(waves), measured, all_waves
+        found.out_of_reach = bool(out_of_reach)
         return found
 
 
@@ -229,5 +257,25 @@ class Effect:
 
 def pooled(values: Float, lit: NDArray[np.bool_]) -> Float:
     """(lines,) mean over the POOLED lines about each, of those that are lit."""
-    total = uniform_filter1d(np.where(lit, values, 0.0), POOLED, mode="constant")
-    return np.asarray(total / np.maximum(uniform_filter1d(lit.astype(np.float64), POOLED, mode="constant"), 1e-9))
+    return np.asarray(_windows(np.where(lit, values, 0.0)) / np.maximum(_windows(lit.astype(np.float64)), 1.0))
+
+
+def pooled_alike(values: Float, before: Float, lit: NDArray[np.bool_]) -> Float:
+    """(lines,) mean over the POOLED lit lines whose variance was next to each one's before; apart of those that were
+    known worst, which may miss the goal. 0 where nothing is lit."""
+    out, lines = np.zeros_like(values), np.flatnonzero(lit)
+    ranked = lines[np.argsort(before[lines], kind="stable")]
+    for some in np.split(ranked, [len(ranked) - int(UNMET * len(ranked))]):
+        if len(some):
+            out[some] = _windows(values[some]) / _windows(np.ones(len(some)))
+    return out
+
+
+def _windows(values: Float) -> Float:
+    """(n,) sums over the POOLED values about each; a running sum would leave the rounding of the largest."""
+    return np.asarray(np.convolve(values, np.ones(POOLED))[POOLED // 2 : POOLED // 2 + len(values)])
+
+
+def _all_but_unmet(values: Float) -> float:
+    """What all but the share UNMET of some values are at most; 0: there are none."""
+    return float(np.quantile(values, 1.0 - UNMET, method="lower")) if len(values) else 0.0

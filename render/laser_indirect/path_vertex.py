@@ -15,8 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.arrays import Float, Int
+from render.base.vectors import (
+    Vector,
+    along,
+    cross,
+    dot,
+    minus,
+    negative,
+    plus,
+    rotated,
+    row_vector,
+    scaled,
+    store,
+    store_row,
+    vector,
+)
 from render.laser_indirect.photon_emission import SEQUENCE
 from render.material.bsdf import SUBSURFACE, eval_band, eval_lobes, is_specular_kind, pdf_lobes, sample
+from render.material.record import ALPHA_X, ALPHA_Y, BSDF_COLUMNS, INDEX, INTERNAL, KIND, METAL_K, METAL_N
+from render.material.scattering import Microsurface, Numbers
 from render.sampling.random import uniform
 from render.world.interior_list import bit_of, index_beside, medium_within
 from render.world.surface_interaction import interaction
@@ -61,12 +78,11 @@ INTERREFLECTION, CAUSTIC, SUBSURFACE_LIGHT, SPECULAR_CHAIN = 0, 1, 2, 4
 """Kinds of light, as bits: none; through clear glass or off a mirror; through a medium; found by merging alone."""
 INNER, OUTER = 1, 2
 """Sides of a surface, as bits: behind its shading normal, and before it."""
-SURFACE = 11
-"""Columns of a material's row that say how its surface scatters."""
 MOST_BOUNCES = 64
-ROULETTE_AFTER = 3
-"""Surfaces met before Russian roulette may end a path."""
+FIRST_ROULETTE_SURFACE = 4
+"""Surface, counted from 1, on leaving which a path may first be ended by Russian roulette."""
 MOST_SURVIVAL = 0.95
+"""Largest probability of surviving it, so that paths among mirrors end. Chosen, not tuned."""
 
 
 class PassContext(NamedTuple):
@@ -106,29 +122,28 @@ def intersect(  # noqa: PLR0913
         if t < 0:
             continue
         a0, a1, a2, n0, n1, n2 = plane_of(surface, t)
-        d0, d1, d2 = direction[r, 0], direction[r, 1], direction[r, 2]
-        b0, b1, b2 = origin[r, 0], origin[r, 1], origin[r, 2]
-        cosine = n0 * d0 + n1 * d1 + n2 * d2
+        start, d, normal = row_vector(origin, r), row_vector(direction, r), (n0, n1, n2)
+        cosine = dot(normal, d)
         if cosine == 0.0:
             continue
-        s = (n0 * (a0 - b0) + n1 * (a1 - b1) + n2 * (a2 - b2)) / cosine
-        p0, p1, p2 = b0 + s * d0, b1 + s * d1, b2 + s * d2
+        s = dot(normal, minus((a0, a1, a2), start)) / cosine
+        point = along(start, s, d)
         choice = uniform(context.seed, paths[r].index, depth, 3)
-        material = interaction(surface, t, p0, p1, p2, n0, n1, n2, choice, rgb, alpha, frame)
+        material = interaction(surface, t, point, normal, choice, rgb, alpha, frame)
         v = vertices[hits]
-        v.p[0], v.p[1], v.p[2] = p0, p1, p2
-        v.n[0], v.n[1], v.n[2] = n0, n1, n2
-        for axis in range(3):
-            v.ns[axis], v.t[axis] = frame[2, axis], frame[0, axis]
-            v.wo[axis] = -(frame[axis, 0] * d0 + frame[axis, 1] * d1 + frame[axis, 2] * d2)
+        store(v.p, point)
+        store(v.n, normal)
+        store(v.ns, row_vector(frame, 2))
+        store(v.t, row_vector(frame, 0))
+        store(v.wo, negative(rotated(frame, d)))
         # on one side of the facet and of the shading normal, or light from behind would leak through
         if v.wo[2] * cosine >= 0.0:
             continue
         v.material = material
         v.reflectance = weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
         v.alpha[0], v.alpha[1] = alpha[0], alpha[1]
-        v.index = context.rows[material, 3]
-        v.turbid = INNER if context.rows[material, 0] == SUBSURFACE else 0
+        v.index = context.rows[material, INDEX]
+        v.turbid = INNER if context.rows[material, KIND] == SUBSURFACE else 0
         paths[hits] = paths[r]
         path = paths[hits]
         bit = bit_of(context.rows, material)
@@ -167,49 +182,46 @@ def interior_beyond(v: Record, path: Record, rows: Float, cosine: float) -> int:
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def is_specular(v: Record, rows: Float) -> bool:
     """The BSDF at a vertex is a delta function: a mirror or clear glass."""
-    return is_specular_kind(rows[v.material, 0], v.alpha[0], v.alpha[1])
+    return is_specular_kind(rows[v.material, KIND], v.alpha[0], v.alpha[1])
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def eval_bsdf(v: Record, rows: Float, o0: float, o1: float, o2: float, i0: float, i1: float, i2: float) -> float:
+def eval_bsdf(v: Record, rows: Float, wo: Vector, wi: Vector) -> float:
     """f(wo, wi) at a vertex, 1/sr (`render.material.bsdf`)."""
     row = rows[v.material]
-    facets, cosine, base = eval_lobes(row[0], v.alpha[0], v.alpha[1], v.index, o0, o1, o2, i0, i1, i2)
-    return eval_band(row[0], facets, cosine, base, v.reflectance, row[4], row[7], row[10])
+    lobes = eval_lobes(row[KIND], Microsurface(v.alpha[0], v.alpha[1], v.index), wo, wi)
+    return eval_band(row[KIND], lobes, v.reflectance, row[METAL_N], row[METAL_K], row[INTERNAL])
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def bsdf_pdf(v: Record, rows: Float, o0: float, o1: float, o2: float, i0: float, i1: float, i2: float) -> float:
+def bsdf_pdf(v: Record, rows: Float, wo: Vector, wi: Vector) -> float:
     """pdf with which a vertex scatters a path from wo to wi, 1/sr (`render.material.bsdf`)."""
-    row = rows[v.material]
-    return pdf_lobes(row[0], v.alpha[0], v.alpha[1], v.index, v.reflectance, o0, o1, o2, i0, i1, i2)
+    m = Microsurface(v.alpha[0], v.alpha[1], v.index)
+    return pdf_lobes(rows[v.material, KIND], m, v.reflectance, wo, wi)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def bitangent(v: Record) -> tuple[float, float, float]:
+def bitangent(v: Record) -> Vector:
     """Second axis of a vertex's shading frame: ns x t."""
-    return (
-        v.ns[1] * v.t[2] - v.ns[2] * v.t[1],
-        v.ns[2] * v.t[0] - v.ns[0] * v.t[2],
-        v.ns[0] * v.t[1] - v.ns[1] * v.t[0],
-    )
+    return cross(vector(v.ns), vector(v.t))
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def to_shading(v: Record, d0: float, d1: float, d2: float) -> tuple[float, float, float]:
+def to_shading(v: Record, d: Vector) -> Vector:
     """A world direction in a vertex's shading frame."""
-    y0, y1, y2 = bitangent(v)
-    return (
-        d0 * v.t[0] + d1 * v.t[1] + d2 * v.t[2],
-        d0 * y0 + d1 * y1 + d2 * y2,
-        d0 * v.ns[0] + d1 * v.ns[1] + d2 * v.ns[2],
-    )
+    return dot(d, vector(v.t)), dot(d, bitangent(v)), dot(d, vector(v.ns))
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def cosine_to(v: Record, d0: float, d1: float, d2: float) -> float:
+def from_shading(v: Record, d: Vector) -> Vector:
+    """A direction in a vertex's shading frame in the world."""
+    return plus(plus(scaled(d[0], vector(v.t)), scaled(d[1], bitangent(v))), scaled(d[2], vector(v.ns)))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def cosine_to(v: Record, d: Vector) -> float:
     """Cosine of a world direction with a vertex's geometric normal."""
-    return v.n[0] * d0 + v.n[1] * d1 + v.n[2] * d2
+    return dot(vector(v.n), d)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
@@ -220,14 +232,7 @@ def shading_normal_factor(v: Record) -> float:
     """
     if v.ns[0] == v.n[0] and v.ns[1] == v.n[1] and v.ns[2] == v.n[2]:
         return 1.0
-    y0, y1, y2 = bitangent(v)
-    o0, o1, o2 = v.wo[0], v.wo[1], v.wo[2]
-    geometric = (
-        v.n[0] * (v.t[0] * o0 + y0 * o1 + v.ns[0] * o2)
-        + v.n[1] * (v.t[1] * o0 + y1 * o1 + v.ns[1] * o2)
-        + v.n[2] * (v.t[2] * o0 + y2 * o1 + v.ns[2] * o2)
-    )
-    return abs(o2 / geometric)
+    return abs(v.wo[2] / cosine_to(v, from_shading(v, vector(v.wo))))
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -248,62 +253,57 @@ def scatter(
     (1997), 5.3.
     """
     rows = context.rows
-    rgb, row, i, f = np.empty(3), np.empty(SURFACE), np.empty(3), np.empty(1)
+    row, f = np.empty(BSDF_COLUMNS), np.empty(1)
     going = 0
     for r in range(vertices.shape[0]):
         v, path = vertices[r], paths[r]
         specular = is_specular(v, rows)
-        choice, r1, r2 = bsdf_sample_numbers(path.index, depth, shift, from_light, context.seed)
-        o0, o1, o2 = v.wo[0], v.wo[1], v.wo[2]
         if specular and not context.kinds & CAUSTIC:
             continue
-        for c in range(SURFACE):
+        numbers = bsdf_sample_numbers(path.index, depth, shift, from_light, context.seed)
+        for c in range(BSDF_COLUMNS):
             row[c] = rows[v.material, c]
-        row[1], row[2], row[3] = v.alpha[0], v.alpha[1], v.index
-        rgb[0] = rgb[1] = rgb[2] = v.reflectance
-        pdf = sample(row, rgb, o0, o1, o2, choice, r1, r2, i, f)
+        row[ALPHA_X], row[ALPHA_Y], row[INDEX] = v.alpha[0], v.alpha[1], v.index
+        rgb = v.reflectance, v.reflectance, v.reflectance
+        wo = vector(v.wo)
+        wi, pdf = sample(row, rgb, wo, numbers, f)
         if pdf == 0.0:
             continue
-        y0, y1, y2 = bitangent(v)
-        d0 = i[0] * v.t[0] + i[1] * y0 + i[2] * v.ns[0]
-        d1 = i[0] * v.t[1] + i[1] * y1 + i[2] * v.ns[1]
-        d2 = i[0] * v.t[2] + i[1] * y2 + i[2] * v.ns[2]
-        out = cosine_to(v, d0, d1, d2)
-        if out * i[2] <= 0.0:
+        d = from_shading(v, wi)
+        cosine = cosine_to(v, d)
+        if cosine * wi[2] <= 0.0:
             continue
-        crosses = o2 * i[2] < 0.0
+        crosses = wo[2] * wi[2] < 0.0
         kind = path.kind | CAUSTIC if specular else path.kind
-        medium = v.material if row[0] == SUBSURFACE and i[2] < 0.0 else -1
-        interior = interior_beyond(v, path, rows, i[2])
+        medium = v.material if row[KIND] == SUBSURFACE and wi[2] < 0.0 else -1
+        interior = interior_beyond(v, path, rows, wi[2])
         if interior > 0:
             medium = medium_within(rows, interior)
-        if crosses and (row[0] == SUBSURFACE or medium >= 0 or path.medium >= 0):
+        if crosses and (row[KIND] == SUBSURFACE or medium >= 0 or path.medium >= 0):
             # what comes out of a medium is left to the paths from the laser
             if not from_light or not context.kinds & SUBSURFACE_LIGHT:
                 continue
             kind |= SUBSURFACE_LIGHT
         throughput = path.throughput * f[0]
         if from_light:
-            throughput *= shading_normal_factor(v) * abs(out / i[2])
+            throughput *= shading_normal_factor(v) * abs(cosine / wi[2])
         elif crosses:
-            throughput *= row[3] * row[3] if o2 < 0.0 else 1.0 / (row[3] * row[3])
-        if depth >= ROULETTE_AFTER:
+            throughput *= row[INDEX] * row[INDEX] if wo[2] < 0.0 else 1.0 / (row[INDEX] * row[INDEX])
+        if depth + 1 >= FIRST_ROULETTE_SURFACE:
             survival = min(f[0], MOST_SURVIVAL)
             if uniform(context.seed, path.index, depth, 4) >= survival:
                 continue
             throughput /= survival
         if throughput <= 0.0:
             continue
-        cosine = abs(out)
         if specular:
-            dvcm, dvc = 0.0, path.dvc * cosine
+            dvcm, dvc = 0.0, path.dvc * abs(cosine)
         else:
-            reverse_pdf = bsdf_pdf(v, rows, i[0], i[1], i[2], o0, o1, o2)
-            dvcm, dvc = 1.0 / pdf, cosine / pdf * (path.dvcm + reverse_pdf * path.dvc)
-        origin[going, 0], origin[going, 1], origin[going, 2] = off_surface(
-            v.p[0], v.p[1], v.p[2], v.n[0], v.n[1], v.n[2], context.ray_epsilon if out > 0.0 else -context.ray_epsilon
-        )
-        direction[going, 0], direction[going, 1], direction[going, 2] = d0, d1, d2
+            reverse_pdf = bsdf_pdf(v, rows, wi, wo)
+            dvcm, dvc = 1.0 / pdf, abs(cosine) / pdf * (path.dvcm + reverse_pdf * path.dvc)
+        side = context.ray_epsilon if cosine > 0.0 else -context.ray_epsilon
+        store_row(origin, going, off_surface(vector(v.p), vector(v.n), side))
+        store_row(direction, going, d)
         all_specular = path.all_specular and (specular or (from_light and path.after_specular))
         paths[going] = paths[r]
         after = paths[going]
@@ -315,9 +315,7 @@ def scatter(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def bsdf_sample_numbers(
-    index: int, depth: int, shift: Float, from_light: bool, seed: int
-) -> tuple[float, float, float]:
+def bsdf_sample_numbers(index: int, depth: int, shift: Float, from_light: bool, seed: int) -> Numbers:
     """The lobe's and the direction's numbers in [0, 1): of a light path's first surface from its sequence."""
     if depth == 0 and from_light:
         return (

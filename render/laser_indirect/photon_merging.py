@@ -15,13 +15,15 @@ import numba
 import numpy as np
 
 from render.base.arrays import Float, Long
+from render.base.vectors import dot, minus, vector
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
-from render.laser_indirect.path_vertex import SPECULAR_CHAIN, Record, Records, eval_bsdf, is_specular
+from render.laser_indirect.path_vertex import SPECULAR_CHAIN, Record, Records, cosine_to, eval_bsdf, is_specular
 
 RADIUS_EXPONENT = 1.0 / 6.0
 """The radius falls as n^-(1/6) with the passes (Knaus and Zwicker 2011, alpha = 2/3)."""
 LEAST_COSINE = 0.7
-"""Between the normals of a photon and of the surface it is merged on: none is taken from around a corner."""
+"""Between the normals of a photon and of the surface it is merged on: none is taken from around a corner. Chosen, not
+tuned."""
 
 
 class PhotonMap(NamedTuple):
@@ -63,7 +65,7 @@ def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, bu
             continue
         contribution = path.throughput * gather_photons(v, path, rows, photons, kernel, buffer) * kernel
         if not 0.0 <= contribution < math.inf:
-            buffer.dropped[0] += 1.0
+            buffer.invalid[0] += 1.0
         elif contribution > 0.0:
             buffer.image[path.pixel] += contribution
             buffer.camera_radiance[path.pixel] += contribution
@@ -87,15 +89,15 @@ def gather_photons(
         j = np.searchsorted(photons.cell, key)
         while j < photons.cell.shape[0] and photons.cell[j] == key:
             w = photons.vertices[j]
-            d0, d1, d2 = w.p[0] - v.p[0], w.p[1] - v.p[1], w.p[2] - v.p[2]
-            near = d0 * d0 + d1 * d1 + d2 * d2 < radius * radius
-            if near and v.n[0] * w.n[0] + v.n[1] * w.n[1] + v.n[2] * w.n[2] > LEAST_COSINE:
-                f = eval_bsdf(v, rows, w.wo[0], w.wo[1], w.wo[2], v.wo[0], v.wo[1], v.wo[2])
+            apart = minus(vector(w.p), vector(v.p))
+            near = dot(apart, apart) < radius * radius
+            if near and cosine_to(v, vector(w.n)) > LEAST_COSINE:
+                f = eval_bsdf(v, rows, vector(w.wo), vector(v.wo))
                 value = photons.power[j] * f
                 if 0.0 <= value < math.inf:
                     total += value
                     buffer.fan_moments[photons.fan_bin[j]] += (path.throughput * value * kernel) ** 2
                 else:
-                    buffer.dropped[0] += 1.0
+                    buffer.invalid[0] += 1.0
             j += 1
     return total

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Float, Long
+from render.base.vectors import Vector, divided, dot, length, minus, negative, store_row, vector
 from render.laser_indirect.connection_buffer import Connections, PassBuffer
 from render.laser_indirect.connections import towards
 from render.laser_indirect.guiding import BINS, TILE, Guide
@@ -102,8 +103,8 @@ def connect_by_ris(
         resampled = total / light.light_paths
         connections.contribution[n] = mis_weighted(v, path, w, w_path, resampled, context.rows)
         set_shadow_ray_between(connections, n, v, w, context)
-        e0, e1, e2, _ = towards(v, w.p[0], w.p[1], w.p[2])
-        connections.interior[n] = interior_beyond(v, path, context.rows, cosine_to(v, e0, e1, e2))
+        direction, _ = towards(v, vector(w.p))
+        connections.interior[n] = interior_beyond(v, path, context.rows, cosine_to(v, direction))
         n += 1
     return n
 
@@ -149,73 +150,84 @@ def weigh_candidates(  # noqa: PLR0913
     return total
 
 
+class Edge(NamedTuple):
+    """The segment from a camera vertex v to a light vertex w."""
+
+    squared_distance: float
+    cosine_v: float
+    """Of its direction with v's geometric normal."""
+    cosine_w: float
+    """Of the opposite direction with w's."""
+    at_v: Vector
+    """Its direction in v's shading frame."""
+    at_w: Vector
+    """The opposite direction in w's."""
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def edge_between(v: Record, w: Record) -> Edge:
+    """The segment from v to w."""
+    to = minus(vector(w.p), vector(v.p))
+    square = dot(to, to)
+    direction = divided(to, math.sqrt(square))
+    back = negative(direction)
+    return Edge(
+        square, cosine_to(v, direction), -cosine_to(w, direction), to_shading(v, direction), to_shading(w, back)
+    )
+
+
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def target_function(v: Record, path: Record, w: Record, w_path: Record, rows: Float) -> float:
     """About what a connection of camera vertex v to light vertex w contributes, MIS-weighted, if it is not occluded.
 
     Near a corner the geometry term is bounded by what the other techniques take of it (`corner_bound`).
     """
-    e0, e1, e2 = w.p[0] - v.p[0], w.p[1] - v.p[1], w.p[2] - v.p[2]
-    square = e0 * e0 + e1 * e1 + e2 * e2
-    distance = math.sqrt(square)
-    e0, e1, e2 = e0 / distance, e1 / distance, e2 / distance
-    out, in_ = cosine_to(v, e0, e1, e2), -cosine_to(w, e0, e1, e2)
-    i0, i1, i2 = to_shading(v, e0, e1, e2)
-    g0, g1, g2 = to_shading(w, -e0, -e1, -e2)
-    if out * i2 <= 0.0 or in_ * g2 <= 0.0:
+    edge = edge_between(v, w)
+    if edge.cosine_v * edge.at_v[2] <= 0.0 or edge.cosine_w * edge.at_w[2] <= 0.0:
         return 0.0
     # no straight way through a medium
-    if is_turbid(v, i2) or is_turbid(w, g2):
+    if is_turbid(v, edge.at_v[2]) or is_turbid(w, edge.at_w[2]):
         return 0.0
-    value = eval_bsdf(v, rows, i0, i1, i2, v.wo[0], v.wo[1], v.wo[2])
+    value = eval_bsdf(v, rows, edge.at_v, vector(v.wo))
     if value <= 0.0:
         return 0.0
-    value *= eval_bsdf(w, rows, w.wo[0], w.wo[1], w.wo[2], g0, g1, g2)
-    return w_path.throughput * value * abs(i2 * in_) / (square + corner_bound(path, out, w_path, in_))
+    value *= eval_bsdf(w, rows, vector(w.wo), edge.at_w)
+    cosines = abs(edge.at_v[2] * edge.cosine_w)
+    return w_path.throughput * value * cosines / (edge.squared_distance + corner_bound(path, w_path, edge))
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def corner_bound(path: Record, out: float, w_path: Record, in_: float) -> float:
-    """m^2 added to the squared distance: the share of the other techniques as if both surfaces were diffuse."""
-    return (w_path.dvcm * abs(in_) + path.dvcm * abs(out)) / math.pi
+def corner_bound(path: Record, w_path: Record, edge: Edge) -> float:
+    """m^2 added to the squared distance: what the other techniques take as if both surfaces were diffuse."""
+    return (w_path.dvcm * abs(edge.cosine_w) + path.dvcm * abs(edge.cosine_v)) / math.pi
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def mis_weighted(v: Record, path: Record, w: Record, w_path: Record, resampled: float, rows: Float) -> float:
     """Contribution of the connection of v to w; resampled: sum of the candidates' weights, for each light path."""
-    e0, e1, e2 = w.p[0] - v.p[0], w.p[1] - v.p[1], w.p[2] - v.p[2]
-    square = e0 * e0 + e1 * e1 + e2 * e2
-    distance = math.sqrt(square)
-    e0, e1, e2 = e0 / distance, e1 / distance, e2 / distance
-    out, in_ = cosine_to(v, e0, e1, e2), -cosine_to(w, e0, e1, e2)
-    i0, i1, i2 = to_shading(v, e0, e1, e2)
-    g0, g1, g2 = to_shading(w, -e0, -e1, -e2)
-    o0, o1, o2 = v.wo[0], v.wo[1], v.wo[2]
-    b0, b1, b2 = w.wo[0], w.wo[1], w.wo[2]
+    edge = edge_between(v, w)
+    square, v_wo, w_wo = edge.squared_distance, vector(v.wo), vector(w.wo)
     # the target function over the true geometry term
-    contribution = resampled * (square + corner_bound(path, out, w_path, in_)) / square * shading_normal_factor(w)
-    from_camera = bsdf_pdf(v, rows, o0, o1, o2, i0, i1, i2) * abs(in_) / square
-    from_light = bsdf_pdf(w, rows, b0, b1, b2, g0, g1, g2) * abs(out) / square
-    back_light = bsdf_pdf(w, rows, g0, g1, g2, b0, b1, b2)
-    back_camera = bsdf_pdf(v, rows, i0, i1, i2, o0, o1, o2)
-    others = from_camera * (w_path.dvcm + back_light * w_path.dvc)
-    others += from_light * (path.dvcm + back_camera * path.dvc)
+    contribution = resampled * (square + corner_bound(path, w_path, edge)) / square * shading_normal_factor(w)
+    pdf_v_to_w = bsdf_pdf(v, rows, v_wo, edge.at_v) * abs(edge.cosine_w) / square
+    pdf_w_to_v = bsdf_pdf(w, rows, w_wo, edge.at_w) * abs(edge.cosine_v) / square
+    reverse_pdf_w = bsdf_pdf(w, rows, edge.at_w, w_wo)
+    reverse_pdf_v = bsdf_pdf(v, rows, edge.at_v, v_wo)
+    others = pdf_v_to_w * (w_path.dvcm + reverse_pdf_w * w_path.dvc)
+    others += pdf_w_to_v * (path.dvcm + reverse_pdf_v * path.dvc)
     return path.throughput * contribution / (1.0 + others)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def set_shadow_ray_between(connections: Connections, n: int, v: Record, w: Record, context: PassContext) -> None:
     """Shadow ray of connection n from a point off v's surface to one off w's."""
-    e0, e1, e2, _ = towards(v, w.p[0], w.p[1], w.p[2])
-    side = context.ray_epsilon if -cosine_to(w, e0, e1, e2) > 0.0 else -context.ray_epsilon
-    t0, t1, t2 = off_surface(w.p[0], w.p[1], w.p[2], w.n[0], w.n[1], w.n[2], side)
-    side = context.ray_epsilon if cosine_to(v, e0, e1, e2) > 0.0 else -context.ray_epsilon
-    s0, s1, s2 = off_surface(v.p[0], v.p[1], v.p[2], v.n[0], v.n[1], v.n[2], side)
-    e0, e1, e2 = t0 - s0, t1 - s1, t2 - s2
-    distance = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
-    centre = context.centre
-    connections.origin[n, 0], connections.origin[n, 1] = s0 - centre[0], s1 - centre[1]
-    connections.origin[n, 2] = s2 - centre[2]
-    connections.direction[n, 0], connections.direction[n, 1] = e0 / distance, e1 / distance
-    connections.direction[n, 2] = e2 / distance
+    direction, _ = towards(v, vector(w.p))
+    side = context.ray_epsilon if -cosine_to(w, direction) > 0.0 else -context.ray_epsilon
+    end = off_surface(vector(w.p), vector(w.n), side)
+    side = context.ray_epsilon if cosine_to(v, direction) > 0.0 else -context.ray_epsilon
+    start = off_surface(vector(v.p), vector(v.n), side)
+    to = minus(end, start)
+    distance = length(to)
+    store_row(connections.origin, n, minus(start, vector(context.centre)))
+    store_row(connections.direction, n, divided(to, distance))
     connections.distance[n] = distance

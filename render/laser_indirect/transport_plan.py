@@ -11,7 +11,7 @@ import numpy as np
 
 from render.base.arrays import Float32
 from render.importance import Importance
-from render.laser_indirect.integrator import indirect_shares
+from render.laser_indirect.integrator import indirect_pilot
 from render.laser_indirect.line_goal import Projection
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.light_group import Shares
@@ -33,8 +33,8 @@ class LightKind:
     """Of `render.laser_indirect.path_vertex`; INTERREFLECTION: nothing but rough surfaces."""
 
     @property
-    def share(self) -> str:
-        """Field of `render.laser_indirect.integrator.Shares`."""
+    def field(self) -> str:
+        """Field of `render.laser_indirect.integrator.IndirectPilot`."""
         return self.name.replace("-", "_")
 
 
@@ -66,7 +66,7 @@ def plan_of(shares: Shares, settings: RenderSettings) -> IndirectPlan:
     kinds = functools.reduce(operator.or_, (kind.bits for kind in chosen), INTERREFLECTION) if chosen else None
     steps = []
     for i, kind in enumerate(LADDER):
-        share, error = shares[kind.share]
+        share, error = shares[kind.field]
         computed, reason = True, "requested" if wanted >= 0 else "pilot"
         if share == error == 0.0 and i > max(wanted, 0):
             # nothing in the scene makes such light, or none that the pilot met
@@ -92,7 +92,7 @@ def _matters(kind: LightKind, shares: Shares, settings: RenderSettings) -> bool:
     """It may well do more to the line than the goal allows, or be more than a negligible share of the light."""
     if settings.goal is not None and effect_of(kind) in shares:
         return shares[effect_of(kind)][0] > 1.0
-    return at_most(shares[kind.share]) > settings.negligible
+    return at_most(shares[kind.field]) > settings.negligible
 
 
 def at_most(share: tuple[float, float]) -> float:
@@ -109,7 +109,7 @@ def pilot_shares(
     """
     known = sum(float(image.sum(dtype=np.float64)) for image in direct)
     found = [
-        indirect_shares(
+        indirect_pilot(
             *laser,
             projection=None if importance is None else Projection.of(importance, i),
             run=run.shifted(PILOT_SEED * (i + 1)),
@@ -119,11 +119,11 @@ def pilot_shares(
     shares = {}
     for kind in LADDER:
         if importance is not None:
-            shares[effect_of(kind)] = max(one.effects.get(kind.share, 0.0) for one in found), 0.0
-        parts = [getattr(one, kind.share) for one in found]
+            shares[effect_of(kind)] = max(one.effects.get(kind.field, 0.0) for one in found), 0.0
+        parts = [getattr(one, kind.field) for one in found]
         flux, error = sum(part[0] for part in parts), math.sqrt(sum(part[1] ** 2 for part in parts))
         if known > 0.0:
-            shares[kind.share] = (flux / known, error / known)
+            shares[kind.field] = (flux / known, error / known)
         else:
-            shares[kind.share] = (math.inf, 0.0) if flux > 0.0 else (0.0, 0.0)
+            shares[kind.field] = (math.inf, 0.0) if flux > 0.0 else (0.0, 0.0)
     return shares

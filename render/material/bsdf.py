@@ -10,8 +10,8 @@ the substance, so the frame must be built on the mesh's own normal, not on the o
 between two boundaries of a SUBSURFACE is the integrator's.
 
 `evaluate` consists of what is common to all bands (`eval_lobes`) and of what differs (`eval_band`), so that a path at
-one wavelength evaluates one band only. Both, and `pdf_lobes`, take single numbers of the row, since the roughness may
-come from an image instead.
+one wavelength evaluates one band only. Both, and `pdf_lobes`, take the roughness apart from the row, since it may come
+from an image instead.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from __future__ import annotations
 import numba
 
 from render.base.arrays import Float
+from render.base.vectors import Vector
 from render.material import coated, conductor, dielectric, lambertian
 from render.material.record import (
     ALPHA_X,
@@ -41,7 +42,7 @@ from render.material.record import (
     SPECULAR_ROUGHNESS,
     SUBSURFACE,
 )
-from render.material.scattering import Lobes, Microsurface
+from render.material.scattering import Direction, Lobes, Microsurface, Numbers
 
 __all__ = [
     "ANISOTROPY",
@@ -94,29 +95,32 @@ def is_specular_kind(kind: float, ax: float, ay: float) -> bool:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def evaluate(  # noqa: PLR0913
-    row: Float, rgb: Float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float, f: Float
-) -> None:
-    """f(wo, wi) in 1/sr, without the cosine -> f (3,) for each band; 0 for delta functions."""
-    specular, cosine, diffuse = eval_lobes(row[KIND], row[ALPHA_X], row[ALPHA_Y], row[INDEX], ox, oy, oz, ix, iy, iz)
-    for band in range(f.shape[0]):
-        n, k = row[METAL_N + band], row[METAL_K + band]
-        f[band] = eval_band(row[KIND], specular, cosine, diffuse, rgb[band], n, k, row[INTERNAL])
+def evaluate(row: Float, rgb: Vector, wo: Direction, wi: Direction) -> Vector:
+    """f(wo, wi) in each of 3 bands, 1/sr, without the cosine; 0 for delta functions."""
+    kind, lobes, internal = row[KIND], eval_lobes(row[KIND], microsurface(row), wo, wi), row[INTERNAL]
+    return (
+        eval_band(kind, lobes, rgb[0], row[METAL_N], row[METAL_K], internal),
+        eval_band(kind, lobes, rgb[1], row[METAL_N + 1], row[METAL_K + 1], internal),
+        eval_band(kind, lobes, rgb[2], row[METAL_N + 2], row[METAL_K + 2], internal),
+    )
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def eval_lobes(  # noqa: PLR0913
-    kind: float, ax: float, ay: float, eta: float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float
-) -> Lobes:
+def microsurface(row: Float) -> Microsurface:
+    """Roughness and refractive index of a row."""
+    return Microsurface(row[ALPHA_X], row[ALPHA_Y], row[INDEX])
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def eval_lobes(kind: float, m: Microsurface, wo: Direction, wi: Direction) -> Lobes:
     """The factors of f(wo, wi) that are common to all bands."""
-    if oz == 0.0 or iz == 0.0 or is_specular_kind(kind, ax, ay):
+    if wo[2] == 0.0 or wi[2] == 0.0 or is_specular_kind(kind, m.alpha_x, m.alpha_y):
         return Lobes(0.0, 0.0, 0.0)
-    m = Microsurface(ax, ay, eta)
     if kind in (DIELECTRIC, SUBSURFACE):
-        return dielectric.evaluate(m, (ox, oy, oz), (ix, iy, iz))
-    if oz * iz < 0.0:
+        return dielectric.evaluate(m, wo, wi)
+    if wo[2] * wi[2] < 0.0:
         return Lobes(0.0, 0.0, 0.0)
-    wo, wi = (ox, oy, abs(oz)), (ix, iy, abs(iz))
+    wo, wi = (wo[0], wo[1], abs(wo[2])), (wi[0], wi[1], abs(wi[2]))
     if kind == CONDUCTOR:
         return conductor.evaluate(m, wo, wi)
     if kind == COATED:
@@ -125,48 +129,31 @@ def eval_lobes(  # noqa: PLR0913
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def eval_band(
-    kind: float, specular: float, cosine: float, diffuse: float, reflectance: float, n: float, k: float, internal: float
-) -> float:
+def eval_band(kind: float, lobes: Lobes, reflectance: float, n: float, k: float, internal: float) -> float:
     """f(wo, wi) in one band, 1/sr, from the lobes that `eval_lobes` returned."""
-    lobes = Lobes(specular, cosine, diffuse)
     if kind == CONDUCTOR:
         return conductor.evaluate_band(lobes, reflectance, n, k)
     if kind == COATED:
         return coated.evaluate_band(lobes, reflectance, internal)
-    return reflectance * (specular + diffuse)
+    return reflectance * (lobes.specular + lobes.diffuse)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def pdf(row: Float, rgb: Float, ox: float, oy: float, oz: float, ix: float, iy: float, iz: float) -> float:
+def pdf(row: Float, rgb: Vector, wo: Direction, wi: Direction) -> float:
     """pdf of `sample` for wi given wo, 1/sr; 0 for delta functions."""
-    mean = (rgb[0] + rgb[1] + rgb[2]) / 3.0
-    return pdf_lobes(row[KIND], row[ALPHA_X], row[ALPHA_Y], row[INDEX], mean, ox, oy, oz, ix, iy, iz)
+    return pdf_lobes(row[KIND], microsurface(row), (rgb[0] + rgb[1] + rgb[2]) / 3.0, wo, wi)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def pdf_lobes(  # noqa: PLR0913
-    kind: float,
-    ax: float,
-    ay: float,
-    index: float,
-    reflectance: float,
-    ox: float,
-    oy: float,
-    oz: float,
-    ix: float,
-    iy: float,
-    iz: float,
-) -> float:
-    """pdf of `sample`, 1/sr, from single numbers of the row; reflectance: the mean over the bands."""
-    if oz == 0.0 or iz == 0.0 or is_specular_kind(kind, ax, ay):
+def pdf_lobes(kind: float, m: Microsurface, reflectance: float, wo: Direction, wi: Direction) -> float:
+    """pdf of `sample`, 1/sr, with the roughness apart from the row; reflectance: the mean over the bands."""
+    if wo[2] == 0.0 or wi[2] == 0.0 or is_specular_kind(kind, m.alpha_x, m.alpha_y):
         return 0.0
-    m = Microsurface(ax, ay, index)
     if kind in (DIELECTRIC, SUBSURFACE):
-        return dielectric.pdf(m, (ox, oy, oz), (ix, iy, iz))
-    if oz * iz < 0.0:
+        return dielectric.pdf(m, wo, wi)
+    if wo[2] * wi[2] < 0.0:
         return 0.0
-    wo, wi = (ox, oy, abs(oz)), (ix, iy, abs(iz))
+    wo, wi = (wo[0], wo[1], abs(wo[2])), (wi[0], wi[1], abs(wi[2]))
     if kind == CONDUCTOR:
         return conductor.pdf(m, wo, wi)
     if kind == COATED:
@@ -175,46 +162,30 @@ def pdf_lobes(  # noqa: PLR0913
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def sample(  # noqa: PLR0913
-    row: Float,
-    rgb: Float,
-    ox: float,
-    oy: float,
-    oz: float,
-    choice: float,
-    r1: float,
-    r2: float,
-    wi: Float,
-    weight: Float,
-) -> float:
-    """Draw wi given wo -> wi (3,), weight (3,) or (1,) = f |cos wi| / pdf for each band.
+def sample(row: Float, rgb: Vector, wo: Direction, numbers: Numbers, weight: Float) -> tuple[Direction, float]:
+    """Draw wi given wo: wi and its pdf, 1/sr; -> weight (3,) or (1,) = f |cos wi| / pdf for each band.
 
-    choice selects the lobe, r1 and r2 the direction in it; all in [0, 1). Returns the pdf, 1/sr; -1 for a delta
-    function (the weight then includes its probability); 0 if nothing is scattered.
+    numbers, in [0, 1): the first selects the lobe, the others the direction in it. The pdf is -1 for a delta function
+    (the weight then includes its probability), and 0 if nothing is scattered.
     """
     for band in range(weight.shape[0]):
         weight[band] = 0.0
-    if oz == 0.0:
-        return 0.0
-    kind, m, numbers = row[KIND], Microsurface(row[ALPHA_X], row[ALPHA_Y], row[INDEX]), (choice, r1, r2)
-    specular, wo = is_specular_row(row), (ox, oy, abs(oz))
+    if wo[2] == 0.0:
+        return (0.0, 0.0, 0.0), 0.0
+    kind, m, specular = row[KIND], microsurface(row), is_specular_row(row)
+    above = wo[0], wo[1], abs(wo[2])
     if is_boundary(row):
-        drawn = dielectric.sample(m, specular, (ox, oy, oz), numbers)
+        drawn = dielectric.sample(m, specular, wo, numbers)
     elif kind == CONDUCTOR:
-        drawn = conductor.sample(m, specular, wo, numbers)
+        drawn = conductor.sample(m, specular, above, numbers)
     elif kind == COATED:
-        drawn = coated.sample(m, (rgb[0] + rgb[1] + rgb[2]) / 3.0, wo, numbers)
+        drawn = coated.sample(m, (rgb[0] + rgb[1] + rgb[2]) / 3.0, above, numbers)
     else:
         drawn = lambertian.sample(numbers)
     if drawn.pdf == 0.0:
-        return 0.0
-    wi[0], wi[1], wi[2] = drawn.wi
-    if oz < 0.0 and not is_boundary(row):
-        wi[2] = -wi[2]
-    lobes = drawn.lobes
+        return (0.0, 0.0, 0.0), 0.0
     for band in range(weight.shape[0]):
-        n, k, internal = row[METAL_N + band], row[METAL_K + band], row[INTERNAL]
-        weight[band] = drawn.factor * eval_band(
-            kind, lobes.specular, lobes.cosine, lobes.diffuse, rgb[band], n, k, internal
-        )
-    return drawn.pdf
+        n, k = row[METAL_N + band], row[METAL_K + band]
+        weight[band] = drawn.factor * eval_band(kind, drawn.lobes, rgb[band], n, k, row[INTERNAL])
+    x, y, z = drawn.wi
+    return (x, y, -z if wo[2] < 0.0 and not is_boundary(row) else z), drawn.pdf

@@ -33,7 +33,7 @@ from render.material.maps import (
 )
 from render.material.microfacet import reflect, reflection, reflection_pdf, sample_visible_normal
 from render.material.record import ALPHA_X, ALPHA_Y, COATED, INDEX, INTERNAL, empty_row
-from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Sample
+from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Numbers, Sample
 from render.material.spectrum import Bands
 
 
@@ -86,7 +86,7 @@ def coat_probability(index: float, reflectance: float, cosine: float) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def sample(m: Microsurface, reflectance: float, wo: Direction, numbers: Direction) -> Sample:
+def sample(m: Microsurface, reflectance: float, wo: Direction, numbers: Numbers) -> Sample:
     """Draw wi off the coat or off the base, wo above the surface; reflectance as for `pdf`."""
     if numbers[0] < coat_probability(m.eta, reflectance, wo[2]):
         wi = reflect(wo, sample_visible_normal(m, wo, numbers[1], numbers[2]))

@@ -49,7 +49,7 @@ from render.material.record import (
     METAL_N,
     empty_row,
 )
-from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Sample
+from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Numbers, Sample
 from render.material.spectrum import Bands
 
 METALS = Path(__file__).parents[2] / "assets" / "metals.json"
@@ -143,7 +143,7 @@ def pdf(m: Microsurface, wo: Direction, wi: Direction) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def sample(m: Microsurface, specular: bool, wo: Direction, numbers: Direction) -> Sample:
+def sample(m: Microsurface, specular: bool, wo: Direction, numbers: Numbers) -> Sample:
     """Draw wi off a facet that is visible from wo, which is above the surface."""
     h = (0.0, 0.0, 1.0) if specular else sample_visible_normal(m, wo, numbers[1], numbers[2])
     wi = reflect(wo, h)

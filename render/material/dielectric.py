@@ -47,7 +47,7 @@ from render.material.microfacet import (
     visible_normal_pdf,
 )
 from render.material.record import ALPHA_X, ALPHA_Y, DIELECTRIC, INDEX, empty_row
-from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Sample
+from render.material.scattering import NOTHING, Direction, Lobes, Microsurface, Numbers, Sample
 from render.material.spectrum import Bands
 
 SUBSTANCES = Path(__file__).parents[2] / "assets" / "substances.json"
@@ -172,7 +172,7 @@ def relative_index(index: float, wo: Direction) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def sample(m: Microsurface, specular: bool, wo: Direction, numbers: Direction) -> Sample:
+def sample(m: Microsurface, specular: bool, wo: Direction, numbers: Numbers) -> Sample:
     """Draw wi by reflection or refraction at a facet that is visible from wo, on any side."""
     side = 1.0 if wo[2] > 0.0 else -1.0
     o = (wo[0], wo[1], abs(wo[2]))

@@ -18,7 +18,7 @@ from render.base.arrays import Float
 from render.base.model import Model
 from render.material.maps import Albedo, Relief, albedo_field, relief_field
 from render.material.record import LAMBERTIAN, empty_row
-from render.material.scattering import Direction, Lobes, Sample
+from render.material.scattering import Direction, Lobes, Numbers, Sample
 from render.material.spectrum import Bands
 
 
@@ -47,7 +47,7 @@ def pdf(wo: Direction, wi: Direction) -> float:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def sample(numbers: Direction) -> Sample:
+def sample(numbers: Numbers) -> Sample:
     """Draw wi from the cosine-weighted hemisphere."""
     wi = cosine_hemisphere(numbers[1], numbers[2])
     return Sample(wi, max(wi[2], 0.0) / math.pi, Lobes(0.0, 0.0, 1.0), 1.0)

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 KIND, ALPHA_X, ALPHA_Y, INDEX, METAL_N, METAL_K, INTERNAL = 0, 1, 2, 3, 4, 7, 10
 ANISOTROPY, EXTINCTION, SCATTERED, EMITTED = 11, 12, 15, 18
 ROW = 21
+BSDF_COLUMNS = ANISOTROPY
+"""The first columns, which are all that a BSDF reads: kernels copy these to set the roughness and index of a point."""
 
 LAMBERTIAN, CONDUCTOR, DIELECTRIC, COATED, SUBSURFACE, EMITTER = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 Direction = tuple[float, float, float]
 """A unit vector in the local frame."""
+Numbers = tuple[float, float, float]
+"""Random numbers in [0, 1): the first selects a lobe, the others a direction in it."""
 
 
 class Microsurface(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,23 @@ from render.base.errors import InputError
 
 MAX_VALUES = 2**30
 """Of all channels together; 4 GB as float32, some twenty layers of a 50 Mpx frame."""
+
+
+def encode_exr(layers: Mapping[str, NDArray[Any]]) -> memoryview:
+    """The bytes of an EXR of (h, w) channels by name: float32, or uint32 where they are so.
+
+    Through memory: the library's own file writing says nothing of a full disk.
+    """
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    channels = {
+        name: np.ascontiguousarray(values, dtype=values.dtype if values.dtype == np.uint32 else np.float32)
+        for name, values in layers.items()
+    }
+    stream = io.BytesIO()
+    OpenEXR.File(header, channels).write(stream)
+    return stream.getbuffer()
 
 
 def decode_exr(content: bytes, where: str, most: int = MAX_VALUES) -> dict[str, NDArray[Any]]:

@@ -12,7 +12,6 @@ read as one.
 from __future__ import annotations
 
 import hashlib
-import io
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from render.base.errors import InputError
 from render.base.files import atomic_write, check_regular, read_bytes, sha256
 from render.frame import Frame, Truth
 from render.output.band import BLOCK, coarse_outside, told
-from render.output.exr import decode_exr
+from render.output.exr import decode_exr, encode_exr
 from render.output.light_record import plan_from, quality_from, quality_of_counts
 from render.output.sidecar import (
     AGAIN,
@@ -82,10 +81,10 @@ def write_frame(
     name = safe_name(stem)
     layers = _layers(frame if band is None else coarse_outside(frame, band), scene)
     written = []
-    exr = _encode_exr(layers)
+    exr = encode_exr(layers)
     written.append(_write(folder / f"{name}.exr", exr))
     if image is not None:
-        written.append(_write(folder / f"{name}.png", _encode_png(image.pixels)))
+        written.append(_write(folder / f"{name}.png", encode_png(image.pixels)))
     record = {
         **sidecar_record(frame, image, scene, sensor),
         "ambient": frame.ambient is not None,
@@ -176,21 +175,8 @@ def _frame(record: Record, layers: Layers) -> Frame:
     )
 
 
-def _encode_exr(layers: Layers) -> memoryview:
-    """Through memory: the library's own file writing says nothing of a full disk."""
-    import OpenEXR
-
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    channels = {
-        name: np.ascontiguousarray(values, dtype=values.dtype if values.dtype == np.uint32 else np.float32)
-        for name, values in layers.items()
-    }
-    stream = io.BytesIO()
-    OpenEXR.File(header, channels).write(stream)
-    return stream.getbuffer()
-
-
-def _encode_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+def encode_png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """The bytes of a PNG file of (h, w) pixels. InputError: it cannot be one."""
     import cv2
 
     ordered = pixels if pixels.ndim == 2 else pixels[..., ::-1]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.arrays import Float, Float32, Int, Long
+from render.base.vectors import along, dot, minus, plus, store, vector
 from render.material.bsdf import DIELECTRIC, ROW, SUBSURFACE
 from render.world.embree import RayScene
 from render.world.enclosure import objects_around
@@ -89,13 +90,12 @@ def cross_boundary(surface: Surface, t: int, centre: Float, offset: float, origi
     Positive: the ray has entered the body; negative: it has left it.
     """
     a0, a1, a2, n0, n1, n2 = plane_of(surface, t)
-    o0, o1, o2 = origin[0] + centre[0], origin[1] + centre[1], origin[2] + centre[2]
-    d0, d1, d2 = float(direction[0]), float(direction[1]), float(direction[2])
-    cosine = n0 * d0 + n1 * d1 + n2 * d2
-    s = (n0 * (a0 - o0) + n1 * (a1 - o1) + n2 * (a2 - o2)) / cosine if cosine != 0.0 else 0.0
-    side = offset if cosine > 0.0 else -offset
-    p0, p1, p2 = off_surface(o0 + s * d0, o1 + s * d1, o2 + s * d2, n0, n1, n2, side)
-    origin[0], origin[1], origin[2] = p0 - centre[0], p1 - centre[1], p2 - centre[2]
+    normal, middle, d = (n0, n1, n2), vector(centre), vector(direction)
+    o = plus(vector(origin), middle)
+    cosine = dot(normal, d)
+    s = dot(normal, minus((a0, a1, a2), o)) / cosine if cosine != 0.0 else 0.0
+    beyond = off_surface(along(o, s, d), normal, offset if cosine > 0.0 else -offset)
+    store(origin, minus(beyond, middle))
     bit = bit_of(surface.rows, surface.object_id[t])
     return bit if cosine < 0.0 else -bit
 

@@ -18,9 +18,10 @@ import numba
 import numpy as np
 
 from render.base.arrays import Float
+from render.base.vectors import Vector, cross, divided, dot, length, minus, plus, scaled
 from render.material.maps import POLISHED
 from render.material.record import ALPHA_X, ALPHA_Y, COATED, KIND
-from render.world.triangles import Surface, bilinear, scattering, to_local, uv_at
+from render.world.triangles import Surface, barycentric, bilinear, edges_of, scattering, to_local, uv_at
 
 SMOOTH_NORMALS, ROUGHNESS_MAP, NORMAL_MAP, BUMP_MAP = 1, 2, 4, 8
 """Flags of `Surface.detail`."""
@@ -31,32 +32,21 @@ LEAST_COSINE = 0.05
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
-def interaction(  # noqa: PLR0913
-    surface: Surface,
-    t: int,
-    p0: float,
-    p1: float,
-    p2: float,
-    n0: float,
-    n1: float,
-    n2: float,
-    choice: float,
-    rgb: Float,
-    alpha: Float,
-    frame: Float,
+def interaction(
+    surface: Surface, t: int, point: Vector, normal: Vector, choice: float, rgb: Float, alpha: Float, frame: Float
 ) -> int:
-    """The material (index of a row of `surface.rows`) at the point p of triangle t, n its unit normal on either side.
+    """The material (index of a row of `surface.rows`) at a point of triangle t; normal: unit, on either side.
 
     -> rgb (3,) reflectance; alpha (2,) roughness, in place of the row's; frame (3, 3) axes, one a row, the last the
-    shading normal, on n's side. choice: uniform in [0, 1), selects one of a blend's materials.
+    shading normal, on the side of `normal`. choice: uniform in [0, 1), selects one of a blend's materials.
     """
-    slot = scattering(surface, t, p0, p1, p2, choice, rgb)
+    slot = scattering(surface, t, point[0], point[1], point[2], choice, rgb)
     row = surface.rows[slot]
     alpha[0], alpha[1] = row[ALPHA_X], row[ALPHA_Y]
     if surface.detail[slot] == 0:
-        to_local(surface, t, row, n0, n1, n2, frame)
+        to_local(surface, t, row, normal[0], normal[1], normal[2], frame)
     else:
-        detailed(surface, t, slot, p0, p1, p2, n0, n1, n2, alpha, frame)
+        detailed(surface, t, slot, point, normal, alpha, frame)
     return slot
 
 
@@ -102,87 +92,82 @@ def bump_slopes(surface: Surface, slot: int, u: float, v: float, rgb: Float) -> 
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def detailed(  # noqa: PLR0913, PLR0915
-    surface: Surface,
-    t: int,
-    slot: int,
-    p0: float,
-    p1: float,
-    p2: float,
-    n0: float,
-    n1: float,
-    n2: float,
-    alpha: Float,
-    frame: Float,
-) -> None:
+def detailed(surface: Surface, t: int, slot: int, point: Vector, normal: Vector, alpha: Float, frame: Float) -> None:
     """Roughness and frame of a material with shading normals or maps; arguments as of `interaction`."""
-    flags, row = surface.detail[slot], surface.rows[slot]
-    v, uv, rgb = surface.vertices, surface.uv, np.empty(3)
-    at_u = at_v = 0.0
+    flags = surface.detail[slot]
+    u = v = 0.0
     if flags & (ROUGHNESS_MAP | NORMAL_MAP | BUMP_MAP):
-        at_u, at_v = uv_at(surface, t, p0, p1, p2)
+        u, v = uv_at(surface, t, point)
     if flags & ROUGHNESS_MAP:
-        mapped_roughness(surface, slot, at_u, at_v, rgb, alpha)
-    a, b, c = surface.triangles[t, 0], surface.triangles[t, 1], surface.triangles[t, 2]
-    ab0, ab1, ab2 = v[b, 0] - v[a, 0], v[b, 1] - v[a, 1], v[b, 2] - v[a, 2]
-    ac0, ac1, ac2 = v[c, 0] - v[a, 0], v[c, 1] - v[a, 1], v[c, 2] - v[a, 2]
-    q0, q1, q2 = p0 - v[a, 0], p1 - v[a, 1], p2 - v[a, 2]
-    # the frame is built on the winding's normal and flipped to n's side at the end
-    outward = n0 * (ab1 * ac2 - ab2 * ac1) + n1 * (ab2 * ac0 - ab0 * ac2) + n2 * (ab0 * ac1 - ab1 * ac0)
-    side = 1.0 if outward >= 0.0 else -1.0
-    g0, g1, g2 = side * n0, side * n1, side * n2
-    s0, s1, s2 = g0, g1, g2
-    bb, bc, cc = ab0 * ab0 + ab1 * ab1 + ab2 * ab2, ab0 * ac0 + ab1 * ac1 + ab2 * ac2, ac0 * ac0 + ac1 * ac1 + ac2 * ac2
-    det = bb * cc - bc * bc
-    if flags & SMOOTH_NORMALS:
-        qb, qc = q0 * ab0 + q1 * ab1 + q2 * ab2, q0 * ac0 + q1 * ac1 + q2 * ac2
-        f, g = (cc * qb - bc * qc) / det, (bb * qc - bc * qb) / det
-        e, corner = 1.0 - f - g, surface.normals[t]
-        s0 = e * corner[0, 0] + f * corner[1, 0] + g * corner[2, 0]
-        s1 = e * corner[0, 1] + f * corner[1, 1] + g * corner[2, 1]
-        s2 = e * corner[0, 2] + f * corner[1, 2] + g * corner[2, 2]
-        length = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-        if length > 0.0:
-            s0, s1, s2 = s0 / length, s1 / length, s2 / length
-        else:
-            s0, s1, s2 = g0, g1, g2
+        mapped_roughness(surface, slot, u, v, np.empty(3), alpha)
+    # the frame is built on the winding's normal and flipped to the given one's side at the end
+    _, ab, ac = edges_of(surface, t)
+    side = 1.0 if dot(normal, cross(ab, ac)) >= 0.0 else -1.0
+    facet = scaled(side, normal)
+    shading = smooth_normal(surface, t, point, facet) if flags & SMOOTH_NORMALS else facet
     if flags & (NORMAL_MAP | BUMP_MAP):
-        # gradients of u and v on the facet, 1/m
-        du1, du2 = uv[t, 1, 0] - uv[t, 0, 0], uv[t, 2, 0] - uv[t, 0, 0]
-        dv1, dv2 = uv[t, 1, 1] - uv[t, 0, 1], uv[t, 2, 1] - uv[t, 0, 1]
-        ub, uc = (cc * du1 - bc * du2) / det, (bb * du2 - bc * du1) / det
-        vb, vc = (cc * dv1 - bc * dv2) / det, (bb * dv2 - bc * dv1) / det
-        u0, u1, u2 = ub * ab0 + uc * ac0, ub * ab1 + uc * ac1, ub * ab2 + uc * ac2
-        v0, v1, v2 = vb * ab0 + vc * ac0, vb * ab1 + vc * ac1, vb * ab2 + vc * ac2
-        if flags & NORMAL_MAP:
-            map_value(surface, slot, 3, at_u, at_v, rgb)
-            along, across = 2.0 * rgb[0] - 1.0, 2.0 * rgb[1] - 1.0
-            along, across = along * surface.relief[slot, 0], across * surface.relief[slot, 1]
-            out = max(2.0 * rgb[2] - 1.0, 1e-3)
-            # the map's u and v run along dP/du and dP/dv, each perpendicular to the other's gradient
-            x0, x1, x2 = v1 * s2 - v2 * s1, v2 * s0 - v0 * s2, v0 * s1 - v1 * s0
-            y0, y1, y2 = s1 * u2 - s2 * u1, s2 * u0 - s0 * u2, s0 * u1 - s1 * u0
-            turned = 1.0 if x0 * u0 + x1 * u1 + x2 * u2 >= 0.0 else -1.0
-            lx, ly = math.sqrt(x0 * x0 + x1 * x1 + x2 * x2), math.sqrt(y0 * y0 + y1 * y1 + y2 * y2)
-            if lx > 0.0 and ly > 0.0:
-                along, across = turned * along / lx, turned * across / ly
-                s0 = out * s0 + along * x0 + across * y0
-                s1 = out * s1 + along * x1 + across * y1
-                s2 = out * s2 + along * x2 + across * y2
-        else:
-            slope_u, slope_v = bump_slopes(surface, slot, at_u, at_v, rgb)
-            s0 -= slope_u * u0 + slope_v * v0
-            s1 -= slope_u * u1 + slope_v * v1
-            s2 -= slope_u * u2 + slope_v * v2
-        length = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-        s0, s1, s2 = s0 / length, s1 / length, s2 / length
-    cosine = s0 * g0 + s1 * g1 + s2 * g2
-    if cosine < LEAST_COSINE:
-        # keep the direction of the tilt
-        s0, s1, s2 = s0 - cosine * g0, s1 - cosine * g1, s2 - cosine * g2
-        length = math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
-        lean = math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE) / length if length > 0.0 else 0.0
-        s0, s1, s2 = lean * s0 + LEAST_COSINE * g0, lean * s1 + LEAST_COSINE * g1, lean * s2 + LEAST_COSINE * g2
-        if length == 0.0:
-            s0, s1, s2 = g0, g1, g2
-    to_local(surface, t, row, side * s0, side * s1, side * s2, frame)
+        shading = mapped_normal(surface, t, slot, u, v, shading)
+    shading = scaled(side, bounded_tilt(shading, facet))
+    to_local(surface, t, surface.rows[slot], shading[0], shading[1], shading[2], frame)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def smooth_normal(surface: Surface, t: int, point: Vector, facet: Vector) -> Vector:
+    """The normal interpolated between the corners of triangle t; the facet's where they cancel."""
+    f, g = barycentric(surface, t, point)
+    e, corner = 1.0 - f - g, surface.normals[t]
+    s0 = e * corner[0, 0] + f * corner[1, 0] + g * corner[2, 0]
+    s1 = e * corner[0, 1] + f * corner[1, 1] + g * corner[2, 1]
+    s2 = e * corner[0, 2] + f * corner[1, 2] + g * corner[2, 2]
+    size = length((s0, s1, s2))
+    return divided((s0, s1, s2), size) if size > 0.0 else facet
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def uv_gradients(surface: Surface, t: int) -> tuple[Vector, Vector]:
+    """Gradients of u and v on the facet of triangle t, 1/m."""
+    _, ab, ac = edges_of(surface, t)
+    uv = surface.uv
+    bb, bc, cc = dot(ab, ab), dot(ab, ac), dot(ac, ac)
+    det = bb * cc - bc * bc
+    du1, du2 = uv[t, 1, 0] - uv[t, 0, 0], uv[t, 2, 0] - uv[t, 0, 0]
+    dv1, dv2 = uv[t, 1, 1] - uv[t, 0, 1], uv[t, 2, 1] - uv[t, 0, 1]
+    ub, uc = (cc * du1 - bc * du2) / det, (bb * du2 - bc * du1) / det
+    vb, vc = (cc * dv1 - bc * dv2) / det, (bb * dv2 - bc * dv1) / det
+    return plus(scaled(ub, ab), scaled(uc, ac)), plus(scaled(vb, ab), scaled(vc, ac))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def mapped_normal(surface: Surface, t: int, slot: int, u: float, v: float, normal: Vector) -> Vector:
+    """The unit normal, tilted by the material's normal map or bump map at (u, v)."""
+    along_u, along_v = uv_gradients(surface, t)
+    rgb = np.empty(3)
+    if surface.detail[slot] & NORMAL_MAP:
+        map_value(surface, slot, 3, u, v, rgb)
+        tilt_x = (2.0 * rgb[0] - 1.0) * surface.relief[slot, 0]
+        tilt_y = (2.0 * rgb[1] - 1.0) * surface.relief[slot, 1]
+        out = max(2.0 * rgb[2] - 1.0, 1e-3)
+        # the map's u and v run along dP/du and dP/dv, each perpendicular to the other's gradient
+        x, y = cross(along_v, normal), cross(normal, along_u)
+        mirrored = 1.0 if dot(x, along_u) >= 0.0 else -1.0
+        if length(x) > 0.0 and length(y) > 0.0:
+            tilt_x, tilt_y = mirrored * tilt_x / length(x), mirrored * tilt_y / length(y)
+            normal = plus(plus(scaled(out, normal), scaled(tilt_x, x)), scaled(tilt_y, y))
+    else:
+        slope_u, slope_v = bump_slopes(surface, slot, u, v, rgb)
+        normal = minus(normal, plus(scaled(slope_u, along_u), scaled(slope_v, along_v)))
+    return divided(normal, length(normal))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def bounded_tilt(shading: Vector, facet: Vector) -> Vector:
+    """The shading normal, tilted from the facet's by no more than LEAST_COSINE allows, in the same direction."""
+    cosine = dot(shading, facet)
+    if not cosine < LEAST_COSINE:
+        return shading
+    aside = minus(shading, scaled(cosine, facet))
+    size = length(aside)
+    if size == 0.0:
+        return facet
+    lean = math.sqrt(1.0 - LEAST_COSINE * LEAST_COSINE) / size
+    return plus(scaled(lean, aside), scaled(LEAST_COSINE, facet))

@@ -15,9 +15,9 @@ from studio.project.project import Project
 from studio.project.project_files import carry
 from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json
+from studio.runtime.workers import Engine
 from studio.scan.interrupt import stop_on_interrupt
 from studio.study.advice import Advice, Change, Proof, Question, advise
-from studio.study.runner import Engine
 
 
 def advise_project(

@@ -8,8 +8,8 @@ from render.base.errors import InputError
 from studio.commands.commands import folder_name, load_project
 from studio.commands.study import run_into
 from studio.project.project import Project
+from studio.runtime.workers import Engine
 from studio.study.cells import WHOLE
-from studio.study.runner import Engine
 from studio.study.study import Study
 
 

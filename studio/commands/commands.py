@@ -183,7 +183,7 @@ def reconstruct_source(
     **extraction: Any,
 ) -> None:
     """`reconstruct`: from a scan's folder, or from images with a project."""
-    from studio.commands.extract import exposure_times
+    from studio.commands.extract import exposure_times, wishes_of
     from studio.photographs.reconstruct_images import reconstruct_images
     from studio.scan.reconstruct import reconstruct_folder
     from studio.scan.scan_folder import open_folder
@@ -197,6 +197,7 @@ def reconstruct_source(
         if len(sources) > 1:
             raise InputError("a scan folder is measured alone", where=str(sources[1]), allowed="one folder, or images")
         found = open_folder(source)
+        _no_photographs(extraction)
         chosen, root = (found.project, found.root) if project is None else load_project(project)
         chosen = with_extraction(chosen, extraction)
         folder = out if out is not None else source
@@ -211,13 +212,24 @@ def reconstruct_source(
                 where=str(source),
                 cure="give the project with --project",
             )
-        chosen = with_extraction(load_project(project)[0], extraction)
+        chosen = load_project(project)[0]
+        wishes = wishes_of(extraction, chosen.extraction)
+        if extraction.get("select") is None and chosen.extraction.select == "strongest":
+            extraction["select"] = "continuous"
+        chosen = with_extraction(chosen, extraction)
         folder = out if out is not None else source.parent
         check_output(folder)
         times = exposure_times(hdr, len(sources))
         with stage_progress(quiet) as progress:
-            result = reconstruct_images(sources, chosen, laser, folder, Clock(progress, never), times, threads)
+            result = reconstruct_images(sources, chosen, laser, folder, Clock(progress, never), times, threads, wishes)
     _print_reconstruction(result, as_json)
+
+
+def _no_photographs(options: dict[str, Any]) -> None:
+    """Take the options of photographs out. InputError: one of them is given."""
+    for name in ("off", "axis", "colour", "channel", "roi", "mask", "pattern", "shape"):
+        if options.pop(name):
+            raise InputError("an option of photographs is given for a scan folder", where=f"--{name}")
 
 
 def rebuild_report(folder: Path, *, threads: int | None, quiet: bool, as_json: bool) -> None:
@@ -266,6 +278,12 @@ def _print_reconstruction(result: dict[str, Any], as_json: bool) -> None:
     _print_results(result)
     for note in result["extraction"]:
         print(note)
+    if "chosen" in result:
+        print_table("Chosen for these photographs", list(result["chosen"]["told"].items()))
+        for text in result["chosen"]["warnings"]:
+            print(f"warning: {text}")
+        for fit in result["fits"]:
+            print(fit["text"])
     if "flags" in result:
         print(f"{result['points']} points on {result['scan_lines']} scan lines")
     for file in result["files"]:

@@ -12,35 +12,25 @@ from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from analysis.line.selection.geometry import WorkingVolume
     from analysis.line.settings import ExtractionSettings
+    from studio.photographs.photograph_set import Look, Wishes
 
 
 @dataclass(frozen=True)
 class Prepared:
     """The options, read and checked against each other."""
 
-    settings: ExtractionSettings
+    look: Look
     volume: WorkingVolume | None
-    offs: list[NDArray[Any]]
-    """Laser-off images: none, one for all, or one for each image."""
     times: tuple[float, ...]
     """Exposure times of a series; empty: every image stands for itself."""
-
-    def off(self, number: int) -> NDArray[Any] | None:
-        if not self.offs:
-            return None
-        return self.offs[number if len(self.offs) > 1 else 0]
 
 
 @dataclass(frozen=True)
 class ImageOptions:
     """What is to be done with the images, as the command line has it."""
 
-    off: tuple[Path, ...]
-    """Images with the laser off."""
     hdr: str | None
     """Exposure times: all images are of one scene."""
     project: Path | None
@@ -48,6 +38,7 @@ class ImageOptions:
     spacetime: bool
     """The images are a sweep over a scene at rest."""
     ridges: bool
+    overlay: bool
 
 
 def extract_images(
@@ -55,18 +46,16 @@ def extract_images(
 ) -> int:
     """`extract`: a bad image is reported and left out; returns how many there were.
 
-    given: fields of `ImageOptions`, and extraction settings.
+    given: fields of `ImageOptions`, those of `wishes_of`, and extraction settings.
     """
     from studio.commands.commands import check_output
-    from studio.photographs.photographs import extract_photograph, extract_series, summary, table_path, write_line
-    from studio.photographs.ridge_files import ridges_of_file
 
     options = ImageOptions(**{field.name: given.pop(field.name) for field in fields(ImageOptions)})
-    prepared = _prepared(images, options, given)
-    if out is not None:
-        check_output(out)
     if options.spacetime + options.ridges + (options.hdr is not None) > 1:
         raise InputError("only one of these at a time", where="--hdr, --spacetime, --ridges")
+    if out is not None:
+        check_output(out)
+    prepared = _prepared(images, options, given)
     if options.spacetime:
         return _extract_sweep(images, prepared, out, threads, as_json)
     done: list[dict[str, Any]] = []
@@ -77,58 +66,110 @@ def extract_images(
         for number, group in enumerate(groups):
             progress("images", number / len(groups))
             try:
-                if options.ridges:
-                    done.append(ridges_of_file(group[0], prepared.settings, prepared.off(number), out, taken, threads))
-                    continue
-                if prepared.times:
-                    line = extract_series(
-                        group, prepared.times, prepared.settings, prepared.offs, prepared.volume, threads
-                    )
-                else:
-                    line = extract_photograph(
-                        group[0], prepared.settings, prepared.off(number), threads, prepared.volume
-                    )
-                table = table_path(group[0], out, taken)
-                write_line(table, line)
-                done.append(summary(group[0], line, table))
+                done.append(_extract_group(group, prepared, options, out, taken, threads))
             except InputError as error:
                 failed.append({"image": str(group[0]), "message": str(error)})
         progress("images", 1.0)
+    look = prepared.look
     if as_json:
-        print_json({"ok": not failed, "images": done, "errors": failed})
+        print_json({"ok": not failed, "chosen": look.record(), "images": done, "errors": failed})
     else:
+        if done and look.told:
+            print_table("Chosen for these photographs", look.told)
+        for text in look.warnings if done else ():
+            print(f"warning: {text}")
         _print_lines(done)
     for failure in failed:
         print(f"error: {failure['message']}", file=sys.stderr)
     return len(failed)
 
 
+def _extract_group(
+    group: tuple[Path, ...],
+    prepared: Prepared,
+    options: ImageOptions,
+    out: Path | None,
+    taken: set[Path],
+    threads: int | None,
+) -> dict[str, Any]:
+    """One image, or the exposures of one scene: written, and summed up. InputError names the file."""
+    from studio.photographs.overlay import write_overlay
+    from studio.photographs.photographs import extract_photograph, extract_series, summary, table_path, write_line
+    from studio.photographs.ridge_files import ridges_of_file
+
+    look = prepared.look
+    if options.ridges:
+        _, off = look.read(group[0])
+        return ridges_of_file(group[0], look.settings, off, out, taken, threads)
+    if prepared.times:
+        line = extract_series(group, prepared.times, look, prepared.volume, threads)
+        table = table_path(group[0], out, taken)
+        write_line(table, line)
+        return summary(group[0], line, table)
+    measured = extract_photograph(group[0], look, threads, prepared.volume)
+    table = table_path(group[0], out, taken)
+    write_line(table, measured.line)
+    row = summary(group[0], measured.line, table)
+    if options.overlay:
+        row["overlay"] = str(write_overlay(table.with_suffix(".png"), measured))
+    return row
+
+
 def _prepared(images: tuple[Path, ...], options: ImageOptions, given: dict[str, Any]) -> Prepared:
     """Raises InputError, which names the option."""
     from analysis.line.extract import settings_of
     from studio.commands.commands import load_project
-    from studio.photographs.image_files import load_photograph
+    from studio.photographs.photograph_set import Look, look_at
     from studio.scan.line_extraction import working_volume
 
-    off, laser = options.off, options.laser_number
-    given["channel"] = given.pop("laser")
-    settings, volume = settings_of(None, **given), None
+    laser = options.laser_number
+    wishes = wishes_of(given)
+    if given.get("select") is None:
+        given["select"] = "continuous"
+    settings, volume = settings_of(None, channel=wishes.colour, axis=wishes.axis, **given), None
     if settings.geometry:
         if options.project is None:
             raise InputError(
                 "the geometric check needs to know camera and laser", where="--geometry", cure="give --project"
             )
-        chosen, _ = load_project(options.project)
-        if laser >= len(chosen.scene.lasers):
-            allowed = f"0 to {len(chosen.scene.lasers) - 1}"
+        project, _ = load_project(options.project)
+        if laser >= len(project.scene.lasers):
+            allowed = f"0 to {len(project.scene.lasers) - 1}"
             raise InputError(
                 "there is no such laser in the project", where="--laser-number", found=laser, allowed=allowed
             )
-        volume = working_volume(chosen, laser, settings)
-    if len(off) not in (0, 1, len(images)):
-        found, allowed = f"{len(off)} for {len(images)} images", "one for all, or one for each"
-        raise InputError("the laser-off images do not go with the images", where="--off", found=found, allowed=allowed)
-    return Prepared(settings, volume, [load_photograph(path) for path in off], exposure_times(options.hdr, len(images)))
+        volume = working_volume(project, laser, settings)
+    times = exposure_times(options.hdr, len(images))
+    if options.spacetime:
+        look = Look(settings, None, "mono", wishes.region, {}, [], [])
+    else:
+        look = look_at(images, settings, wishes)
+    return Prepared(look, volume, times)
+
+
+def wishes_of(given: dict[str, Any], project: ExtractionSettings | None = None) -> Wishes:
+    """The options `off`, `axis`, `colour`, `channel`, `roi` and `mask`, taken out of `given`.
+
+    An option that is not given is as in the project's settings, or, without a project, found by the photographs.
+    """
+    from studio.photographs.photograph_set import Wishes
+    from studio.photographs.region import region_of
+
+    region = region_of(given.pop("roi"), given.pop("mask"))
+    auto = {name: given.pop(name) for name in ("axis", "colour", "channel")}
+    if project is not None:
+        auto["axis"], auto["colour"] = auto["axis"] or project.axis, auto["colour"] or project.channel
+    axis, colour, channel = (None if value == "auto" else value for value in auto.values())
+    if colour == "mono" and channel is None:
+        channel = "mono"
+    return Wishes(
+        axis=axis,
+        colour=colour,
+        channel=channel,
+        off=tuple(given.pop("off")),
+        region=region,
+        shape="sphere" if given.pop("shape", None) == "sphere" else "plane",
+    )
 
 
 def exposure_times(text: str | None, count: int) -> tuple[float, ...]:
@@ -151,7 +192,7 @@ def _extract_sweep(
     """The images as the frames of one sweep of the sheet over a scene at rest."""
     from studio.photographs.sweep_files import passage_of_files
 
-    result = passage_of_files(images, prepared.settings, out, threads)
+    result = passage_of_files(images, prepared.look.settings, out, threads)
     if as_json:
         print_json({"ok": True, **result})
     else:
@@ -178,4 +219,4 @@ def _print_lines(done: list[dict[str, Any]]) -> None:
     if rows:
         print_table("Laser line", rows, header=header)
     for row in done:
-        print(f"wrote {row['file']}")
+        print(f"wrote {row['file']}" + (f" and {row['overlay']}" if "overlay" in row else ""))

@@ -13,7 +13,7 @@ from studio.commands.commands import OUTPUT, folder_name, print_scan, scan_into
 from studio.project.input_files import listed
 from studio.scan.options import ScanOptions
 from studio.scan.results import versions
-from studio.scan.run_record import Recorded, input_root, read_run, unequal
+from studio.scan.run_record import Recorded, input_root, other_figures, read_run
 
 FREE = {"out", "threads", "quiet", "as_json", "report", "resume"}
 """Options that change no number."""
@@ -47,7 +47,7 @@ def run_report(
     options = ScanOptions(steps=said.frames, image_scale=said.image_scale, at_scale=True, **free)
     folder = out if out is not None else Path(OUTPUT) / f"{folder_name(found.project.name)}_again"
     done = scan_into(folder, found.project, place, options, source=path, quiet=quiet)
-    differs = unequal(list(said.results), done.manifest["results"])
+    differs = other_figures(said.results, done.manifest["results"])
     print_scan(done, quiet=quiet, as_json=as_json, more={"reproduced": not differs, "differs": differs})
     if differs:
         print(

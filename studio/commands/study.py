@@ -12,13 +12,14 @@ from studio.commands.commands import check_output, folder_name, never
 from studio.project.project import Project
 from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json
+from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
 from studio.scan.interrupt import stop_on_interrupt
 from studio.study.cells import Shard, check_size, next_cells
 from studio.study.labels import field_labels
 from studio.study.measuring import tasks
 from studio.study.page import sentences, write_page
-from studio.study.runner import Engine, run_study
+from studio.study.runner import run_study
 from studio.study.store import Store, described
 from studio.study.study import Study, ready_made
 from studio.study.tables import write_tables
@@ -40,7 +41,7 @@ def run_file(
 ) -> None:
     """`study run`: measure what is missing, then write tables, charts and page."""
     study, root = Study.load(file)
-    part, bases = _shard(shard), study.bases(root)
+    part, bases = shard_of(shard), study.bases(root)
     folder = out if out is not None else Path("scan-output") / f"study-{folder_name(study.name)}"
     run_into(folder, study, bases, part, Engine(workers, scheduler), quiet=quiet, as_json=as_json)
 
@@ -119,8 +120,8 @@ def _write(folder: Path, study: Study, bases: dict[str, Project], store: Store, 
     print(f"{len(rows)} cells{left}\nwrote {page}\nwrote {written[0]}")
 
 
-def _shard(text: str) -> Shard:
-    """InputError: not like 3/40."""
+def shard_of(text: str) -> Shard:
+    """The part of the work that `--shard 3/40` means. InputError: not like that."""
     found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
     number, count = (int(found[1]), int(found[2])) if found else (0, 0)
     if not 1 <= number <= count:

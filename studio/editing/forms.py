@@ -26,7 +26,7 @@ from render.scene.scene import Scene, SceneObject
 from render.scene.settings import RenderSettings
 from render.sensor.sensor import Sensor, SpectralCurve
 from studio.editing.linked_fields import DERIVED, LINKED
-from studio.editing.units import Unit
+from studio.editing.units import FACTORS, Unit
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.project import Project
 
@@ -53,6 +53,8 @@ class _Required:
         return "REQUIRED"
 
 
+UNITS = {unit for units in FACTORS.values() for unit in units}
+"""Their case is part of their name."""
 REQUIRED = _Required()
 """The default of a field that has none."""
 
@@ -212,6 +214,8 @@ def _files(kind: type[BaseModel]) -> list[str]:
 
 def choice_label(value: Any) -> str:
     """What one value of a choice is called."""
+    if value in UNITS:
+        return str(value)
     return "None" if value is None else words(value) if isinstance(value, str) else str(value)
 
 

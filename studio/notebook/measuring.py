@@ -242,12 +242,9 @@ def triangulate(line: ExtractedLine, *, project: Project | None = None, laser: i
     camera = given.scene.camera
     across = camera.height if line.axis == "rows" else camera.width
     if len(line.u) != across:
-        raise InputError(
-            "the image of the line is of another size than the project's",
-            where="triangulate: project",
-            found=f"{len(line.u)} {line.axis}",
-            allowed=f"{across}, as the camera has",
-        )
+        what = "the image of the line is of another size than the project's"
+        found, allowed = f"{len(line.u)} {line.axis}", f"{across}, as the camera has"
+        raise InputError(what, where="triangulate: project", found=found, allowed=allowed)
     return extended(TriangulatedPoints, triangulate_line(given, line, which, step), line=line, laser=which)
 
 

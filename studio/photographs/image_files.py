@@ -1,8 +1,9 @@
-"""Image files of a camera: PNG, TIFF, JPEG, BMP and EXR, whole, of one page, and within stated limits."""
+"""Image files of a camera: PNG, TIFF, JPEG, BMP and EXR, whole, of one page, upright, and within stated limits."""
 
 from __future__ import annotations
 
 import io
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +18,48 @@ MAX_BYTES = 2**29
 MAX_PIXELS = 2**27
 """Far above any line camera's; as float32 RGB 1.6 GB."""
 KINDS = "PNG, TIFF, JPEG, BMP or EXR"
+ORIENTATION = 0x0112
+"""EXIF tag."""
+TURNS = {
+    2: "mirrored left to right",
+    3: "turned by 180 degrees",
+    4: "mirrored top to bottom",
+    5: "turned by 90 degrees and mirrored",
+    6: "turned by 90 degrees clockwise",
+    7: "turned by 90 degrees and mirrored",
+    8: "turned by 90 degrees counter-clockwise",
+}
+"""What EXIF asks a viewer to do."""
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """An image file, upright."""
+
+    pixels: NDArray[Any]
+    """(h, w), or (h, w, 3) RGB where the channels differ, digital numbers."""
+    turned: str
+    """What was done because EXIF asks for it; empty: nothing."""
+    lossy: bool
+    """A colour JPEG: most have their colour at half resolution, and none keeps what is clipped at one number."""
 
 
 def load_photograph(path: Path) -> NDArray[Any]:
-    """(h, w) or (h, w, 3) RGB digital numbers of a PNG, TIFF, JPEG, BMP or EXR.
+    """(h, w) or (h, w, 3) RGB digital numbers of an image file, upright. InputError: as `read_photograph`."""
+    return read_photograph(path).pixels
+
+
+def read_photograph(path: Path) -> Photograph:
+    """A PNG, TIFF, JPEG, BMP or EXR, turned as EXIF says.
 
     InputError: missing, no regular file, too big, of several pages, damaged, or without channels RGB or Y.
     """
     data = read_bytes(path, MAX_BYTES, "image")
     if path.suffix.lower() == ".exr":
-        return _exr_image(data, str(path))
+        return Photograph(_exr_image(data, str(path)), "", lossy=False)
     import cv2
 
-    _check_pages(data, str(path))
+    orientation, lossy = _checked(data, str(path))
     try:
         image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if data else None
     except cv2.error:
@@ -37,22 +67,41 @@ def load_photograph(path: Path) -> NDArray[Any]:
     if image is None:
         allowed = f"a whole {KINDS}"
         raise InputError("the file is not an image, or is damaged", where=str(path), allowed=allowed)
-    if image.ndim == 3:
-        image = np.ascontiguousarray(image[:, :, 2::-1])
-    return np.asarray(image)
+    if image.ndim == 3 and image.shape[2] >= 3:
+        grey = np.array_equal(image[..., 0], image[..., 1]) and np.array_equal(image[..., 1], image[..., 2])
+        image = np.ascontiguousarray(image[..., 0] if grey else image[:, :, 2::-1])
+    elif image.ndim == 3:
+        image = np.ascontiguousarray(image[..., 0])
+    return Photograph(upright(image, orientation), TURNS.get(orientation, ""), lossy and image.ndim == 3)
 
 
-def _check_pages(data: bytes, where: str) -> None:
-    """InputError: more pixels than MAX_PIXELS, or several pages; what Pillow does not know is OpenCV's to judge."""
+def upright(image: NDArray[Any], orientation: int) -> NDArray[Any]:
+    """(h, w, ...) as stored -> as it is to be seen, by the EXIF orientation 1 to 8."""
+    if orientation in (5, 6, 7, 8):
+        image = image.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        image = image[::-1]
+    if orientation in (2, 3, 6, 7):
+        image = image[:, ::-1]
+    return np.ascontiguousarray(image)
+
+
+def _checked(data: bytes, where: str) -> tuple[int, bool]:
+    """EXIF orientation, and whether it is a JPEG; what Pillow does not know is OpenCV's to judge.
+
+    InputError: more pixels than MAX_PIXELS, or several pages.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(io.BytesIO(data)) as image:
-            size, pages = image.size, getattr(image, "n_frames", 1)
+            # the further pages of an MPO are previews of the first, as phones keep them
+            size, pages = image.size, 1 if image.format == "MPO" else getattr(image, "n_frames", 1)
+            orientation, lossy = int(image.getexif().get(ORIENTATION, 1)), image.format in ("JPEG", "MPO")
             if image.format == "PNG" and size[0] * size[1] <= MAX_PIXELS:
                 image.load()  # what is damaged is refused here, where libpng would print words of its own
     except UnidentifiedImageError:
-        return
+        return 1, False
     except Image.DecompressionBombError:
         size, pages = (MAX_PIXELS, 2), 1
     except Exception as error:  # Pillow raises many kinds on damaged data, in words of its own
@@ -63,6 +112,7 @@ def _check_pages(data: bytes, where: str) -> None:
     if pages > 1:
         cure = "save each page as an image of its own"
         raise InputError("the image has several pages", where=where, found=pages, allowed="one", cure=cure)
+    return orientation, lossy
 
 
 def _exr_image(data: bytes, where: str) -> NDArray[Any]:

@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.detection.channel import check_image
-from analysis.line.detection.noise import image_saturation
+from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise, residual_ratio
-from analysis.line.extract import extract
+from analysis.line.extract import CANDIDATES, extract, select
 from analysis.line.result import Flag, Line
 from analysis.line.selection.geometry import WorkingVolume
 from analysis.line.series.hdr import Fused, fuse
@@ -24,12 +24,12 @@ from analysis.line.series.subtract import subtract_off
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 from render.base.files import atomic_write
-from studio.photographs.image_files import load_photograph
+from studio.photographs.evidence import chains_of, shrink
+from studio.photographs.laser_light import Light, banded, laser_light, without
+from studio.photographs.photograph_set import Look
 from studio.scan.line_extraction import note_of
-from studio.scan.own_files import LINE_COLUMNS, check_replaceable
+from studio.scan.own_files import check_replaceable, line_columns
 
-SCARCE, PLENTY = 0.25, 0.5
-"""Shares of scan lines with a line: below the first, the other axis is tried, and named if it has the second."""
 GAIN_ROUNDS = 5
 PLATEAU = 32
 """Pixels of one number that a sensor's limit makes, and chance does not."""
@@ -37,42 +37,167 @@ SATURATED_SHARE = 0.5
 """Of the scan lines; an exposure with more of them is no base to estimate noise from."""
 
 
-def extract_photograph(
-    path: Path,
-    settings: ExtractionSettings,
-    off: NDArray[Any] | None = None,
-    threads: int | None = None,
-    volume: WorkingVolume | None = None,
-) -> Line:
-    """The line in an image file, less a laser-off image; the noise is estimated from it.
+@dataclass(frozen=True)
+class Measured:
+    """The line of a photograph, in its whole image."""
 
-    volume: only peaks that the laser can have made in it. InputError names the file and what is wrong: unreadable, of
-    the wrong type or size, black, saturated, not a number, without the channel asked for, or with its line along the
-    other axis.
+    line: Line
+    image: NDArray[Any]
+    """(h, w) or (h, w, 3), upright."""
+    light: NDArray[Any] | None = None
+    """(h, w) that was measured, NaN outside the region; None: nothing was."""
+    noise: NoiseModel | None = None
+
+
+def extract_photograph(
+    path: Path, look: Look, threads: int | None = None, volume: WorkingVolume | None = None
+) -> Measured:
+    """The line in an image file, less its laser-off image; the noise is estimated from it.
+
+    look: of the set that it belongs to. volume: only peaks that the laser can have made in it. InputError names the
+    file and what is wrong: unreadable, of the wrong type or size, black, saturated, not a number, without the channel
+    asked for.
     """
+    settings = look.settings
     with naming(path):
-        image = check_image(load_photograph(path))
-        check_light(image)
-        noise = None
-        if off is not None:
-            image, saturation = subtract_off(image, off)
-            noise = estimate_noise(image, settings, saturation)
-        check_camera(image, volume)
-        line = extract(image, settings=settings, noise=noise, volume=volume, threads=threads)
-        _check_axis(image, line, settings, threads)
-    return replace(line, note=note_of(line, settings, []))
+        taken, off = look.read(path)
+        whole = check_image(taken.pixels)
+        check_camera(whole, volume)
+        check_light(look.region.part(whole))
+        light = measured_light(whole, off, look, taken.lossy)
+        if light is None:
+            return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
+        noise = estimate_noise(light.seen, settings, light.saturation)
+        alone = settings.select == "strongest" and volume is None
+        wanted = settings if alone else settings.model_copy(update={"peaks": max(settings.peaks, CANDIDATES)})
+        line = extract(light.image, settings=wanted, select="strongest", noise=noise, threads=threads)
+        line = placed(unsure_dropped(line), whole.shape, look.region.corner)
+        line = line if alone else selected(line, settings, volume)
+        around = light.image
+        if around.shape != whole.shape[:2]:
+            x, y = look.region.corner
+            around = np.full(whole.shape[:2], np.nan, np.float32)
+            around[y : y + light.image.shape[0], x : x + light.image.shape[1]] = light.image
+    return Measured(replace(line, note=note_of(line, settings, [])), whole, around, noise)
+
+
+def measured_light(whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lossy: bool) -> Light | None:
+    """What is measured of an image, in its region, and where that is; None: nothing is left."""
+    image, closed = look.region.part(whole), look.region.closed
+    off = None if off is None else look.region.part(off)
+    if look.settings.pattern is not None:
+        light = Light(image, None) if off is None else Light(*subtract_off(image, off))
+    else:
+        if image.ndim == 2 and look.named is not None:
+            allowed = "auto or mono on a mono image"
+            raise InputError("the image has no such channel", where="channel", found=look.named, allowed=allowed)
+        colour = "mono" if look.evidence is None else look.evidence.colour
+        light = laser_light(image, off, look.channel, colour, lossy)
+    if look.banded and image.ndim == 3:
+        assert look.evidence is not None
+        shrunk = shrink(image, off, closed)
+        chains = chains_of(shrunk, look.evidence.combination, look.evidence.axis, look.settings.peaks)
+        light = banded(light, chains, look.evidence.axis)
+    if closed is not None:
+        light = without(light, closed)
+    return light if light.open is None or light.open.any() else None
+
+
+def no_line(shape: tuple[int, ...], settings: ExtractionSettings, note: str) -> Line:
+    """The line of an image (h, w, ...) that has none."""
+    count = shape[0] if settings.axis == "rows" else shape[1]
+    none = np.full((count, 1), np.nan)
+    flag = np.full((count, 1), np.uint8(Flag.NO_PEAK))
+    return Line(settings.axis, settings.method, none, none, none, none, none, none, flag, note)
+
+
+def unsure_dropped(line: Line) -> Line:
+    """The line without the positions that are less certain than the line is wide."""
+    unsure = line.valid & (line.sigma_u > line.width)
+    if not unsure.any():
+        return line
+
+    def kept(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(unsure, np.nan, values)
+
+    return replace(
+        line,
+        u=kept(line.u),
+        sigma_u=kept(line.sigma_u),
+        width=kept(line.width),
+        amplitude=kept(line.amplitude),
+        background=kept(line.background),
+        chi2=kept(line.chi2),
+        correlation_length=None if line.correlation_length is None else kept(line.correlation_length),
+        flag=np.where(unsure, np.uint8(Flag.UNSURE), line.flag).astype(np.uint8),
+    )
+
+
+def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
+    """The line of a part of an image, in the whole image; scan lines beyond the part have no pixels."""
+    count = shape[0] if line.axis == "rows" else shape[1]
+    if len(line.u) == count and corner == (0, 0):
+        return line
+    along, first = corner if line.axis == "rows" else corner[::-1]
+
+    def whole(values: NDArray[np.float64], shift: float = 0.0) -> NDArray[np.float64]:
+        out = np.full((count, values.shape[1]), np.nan)
+        out[first : first + len(values)] = values + shift
+        return out
+
+    flag = np.full((count, line.flag.shape[1]), np.uint8(Flag.NO_PIXELS))
+    flag[first : first + len(line.flag)] = line.flag
+    return replace(
+        line,
+        u=whole(line.u, along),
+        sigma_u=whole(line.sigma_u),
+        width=whole(line.width),
+        amplitude=whole(line.amplitude),
+        background=whole(line.background),
+        chi2=whole(line.chi2),
+        correlation_length=None if line.correlation_length is None else whole(line.correlation_length),
+        flag=flag,
+    )
+
+
+def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolume | None) -> Line:
+    """Peaks (n, k) -> (n, 1) by the selection, or, of the continuous one, (n, peaks): a chain each."""
+    if settings.select != "continuous" or settings.peaks == 1:
+        return select(candidates, settings.select, volume)
+    left, chains = candidates, []
+    for _ in range(settings.peaks):
+        chain = select(left, "continuous", volume)
+        chains.append(chain)
+        used = chain.valid & (left.u == chain.u)
+        left = replace(left, u=np.where(used, np.nan, left.u), flag=np.where(used, np.uint8(Flag.REJECTED), left.flag))
+
+    def side_by_side(name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(chain, name) for chain in chains], axis=1)
+
+    return replace(
+        candidates,
+        u=side_by_side("u"),
+        sigma_u=side_by_side("sigma_u"),
+        width=side_by_side("width"),
+        amplitude=side_by_side("amplitude"),
+        background=side_by_side("background"),
+        chi2=side_by_side("chi2"),
+        correlation_length=None if candidates.correlation_length is None else side_by_side("correlation_length"),
+        flag=side_by_side("flag"),
+        candidates=candidates,
+    )
 
 
 def extract_series(
     paths: Sequence[Path],
     times: Sequence[float],
-    settings: ExtractionSettings,
-    offs: Sequence[NDArray[Any]] = (),
+    look: Look,
     volume: WorkingVolume | None = None,
     threads: int | None = None,
 ) -> Line:
     """The line in several exposures of one scene, fused in electrons; times in any unit. InputError names the file."""
-    fused = fuse_files(paths, times, settings, offs)
+    settings = look.settings
+    fused = fuse_files(paths, times, look)
     with naming(paths[0]):
         check_camera(fused.electrons, volume)
         line = extract(
@@ -87,20 +212,20 @@ def extract_series(
     return replace(line, note="; ".join(filter(None, (note_of(line, settings, []), told))))
 
 
-def fuse_files(
-    paths: Sequence[Path], times: Sequence[float], settings: ExtractionSettings, offs: Sequence[NDArray[Any]] = ()
-) -> Fused:
+def fuse_files(paths: Sequence[Path], times: Sequence[float], look: Look) -> Fused:
     """Mono image files of one scene, less their laser-off images -> Fused. InputError names the file."""
+    settings = look.settings
     images: list[NDArray[Any]] = []
     highest = 0.0
-    for number, path in enumerate(paths):
+    for path in paths:
         with naming(path):
-            image = check_image(load_photograph(path))
+            taken, off = look.read(path)
+            image = check_image(taken.pixels)
             if image.ndim != 2:
                 raise InputError("exposures are fused of mono or raw images only", found="colour")
             highest = max(highest, image_saturation(image) or _plateau(image))
-            if offs:
-                image, _ = subtract_off(image, offs[number if len(offs) > 1 else 0])
+            if off is not None:
+                image, _ = subtract_off(image, off)
             images.append(image)
     full = highest or 2.0 * max(float(np.nanmax(image)) for image in images)  # none is saturated
     # the more light, the better the noise can be told, as long as the line is not cut off on most scan lines
@@ -168,27 +293,11 @@ def check_light(image: NDArray[Any]) -> None:
         raise InputError("the image is the same everywhere", found=f"every pixel at {high:g}")
 
 
-def _check_axis(image: NDArray[Any], line: Line, settings: ExtractionSettings, threads: int | None) -> None:
-    share = float(line.valid[:, 0].mean())
-    if share >= SCARCE:
-        return
-    other = "columns" if settings.axis == "rows" else "rows"
-    turned = settings.model_copy(update={"axis": other, "method": "centre_of_mass", "select": "strongest"})
-    crossed = float(extract(image, settings=turned, threads=threads).valid[:, 0].mean())
-    if crossed >= PLENTY and crossed > 2.0 * share:
-        raise InputError(
-            f"the line runs along the image's {settings.axis}",
-            where="axis",
-            found=f"a line on {share:.0%} of the {settings.axis}, but on {crossed:.0%} of the {other}",
-            cure=f"use --axis {other}",
-        )
-
-
 def write_line(path: Path, line: Line) -> None:
     """One row of the table for each scan line and peak: where it is, or the reason why there is none. Units: px, e-."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(LINE_COLUMNS)
+    writer.writerow(line_columns(line.axis))
     along, across = (line.u, line.v) if line.axis == "rows" else (line.v, line.u)
     length = np.ones_like(line.u) if line.correlation_length is None else line.correlation_length
     numbers = (along, across, line.sigma_u, line.width, line.amplitude, line.background, line.chi2, length)

@@ -1,55 +1,136 @@
-"""How well camera and laser planes are known: an error of theirs is common to all points, and no mean removes it."""
+"""What a calibration found and how well: an error of it is common to all points, and no mean removes it."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from analysis.triangulate import CALIBRATION
 from render.base.model import Model, quantity
+from render.camera.camera import DISTORTION_LENGTHS, MAX_SIDE, Camera, Coefficient
 
-Entry = Annotated[float, Field(ge=-1e9, le=1e9)]
-Row = Annotated[tuple[Entry, ...], Field(min_length=len(CALIBRATION), max_length=len(CALIBRATION))]
-Covariance = Annotated[tuple[Row, ...], Field(min_length=len(CALIBRATION), max_length=len(CALIBRATION))]
+Entry = Annotated[float, Field(ge=-1e24, le=1e24)]
+SIZES = tuple(len(CALIBRATION) + terms for terms in DISTORTION_LENGTHS)
+Row = Annotated[tuple[Entry, ...], Field(min_length=SIZES[0], max_length=SIZES[-1])]
+Covariance = Annotated[tuple[Row, ...], Field(min_length=SIZES[0], max_length=SIZES[-1])]
+Component = Annotated[float, Field(ge=-1e6, le=1e6)]
+Plane = tuple[Component, Component, Component, Component]
 
+CALIBRATION_KIND = "blazer-calibration"
+"""What a calibration file says of itself."""
 ROUNDING = 1e-9
 """Of the largest variances: what asymmetry and negative variances of a printed matrix may amount to."""
 
 
-class Calibration(Model):
-    """What a calibration says of its own errors; as it is, camera and lasers are taken as exact."""
+class CalibratedCamera(Model):
+    """The camera as a calibration found it."""
 
+    width: int = quantity(unit="px", label="Width", gt=0, le=MAX_SIDE)
+    height: int = quantity(unit="px", label="Height", gt=0, le=MAX_SIDE)
+    fx: float = quantity(unit="px", label="fx", ge=0.01, le=1e7)
+    fy: float = quantity(unit="px", label="fy", ge=0.01, le=1e7)
+    cx: float = quantity(unit="px", label="cx", ge=-1e6, le=1e6)
+    cy: float = quantity(unit="px", label="cy", ge=-1e6, le=1e6)
+    distortion: tuple[Coefficient, ...] = quantity((), label="Distortion", help="In OpenCV's order.")
+
+    @field_validator("distortion")
+    @classmethod
+    def _known_length(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if len(value) not in DISTORTION_LENGTHS:
+            raise ValueError(f"has {len(value)} coefficients; allowed: 0, 4, 5, 8, 12 or 14")
+        return value
+
+    def of(self, camera: Camera) -> Camera:
+        """A camera with what was found in place of what it has."""
+        width, height = camera.width, camera.height
+        found = camera.model_copy(
+            update={**{name: getattr(self, name) for name in type(self).model_fields}, "skew": 0.0}
+        )
+        if (width, height) == (self.width, self.height):
+            return found
+        scaled = found.scaled(width / self.width)
+        return scaled.model_copy(update={"width": width, "height": height, "pixel_pitch": camera.pixel_pitch})
+
+
+class Calibration(Model):
+    """What points are made with, and its covariance; as it is, camera and lasers are the scene's, and exact."""
+
+    camera: CalibratedCamera | None = quantity(None, label="Camera", help="None: the scene's.")
+    planes: tuple[Plane, ...] = quantity(
+        (),
+        label="Laser planes",
+        help="One for each laser: a, b, c (unit normal), d (m) in the camera's frame; none: the scene's.",
+        max_length=64,
+    )
     covariances: tuple[Covariance, ...] = quantity(
         (),
         label="Covariances",
-        help="One 8 x 8 matrix for each laser, of fx, fy, cx, cy (px) and its plane a, b, c (unit normal), d (m), in "
-        "the camera's frame; none: exact.",
+        help="One matrix for each laser, of fx, fy, cx, cy (px), its plane a, b, c (unit normal), d (m) in the "
+        "camera's frame, and, if it has more than 8 rows, the distortion coefficients; none: exact.",
         max_length=64,
     )
+
+    @field_validator("planes")
+    @classmethod
+    def _are_planes(cls, planes: tuple[Plane, ...]) -> tuple[Plane, ...]:
+        for i, plane in enumerate(planes):
+            if not abs(np.linalg.norm(plane[:3]) - 1.0) < 1e-3:
+                raise ValueError(f"plane {i} has a normal of length {np.linalg.norm(plane[:3]):.6g}; allowed: 1")
+        return planes
 
     @field_validator("covariances")
     @classmethod
     def _are_covariances(cls, matrices: tuple[Covariance, ...]) -> tuple[Covariance, ...]:
         for i, rows in enumerate(matrices):
+            if len(rows) not in SIZES or any(len(row) != len(rows) for row in rows):
+                raise ValueError(f"covariance {i} has {len(rows)} rows; allowed: a square matrix of {SIZES} rows")
             matrix = np.array(rows)
             spread = np.sqrt(np.maximum(np.diag(matrix), 0.0))
             scale = np.outer(spread, spread) + np.finfo(float).tiny
             if np.any(np.abs(matrix - matrix.T) > ROUNDING * scale):
                 raise ValueError(f"covariance {i} is not symmetric; allowed: a matrix equal to its transpose")
             related = matrix / np.where(scale > ROUNDING * np.finfo(float).tiny, scale, 1.0)
-            if np.linalg.eigvalsh(np.where(np.abs(matrix) > 0.0, related, 0.0)).min() < -len(CALIBRATION) * ROUNDING:
+            if np.linalg.eigvalsh(np.where(np.abs(matrix) > 0.0, related, 0.0)).min() < -len(rows) * ROUNDING:
                 raise ValueError(f"covariance {i} has negative variances; allowed: a positive semi-definite matrix")
         return matrices
 
+    @model_validator(mode="after")
+    def _goes_together(self) -> Calibration:
+        lengths = {len(each) for each in (self.planes, self.covariances) if each}
+        if len(lengths) > 1:
+            raise ValueError(f"has {len(self.planes)} planes and {len(self.covariances)} covariances; allowed: as many")
+        return self
+
+    @property
+    def laser_count(self) -> int:
+        """Lasers that it was made for; 0: of none it says anything."""
+        return max(len(self.planes), len(self.covariances))
+
     def covariance(self, laser: int) -> NDArray[np.float64] | None:
-        """(8, 8) of `analysis.triangulate.CALIBRATION` for a laser, None where it is taken as exact."""
+        """(8, 8) of `analysis.triangulate.CALIBRATION`, or with the distortion, None where a laser is exact."""
         return np.array(self.covariances[laser]) if self.covariances else None
 
+    def plane(self, laser: int, scene_plane: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(4,) of a laser, the scene's where none was found."""
+        return np.array(self.planes[laser]) if self.planes else scene_plane
+
+    def camera_of(self, camera: Camera) -> Camera:
+        """The camera that points are made with."""
+        return camera if self.camera is None else self.camera.of(camera)
+
     def scaled(self, image_scale: float) -> Calibration:
-        """That of images with `image_scale` times the pixels a side."""
-        by = np.array([image_scale] * 4 + [1.0] * 4)
-        matrices = [np.array(rows) * np.outer(by, by) for rows in self.covariances]
-        return Calibration(covariances=tuple(tuple(tuple(row) for row in matrix.tolist()) for matrix in matrices))
+        """That of images with `image_scale` times the pixels a side; the camera follows by itself (`camera_of`)."""
+        matrices = []
+        for rows in self.covariances:
+            by = np.array([image_scale] * 4 + [1.0] * (len(rows) - 4))
+            matrices.append(np.array(rows) * np.outer(by, by))
+        covariances = tuple(tuple(tuple(row) for row in matrix.tolist()) for matrix in matrices)
+        return self.model_copy(update={"covariances": covariances})
+
+
+def from_file_data(data: dict[str, Any]) -> dict[str, Any]:
+    """The part of a calibration file that a project takes over: camera, planes and covariances."""
+    return {name: data[name] for name in ("camera", "planes", "covariances") if name in data}

@@ -80,16 +80,16 @@ class Document:
         self.apply(label or f"change {path[-1]}", replaced(self.project, path, value), merge)
 
     def undo(self) -> None:
-        if self._undo:
-            edit = self._undo.pop()
-            self._redo.append(Edit(edit.label, self.project, ""))
-            self.project = edit.before
-            self._tell()
+        self._step(self._undo, self._redo)
 
     def redo(self) -> None:
-        if self._redo:
-            edit = self._redo.pop()
-            self._undo.append(Edit(edit.label, self.project, ""))
+        self._step(self._redo, self._undo)
+
+    def _step(self, back: list[Edit], forth: list[Edit]) -> None:
+        """Take the last edit of one list back; the other one leads to the project as it is now."""
+        if back:
+            edit = back.pop()
+            forth.append(Edit(edit.label, self.project, ""))
             self.project = edit.before
             self._tell()
 

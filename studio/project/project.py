@@ -20,7 +20,7 @@ from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from render.scene.shape import MeshFile
 from render.sensor.sensor import Sensor
-from studio.project.calibration import Calibration
+from studio.project.calibration import CALIBRATION_KIND, Calibration, from_file_data
 from studio.project.migrations import migrate
 from studio.project.strict_json import parse_object, pretty, read_object
 from studio.project.templates import DESCRIPTIONS, template_folder
@@ -52,9 +52,14 @@ class Project(Model):
 
     @model_validator(mode="after")
     def _every_laser_is_calibrated(self) -> Self:
-        given, lasers = len(self.calibration.covariances), len(self.scene.lasers)
+        found, given, lasers = self.calibration, self.calibration.laser_count, len(self.scene.lasers)
         if given not in (0, lasers):
-            raise ValueError(f"calibration has {given} covariances; allowed: none, or {lasers}, one for each laser")
+            what = "covariances" if found.covariances else "planes"
+            raise ValueError(f"calibration has {given} {what}; allowed: none, or {lasers}, one for each laser")
+        terms = len(found.camera_of(self.scene.camera).distortion)
+        for i, rows in enumerate(found.covariances):
+            if len(rows) not in (8, 8 + terms):
+                raise ValueError(f"calibration.covariances[{i}] has {len(rows)} rows; allowed: 8 or {8 + terms}")
         return self
 
     @model_validator(mode="after")
@@ -94,7 +99,10 @@ class Project(Model):
             kind = type(path).__name__
             allowed = "a template's name or a path"
             raise InputError("a project is loaded by name", found=kind, allowed=allowed) from None
-        return cls.from_data(read_object(file), str(file)).in_folder(file.parent)
+        data = read_object(file)
+        if isinstance(data.get("calibration"), str):
+            data["calibration"] = _read_calibration(file, data["calibration"])
+        return cls.from_data(data, str(file)).in_folder(file.parent)
 
     @classmethod
     def from_text(cls, text: str, where: str = "project") -> Self:
@@ -155,6 +163,16 @@ class Project(Model):
             objects.append(item)
         scene = self.scene.model_copy(update={"objects": tuple(objects)})
         return self.model_copy(update={"scene": scene})
+
+
+def _read_calibration(project: Path, name: str) -> dict[str, Any]:
+    """What a project takes over from the calibration file that it names. InputError: it is none."""
+    where = f"{project}: calibration"
+    data = read_object(inside(project.parent, name, where), "calibration file")
+    if data.get("kind") != CALIBRATION_KIND:
+        cure = "make one by main.py calibrate"
+        raise InputError("the file is no calibration", where=where, found=name, allowed=CALIBRATION_KIND, cure=cure)
+    return from_file_data(data)
 
 
 def _there(key: str | int, node: Any, place: str) -> Any:

@@ -40,6 +40,18 @@ def missing_files(scene: Scene, root: Path) -> list[tuple[int, Path]]:
     return found
 
 
+def bring(found: Path, target: Path) -> None:
+    """Copy a file to the place where a project has it, and beside it what reading it takes, as far as that is there.
+
+    What is there already stays. InputError: it cannot be written.
+    """
+    beside = side_files(found, found.parent)
+    for source, place in ((found, target), *((found.parent / name, target.parent / name) for name in beside)):
+        if source.is_file() and not place.exists():
+            with atomic_write(place) as temporary:
+                shutil.copyfile(source, temporary)
+
+
 def carry(scene: Scene, root: Path, folder: Path) -> list[Path]:
     """Copy the files the scene names from `root` to the same places below `folder`; returns what was written.
 

@@ -85,6 +85,36 @@ def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def photographed(command: Callable[..., Any]) -> Callable[..., Any]:
+    """What photographs say themselves, and a person may say instead."""
+    for option in (
+        click.option("--mask", type=click.Path(path_type=Path), help="Image that is black where not to look."),
+        click.option("--roi", metavar="X,Y,W,H", help="Part of the image to look at, px."),
+        click.option("--pattern", type=click.Choice(["RGGB", "BGGR", "GRBG", "GBRG"]), help="Bayer, of raw images."),
+        click.option(
+            "--off",
+            type=click.Path(path_type=Path),
+            multiple=True,
+            help="Image with the laser off, to subtract: one for all, or one for each, by name or in order.",
+        ),
+        click.option(
+            "--channel",
+            type=click.Choice(["auto", "mono", "luminance", "red", "green", "blue", "difference"]),
+            help="What is measured of colour images, else found; difference: the laser's colour less the others.",
+        ),
+        click.option(
+            "--axis",
+            type=click.Choice(["auto", "rows", "columns"]),
+            help="Scan lines: rows for an upright line, columns for a level one. Auto: by evidence.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+COLOUR = click.Choice(["auto", "mono", "red", "green", "blue"])
+
+
 def repeating(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of the commands that run a project many times."""
     for option in (
@@ -94,3 +124,55 @@ def repeating(command: Callable[..., Any]) -> Callable[..., Any]:
     ):
         command = option(command)
     return common(command)
+
+
+def sharing(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of long work that processes, a cluster or several machines share."""
+    for option in (
+        click.option("--shard", default="1/1", show_default=True, help="Only this part of the work: 3/40."),
+        click.option(
+            "--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://host:8786, in place of processes here."
+        ),
+        click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor]."),
+    ):
+        command = option(command)
+    return command
+
+
+def virtual_views(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of a calibration in silico."""
+    sigma = FiniteRange(1e-4, 10.0)
+    for option in (
+        click.option("--line-sigma", type=sigma, default=0.05, help="Of virtual lines, px."),
+        click.option("--corner-sigma", type=sigma, default=0.05, help="Of virtual corners, px."),
+        click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, help="Of virtual views."),
+        click.option("--views", type=click.IntRange(3, 1000), default=20, show_default=True, help="Virtual ones."),
+    ):
+        command = option(command)
+    return command
+
+
+def real_views(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of a calibration from photographs."""
+    for option in (
+        click.option(
+            "--channel",
+            type=click.Choice(["auto", "mono", "red", "green", "blue"]),
+            default="auto",
+            help="The laser's colour.",
+        ),
+        click.option(
+            "--axis", type=click.Choice(["rows", "columns"]), default="rows", show_default=True, help="Scan lines."
+        ),
+        click.option(
+            "--lens",
+            type=click.Choice(["auto", "0", "4", "5", "8", "12", "14"]),
+            default="auto",
+            help="Distortion terms.",
+        ),
+        click.option(
+            "--camera", type=click.Path(path_type=Path), help="Calibration file of the camera, for laser alone."
+        ),
+    ):
+        command = option(command)
+    return command

@@ -81,6 +81,8 @@ class Job(Generic[Result]):
         self._thread: threading.Thread | None = None
         self._since: float | None = None
         self._seconds = 0.0
+        self._told = 0.0
+        """Seconds of work when `done` was told last."""
 
     @property
     def state(self) -> State:
@@ -101,7 +103,9 @@ class Job(Generic[Result]):
         """Estimated from the progress; None while that says too little."""
         if self.ended or self.done < 0.01 or self.seconds < EARLIEST_ESTIMATE:
             return None
-        return self.seconds * (1.0 - self.done) / self.done
+        # time that passes since the work told how far it is makes what is left less, not more
+        left = self._told / self.done - self.seconds
+        return left if left > 0.0 else None
 
     def start(self) -> None:
         """Begin; a job that was cancelled before ends without having worked."""
@@ -148,7 +152,10 @@ class Job(Generic[Result]):
         return True
 
     def _progress(self, stage: str, done: float) -> None:
-        self.stage, self.done = stage, min(max(done, 0.0), 1.0)
+        done = min(max(done, 0.0), 1.0)
+        if done != self.done:
+            self._told = self.seconds
+        self.stage, self.done = stage, done
 
     def _run(self) -> None:
         _be_polite()

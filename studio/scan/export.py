@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.cloud import Cloud, cloud, merge, write_csv, write_ply
-from analysis.report.record import record_of
+from analysis.report.record import ScanRecord, record_of
 from render.base.errors import Cancelled, InputError
 from render.base.files import atomic_write
 from render.base.threads import Cancel
@@ -19,12 +19,13 @@ from render.output.frame_files import write_frame
 from render.sensor.develop import Image
 from render.world.world import World, build_world
 from studio.project.date_and_time import now
-from studio.project.input_files import input_files
+from studio.project.input_files import input_files, input_hashes
 from studio.project.project import Project
 from studio.scan.cautions import Cautions
 from studio.scan.own_files import check_not_read, check_replaceable
 from studio.scan.remarks import Measurements, best, frame_result
 from studio.scan.results import report_input
+from studio.scan.run_record import run_text
 from studio.scan.summary import summarise
 
 
@@ -43,6 +44,10 @@ class Exported:
     measurements: Measurements
     image_scale: float = 1.0
     """Of the image, to the scanner's."""
+    repeatable: bool = False
+    """A run of the project's first step, as it is now, gives the same images."""
+    finished: bool = True
+    """The frame's light was neither stopped nor ended by the clock."""
 
 
 Writer = Callable[[Path, Exported], list[Path]]
@@ -64,7 +69,16 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     result = frame_result(what.project, what.frame, what.measurements, what.images)
     with closing(record_of(what.project.scene, [result])) as record:
         notes = cautions.notes(summarise(record))
-        data = report_input(what.project, first, record, {}, notes=notes, created=now(), image_scale=what.image_scale)
+        data = report_input(
+            what.project,
+            first,
+            record,
+            {},
+            notes=notes,
+            created=now(),
+            image_scale=what.image_scale,
+            run=_run_text(what, record),
+        )
         if path.suffix.lower() != ".pdf":
             with atomic_write(path) as temporary:
                 temporary.write_text(render_page(data), encoding="utf-8")
@@ -129,6 +143,15 @@ def point_clouds(what: Exported) -> list[Cloud]:
     """One for each laser, by the project's method."""
     found = best(what.measurements, what.project)
     return [cloud(one.points, one.errors, one.laser, one.step, what.project.scene) for one in found]
+
+
+def _run_text(what: Exported, record: ScanRecord) -> str:
+    """As of `run_text`; empty: another power than the rendered one scales the light, which a run only does nearly."""
+    rendered, now = (tuple(laser.power for laser in one.scene.lasers) for one in (what.rendered, what.project))
+    if not what.repeatable or rendered != now:
+        return ""
+    inputs = input_hashes(what.project.scene, what.root)
+    return run_text(what.project, record, image_scale=what.image_scale, inputs=inputs, finished=what.finished)
 
 
 def _spare_inputs(what: Exported, targets: Sequence[Path]) -> None:

@@ -44,12 +44,8 @@ def hold(folder: Path, *, reading: bool = False) -> Iterator[None]:
         ) from None
     except OSError as error:
         if not reading or error.errno not in (errno.EACCES, errno.EPERM, errno.EROFS):
-            raise InputError(
-                "the folder cannot be locked",
-                where=str(folder),
-                found=error.strerror or error,
-                cure="choose another folder with --out",
-            ) from None
+            what, found = "the folder cannot be locked", error.strerror or error
+            raise InputError(what, where=str(folder), found=found, cure="choose another folder with --out") from None
     try:
         yield
     finally:

@@ -16,19 +16,14 @@ HEAD = 64 * 1024
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 EXR_LAYERS = re.compile(rb"laser\.[^\0]*\.direct\.Y\0|object_id\.Y\0|ambient\.B\0.{16}ambient\.G\0|sigma_time\0", re.S)
 JSON_FORMAT = re.compile(rb'\{\s*"format": "blazer-(frame|scan)"')
-LINE_COLUMNS = (
-    "scan_line",
-    "rank",
-    "u",
-    "v",
-    "sigma_u",
-    "width",
-    "amplitude",
-    "background",
-    "chi2",
-    "correlation_length",
-    "flag",
-)
+OF_A_POSITION = ("rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "correlation_length", "flag")
+
+
+def line_columns(axis: str) -> tuple[str, ...]:
+    """Titles of a line's table; the first column counts the image's rows or columns."""
+    return (axis.removesuffix("s"), *OF_A_POSITION)
+
+
 RIDGE_COLUMNS = (
     "line",
     "u",
@@ -44,6 +39,7 @@ RIDGE_COLUMNS = (
 )
 POINT_COLUMNS = tuple(title(name) for name in UNITS)
 FORMER_COLUMNS = (
+    ("scan_line", *OF_A_POSITION),
     ("scan_line", "rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "flag"),
     (
         "x_m",
@@ -60,17 +56,20 @@ FORMER_COLUMNS = (
     ),
 )
 """Of versions before this one."""
-TABLES = tuple(",".join(columns).encode() for columns in (LINE_COLUMNS, RIDGE_COLUMNS, POINT_COLUMNS, *FORMER_COLUMNS))
+TABLES = tuple(
+    ",".join(columns).encode()
+    for columns in (line_columns("rows"), line_columns("columns"), RIDGE_COLUMNS, POINT_COLUMNS, *FORMER_COLUMNS)
+)
 
 
 def is_own(path: Path) -> bool:
     """An earlier run of this program wrote the file, as far as its content tells; False: another kind, or unreadable.
 
-    A PNG belongs to the frame beside it, a PDF to the HTML.
+    A PNG belongs to the frame or table beside it, a PDF to the HTML.
     """
     suffix = path.suffix.lower()
     if suffix == ".png":
-        return any(is_own(path.with_suffix(other)) for other in (".exr", ".json"))
+        return any(is_own(path.with_suffix(other)) for other in (".exr", ".json", ".csv"))
     if suffix == ".pdf":
         return is_own(path.with_suffix(".html"))
     head = _head(path)

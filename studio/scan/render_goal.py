@@ -18,7 +18,9 @@ from analysis.line.detection.matched_filter import BLOCK, NOISE_GAIN, TAPS
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.influence import influence
 from analysis.line.result import Line
+from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float, Float32
+from render.base.threads import map_chunks
 from render.frame import Frame
 from render.importance import CELL, Importance
 from render.scene.settings import DepthGoal
@@ -33,6 +35,8 @@ NEAREST = 0.25
 """Of the detection threshold, in the noise of line and rival: nearer than this to a change the sensor decides."""
 AROUND = 3.0
 """Sigmas of a line within which it is itself the peak."""
+ROWS = 64
+"""Scan lines at a time, which a processor's cache holds."""
 
 
 def goal_of(project: Project, threads: int | None = None) -> Callable[[Frame], Importance] | None:
@@ -90,7 +94,7 @@ def _weights(
     axis = 1 if line.axis == "rows" else 0
     sigma = _sigma(line, derivative, electrons, noise, axis)
     moved = derivative / np.expand_dims(allowed * sigma, axis)
-    risen = _peaks(electrons if axis == 1 else electrons.T, line, noise, settings.threshold, settings.select)
+    risen = _peaks(electrons if axis == 1 else electrons.T, line, noise, settings, threads)
     return moved.astype(np.float32), np.ascontiguousarray(risen if axis == 1 else risen.T)
 
 
@@ -107,47 +111,64 @@ def _expected_image(project: Project, electrons: Float32) -> Image:
 
 
 def _sigma(line: Line, derivative: Float32, electrons: Float32, noise: NoiseModel, axis: int) -> Float:
-    """(n,) standard deviation of each scan line's position, px; infinite where there is none."""
-    told = np.where(line.valid, line.sigma_u, np.nan)
+    """(n,) standard deviation of each scan line's position, px; infinite where there is none.
+
+    At least what the noise of its own pixels makes of it: a line that is moved by more than it tells asks of no light
+    to be known better than the goal's share of that noise.
+    """
+    told = np.min(np.where(line.valid & np.isfinite(line.sigma_u), line.sigma_u, np.inf), axis=1)
     counted = np.sqrt(np.sum(derivative.astype(np.float64) ** 2 * (electrons + noise.floor), axis=axis))
-    least = np.min(np.where(np.isfinite(told), told, np.inf), axis=1)
-    sigma = np.where(np.isfinite(least), least, counted)
+    sigma = np.maximum(np.where(np.isfinite(told), told, 0.0), counted)
     return np.where(line.valid.any(axis=1) & (sigma > 0.0), sigma, np.inf)
 
 
-def _peaks(electrons: Float32, line: Line, noise: NoiseModel, threshold: float, select: str) -> Float32:
+def _peaks(
+    electrons: Float32, line: Line, noise: NoiseModel, extraction: ExtractionSettings, threads: int | None
+) -> Float32:
     """(n, w) what an electron adds to the matched filter's response, over what may be added without a change."""
-    light = np.asarray(electrons, np.float32)
+    out: Float32 = np.empty(electrons.shape, np.float32)
+
+    def work(start: int, stop: int) -> None:
+        rows = slice(start, stop)
+        out[rows] = _row_peaks(np.asarray(electrons[rows], np.float32), line, rows, noise, extraction)
+
+    map_chunks(work, len(out), ROWS, threads)
+    return out
+
+
+def _row_peaks(light: Float32, line: Line, rows: slice, noise: NoiseModel, extraction: ExtractionSettings) -> Float32:
+    valid, u = line.valid[rows], line.u[rows]
     response = correlate1d(light, TAPS.astype(np.float32), axis=1, mode="nearest")
     n, w = response.shape
     block = max(1, min(BLOCK, w // 8))
     means = response[:, : w // block * block].reshape(n, -1, block).mean(axis=2)
-    level = np.repeat(median_filter(means, (1, 7), mode="nearest"), block, axis=1)
-    level = np.pad(level, ((0, 0), (0, w - level.shape[1])), mode="edge")
-    margin = threshold * np.sqrt(NOISE_GAIN * np.maximum(level + noise.floor, 1e-2))
-    height = response - level
+    medians = median_filter(means, (1, 7), mode="nearest")
+    column = np.minimum(np.arange(w) // block, medians.shape[1] - 1)
+    margins = extraction.threshold * np.sqrt(NOISE_GAIN * np.maximum(medians + noise.floor, 1e-2))
+    margin = margins.astype(np.float32)[:, column]
+    height = response - medians[:, column]
     # alone, the strongest peak is the line, and another one counts only where it would be higher
-    bound = margin.copy()
-    x = np.arange(w)
-    top = np.zeros(n)
-    if select == "strongest" and line.u.shape[1] == 1:
-        seen = line.valid[:, 0]
-        centre = np.clip(np.rint(np.where(seen, line.u[:, 0], 0.0)).astype(np.int64), 0, w - 1)
-        top = np.where(seen, height[np.arange(n), centre], 0.0)
-        bound = np.maximum(bound, top[:, None])
-    away = np.abs(bound - height)
-    for k in range(line.u.shape[1]):
-        rows = np.flatnonzero(line.valid[:, k])
-        reach = AROUND * np.maximum(line.width[rows, k], 1.0)
-        own = np.abs(x - line.u[rows, k][:, None]) <= reach[:, None]
-        away[rows] = np.where(own, np.maximum(top[rows][:, None] - margin[rows], margin[rows]), away[rows])
-    scattered = noise.table[0, 0] if noise.scintillation else 0.0
-    variance = NOISE_GAIN * (np.maximum(response, 0.0) + top[:, None] + noise.floor)
-    variance += scattered * (np.maximum(height, 0.0) ** 2 + top[:, None] ** 2)
-    weight = (
-        CERTAIN * TAPS[len(TAPS) // 2] / np.maximum(away, NEAREST * threshold * np.sqrt(np.maximum(variance, 1e-2)))
-    )
-    return np.asarray(weight, np.float32)
+    top = np.zeros(n, np.float32)
+    if extraction.select == "strongest" and u.shape[1] == 1:
+        centre = np.clip(np.rint(np.where(valid[:, 0], u[:, 0], 0.0)).astype(np.int64), 0, w - 1)
+        top = np.where(valid[:, 0], height[np.arange(n), centre], np.float32(0.0))
+    away = np.abs(np.maximum(margin, top[:, None]) - height)
+    for k in range(u.shape[1]):
+        seen = np.flatnonzero(valid[:, k])
+        reach = AROUND * np.maximum(line.width[rows][seen, k], 1.0)
+        first = np.rint(u[seen, k]).astype(np.int64)
+        most = math.ceil(reach.max(initial=0.0)) + 1
+        x = first[:, None] + np.arange(-most, most + 1)
+        own = (np.abs(x - u[seen, k][:, None]) <= reach[:, None]) & (x >= 0) & (x < w)
+        place = np.broadcast_to(seen[:, None], x.shape)[own], x[own]
+        away[place] = np.maximum(top[place[0]] - margin[place], margin[place])
+    variance = np.maximum(response, 0.0) + (top + np.float32(noise.floor))[:, None]
+    variance *= np.float32(NOISE_GAIN)
+    if noise.scintillation:
+        scattered = np.float32(noise.table[0, 0])
+        variance += scattered * (np.maximum(height, 0.0) ** 2 + top[:, None] ** 2)
+    nearest = np.float32(NEAREST * extraction.threshold) * np.sqrt(np.maximum(variance, np.float32(1e-2)))
+    return np.asarray(np.float32(CERTAIN * TAPS[len(TAPS) // 2]) / np.maximum(away, nearest), np.float32)
 
 
 def _tiled(response: Float, illumination: Float32) -> Float32:

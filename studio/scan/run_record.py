@@ -23,6 +23,7 @@ from pydantic import Field, ValidationError
 
 from analysis.report.record import ScanRecord
 from analysis.report.sample import IMAGE
+from analysis.report.total import total
 from render.base.errors import InputError
 from render.base.files import inside, read_bytes, sha256
 from render.base.model import Model
@@ -30,7 +31,7 @@ from studio.project.input_files import listed
 from studio.project.project import Project
 from studio.project.strict_json import parse_object, read_object
 from studio.project.validation_messages import input_error
-from studio.scan.results import versions
+from studio.scan.results import METHODS, versions
 from studio.scan.scan_folder import MANIFEST
 from studio.scan.summary import summarise
 
@@ -86,7 +87,11 @@ class Recorded:
 def run_text(
     project: Project, record: ScanRecord, *, image_scale: float, inputs: Mapping[str, str], finished: bool
 ) -> str:
-    """The text for the page: ASCII, one line of JSON. project: as it was run, at the image scale."""
+    """The text for the page: ASCII, one line of JSON. project: as it was run, at the image scale.
+
+    Of methods that a second run does not compare with, which a person may have added in the window, nothing is held.
+    """
+    again = {*METHODS, *(total(record.chosen(laser)).method for laser in range(len(record.scene.lasers)))}
     said = RunRecord(
         image_scale=image_scale,
         frames=len(record.steps),
@@ -94,7 +99,7 @@ def run_text(
         inputs=dict(inputs),
         versions=versions(),
         machine=platform.machine(),
-        results=tuple(summarise(record)),
+        results=tuple(one for one in summarise(record) if one["method"] in again),
         points=tuple(_packed(record, laser) for laser in range(len(record.scene.lasers))),
     )
     whole = {**said.model_dump(mode="json"), "project": project.model_dump(mode="json")}
@@ -151,6 +156,13 @@ def input_root(found: Recorded, given: Path | None) -> Path:
         allowed="the same files at the same paths as then",
         cure="say with --root which folder holds them",
     )
+
+
+def other_figures(then: Sequence[Mapping[str, Any]], now: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Figures of a record that a second run does not give to the bit; it may have measured by further methods."""
+    told = {f"{one['laser']}, {one['method']}": one for one in now}
+    rows = {f"{one.get('laser')}, {one.get('method')}": one for one in then}
+    return unequal(rows, {name: told.get(name) for name in rows})
 
 
 def unequal(then: Any, now: Any, place: str = "") -> list[str]:

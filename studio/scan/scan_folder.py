@@ -40,10 +40,10 @@ class Begun:
     """A scan under way, which no other program can write into."""
 
     folder: Path
-    project: Project
-    root: Path
     inputs: Mapping[str, str]
     """SHA-256 of every input file, by its path relative to `root`."""
+    project: Project
+    root: Path
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def begin(
         _clear(folder, count, reads, keep_frames=resume)
         with atomic_write(folder / PROJECT) as temporary:
             temporary.write_text(project.to_text(), encoding="utf-8")
-        yield Begun(folder, project, root, inputs)
+        yield Begun(folder, inputs, project, root)
 
 
 def frame_stem(step: int) -> str:

@@ -186,8 +186,8 @@ def triangulate_line(project: Project, line: Line, laser: int, step: int) -> Poi
     scene = project.scene
     return triangulate(
         line,
-        scene.camera,
-        scene.laser_plane(laser),
+        project.calibration.camera_of(scene.camera),
+        project.calibration.plane(laser, scene.laser_plane(laser)),
         T_rig_camera=scene.camera.T_rig_camera.matrix,
         T_world_camera=scene.T_world_camera(step),
         calibration_covariance=project.calibration.covariance(laser),

@@ -18,7 +18,8 @@ import numpy as np
 from analysis.study.intervals import Interval, mean_interval
 from render.base.errors import InputError
 from studio.project.project import MAX_SEED, Project
-from studio.study.runner import Engine, run_study
+from studio.runtime.workers import Engine
+from studio.study.runner import run_study
 from studio.study.store import Store
 from studio.study.study import Study
 from studio.study.tables import grouped, seconds_of, values_of
@@ -78,7 +79,7 @@ class Tried:
 
     part: Part
     found: Change
-    taken: bool
+    taken: bool = False
 
 
 @dataclass(frozen=True)

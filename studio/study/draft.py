@@ -55,6 +55,19 @@ def finished(draft: Data) -> Study:
         raise input_error(error, Study, draft, "study") from None
 
 
+def varies_nothing(draft: Data) -> str:
+    """The name of the first sweep without a field to vary; empty: there is none."""
+    found = (one["name"] for one in draft["sweeps"] if not one["vary"] and one.get("sampling") != "effects")
+    return next(found, "")
+
+
+def by_names(text: str, draft: Data) -> str:
+    """A message about a draft with its sweeps by their names, where a study's file counts them."""
+    for number, sweep in enumerate(draft["sweeps"]):
+        text = text.replace(f"study: sweeps[{number}]", sweep["name"])
+    return text
+
+
 def path_text(path: FieldPath) -> str:
     """As a study's file names a field: scene.rig.lasers[0].power."""
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")

@@ -10,15 +10,15 @@ from pathlib import Path
 from render.base.errors import InputError
 from studio.project.project import Project
 from studio.runtime.console import StageProgress
+from studio.runtime.workers import EVERY_PROCESSOR, Engine
 from studio.scan.folder_lock import hold
 from studio.study.answers import Answer, answers
 from studio.study.cells import Cell, cells_at, check_size, next_cells
-from studio.study.runner import Engine, run_study
+from studio.study.runner import run_study
 from studio.study.store import Row, Store, described
 from studio.study.study import Study
 from studio.study.tables import values_of, write_tables
 
-EVERY_PROCESSOR = Engine()
 SHARE = 0.1
 """Of the driver's time that may go into working out answers while the study runs."""
 

@@ -44,12 +44,11 @@ class Store:
             )
             self._check(digest)
         except sqlite3.DatabaseError as error:
-            raise InputError(
-                "the study's store cannot be read",
-                where=str(self.path),
-                found=str(error),
-                cure="restore it from a copy, or remove the folder and run the study anew",
-            ) from None
+            cure = "restore it from a copy, or remove the folder and run the study anew"
+            raise self._refused("read", error, cure) from None
+
+    def _refused(self, what: str, error: sqlite3.Error, cure: str) -> InputError:
+        return InputError(f"the study's store cannot be {what}", where=str(self.path), found=str(error), cure=cure)
 
     def _check(self, digest: str | None) -> None:
         with self._transaction():
@@ -94,12 +93,7 @@ class Store:
             with self._transaction():
                 self._connection.executemany("INSERT OR IGNORE INTO row VALUES (?, ?, ?)", lines)
         except sqlite3.OperationalError as error:
-            raise InputError(
-                "the study's store cannot be written",
-                where=str(self.path),
-                found=str(error),
-                cure="make room, then run the study again: it goes on from here",
-            ) from None
+            raise self._refused("written", error, "make room, then run the study again: it goes on from here") from None
 
     def rows(self) -> dict[str, Row]:
         """Measured numbers and, as `seconds_...`, times of every cell by its key."""

@@ -163,6 +163,23 @@ def test_systematic_covariance_is_that_of_perturbed_calibrations():
     assert np.allclose(found[0], wanted, rtol=1e-5, atol=1e-14)
 
 
+def test_the_distortion_may_be_a_part_of_the_calibration():
+    u, v = np.array([700.0]), np.array([400.0])
+    sigmas = [0.3, 0.3, 0.2, 0.2, 1e-4, 1e-4, 1e-4, 1e-4, *np.full(len(DISTORTED.distortion), 1e-3)]
+    plain = points_at(u, v, DISTORTED, covariance=np.diag(np.square(sigmas[:8]))).covariance_systematic
+    whole = points_at(u, v, DISTORTED, covariance=np.diag(np.square(sigmas))).covariance_systematic
+    assert plain is not None and whole is not None
+    wanted = np.zeros((3, 3))
+    for i in range(len(DISTORTED.distortion)):
+        ends = []
+        for step in (1e-5, -1e-5):
+            moved = [k + step * (i == j) for j, k in enumerate(DISTORTED.distortion)]
+            ends.append(points_at(u, v, DISTORTED.model_copy(update={"distortion": tuple(moved)})).camera[0])
+        derivative = (ends[0] - ends[1]) / 2e-5 * 1e-3
+        wanted += np.outer(derivative, derivative)
+    assert np.allclose(whole[0] - plain[0], wanted, rtol=1e-5, atol=1e-14)
+
+
 def test_random_covariance_is_that_of_noisy_lines():
     random = np.random.default_rng(4)
     here = points_at(900.0, 700.0, DISTORTED)

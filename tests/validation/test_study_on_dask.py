@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from render.base.errors import InputError
-from studio.study.cluster import cluster
-from studio.study.runner import Engine
+from studio.runtime.cluster import cluster
+from studio.runtime.workers import Engine
 from tests.studio.study.test_run import DATA, run
 
 pytestmark = pytest.mark.validation
@@ -30,6 +30,6 @@ def test_a_cluster_gives_the_same_table_as_one_process(scheduler: str, tmp_path:
 
 def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("studio.study.cluster.PATIENCE", "2s")
-    with pytest.raises(InputError, match="no Dask scheduler answers"), cluster("tcp://127.0.0.1:1"):
+    monkeypatch.setattr("studio.runtime.cluster.PATIENCE", "2s")
+    with pytest.raises(InputError, match="no Dask scheduler answers"), cluster("tcp://127.0.0.1:1", print):
         pass

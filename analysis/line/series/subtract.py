@@ -15,13 +15,16 @@ ROOM = 0.5
 """Of the full scale; with less of it left by the off image, a saturated difference does not stand out as the line's."""
 
 
-def subtract_off(image: NDArray[Any], off: NDArray[Any]) -> tuple[NDArray[np.float32], float | None]:
+def subtract_off(
+    image: NDArray[Any], off: NDArray[Any], saturation: float | None = None
+) -> tuple[NDArray[np.float32], float | None]:
     """Images (h, w) or (h, w, 3) of one shape and type -> their difference in DN, and the number of saturated pixels.
 
     A pixel that the laser-on image saturates says "at least this much" where the off image leaves room for laser light,
     and then keeps the full scale; elsewhere, as in a lamp that saturates both, it keeps its difference, which is no
     light of the laser's. Of colour images all channels must be saturated: one alone would make a spike in their mean.
-    The second value is the full scale, None where nothing is saturated. Raises InputError: another shape or type, or
+    The second value is the full scale, None where nothing is saturated; saturation: DN, of an image that does not tell
+    it by its type. Raises InputError: another shape or type, or
     an off image brighter than the other.
     """
     image, off = check_image(image), check_image(off)
@@ -38,7 +41,7 @@ def subtract_off(image: NDArray[Any], off: NDArray[Any]) -> tuple[NDArray[np.flo
     if np.nanmax(difference) <= max(-0.5 * float(np.nanmin(difference)), 0.0):
         cure = "give the laser-on image first"
         raise InputError("the laser-off image is the brighter one", where="off image", cure=cure)
-    full = image_saturation(image)
+    full = image_saturation(image) if saturation is None else saturation
     if full is not None:
         censored = (image >= full) & (off <= (1.0 - ROOM) * full)
         difference[censored if image.ndim == 2 else censored.all(axis=2)] = full

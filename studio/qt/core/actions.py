@@ -25,6 +25,19 @@ class Command:
     checkable: bool = False
 
 
+VIEW_KEYS = {
+    "1": "from the front",
+    "2": "from the left",
+    "3": "from above",
+    "4": "at an angle",
+    "5": "parallel or in perspective",
+    "C": "through the camera",
+    "L": "along the laser",
+    "F": "frame what is selected",
+    "A": "frame everything",
+    "X": "arrows along the part or the world",
+}
+"""Key -> what it does while the 3D view has the focus."""
 COMMANDS: tuple[Command | str, ...] = (
     Command("new", "File", "New from &template…", "Ctrl+N", "new", "Start from a project that comes with the program"),
     Command("open", "File", "&Open…", "Ctrl+O", "open", "Open a project file"),

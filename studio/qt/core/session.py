@@ -68,6 +68,11 @@ class Render:
         """The project, at full scale, by whose sensor, power and extraction it is developed and measured."""
         return self.source if self.cell and self.source is not None else now
 
+    def repeatable(self, now: Project) -> bool:
+        """A run of its first step gives the same images: those of a step follow the scan's plan, a cell its study's."""
+        alone = self.scan is None and not self.cell
+        return alone and self.noise and self.frame.step == 0 and self.project.seed == now.seed
+
     def is_stale(self, now: Project) -> bool:
         """The scene has changed since, in a way that developing cannot follow; what a study measured stays as it is."""
         return not self.cell and is_stale(self.source or self.project, now)

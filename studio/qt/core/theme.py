@@ -35,34 +35,21 @@ class Colours:
     good: str
 
 
-DARK = Colours(
-    window="#20252b",
-    base="#171b20",
-    raised="#2b323a",
-    text="#dfe4e9",
-    muted="#94a0ab",
-    line="#38414a",
-    edge="#7c8894",
-    accent="#2f9fc0",
-    on_accent="#06161c",
-    warning="#e8b04a",
-    error="#f0736a",
-    good="#5fbf8f",
-)
-LIGHT = Colours(
-    window="#f1f3f5",
-    base="#ffffff",
-    raised="#ffffff",
-    text="#1c2733",
-    muted="#5d6974",
-    line="#d3d9de",
-    edge="#6f7982",
-    accent="#0b6e8a",
-    on_accent="#ffffff",
-    warning="#9a6500",
-    error="#b3261e",
-    good="#1d7a4c",
-)
+DARK_AND_LIGHT = {
+    "window": ("#20252b", "#f1f3f5"),
+    "base": ("#171b20", "#ffffff"),
+    "raised": ("#2b323a", "#ffffff"),
+    "text": ("#dfe4e9", "#1c2733"),
+    "muted": ("#94a0ab", "#5d6974"),
+    "line": ("#38414a", "#d3d9de"),
+    "edge": ("#7c8894", "#6f7982"),
+    "accent": ("#38a8ca", "#0b6e8a"),
+    "on_accent": ("#06161c", "#ffffff"),
+    "warning": ("#e8b04a", "#966200"),
+    "error": ("#f0736a", "#b3261e"),
+    "good": ("#5fbf8f", "#1d7a4c"),
+}
+DARK, LIGHT = (Colours(**{role: pair[theme] for role, pair in DARK_AND_LIGHT.items()}) for theme in (0, 1))
 
 
 class _Notice(QObject):

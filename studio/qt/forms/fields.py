@@ -138,6 +138,7 @@ class TextField(QLineEdit):
             self.enter()
             if self.pending:
                 self.revert()
+                self.refused.emit("")
             self.deselect()
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:

@@ -201,6 +201,9 @@ class Row(QWidget):
             if self.change(whole(value)):
                 self.refresh(self.spec)  # as it is written here: 20 for 20.0
             else:
+                if isinstance(field, TextField) and not field.hasFocus():  # the old value comes back at once
+                    why = f"{self.spec.label}: {self.reason.text()} The value is as it was"
+                    self.form.session.message.emit("warning", why)
                 field.reject()
 
         field.entered.connect(enter)

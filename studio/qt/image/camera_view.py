@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QSizePolicy,
-    QSplitter,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -26,6 +25,7 @@ from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
+from studio.qt.core.widgets import ElidedLabel, flush, upper_and_lower
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.line_overlay import LineOverlay
 from studio.qt.image.row_profile import RowProfile
@@ -57,7 +57,7 @@ class CameraView(QWidget):
         self.bright.setChecked(True)
         self.readout = QLabel()
         self.badge = QFrame()
-        self.badge_text = QLabel()
+        self.badge_text = ElidedLabel()
         self.lines = QWidget()
         self.render_button = QPushButton("Render")
         self.is_live = True
@@ -73,10 +73,6 @@ class CameraView(QWidget):
         self._lay_out()
         self._connect()
         self._renders_changed()
-
-    def closeEvent(self, event: QCloseEvent) -> None:
-        self.runner.close()
-        super().closeEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -140,31 +136,23 @@ class CameraView(QWidget):
             bar.addWidget(button)
         badge = QHBoxLayout(self.badge)
         badge.setContentsMargins(8, 3, 4, 3)
-        self.badge_text.setMinimumWidth(1)  # a narrow panel may cut it off
         badge.addWidget(self.badge_text, 1)
         badge.addWidget(self.render_button)
         self.readout.setContentsMargins(8, 2, 8, 2)
         self.readout.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.readout.setMinimumWidth(1)
         picture = QWidget()
-        column = QVBoxLayout(picture)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(self.badge)
+        column = flush(QVBoxLayout(picture), self.badge)
         column.addWidget(self.view, 1)
         column.addWidget(self.readout)
-        split = QSplitter(Qt.Orientation.Vertical)
-        split.addWidget(picture)
-        split.addWidget(self.profile)
-        split.setStretchFactor(0, 3)
-        split.setStretchFactor(1, 1)
-        split.setSizes([300, 140])
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
+        layout = flush(QVBoxLayout(self))
         layout.addLayout(bar)
-        layout.addWidget(split, 1)
+        layout.addWidget(upper_and_lower(picture, self.profile, (300, 140)), 1)
         self._colour()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.runner.close()
+        super().closeEvent(event)
 
     def _connect(self) -> None:
         session = self.session

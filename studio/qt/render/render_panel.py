@@ -14,8 +14,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
     QLabel,
-    QProgressBar,
-    QPushButton,
     QSizePolicy,
     QSpinBox,
     QVBoxLayout,
@@ -33,6 +31,7 @@ from render.world.world import World
 from studio.project.project import Project
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Render, Session
+from studio.qt.core.widgets import text_button, thin_bar
 from studio.qt.render.history import History
 from studio.qt.render.render_job import can_go_on, render_frames
 from studio.runtime.jobs import Job, Progress, State
@@ -98,19 +97,16 @@ class RenderPanel(QWidget):
             self.transport.addItem(text, value)
         self.transport.setToolTip("A short pilot finds out what the reflections add, unless you decide.")
         self.scale = QComboBox()
-        self.start_button = QPushButton("Render")
-        self.start_button.setObjectName("primary")
-        self.continue_button = QPushButton("Continue")
-        self.continue_button.setToolTip("Go on with the shown render, which was stopped before it reached its errors")
-        self.pause_button = QPushButton("Pause")
-        self.keep_button = QPushButton("Keep")
-        self.keep_button.setToolTip("Stop here and keep the image as it is")
-        self.cancel_button = QPushButton("Cancel")
-        self.cancel_button.setToolTip("Stop and forget this render")
-        self.bar = QProgressBar(maximum=1000, textVisible=False)
-        self.bar.setMaximumHeight(10)
+        self.start_button = text_button("Render", name="primary")
+        self.continue_button = text_button(
+            "Continue", "Go on with the shown render, which was stopped before it reached its errors"
+        )
+        self.pause_button = text_button("Pause")
+        self.keep_button = text_button("Keep", "Stop here and keep the image as it is")
+        self.cancel_button = text_button("Cancel", "Stop and forget this render")
+        self.bar = thin_bar()
         self.stage = QLabel()
-        self.errors = QLabel(textFormat=Qt.TextFormat.RichText)
+        self.errors = QLabel(textFormat=Qt.TextFormat.RichText, wordWrap=True)
         self.history = History(session)
         self._lay_out()
         self._connect()
@@ -234,9 +230,8 @@ class RenderPanel(QWidget):
         session.document_replaced.connect(self._document_replaced)
         session.render_asked.connect(self.start)
         runner.progress.connect(self._tell_progress)
-        runner.finished.connect(self._ended)
-        runner.failed.connect(self._ended)
-        runner.cancelled.connect(self._ended)
+        for ended in (runner.finished, runner.failed, runner.cancelled):
+            ended.connect(self._ended)
         self._refined.connect(self._take_frame)
         self.laser_error.valueChanged.connect(
             lambda percent: session.set(("render", "laser_error"), round(percent / 100, 8), "laser error")

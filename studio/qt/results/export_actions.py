@@ -78,7 +78,8 @@ class ExportActions(QObject):
         render = self.session.shown
         if render is None:
             return
-        how = development(render.project, self.session.project, render.image_scale)
+        now = render.developed_by(self.session.project)
+        how = development(render.project, now, render.image_scale)
         what = export.Exported(
             how.powered,
             render.project,
@@ -88,6 +89,8 @@ class ExportActions(QObject):
             tuple(render.images),
             dict(render.measurements),
             render.scanner_scale,
+            repeatable=render.repeatable(now),
+            finished=render.final and not render.frame.unfinished,
         )
         writers: dict[str, export.Writer] = {
             "report": export.export_report,
@@ -98,7 +101,7 @@ class ExportActions(QObject):
         writer = writers[KINDS[key][2]]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
-            progress(path.name, 0.3)
+            progress(path.name, 0.0)  # how far it is, nobody knows
             return export.export_unless(cancelled, writer, path, what)
 
         notes = scale_notes(render.scanner_scale)

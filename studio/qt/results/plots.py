@@ -5,11 +5,50 @@ from __future__ import annotations
 from typing import Any
 
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF
+from PySide6.QtCore import QEvent, QPointF, Signal
 
 from studio.qt.core import theme
 
 pg.setConfigOptions(antialias=False)
+
+
+class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """Plots whose samples belong to scan lines. `hovered` tells the one under the mouse, None when it leaves."""
+
+    hovered = Signal(object)
+    chosen = Signal(int)
+
+    def __init__(self, *shown: pg.PlotItem) -> None:
+        """shown: from top to bottom."""
+        super().__init__()
+        self.plots = shown
+        for row, plot in enumerate(shown):
+            self.addItem(plot, row=row, col=0)
+            plot.getAxis("left").setWidth(62)
+        self.ci.layout.setContentsMargins(2, 4, 8, 2)
+        self.scene().sigMouseMoved.connect(self._move)
+        self.scene().sigMouseClicked.connect(self._click)
+
+    def scan_line_at(self, position: QPointF) -> int | None:
+        """Of the sample at a place of the widget, None where none is near."""
+        raise NotImplementedError
+
+    def leaveEvent(self, event: QEvent) -> None:
+        super().leaveEvent(event)
+        self.hovered.emit(None)
+
+    def _move(self, position: QPointF) -> None:
+        scan_line = self.scan_line_at(position)
+        if scan_line is not None:
+            self.hovered.emit(scan_line)
+
+    def _click(self, event: Any) -> None:
+        scan_line = self.scan_line_at(event.scenePos())
+        if event.double():
+            for plot in self.plots:
+                plot.enableAutoRange()
+        elif scan_line is not None:
+            self.chosen.emit(scan_line)
 
 
 def new_plot(bottom: str = "", left: str = "", left_unit: str = "") -> pg.PlotItem:

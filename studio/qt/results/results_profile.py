@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QPointF, Signal
+from PySide6.QtCore import QPointF
 
 from analysis.report.colour import TRUTH, method_colour
 from studio.qt.core import theme
@@ -17,19 +17,13 @@ NEAR = 30.0
 """px; the mouse hovers a sample that is no farther than this."""
 
 
-class ProfilePlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+class ProfilePlot(plots.PointedPlots):
     """Distance from the laser over the place along its fan, both mm. Nearer is up."""
 
-    hovered = Signal(object)
-    chosen = Signal(int)
-
     def __init__(self) -> None:
-        super().__init__()
         self.plot = plots.new_plot("Along the fan / mm", "Distance from the laser", "mm")
-        self.addItem(self.plot)
+        super().__init__(self.plot)
         self.plot.invertY(True)
-        self.plot.getAxis("left").setWidth(62)
-        self.ci.layout.setContentsMargins(2, 4, 8, 2)
         self.truth = plots.curve(TRUTH)
         self.truth.setZValue(10)
         self.plot.addItem(self.truth)
@@ -37,8 +31,6 @@ class ProfilePlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.plot.addItem(self.ring, ignoreBounds=True)
         self._dots: list[Any] = []
         self._shown: dict[str, Series] = {}
-        self.scene().sigMouseMoved.connect(self._move)
-        self.scene().sigMouseClicked.connect(self._click)
         self.repaint_theme()
 
     def show_series(self, truth: Series | None, measured: dict[str, Series]) -> None:
@@ -75,12 +67,8 @@ class ProfilePlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         plots.paint(self.plot)
         self.ring.setPen(pg.mkPen(c.text, width=1.5))
 
-    def leaveEvent(self, event: QEvent) -> None:
-        super().leaveEvent(event)
-        self.hovered.emit(None)
-
-    def nearest(self, position: QPointF) -> int | None:
-        """The scan line of the sample nearest to a place of the widget, None where none is near."""
+    def scan_line_at(self, position: QPointF) -> int | None:
+        """Of the nearest sample."""
         point = plots.at(self.plot, position)
         if point is None:
             return None
@@ -93,15 +81,3 @@ class ProfilePlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
                 if squared[i] < best:
                     best, found = float(squared[i]), int(series.index[i])
         return found
-
-    def _move(self, position: QPointF) -> None:
-        scan_line = self.nearest(position)
-        if scan_line is not None:
-            self.hovered.emit(scan_line)
-
-    def _click(self, event: Any) -> None:
-        scan_line = self.nearest(event.scenePos())
-        if event.double():
-            self.plot.enableAutoRange()
-        elif scan_line is not None:
-            self.chosen.emit(scan_line)

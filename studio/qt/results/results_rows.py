@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QPointF, Signal
+from PySide6.QtCore import QPointF
 
 from analysis.report.colour import TRUTH, method_colour
 from render.base.arrays import Float
@@ -18,26 +18,18 @@ PLOTTED = 99.5
 """Percent of the errors within the axis."""
 
 
-class RowPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
-    """Stacked plots with one scan-line axis. `hovered` tells the scan line under the mouse, None when it leaves."""
-
-    hovered = Signal(object)
-    chosen = Signal(int)
+class RowPlots(plots.PointedPlots):
+    """Stacked plots with one scan-line axis."""
 
     def __init__(self) -> None:
-        super().__init__()
         self.position = plots.new_plot("", "Position", "px")
         self.depth = plots.new_plot("", "Depth", "mm")
         self.error = plots.new_plot("Row", "Error", "µm")
-        self.plots = (self.position, self.depth, self.error)
-        for row, plot in enumerate(self.plots):
-            self.addItem(plot, row=row, col=0)
-            plot.getAxis("left").setWidth(62)
-            if plot is not self.error:
-                plot.setXLink(self.error)
-                plot.getAxis("bottom").setStyle(showValues=False)
+        super().__init__(self.position, self.depth, self.error)
+        for plot in (self.position, self.depth):
+            plot.setXLink(self.error)
+            plot.getAxis("bottom").setStyle(showValues=False)
         self.ci.layout.setSpacing(2)
-        self.ci.layout.setContentsMargins(2, 4, 8, 2)
         self.cursors = [plots.cursor(plot) for plot in self.plots]
         self.zero = pg.InfiniteLine(angle=0, pos=0.0)
         self.error.addItem(self.zero, ignoreBounds=True)
@@ -46,8 +38,6 @@ class RowPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             plot.addItem(ring, ignoreBounds=True)
         self._drawn: list[tuple[pg.PlotItem, Any]] = []
         self._shown: dict[str, tuple[Series, Float]] = {}
-        self.scene().sigMouseMoved.connect(self._move)
-        self.scene().sigMouseClicked.connect(self._click)
         self.repaint_theme()
 
     def show_series(
@@ -102,31 +92,14 @@ class RowPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             ring.setPen(pg.mkPen(c.text, width=1.5))
         self.zero.setPen(pg.mkPen(c.muted, width=1))
 
-    def leaveEvent(self, event: QEvent) -> None:
-        super().leaveEvent(event)
-        self.hovered.emit(None)
-
     def _add(self, plot: pg.PlotItem, item: Any) -> Any:
         plot.addItem(item)
         self._drawn.append((plot, item))
         return item
 
-    def _scan_line(self, position: QPointF) -> int | None:
+    def scan_line_at(self, position: QPointF) -> int | None:
         for plot in self.plots:
             point = plots.at(plot, position)
             if point is not None:
                 return round(point.x())
         return None
-
-    def _move(self, position: QPointF) -> None:
-        scan_line = self._scan_line(position)
-        if scan_line is not None:
-            self.hovered.emit(scan_line)
-
-    def _click(self, event: Any) -> None:
-        scan_line = self._scan_line(event.scenePos())
-        if event.double():
-            for plot in self.plots:
-                plot.enableAutoRange()
-        elif scan_line is not None:
-            self.chosen.emit(scan_line)

@@ -20,9 +20,8 @@ class ScanBar(QWidget):
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.session = session
+        self.session, self.steps = session, StepBar(session)
         self.scan: ScanResults | None = None
-        self.steps = StepBar(session)
         self.steps.setMinimumWidth(260)
         self.told = QLabel()
         self.scope = QComboBox()

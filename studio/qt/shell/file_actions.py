@@ -5,17 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
-from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QMessageBox, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QWidget
 
 from render.base.errors import InputError
 from studio.project.autosave import Autosave, find, sweep
-from studio.project.document import Document, replaced
+from studio.project.date_and_time import read_out
+from studio.project.document import Document
 from studio.project.project import Project, project_file
 from studio.project.project_files import carry, missing_files
 from studio.project.templates import template_folder
 from studio.qt.core.dialogs import TemplateDialog, ask_recovery, ask_unsaved, show_trouble, suggested
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
+from studio.qt.shell.missing_files import may_open
 from studio.runtime.error_messages import trouble
 from studio.runtime.preferences import PreferencesFile, recovery_folder
 from studio.scan.scan_folder import ScanFolder, image_scale_of, open_folder
@@ -102,17 +104,20 @@ class FileActions(QObject):
         scan = holds_scan(path)
         if scan is not None:
             return self.open_results(scan, ask)
-        if ask and not self.may_close():
-            return False
         try:
             file = project_file(path)
             document = Document(Project.load(file), file)
-            gone = missing_files(document.project.scene, document.root)
+            missing_files(document.project.scene, document.root)
         except (InputError, OSError, MemoryError) as error:
             self.preferences.forget_recent(path)
             self._tell(error, f"open {path.name}")
             return False
-        if gone and not self._open_without(document, gone):
+        try:
+            wanted = may_open(self.window, document)
+        except (InputError, OSError) as error:
+            self._tell(error, f"open {path.name}")
+            return False
+        if not wanted or (ask and not self.may_close()):
             return False
         self.replace(document)
         self.preferences.add_recent(file)
@@ -192,7 +197,8 @@ class FileActions(QObject):
         left = find(self.autosave.folder)
         if not left:
             return False
-        if not ask_recovery(self.window, left[0].project.name, left[0].when, len(left)):
+        when = read_out(left[0].when)
+        if not ask_recovery(self.window, left[0].project.name, when, len(left)):
             left[0].discard()
             return False
         document = left[0].document()
@@ -203,7 +209,7 @@ class FileActions(QObject):
         self._pristine = document.project.model_copy(update={"name": ""})  # equal to nothing: it is unsaved work
         self.keep()
         left[0].discard()
-        self.session.message.emit("info", f"Recovered the work of {left[0].when}; save it to keep it")
+        self.session.message.emit("info", f"Recovered the work of {when}; save it to keep it")
         return True
 
     def fill_recent(self, menu: QMenu) -> None:
@@ -238,30 +244,6 @@ class FileActions(QObject):
         self.count_as_saved(document.project)
         self.preferences.add_recent(path)
         self.session.message.emit("info", f"Saved {path}")
-        return True
-
-    def _open_without(self, document: Document, gone: list[tuple[int, Path]]) -> bool:
-        """Files are missing: open with their objects hidden, or not at all."""
-        names = [document.project.scene.objects[i].name for i, _ in gone]
-        button = QMessageBox.StandardButton
-        box = QMessageBox(
-            QMessageBox.Icon.Warning, "Missing files", "Files of this project are missing", parent=self.window
-        )
-        box.setObjectName("missing")
-        listed = "\n".join(f"{name}: {file}" for name, (_, file) in zip(names[:8], gone, strict=False))
-        box.setInformativeText(
-            f"{listed}\n\nPut them back and open the project again; or open it with these objects hidden. "
-            "The project file stays as it is until you save."
-        )
-        hide = box.addButton("Open with them hidden", QMessageBox.ButtonRole.AcceptRole)
-        box.addButton(button.Cancel)
-        box.exec()
-        if box.clickedButton() is not hide:
-            return False
-        project = document.project
-        for i in {i for i, _ in gone}:
-            project = replaced(project, ("scene", "objects", i, "visible"), False)
-        document.apply("hide what is missing", project)
         return True
 
     def _tell(self, error: BaseException, doing: str) -> None:

@@ -36,8 +36,8 @@ class Help(QDialog):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setWindowTitle("Help")
         self.setObjectName("help")
+        self.setWindowTitle("Help")
         self.list = QListWidget()
         self.list.addItems(list(PAGES.values()))
         self.list.setMaximumWidth(210)

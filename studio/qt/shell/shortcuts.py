@@ -9,7 +9,7 @@ from PySide6.QtGui import QKeySequence
 from PySide6.QtWidgets import QDialog, QLabel, QVBoxLayout, QWidget
 
 from studio.qt.core import theme
-from studio.qt.core.actions import COMMANDS, Command
+from studio.qt.core.actions import COMMANDS, VIEW_KEYS, Command
 
 MOUSE = (
     ("Drag", "turn the 3D view"),
@@ -18,9 +18,15 @@ MOUSE = (
     ("Click", "select; in a plot: keep the scan line"),
     ("Double-click", "frame what is selected; in a plot: show everything"),
     ("Hover", "the same scan line in every view"),
-    ("Drag on a number", "change it"),
+    ("Drag on a number", "change it; with Shift finer, with Ctrl coarser"),
 )
-COLUMNS = (("File", "Render"), ("Edit", "Scene", "Help"), ("View", "Measure"), ("Mouse",))
+FIELDS = (
+    ("Return", "take it over"),
+    ("Esc", "the value as it was; end a drag, a menu, the tour"),
+    ("Up, Down", "a step; with Shift a tenth of it"),
+)
+LISTS = (("Return", "frame the part"), ("F2", "name a part or a render"), ("Del", "remove a part or a render"))
+COLUMNS = (("File", "Render", "Fields"), ("Edit", "Scene", "Lists", "Help"), ("View", "Measure", "3D view"), ("Mouse",))
 
 
 class CheatSheet(QDialog):
@@ -46,7 +52,7 @@ def page() -> str:
             keys = QKeySequence(command.shortcut).toString(QKeySequence.SequenceFormat.NativeText)
             text = command.text.replace("&", "").rstrip("…")
             groups.setdefault(command.menu.split("/")[0], []).append((keys, text))
-    groups["Mouse"] = list(MOUSE)
+    groups |= {"Mouse": list(MOUSE), "Fields": list(FIELDS), "Lists": list(LISTS), "3D view": list(VIEW_KEYS.items())}
     cells = "".join(
         f"<td style='padding-right: 28px'>{''.join(_group(name, groups[name]) for name in column)}</td>"
         for column in COLUMNS

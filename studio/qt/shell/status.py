@@ -73,6 +73,7 @@ class StatusBar(QStatusBar):
         self.job = job
         paused = job.state is State.PAUSED
         self.work.setText(f"{job.name}: {job.stage}" if job.stage and job.stage != job.name else job.name)
+        self.bar.setMaximum(1000 if job.done > 0.0 else 0)  # without a share that is known it runs to and fro
         self.bar.setValue(round(1000 * job.done))
         self.left.setText("stopping" if job.cancel_asked else "paused" if paused else time_left(job.seconds_left))
         self.pause.setIcon(icon("play" if paused else "pause"))

@@ -43,52 +43,23 @@ class Workspace:
     """The areas at the sides, not the bottom one, hold the lower corners."""
 
 
+SETTING_UP = (
+    Column(LEFT, 0.17, (("scene", 1.0),)),
+    Column(RIGHT, 0.26, (("inspector", 0.58), ("readout", 0.42))),
+    Column(BOTTOM, 0.42, (("camera", 1.0),)),
+)
+RENDERING = (
+    Column(LEFT, 0.74, (("camera", 1.0),)),
+    Column(RIGHT, 0.26, (("render", 0.6), ("develop", 0.4))),
+)
+MEASURING = (Column(LEFT, 0.42, (("camera", 1.0),)), Column(BOTTOM, 0.5, (("results", 1.0),)))
+STUDYING = (Column(LEFT, 0.32, (("study", 1.0),)), Column(RIGHT, 0.68, (("charts", 1.0),)))
+QUESTION = "Many runs with one question: what a value changes, and where methods break"
 WORKSPACES = (
-    Workspace(
-        "setup",
-        "Set up",
-        "Place and design: camera, lasers, objects",
-        True,
-        (
-            Column(LEFT, 0.17, (("scene", 1.0),)),
-            Column(RIGHT, 0.26, (("inspector", 0.58), ("readout", 0.42))),
-            Column(BOTTOM, 0.42, (("camera", 1.0),)),
-        ),
-        True,
-    ),
-    Workspace(
-        "render",
-        "Render",
-        "The image and its light",
-        False,
-        (
-            Column(LEFT, 0.74, (("camera", 1.0),)),
-            Column(RIGHT, 0.26, (("render", 0.6), ("develop", 0.4))),
-        ),
-        True,
-    ),
-    Workspace(
-        "measure",
-        "Measure",
-        "Line, points and their error",
-        True,
-        (
-            Column(LEFT, 0.42, (("camera", 1.0),)),
-            Column(BOTTOM, 0.5, (("results", 1.0),)),
-        ),
-        False,
-    ),
-    Workspace(
-        "study",
-        "Study",
-        "Many runs with one question: what a value changes, and where methods break",
-        False,
-        (
-            Column(LEFT, 0.32, (("study", 1.0),)),
-            Column(RIGHT, 0.68, (("charts", 1.0),)),
-        ),
-        True,
-    ),
+    Workspace("setup", "Set up", "Place and design: camera, lasers, objects", True, SETTING_UP, True),
+    Workspace("render", "Render", "The image and its light", False, RENDERING, True),
+    Workspace("measure", "Measure", "Line, points and their error", True, MEASURING, False),
+    Workspace("study", "Study", QUESTION, False, STUDYING, True),
 )
 """In the order of the switch; the 3D view takes what the columns leave."""
 

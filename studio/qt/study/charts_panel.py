@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
     QLabel,
-    QSplitter,
     QStackedLayout,
     QTabBar,
     QTableWidget,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, one_of
+from studio.qt.core.widgets import flush, upper_and_lower
 from studio.qt.study.cell_opener import CellOpener
 from studio.qt.study.chart_view import ChartView
 from studio.qt.study.study_work import StudyWork
@@ -73,8 +73,8 @@ class ChartsPanel(QWidget):
         self.refresh()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        self.chart.close()
-        self.work.close()
+        for part in (self.chart, self.work):
+            part.close()
         super().closeEvent(event)
 
     @property
@@ -174,24 +174,10 @@ class ChartsPanel(QWidget):
         upper.addWidget(self.chart, 1)
         upper.addWidget(self.reading)
         upper.addWidget(self.findings)
-        split = QSplitter(Qt.Orientation.Vertical)
-        split.addWidget(picture)
-        split.addWidget(self.table)
-        split.setStretchFactor(0, 3)
-        split.setStretchFactor(1, 1)
-        split.setSizes([420, 150])
-        split.setCollapsible(0, False)
-        full = QWidget()
-        column = QVBoxLayout(full)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(0)
-        column.addWidget(split, 1)
+        full = upper_and_lower(picture, self.table, (420, 150))
+        full.setCollapsible(0, False)
         holder = QWidget()
         self.stack = QStackedLayout(holder)
         self.stack.addWidget(empty)
         self.stack.addWidget(full)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(self.tabs)
-        layout.addWidget(holder, 1)
+        flush(QVBoxLayout(self), self.tabs).addWidget(holder, 1)

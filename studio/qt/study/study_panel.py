@@ -18,8 +18,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QMenu,
-    QProgressBar,
-    QPushButton,
     QScrollArea,
     QSizePolicy,
     QSpinBox,
@@ -31,15 +29,17 @@ from render.base.threads import thread_count
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
+from studio.qt.core.widgets import ElidedLabel, flush, text_button, thin_bar
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
 from studio.runtime.jobs import Job, State
-from studio.study.draft import new_sweep
+from studio.study.draft import new_sweep, varies_nothing
 from studio.study.estimate import Estimate
 from studio.study.study import Study, ready_made
 
 NARROWEST = 300
 """px; every row has room for its values then."""
+EMPTY = "What it takes is told here as soon as every sweep varies a field."
 FILES = "Studies (*.json);;All files (*)"
 
 
@@ -53,8 +53,7 @@ class StudyPanel(QWidget):
         self.work.attach(runner)
         self.name = QLineEdit(maxLength=100)
         self.name.setAccessibleName("Name of the study")
-        self.files = QPushButton("File")
-        self.files.setToolTip("Ready-made studies, files, and results of earlier runs")
+        self.files = text_button("File", "Ready-made studies, files, and results of earlier runs")
         menu = QMenu(self.files)
         menu.aboutToShow.connect(partial(self._fill_files, menu))
         self.files.setMenu(menu)
@@ -76,22 +75,17 @@ class StudyPanel(QWidget):
         self.repeats.setKeyboardTracking(False)
         self.scale.setKeyboardTracking(False)
         self.told = QLabel(wordWrap=True)
-        self.time = QPushButton("Time it")
-        self.time.setToolTip("Measure one cell of each sweep, to tell how long the study takes")
+        self.time = text_button("Time it", "Measure one cell of each sweep, to tell how long the study takes")
         self.problem = QLabel(wordWrap=True)
         self.problem.setObjectName("error")
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.folder = QLabel()
+        self.folder = ElidedLabel(Qt.TextElideMode.ElideMiddle)
         self.folder.setObjectName("muted")
         self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.choose = QPushButton("Folder…")
-        self.choose.setToolTip("Where the results go; a study that is there goes on")
-        self.run = QPushButton("Run…")
-        self.run.setObjectName("primary")
-        self.stop = QPushButton("Stop")
-        self.stop.setToolTip("What is measured stays")
-        self.bar = QProgressBar(maximum=1000, textVisible=False)
-        self.bar.setMaximumHeight(10)
+        self.choose = text_button("Folder…", "Where the results go; a study that is there goes on")
+        self.run = text_button("Run…", name="primary")
+        self.stop = text_button("Stop", "What is measured stays")
+        self.bar = thin_bar()
         self.stage = QLabel()
         self.stage.setObjectName("muted")
         self._lay_out()
@@ -213,20 +207,22 @@ class StudyPanel(QWidget):
         self.stop.clicked.connect(work.stop)
         work.draft_changed.connect(self.refresh)
         work.estimated.connect(self._tell_estimate)
-        work.state_changed.connect(self._show_state)
-        work.found_changed.connect(self._show_state)
+        for changed in (work.state_changed, work.found_changed):
+            changed.connect(self._show_state)
         work.unseen.progress.connect(self._tell_timing)
         self.runner.progress.connect(self._tell_progress)
         self.session.document_replaced.connect(self.refresh)
 
     def _tell_estimate(self) -> None:
-        work = self.work
+        work, empty = self.work, varies_nothing(self.work.draft)
         self.problem.setText(work.failure or work.problem)
         self.problem.setVisible(bool(self.problem.text()))
         if work.estimate is not None:
             self.told.setText(estimate_text(work.estimate, self._processors()))
         else:
-            self.told.setText("" if work.problem else "Working out what it takes…")
+            self.told.setText("" if work.problem else EMPTY if empty else "Working out what it takes…")
+        self.told.setObjectName("muted" if empty else "")
+        self.told.style().polish(self.told)
         self.told.setVisible(bool(self.told.text()))
         self.time.setVisible(work.estimate is not None and work.estimate.seconds is None and not work.running)
         self._show_state()
@@ -261,11 +257,7 @@ class StudyPanel(QWidget):
         if not running:
             self.bar.setValue(0)
             self.stage.clear()
-        text = str(work.folder) if work.folder is not None else "no folder yet"
-        self.folder.setText(
-            self.folder.fontMetrics().elidedText(text, Qt.TextElideMode.ElideMiddle, self.width() - 130)
-        )
-        self.folder.setToolTip(text)
+        self.folder.setText(str(work.folder) if work.folder is not None else "no folder yet")
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -317,9 +309,7 @@ class StudyPanel(QWidget):
         foot.addWidget(self.bar)
         foot.addWidget(self.stage)
         foot.addLayout(buttons)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
+        layout = flush(QVBoxLayout(self))
         layout.addWidget(area, 1)
         layout.addLayout(foot)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,10 @@ from studio.project.templates import DESCRIPTIONS, FOLDER
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Job, Progress, State
-from studio.study.draft import Data, finished, new_draft, path_text, suggested
+from studio.runtime.workers import Engine
+from studio.study.draft import Data, by_names, finished, new_draft, path_text, suggested, varies_nothing
 from studio.study.estimate import Costs, Estimate, costs, estimate
 from studio.study.folder_run import Found, in_window, opened, run_into
-from studio.study.runner import Engine
 from studio.study.study import Study, base_project
 
 LANE = "study"
@@ -45,6 +46,7 @@ class Ended:
 class StudyWork(QObject):
     """Never asks a person anything: what cannot be done is told in `problem`."""
 
+    _grew = Signal(object, object)
     draft_changed = Signal()
     estimated = Signal()
     """`estimate`, or `problem` in its place, or `failure` is another one."""
@@ -53,7 +55,6 @@ class StudyWork(QObject):
     """It runs, or no longer; the folder is another one."""
     asked_for = Signal()
     """A field joined the draft."""
-    _grew = Signal(object, object)
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
@@ -195,7 +196,7 @@ class StudyWork(QObject):
         self.change(lambda draft: draft.update(base=self.base_name))
 
     def save(self, file: Path) -> bool:
-        """Write the study's file; False: told in `problem`, nothing is written."""
+        """Write the study's file; False: told in `failure`, nothing is written."""
         from render.base.files import atomic_write
         from studio.project.strict_json import pretty
 
@@ -206,7 +207,7 @@ class StudyWork(QObject):
             with atomic_write(file) as temporary:
                 temporary.write_text(pretty({"schema_version": 1, **data}) + "\n", encoding="utf-8")
         except InputError as error:
-            self._fail(in_window(error))
+            self._fail(self._said(error))
             return False
         self.session.message.emit("info", f"Saved the study: {file}")
         return True
@@ -221,7 +222,8 @@ class StudyWork(QObject):
         except InputError as error:
             self.estimate = None
             self.unseen.cancel("estimate")
-            self._tell(in_window(error))
+            # nothing is wrong with a sweep that nobody has filled in yet
+            self._tell("" if varies_nothing(self.draft) else self._said(error))
             return
         self._tell("")  # what was wrong before no longer is
         rows = self.found.rows if self.found is not None else {}
@@ -254,23 +256,14 @@ class StudyWork(QObject):
             study = self.study()
             bases = self.bases(study)
         except InputError as error:
-            self._fail(in_window(error))
+            self._fail(self._said(error))
             return
-        folder, engine, grew = self.folder, self.engine, self._grew.emit
+        folder, engine, grew = self.folder, self.engine, partial(self._grew.emit, self.folder)
 
         def work(progress: Progress, cancelled: Cancel) -> Ended:
             try:
-                return Ended(
-                    run_into(
-                        folder,
-                        study,
-                        bases,
-                        engine=engine,
-                        progress=progress,
-                        cancelled=cancelled,
-                        grew=lambda found: grew(folder, found),
-                    )
-                )
+                found = run_into(folder, study, bases, engine=engine, progress=progress, cancelled=cancelled, grew=grew)
+                return Ended(found)
             except InputError as error:
                 return Ended(None, in_window(error))
 
@@ -362,6 +355,9 @@ class StudyWork(QObject):
                 self.session.message.emit("info", f"The study was stopped; Go on continues it: {self.folder}")
             self.state_changed.emit()
             self.look_ahead()
+
+    def _said(self, error: InputError) -> str:
+        return by_names(in_window(error), self.draft)
 
     def _fail(self, failure: str) -> None:
         self.failure = failure

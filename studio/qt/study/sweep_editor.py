@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QMenu,
-    QPushButton,
     QSizePolicy,
     QSpinBox,
     QVBoxLayout,
@@ -26,6 +25,7 @@ from analysis.line.settings import Method
 from analysis.report.colour import method_colour, method_name
 from studio.editing.forms import FieldSpec
 from studio.editing.units import Unit
+from studio.qt.core.widgets import text_button
 from studio.qt.forms.fields import ChoiceField
 from studio.qt.forms.number_field import NumberField
 from studio.qt.image.line_overlay import swatch
@@ -69,8 +69,9 @@ class SweepEditor(QWidget):
             "Nothing is varied yet: right-click a field of the inspector, or add one here.", wordWrap=True
         )
         self.hint.setObjectName("muted")
-        self.add = QPushButton("Vary a field")
-        self.add.setToolTip("Every field of the project; the same is in the menu of each field of the inspector")
+        self.add = text_button(
+            "Vary a field", "Every field of the project; the same is in the menu of each field of the inspector"
+        )
         menu = QMenu(self.add)
         menu.aboutToShow.connect(lambda: fill_field_menu(menu, work.session, work.project()))
         self.add.setMenu(menu)
@@ -80,7 +81,7 @@ class SweepEditor(QWidget):
         self.samples.setKeyboardTracking(False)
         self.tolerance.setKeyboardTracking(False)
         self.tolerance.setToolTip("Of the range: the search ends in a bracket of this width, or where noise decides")
-        self.methods_button = QPushButton()
+        self.methods_button = text_button("")
         self.methods_button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.methods_menu = QMenu(self.methods_button)
         self.methods_button.setMenu(self.methods_menu)

@@ -21,9 +21,11 @@ from studio.scan.redevelop import is_stale
 from studio.scan.remarks import best
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, symmetric_limit
 
-POINT_PX, MARK_PX, NEAR_PX = 3.5, 9.0, 9.0
-OFFSET = -80.0
-"""Of the depth buffer, so that a point a little below the surface is seen."""
+POINT_PX, RIM_PX, MARK_PX, NEAR_PX = 3.5, 6.5, 9.0, 9.0
+OFFSET, RIM_OFFSET = -80.0, -60.0
+"""Of the depth buffer, so that a point a little below the surface is seen, and its rim behind it."""
+RIM = (0.16, 0.18, 0.21)
+"""Around the points, as an error of zero is as white as a white part."""
 
 
 class ErrorCloud(QObject):
@@ -48,16 +50,17 @@ class ErrorCloud(QObject):
         self._sample, self._scan_scale = PointSample(), 1.0
         self._data, self._actor = _point_actor(POINT_PX)
         self._marks, self._mark_actor = _point_actor(MARK_PX)
-        for actor in (self._actor, self._mark_actor):
+        self._rim = _rim_actor(self._data)
+        for actor in (self._rim, self._actor, self._mark_actor):
             view.renderer.AddActor(actor)
         self.bar = ColourBar(view)
         view.hovered.connect(self._hover)
-        session.renders_changed.connect(self.refresh)
-        session.measured.connect(self.refresh)
-        session.project_changed.connect(self._show_or_hide)
         session.hover_changed.connect(self._mark)
+        session.project_changed.connect(self._show_or_hide)
         session.step_changed.connect(self._follow_step)
         session.document_replaced.connect(self.clear)
+        for changed in (session.renders_changed, session.measured):
+            changed.connect(self.refresh)
         self.refresh()
 
     @property
@@ -155,8 +158,8 @@ class ErrorCloud(QObject):
 
     def _show_or_hide(self) -> None:
         shown = len(self.points) > 0 and (self.pinned or self._of_scan or not self._stale())
-        self._actor.SetVisibility(shown)
-        self._mark_actor.SetVisibility(shown)
+        for actor in (self._rim, self._actor, self._mark_actor):
+            actor.SetVisibility(shown)
         self.bar.setVisible(shown)
         self.view.redraw()
 
@@ -236,11 +239,22 @@ class ColourBar(QWidget):
 
 def _point_actor(size: float) -> tuple[pv.PolyData, vtkActor]:
     data = pv.PolyData()
+    return data, _actor_of(data, size, OFFSET)
+
+
+def _rim_actor(data: pv.PolyData) -> vtkActor:
+    actor = _actor_of(data, RIM_PX, RIM_OFFSET)
+    actor.GetMapper().ScalarVisibilityOff()
+    actor.GetProperty().SetColor(*RIM)
+    return actor
+
+
+def _actor_of(data: pv.PolyData, size: float, offset: float) -> vtkActor:
     mapper = vtkPolyDataMapper()
     mapper.SetInputData(data)
     mapper.SetColorModeToDirectScalars()
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
-    mapper.SetRelativeCoincidentTopologyPointOffsetParameter(OFFSET)
+    mapper.SetRelativeCoincidentTopologyPointOffsetParameter(offset)
     actor = vtkActor()
     actor.SetMapper(mapper)
     actor.PickableOff()
@@ -248,7 +262,7 @@ def _point_actor(size: float) -> tuple[pv.PolyData, vtkActor]:
     look = actor.GetProperty()
     look.SetPointSize(size)
     look.SetLighting(False)
-    return data, actor
+    return actor
 
 
 def _give(data: pv.PolyData, points: Float, colours: NDArray[np.uint8]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from studio.editing.placement import working_distance
 from studio.preview.view_camera import STANDARD, through, turntable
 from studio.project.document import FieldPath, value_at
 from studio.qt.core import theme
+from studio.qt.core.actions import VIEW_KEYS
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.viewport.gizmo import Gizmo
@@ -132,21 +134,22 @@ class Viewport(QWidget):
         view.left.connect(self._hover.stop)
         view.navigated.connect(self._leave)
         self.gizmo.told.connect(self.bar.tell)
-        for key, handler in (
-            ("1", lambda: self.look_along("front")),
-            ("2", lambda: self.look_along("left")),
-            ("3", lambda: self.look_along("top")),
-            ("4", lambda: self.look_along("iso")),
-            ("5", lambda: self.set_parallel(not self.view.eye.parallel)),
-            ("C", lambda: self.look_through(CAMERA)),
-            ("L", self.look_through_laser),
-            ("F", lambda: self.frame(self.session.selection)),
-            ("A", self.frame),
-            ("X", lambda: self.set_local(not self.gizmo.local)),
-        ):
+        handlers: dict[str, Callable[[], None]] = {
+            "1": lambda: self.look_along("front"),
+            "2": lambda: self.look_along("left"),
+            "3": lambda: self.look_along("top"),
+            "4": lambda: self.look_along("iso"),
+            "5": lambda: self.set_parallel(not self.view.eye.parallel),
+            "C": lambda: self.look_through(CAMERA),
+            "L": self.look_through_laser,
+            "F": lambda: self.frame(self.session.selection),
+            "A": self.frame,
+            "X": lambda: self.set_local(not self.gizmo.local),
+        }
+        for key in VIEW_KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
             shortcut.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-            shortcut.activated.connect(handler)
+            shortcut.activated.connect(handlers[key])
 
     def _draw(self) -> None:
         if not self.live.ready:

@@ -114,9 +114,9 @@ def test_a_clamp_makes_darker_and_says_so():
     scene, world = box_on_a_wall()
     free = images_of(scene, world, target=1e-5, most=16, surfaces=None)[-1]
     cut = images_of(scene, world, target=1e-5, most=16, surfaces=None, clamp=0.02)[-1]
-    assert free.clamped == 0 and free.cut == 0.0 and free.dropped == 0
+    assert free.clamped == 0 and free.clamped_radiance == 0.0 and free.invalid == 0
     assert cut.clamped > 0 and cut.radiance.mean() < free.radiance.mean()
-    assert free.radiance.mean() - cut.radiance.mean() == pytest.approx(cut.cut, rel=0.1)
+    assert free.radiance.mean() - cut.radiance.mean() == pytest.approx(cut.clamped_radiance, rel=0.1)
     settings = RenderSettings(ambient_samples=4, clamp=0.02, transport="interreflection", truth_images=False)
     frame = render_world(world, scene, settings=settings)
     assert frame.plan.clamp == 0.02 and frame.quality_of("ambient").clamped > 0

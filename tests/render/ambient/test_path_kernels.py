@@ -10,7 +10,7 @@ import pytest
 
 import render.ambient.integrator
 from render.ambient.integrator import ambient_image
-from render.ambient.path_state import CLAMPED, DROPPED, accumulate
+from render.ambient.path_state import CLAMPED, INVALID, accumulate
 from render.ambient.path_tracer import camera_paths
 from render.base.pose import Pose
 from render.material.bsdf import evaluate
@@ -59,12 +59,12 @@ def directional_albedo(row, o, both_sides):
     n, m = 600, 240
     z = (np.arange(n) + 0.5) / n
     phi = (np.arange(m) + 0.5) / m * 2 * math.pi
-    f, total = np.empty(3), np.zeros(3)
+    total = np.zeros(3)
     for c in np.concatenate([z, -z]) if both_sides else z:
         s = math.sqrt(1 - c * c)
         for angle in phi:
-            evaluate(row, np.ones(3), *o, s * math.cos(angle), s * math.sin(angle), c, f)
-            total += f * abs(c)
+            f = evaluate(row, (1.0, 1.0, 1.0), tuple(o), (s * math.cos(angle), s * math.sin(angle), c))
+            total += np.array(f) * abs(c)
     return total * 2 * math.pi / (n * m)
 
 
@@ -277,7 +277,7 @@ def test_threads_do_not_change_a_bit():
 def test_what_is_no_radiance_is_dropped_and_counted():
     sums, tally = np.zeros((2, 4)), np.zeros(2)
     for bad in ((math.nan, 0.0, 0.0), (0.0, math.inf, 0.0), (1.0, 1.0, -1e-9)):
-        accumulate(sums, tally, 1, math.inf, *bad)
-    assert tally[DROPPED] == 3 and not sums.any()
-    accumulate(sums, tally, 1, 2.0, 4.0, 2.0, 0.0)
+        accumulate(sums, tally, 1, math.inf, bad)
+    assert tally[INVALID] == 3 and not sums.any()
+    accumulate(sums, tally, 1, 2.0, (4.0, 2.0, 0.0))
     assert sums[1] == pytest.approx([2.0, 1.0, 0.0, 1.0]) and tally[CLAMPED] == 1

@@ -47,10 +47,10 @@ def test_what_is_no_number_is_left_out_and_counted():
     connections.pixel[:], connections.kind[:], connections.fan_bin[:] = np.arange(6), 0, 0
     splat_unoccluded(connections, np.array([False] * 5 + [True]), 6, 0.5, buffer)
     assert buffer.image.tolist() == [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
-    assert buffer.dropped[0] == 3.0 and np.isfinite(buffer.fan_moments).all() and np.isfinite(buffer.sums).all()
+    assert buffer.invalid[0] == 3.0 and np.isfinite(buffer.fan_moments).all() and np.isfinite(buffer.sums).all()
     so_far = nothing()
     so_far.add([buffer, empty_buffer(8)], np.zeros((2, 0, BINS)))
-    assert so_far.dropped == 3.0 and np.isfinite(so_far.radiance((2, 4))).all()
+    assert so_far.invalid == 3.0 and np.isfinite(so_far.radiance((2, 4))).all()
 
 
 def test_the_error_is_that_of_the_mean_of_the_passes():

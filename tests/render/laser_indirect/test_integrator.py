@@ -8,7 +8,7 @@ from render.laser.laser import Divergence, LineLaser
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.bdpt_pass import BdptPass, Sampling
 from render.laser_indirect.guiding import no_guide
-from render.laser_indirect.integrator import ALL_KINDS, empty_buffer, indirect_image, indirect_shares
+from render.laser_indirect.integrator import ALL_KINDS, empty_buffer, indirect_image, indirect_pilot
 from render.laser_indirect.light_group import IndirectLight
 from render.laser_indirect.photon_emission import (
     fan_integral,
@@ -69,7 +69,7 @@ def test_the_normal_quantile_inverts_the_distribution():
 def test_a_lone_convex_body_or_plane_has_no_indirect_light():
     for mesh in (plane_mesh((0, 0, 1), 0.9), moved(primitive_mesh(Sphere(radius=0.1)), (0, 0, 0.9))):
         _, parts = setting([mesh], [Lambertian(albedo=0.9)])
-        shares = indirect_shares(*parts)
+        shares = indirect_pilot(*parts)
         assert shares.interreflection == shares.caustic == shares.specular_chain == shares.subsurface == (0.0, 0.0)
 
 
@@ -223,12 +223,12 @@ def test_a_line_seen_through_glass_is_found_from_the_camera_and_a_caustic_there_
     window = moved(primitive_mesh(Box(size_x=0.2, size_y=0.2, size_z=0.005)), (0.0, 0.0, 0.3))
     ball = moved(primitive_mesh(Sphere(radius=0.03)), (0.01, 0.0, 0.8))
     _, parts = setting([wall, window, ball], [Lambertian(albedo=0.5), Glass(index=1.5), Glass(index=1.5)])
-    shares = indirect_shares(*parts)
+    shares = indirect_pilot(*parts)
     assert shares.caustic[0] > 5 * shares.caustic[1] > 0
     assert shares.specular_chain[0] > 3 * shares.specular_chain[1] > 0
     # without the window there is only what the ball itself shows of its caustic
     _, without = setting([wall, ball], [Lambertian(albedo=0.5), Glass(index=1.5)])
-    assert indirect_shares(*without).specular_chain[0] < 0.5 * shares.specular_chain[0]
+    assert indirect_pilot(*without).specular_chain[0] < 0.5 * shares.specular_chain[0]
 
 
 def test_camera_and_light_paths_weigh_each_other_without_bias():

@@ -14,7 +14,7 @@ from scipy.stats import t as student
 
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.guiding import specular_pixels
-from render.laser_indirect.integrator import indirect_image, indirect_shares
+from render.laser_indirect.integrator import indirect_image, indirect_pilot
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.laser_indirect.transport_plan import pilot_shares, plan_of
 from render.material.material import Conductor, Glass, Lambertian, Subsurface
@@ -114,7 +114,7 @@ KINDS_OF = {
 def test_the_pilots_uncertainty_holds_as_often_as_it_says(case):
     meshes, materials, kind = KINDS_OF[case]
     _, parts = setting(meshes, materials, camera=CAMERA)
-    found = np.array([getattr(indirect_shares(*parts, run=Run(seed=seed)), kind) for seed in range(SEEDS)])
+    found = np.array([getattr(indirect_pilot(*parts, run=Run(seed=seed)), kind) for seed in range(SEEDS)])
     mean = found[:, 0].mean()
     assert mean > 0.0
     # of four passes; the mean of all seeds is known to a fifth of one's error
@@ -132,7 +132,7 @@ def test_light_behind_glass_thinner_than_the_rays_that_look_for_it_is_found():
     expected = (1.0 - 0.04) / (1.0 + 0.04) * np.median(line[line > 0.0]) * 0.006 / 0.5 * parts[1].fy
     for bar in THIN:
         _, parts = setting([WALL, bar], [GREY, GLASS], camera=CAMERA)
-        share, error = indirect_shares(*parts).caustic
+        share, error = indirect_pilot(*parts).caustic
         assert abs(share - expected) < student.ppf(0.9995, 3) * error + 0.1 * expected
 
 

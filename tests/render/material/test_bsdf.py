@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from render.base.vectors import store, vector
 from render.material import bsdf
 from render.material.fresnel import diffuse_reflectance, fresnel_conductor, fresnel_dielectric
 from render.material.microfacet import ggx, visible_normal_pdf
@@ -42,9 +43,8 @@ def unit(v):
 def draw(row, rgb, o, numbers):
     out, weights, chance = np.empty((len(numbers), 3)), np.empty((len(numbers), 3)), np.empty(len(numbers))
     for j in range(len(numbers)):
-        chance[j] = bsdf.sample(
-            row, rgb, o[0], o[1], o[2], numbers[j, 0], numbers[j, 1], numbers[j, 2], out[j], weights[j]
-        )
+        wi, chance[j] = bsdf.sample(row, vector(rgb), vector(o), vector(numbers[j]), weights[j])
+        store(out[j], wi)
     return out, weights, chance
 
 
@@ -52,7 +52,7 @@ def draw(row, rgb, o, numbers):
 def densities(row, rgb, o, i):
     out = np.empty(len(i))
     for j in range(len(i)):
-        out[j] = bsdf.pdf(row, rgb, o[0], o[1], o[2], i[j, 0], i[j, 1], i[j, 2])
+        out[j] = bsdf.pdf(row, vector(rgb), vector(o), vector(i[j]))
     return out
 
 
@@ -60,7 +60,7 @@ def densities(row, rgb, o, i):
 def values(row, rgb, o, i):
     out = np.empty((len(i), 3))
     for j in range(len(i)):
-        bsdf.evaluate(row, rgb, o[0], o[1], o[2], i[j, 0], i[j, 1], i[j, 2], out[j])
+        store(out[j], bsdf.evaluate(row, vector(rgb), vector(o), vector(i[j])))
     return out
 
 

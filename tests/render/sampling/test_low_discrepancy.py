@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from render.ambient.light_sampling import (
+    AREA,
     light_in_view,
     light_probability,
     pack_lights,
@@ -66,10 +67,10 @@ def test_a_lamp_is_drawn_with_its_chance_and_never_where_it_cannot_shine():
     lights, _ = lights_of(*lamps)
     rows, point = lights.rows, (0.0, 0.0, 0.5)
     assert len(rows) == 4 and lights.rectangles == 2
-    expected = np.array([light_probability(rows, k, *point) for k in range(len(rows))])
+    expected = np.array([light_probability(rows, k, point) for k in range(len(rows))])
     assert expected.sum() == pytest.approx(1.0) and expected[3] == 0.0 and np.all(expected[:3] > 0.0)
     n = 4000
-    drawn = [sample_light(rows, *point, (i + 0.5) / n) for i in range(n)]
+    drawn = [sample_light(rows, point, (i + 0.5) / n) for i in range(n)]
     share = np.bincount([k for k, _ in drawn], minlength=4) / n
     assert share == pytest.approx(expected, abs=2 / n)
     assert all(value == pytest.approx(expected[k]) for k, value in drawn)
@@ -77,20 +78,20 @@ def test_a_lamp_is_drawn_with_its_chance_and_never_where_it_cannot_shine():
 
 def test_a_rectangle_is_seen_from_its_front_only():
     lights, _ = lights_of(RectangleLight(width=0.2, height=0.1), PointLight())
-    assert light_in_view(lights.rows, 0.09, 0.0, 1.0, 0.0, 0.0, -1.0, 2.0) == 0
-    assert light_in_view(lights.rows, 0.09, 0.0, 1.0, 0.0, 0.0, -1.0, 0.5) == -1
-    assert light_in_view(lights.rows, 0.09, 0.06, 1.0, 0.0, 0.0, -1.0, 2.0) == -1
-    assert light_in_view(lights.rows, 0.09, 0.0, -1.0, 0.0, 0.0, 1.0, 2.0) == -1
+    assert light_in_view(lights.rows, (0.09, 0.0, 1.0), (0.0, 0.0, -1.0), 2.0) == 0
+    assert light_in_view(lights.rows, (0.09, 0.0, 1.0), (0.0, 0.0, -1.0), 0.5) == -1
+    assert light_in_view(lights.rows, (0.09, 0.06, 1.0), (0.0, 0.0, -1.0), 2.0) == -1
+    assert light_in_view(lights.rows, (0.09, 0.0, -1.0), (0.0, 0.0, 1.0), 2.0) == -1
 
 
 def test_points_of_a_shining_object_are_uniform_on_it():
     ball = moved(primitive_mesh(Sphere(radius=0.3)), (1, 2, 3))
     lights, surface = lights_of(objects=((ball, Emitter()),))
-    assert lights.rows[0, 16] == pytest.approx(4 * np.pi * 0.09, rel=2e-3)
+    assert lights.rows[0, AREA] == pytest.approx(4 * np.pi * 0.09, rel=2e-3)
     random, n = np.random.default_rng(4), 20000
     points, normals = np.empty((n, 3)), np.empty((n, 3))
     for i in range(n):
-        sample_emitter_point(lights, surface, 0, *random.random(2), points[i], normals[i])
+        points[i], normals[i] = sample_emitter_point(lights, surface, 0, *random.random(2))
     out = (points - (1, 2, 3)) / 0.3
     assert np.linalg.norm(out, axis=1) == pytest.approx(1.0, abs=2e-3)
     assert np.all(np.sum(out * normals, axis=1) > 0.99)

@@ -12,9 +12,10 @@ import pytest
 
 from render.ambient.integrator import ambient_image
 from render.base.pose import Pose
+from render.base.vectors import store, vector
 from render.laser.laser import Divergence
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.integrator import indirect_image, indirect_shares
+from render.laser_indirect.integrator import indirect_image, indirect_pilot
 from render.material import bsdf
 from render.material.material import (
     BumpMap,
@@ -63,7 +64,7 @@ def frames(surface, t, points, normal):
     out, alphas, rgb = np.empty((len(t), 3, 3)), np.empty((len(t), 2)), np.empty(3)
     for j in range(len(t)):
         p, n = points[j], normal[j]
-        interaction(surface, t[j], p[0], p[1], p[2], n[0], n[1], n[2], 0.5, rgb, alphas[j], out[j])
+        interaction(surface, t[j], vector(p), vector(n), 0.5, rgb, alphas[j], out[j])
     return out, alphas
 
 
@@ -242,8 +243,10 @@ def carried(row, axes, numbers, from_light):
         o = axes @ a
         if o[2] <= 0.0:
             continue
-        if bsdf.sample(row, rgb, o[0], o[1], o[2], numbers[j, 0], numbers[j, 1], numbers[j, 2], out, weight) == 0.0:
+        wi, pdf = bsdf.sample(row, vector(rgb), vector(o), vector(numbers[j]), weight)
+        if pdf == 0.0:
             continue
+        store(out, wi)
         b = axes.T @ out
         if light_side(out[2], b[2]) == 0.0 or b[2] < 0.0:
             continue
@@ -320,4 +323,4 @@ def test_no_light_leaks_through_a_sheet_whatever_its_relief(tmp_path, steep, lea
     image = indirect_image(world, scene.camera, scene.lasers[0], pose, T_laser, target=0.5, most_paths=1 << 20)
     assert not image.radiance.any()
     # there is light behind
-    assert indirect_shares(world, scene.camera, scene.lasers[0], T_laser, T_laser).interreflection[0] > 0.0
+    assert indirect_pilot(world, scene.camera, scene.lasers[0], T_laser, T_laser).interreflection[0] > 0.0

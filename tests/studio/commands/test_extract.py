@@ -142,6 +142,6 @@ def test_photographs_of_a_rig_with_its_geometry_and_exposures_and_along_time(tmp
     checked = call("extract", names[0], *beyond, "--project", tmp_path / "rig.json")
     assert json.loads(checked.stdout)["images"][0]["found"] == 0
     timed = points(*names, "--spacetime")
-    assert timed["extraction"] == ["measured along time"] and timed["points"] > 0
+    assert timed["extraction"] == ["the smoothest chain of peaks; measured along time"] and timed["points"] > 0
     too_many = call("reconstruct", *names, names[0], "--project", tmp_path / "rig.json")
     assert too_many.exit_code == 2 and "more images than steps" in too_many.stderr

@@ -6,6 +6,7 @@ import html
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,15 @@ from click.testing import CliRunner, Result
 import main
 from analysis.cloud import read_ply
 from render.base.errors import InputError
+from render.progressive import refine
+from render.run import Run, never
+from render.world.world import build_world
+from studio.project.project import Project
+from studio.scan.export import Exported, export_report
+from studio.scan.redevelop import develop_again, development, measure_again
 from studio.scan.run_record import ELEMENT, read_run, unequal
-from tests.studio.small_scan import contents, scan, small_project
+from studio.scan.stages import scaled
+from tests.studio.small_scan import SCALE, contents, scan, small_project
 
 
 def call(*arguments: object) -> Result:
@@ -127,6 +135,40 @@ def test_what_is_no_report_or_damaged_is_told_in_one_message(scanned: Path, tmp_
             read_run(edited(source, page, lambda record, change=change: record.update(change)))
     with pytest.raises(InputError, match="damaged"):
         read_run(edited(source, page, lambda record: record.update(points=["no base64!"]))).points(0)
+
+
+def exported(folder: Path, **kept: Any) -> Exported:
+    """What the window exports of the first step, which it developed and measured by methods of a person's choice."""
+    project = scaled(Project.load(small_project(folder)), SCALE)
+    world = build_world(project.scene, folder, 0)
+    *_, frame = refine(world, project.scene, settings=project.render, run=Run(seed=project.seed, threads=1))
+    how = development(project, project)
+    images = develop_again(frame, how, threads=1)
+    chosen = (project.extraction.method, "parabola", "centre_of_mass")
+    found = measure_again(frame, world, how, images, chosen, cancelled=never, threads=1)
+    return Exported(how.powered, project, folder, world, frame, tuple(images), found, SCALE, **kept)
+
+
+def test_a_report_of_the_window_runs_again_to_the_bit(tmp_path: Path) -> None:
+    page, out = tmp_path / "project" / "seen.html", tmp_path / "out"
+    export_report(page, exported(page.parent, repeatable=True))
+    done = call("run", page, "--no-report", "--out", out, "--json", "--quiet")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["reproduced"]
+    rows = read_run(page).record.results
+    assert [one["method"] for one in rows] == ["likelihood", "centre_of_mass"] and rows[0]["points"] > 0
+
+
+def test_a_report_that_no_run_repeats_holds_no_record(tmp_path: Path) -> None:
+    page = tmp_path / "seen.html"
+    what = exported(tmp_path, repeatable=True)
+    laser = what.project.scene.lasers[0]
+    rig = what.project.scene.rig.model_copy(update={"lasers": (laser.model_copy(update={"power": 2 * laser.power}),)})
+    brighter = what.project.model_copy(update={"scene": what.project.scene.model_copy(update={"rig": rig})})
+    for other in (replace(what, repeatable=False), replace(what, project=brighter)):
+        export_report(page, other)
+        with pytest.raises(InputError, match="does not say what was run"):
+            read_run(page)
 
 
 def test_numbers_that_differ_are_named_with_their_place() -> None:

@@ -26,6 +26,7 @@ from studio.editing.forms import (
     REQUIRED,
     Alternative,
     FieldSpec,
+    choice_label,
     describe,
     describe_item,
     edited,
@@ -351,3 +352,9 @@ class TestEulerAngles:
                 if field.default is not REQUIRED or field.kind == "pose":
                     assert value_at(project, field_path(owner, field)) == field.value
         assert Plane().width == 1.0
+
+
+def test_units_keep_their_case_and_words_begin_with_a_capital() -> None:
+    assert [choice_label(value) for value in ("m", "mm", "um", "in", "top-hat", "RGGB", None)] == [
+        "m", "mm", "um", "in", "Top hat", "RGGB", "None"
+    ]  # fmt: skip

@@ -105,7 +105,6 @@ def bad_images(folder: Path) -> dict[str, str]:
         "white.png": (np.full_like(good, 255), "saturated all over"),
         "grey.png": (np.full_like(good, 77), "same everywhere"),
         "nan.tiff": (np.full(good.shape, np.nan, np.float32), "finite"),
-        "turned.png": (np.ascontiguousarray(good.T), "--axis columns"),
         "one_bit.png": (np.where(good > 20, np.uint8(255), np.uint8(0)), "black and white, without the line's profile"),
     }
     for name, (image, _) in images.items():

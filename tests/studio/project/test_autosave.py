@@ -17,6 +17,7 @@ import pytest
 
 from render.base.errors import InputError
 from studio.project.autosave import Autosave, find, sweep
+from studio.project.date_and_time import read_out
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.project.templates import template_folder
@@ -239,3 +240,13 @@ def end_without_closing(program: Autosave) -> None:
     assert program._lock is not None
     program._lock.close()
     program._lock = None
+
+
+@pytest.mark.skipif(not hasattr(time, "tzset"), reason="the zone cannot be set there")
+def test_when_work_was_kept_is_read_out_in_local_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as east:
+        east.setenv("TZ", "UTC-9")  # nine hours ahead, by POSIX
+        time.tzset()
+        assert read_out("2026-07-03 19:05:59+00:00") == "4 July 2026, 04:05"
+    time.tzset()
+    assert read_out("yesterday") == "yesterday"

@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from render.base.errors import Cancelled, InputError
 from render.base.threads import Cancel, map_chunks
 from render.run import Run
 from studio.project.project import Project
+from studio.runtime import jobs
 from studio.runtime.jobs import Job, Progress, State
 
 
@@ -131,18 +133,28 @@ def test_pause_holds_a_pool_of_threads_as_well() -> None:
     assert job.join(180) and job.state is State.CANCELLED
 
 
-def test_time_left_follows_the_progress() -> None:
-    half = threading.Event()
+def test_time_left_follows_the_progress_and_never_grows_between_two_reports(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(jobs, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    begun, go, told, end = (threading.Event() for _ in range(4))
 
     def work(progress: Progress, cancelled: Cancel) -> None:
-        progress("first half", 0.5)
-        half.wait(180)
+        begun.set()
+        go.wait(180)
+        progress("first quarter", 0.25)
+        told.set()
+        end.wait(180)
 
     job = started(work)
-    until(lambda: job.seconds_left is not None)
-    left, spent = job.seconds_left, job.seconds
-    assert left is not None and left == pytest.approx(spent, rel=0.05)
-    half.set()
+    assert begun.wait(180) and job.seconds_left is None
+    clock[0] = 2.0
+    go.set()
+    assert told.wait(180) and job.seconds_left == pytest.approx(6.0)
+    clock[0] = 7.0
+    assert job.seconds_left == pytest.approx(1.0)
+    clock[0] = 9.0  # longer than was thought: nobody knows
+    assert job.seconds_left is None
+    end.set()
     job.join()
     assert job.seconds_left is None
 

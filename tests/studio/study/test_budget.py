@@ -17,9 +17,10 @@ from render.material.material import Lambertian, Subsurface
 from studio.notebook.frame import render
 from studio.notebook.measuring import develop
 from studio.project.project import Project
+from studio.runtime.workers import Engine
 from studio.study.answers import answers
 from studio.study.effects import EFFECTS, STATES, effects_of, in_state
-from studio.study.runner import Engine, run_study
+from studio.study.runner import run_study
 from studio.study.store import Store, described
 from studio.study.study import Study
 from tests.studio.small_scan import small_project

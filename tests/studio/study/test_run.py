@@ -15,12 +15,13 @@ from typing import Any
 import pyarrow.parquet
 import pytest
 
-import studio.study.runner
+import studio.runtime.workers
 from render.base.errors import Cancelled, InputError
+from studio.runtime.workers import Engine
 from studio.study.answers import answers
 from studio.study.cells import Shard
 from studio.study.page import write_page
-from studio.study.runner import Engine, run_study
+from studio.study.runner import run_study
 from studio.study.store import FILE, Store, described
 from studio.study.study import Study
 from studio.study.tables import write_tables
@@ -143,17 +144,17 @@ def test_a_worker_that_dies_again_and_again_is_told_and_what_was_measured_is_kep
 
     done = 0
 
-    def lost(task: Any, cancelled: Any) -> Future[Any]:
+    def lost(work: Any, cancelled: Any, task: Any) -> Future[Any]:
         nonlocal done
         done += 1
         if done <= 2:
-            return here(task, cancelled)
+            return here(work, cancelled, task)
         future: Future[Any] = Future()
         future.set_exception(BrokenProcessPool("a worker was killed"))
         return future
 
-    here = studio.study.runner._here
-    monkeypatch.setattr(studio.study.runner, "_here", lost)
+    here = studio.runtime.workers._here
+    monkeypatch.setattr(studio.runtime.workers, "_here", lost)
     with pytest.raises(InputError, match="workers of the study end before their work is done"):
         run(tmp_path)
     chosen, bases = described(tmp_path)

@@ -98,7 +98,7 @@ def test_pointing_at_the_profile_finds_the_nearest_sample(
     series = measured_series(render.measurements["likelihood"][0], render.project.scene)
     i = int(np.flatnonzero(np.isfinite(series.distance))[20])
     at = results.profile.plot.vb.mapViewToScene(QPointF(series.across[i], series.distance[i]))
-    found = results.profile.nearest(at)
+    found = results.profile.scan_line_at(at)
     assert found is not None and abs(found - series.index[i]) <= 1
 
 

@@ -79,7 +79,7 @@ class TestTyping:
         before, editor = session.project, field(inspector, *LASER, "power")
         type_into(qtbot, editor, "-5", key=Qt.Key.Key_Tab)
         assert editor.text() == "20" and not editor.invalid
-        assert session.project is before
+        assert session.project is before and not row(inspector, *LASER, "power").reason.isVisible()
 
     def test_what_only_the_whole_model_can_judge_is_told_under_the_field_too(
         self, qtbot: QtBot, session: Session, inspector: Inspector
@@ -89,6 +89,10 @@ class TestTyping:
         path = ("scene", "objects", 1, "shape", "depth")
         type_into(qtbot, field(inspector, *path), "31")
         assert "thickness" in row(inspector, *path).reason.text()
+        told: list[str] = []
+        session.message.connect(lambda kind, text: told.append(text))
+        type_into(qtbot, field(inspector, *path), "31", key=Qt.Key.Key_Tab)
+        assert not row(inspector, *path).reason.isVisible() and "thickness" in told[-1]
         assert session.project.scene.objects[1].shape == VGroove()
 
     def test_names_choices_flags_and_empty_numbers(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:

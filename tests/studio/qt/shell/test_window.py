@@ -23,7 +23,7 @@ from pytestqt.qtbot import QtBot
 from render.material.material import Texture
 from studio.project.autosave import Autosave
 from studio.qt.core import theme
-from studio.qt.core.actions import COMMANDS, Command
+from studio.qt.core.actions import COMMANDS, VIEW_KEYS, Command
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render
 from studio.qt.shell.fault_notice import FaultNotice, offer
@@ -284,6 +284,7 @@ class TestCommands:
         for command in COMMANDS:
             if isinstance(command, Command) and command.shortcut:
                 assert command.text.replace("&", "").rstrip("…") in text
+        assert all(f"<b>{key}</b></td><td>{what}</td>" in text for key, what in VIEW_KEYS.items())
 
     def test_help_has_a_page_for_each_panel_and_its_links_lead_somewhere(
         self, window: MainWindow, qtbot: QtBot

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication
@@ -16,6 +17,7 @@ from pytestqt.qtbot import QtBot
 from studio.project.autosave import Autosave
 from studio.project.document import Document
 from studio.project.project import Project
+from studio.project.project_files import missing_files
 from studio.qt.shell.window import MainWindow
 from tests.studio.qt.shell.window_hands import answer, choose_file, dialog, drop, files, project_with_missing_mesh
 
@@ -157,6 +159,29 @@ class TestBadInput:
         assert not window.session.project.scene.objects[-1].visible
         assert Project.load(broken).scene.objects[-1].visible, "the file stays as it is until it is saved"
         window.session.replace_document(before)
+
+    def test_missing_meshes_are_located_and_copied_to_their_place(
+        self, window: MainWindow, qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        broken = project_with_missing_mesh(window.session.project, tmp_path)
+        before = window.session.document
+        ((_, gone),) = missing_files(Project.load(broken).scene, broken.parent)
+        elsewhere = tmp_path / "elsewhere" / f"another{gone.suffix}"
+        elsewhere.parent.mkdir()
+        trimesh.creation.box((0.1, 0.1, 0.1)).export(elsewhere)
+        choose_file(monkeypatch, elsewhere)
+        answer(qtbot, "missing", "Locate…")
+        assert window.files.open(broken)
+        assert window.session.project.scene.objects[-1].visible
+        assert gone.read_bytes() == elsewhere.read_bytes()
+        window.session.replace_document(before)
+
+    def test_nobody_is_asked_about_unsaved_work_for_a_file_that_cannot_be_opened(
+        self, window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(window.files, "may_close", lambda: pytest.fail("asked"))
+        assert not window.files.open(tmp_path / "nothing.json")
+        self.told("Could not open nothing.json")
 
     def test_a_mesh_that_is_none(self, window: MainWindow, qtbot: QtBot, small_project: Path) -> None:
         file = small_project.parent / "broken.stl"

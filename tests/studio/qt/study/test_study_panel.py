@@ -23,9 +23,9 @@ from studio.qt.scene.inspector import Inspector
 from studio.qt.study.charts_panel import ChartsPanel
 from studio.qt.study.study_panel import StudyPanel
 from studio.qt.study.study_work import StudyWork
+from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
 from studio.study.draft import VALUES
-from studio.study.runner import Engine
 from studio.study.store import FILE
 
 NOISE = ("sensor", "read_noise")
@@ -129,12 +129,20 @@ class TestDraft:
         qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.seconds is not None)
         assert "12 cells of 2 renders, about" in desk.panel.told.text()
 
-    def test_what_is_missing_or_impossible_is_told_and_nothing_runs(self, qtbot: QtBot, desk: Desk) -> None:
+    def test_a_study_that_nobody_has_begun_is_no_fault(self, desk: Desk) -> None:
         desk.work.look_ahead()
-        assert "0 fields are varied" in desk.panel.problem.text() and not desk.panel.run.isEnabled()
+        assert not desk.panel.problem.text() and "varies a field" in desk.panel.told.text()
+        assert not desk.panel.run.isEnabled()
+
+    def test_what_is_impossible_is_told_by_the_name_of_the_sweep_and_nothing_runs(
+        self, qtbot: QtBot, desk: Desk
+    ) -> None:
         desk.small([2.0, -3.0])
         qtbot.waitUntil(lambda: "read_noise" in desk.panel.problem.text())
         assert not desk.panel.run.isEnabled()
+        desk.work.change_sweep(sampling="bisection")
+        desk.work.look_ahead()
+        assert desk.panel.problem.text().startswith("Sweep 1: bisection takes ranges")
 
     def test_a_ready_made_study_comes_with_its_own_base(self, qtbot: QtBot, desk: Desk) -> None:
         desk.work.load("quick")

@@ -8,15 +8,16 @@ from contextlib import contextmanager
 from typing import Any
 
 from render.base.errors import InputError
-from studio.study.measuring import Task, measure_task
+from render.run import never
 
 PATIENCE = "20s"
 
 
 @contextmanager
-def cluster(address: str) -> Iterator[tuple[Callable[[Task], Any], int]]:
-    """How to hand a task to the cluster, and how many at a time. Dask's own configuration, TLS included, holds.
+def cluster(address: str, work: Callable[..., Any]) -> Iterator[tuple[Callable[[Any], Future[Any]], int]]:
+    """How to hand a task of `work` to the cluster, and how many at a time.
 
+    Dask's own configuration, TLS included, holds.
     Workers find meshes and textures at the paths of this machine: a folder that all share.
     InputError: dask.distributed is not installed, or no scheduler answers.
     """
@@ -39,8 +40,8 @@ def cluster(address: str) -> Iterator[tuple[Callable[[Task], Any], int]]:
         threads = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
         with client.get_executor(pure=False, retries=2) as executor:
 
-            def submit(task: Task) -> Future[Any]:
-                return executor.submit(measure_task, task)  # type: ignore[no-any-return]
+            def submit(task: Any) -> Future[Any]:
+                return executor.submit(work, task, never)  # type: ignore[no-any-return]
 
             yield submit, max(2 * threads, 2)
     finally:

@@ -1,0 +1,1 @@
+"""Calibration of camera and lasers from views of a flat board, with its own uncertainty."""

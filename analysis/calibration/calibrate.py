@@ -1,0 +1,145 @@
+"""From views of a board to a calibration that says how good it is: the whole way in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.calibration.adjust import Prior
+from analysis.calibration.checks import Halves, LensTrial, Whiteness, choose_lens, halves, whiteness
+from analysis.calibration.degenerate import complaints
+from analysis.calibration.depth import DepthError, depth_error, working_volume
+from analysis.calibration.estimate import Estimate, free_parameters
+from analysis.calibration.next_pose import Advice, advise
+from analysis.calibration.observations import View, gather
+from analysis.calibration.robust import Adjusted, adjust_robustly
+from analysis.calibration.start import start
+from render.base.arrays import Float
+from render.base.errors import InputError
+
+FEWEST_FOR_CHOICE = 9
+"""Views that the choice of a lens model needs, in three folds."""
+DEFAULT_TERMS = 5
+
+
+@dataclass(frozen=True)
+class Known:
+    """A camera that is calibrated already: intrinsics (4,), distortion, covariance (4 + terms, 4 + terms)."""
+
+    intrinsics: Float
+    distortion: Float
+    covariance: Float
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be calibrated, and how."""
+
+    size: tuple[int, int]
+    """px, width and height."""
+    lasers: int = 0
+    terms: int | None = None
+    """Distortion terms; None: chosen by held-out error."""
+    warp: bool = True
+    """The board may be bent."""
+    nearest: float | None = None
+    farthest: float | None = None
+    """m, of the working volume; None: as far as the boards were."""
+    most_tilt: float = np.radians(45.0)
+    known: Known | None = None
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """The result, its checks and what to do next."""
+
+    adjusted: Adjusted
+    depth: tuple[DepthError, ...]
+    """Of each laser."""
+    faults: tuple[str, ...]
+    halves: Halves | None
+    whiteness: Whiteness
+    lens_trials: tuple[LensTrial, ...]
+    advice: Advice | None
+
+    @property
+    def estimate(self) -> Estimate:
+        return self.adjusted.solution.estimate
+
+
+def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibrated:
+    """views: each with eight corners or more; target (n, 2) m, all corners of the board.
+
+    InputError: too few views, or the views do not determine what is asked for; it tells what to photograph.
+    """
+    seen = gather(views, np.stack([target.min(axis=0), target.max(axis=0)]))
+    known = request.known
+    terms, trials = request.terms, list[LensTrial]()
+    guess = start(
+        views,
+        request.size,
+        DEFAULT_TERMS if terms is None else terms,
+        request.lasers,
+        None if known is None else (known.intrinsics, known.distortion),
+    )
+    faults = complaints(views, guess, request.size, camera=known is None)
+    if known is None and terms is None and len(views) >= FEWEST_FOR_CHOICE:
+        terms, trials = choose_lens(seen, guess)
+        padded = np.zeros(terms)
+        padded[: min(terms, 1)] = guess.distortion[: min(terms, 1)]
+        guess = Estimate(guess.intrinsics, padded, guess.warp, guess.planes, guess.rotation, guess.translation)
+    prior = None if known is None else _prior(known, guess)
+    try:
+        adjusted = adjust_robustly(seen, guess, free_parameters(guess, warp=request.warp), prior)
+    except (InputError, np.linalg.LinAlgError) as error:
+        raise InputError(
+            "the views do not determine the calibration",
+            found="; ".join(faults) if faults else str(error),
+            cure="" if faults else "photograph the board at other tilts and distances",
+        ) from None
+    estimate, covariance = adjusted.solution.estimate, adjusted.solution.covariance
+    distance = estimate.translation[:, 2]
+    nearest = float(distance.min()) if request.nearest is None else request.nearest
+    farthest = float(distance.max()) if request.farthest is None else request.farthest
+    farthest = max(farthest, nearest * 1.01)
+    volumes = [working_volume(estimate, laser, request.size, nearest, farthest) for laser in range(request.lasers)]
+    typical = _typical_sigma(adjusted)
+    depths = tuple(depth_error(estimate, covariance, one, typical[1]) for one in volumes if len(one.depth))
+    usable = [one.volume for one in depths]
+    advice = None
+    if usable:
+        advice = advise(
+            estimate,
+            adjusted.solution.information,
+            adjusted.solution.free,
+            target,
+            request.size,
+            usable,
+            most_tilt=request.most_tilt,
+            sigmas=typical,
+        )
+    return Calibrated(
+        adjusted, depths, tuple(faults), halves(adjusted, usable, prior), whiteness(adjusted), tuple(trials), advice
+    )
+
+
+def _prior(known: Known, guess: Estimate) -> Prior:
+    size = len(guess.shared)
+    information = np.zeros((size, size))
+    count = guess.camera_count
+    spread = np.sqrt(np.maximum(np.diag(known.covariance), 1e-30))
+    scaled = known.covariance / np.outer(spread, spread)
+    np.fill_diagonal(scaled, 1.0)
+    information[:count, :count] = np.linalg.inv(scaled) / np.outer(spread, spread)
+    return Prior(guess.shared.copy(), information)
+
+
+def _typical_sigma(adjusted: Adjusted) -> tuple[float, float]:
+    """px of corners and of laser points, as the residuals have them."""
+    seen = adjusted.seen
+    used = seen.whitening[:, 0, 0] > 0.0
+    line = seen.laser_weight[seen.laser_weight > 0.0]
+    corner = np.abs(np.linalg.det(seen.whitening[used])) ** -0.5
+    return float(np.median(corner)), float(np.median(1.0 / line)) if len(line) else 0.05

@@ -1,0 +1,166 @@
+"""Whether a calibration may be believed: its halves against each other, its residuals, its lens against others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from analysis.calibration.adjust import Prior, adjust, without_views
+from analysis.calibration.depth import Volume, depth_jacobian
+from analysis.calibration.estimate import Estimate, free_parameters
+from analysis.calibration.lens import LENGTHS, normalise
+from analysis.calibration.observations import Observations
+from analysis.calibration.residuals import corners
+from analysis.calibration.robust import Adjusted
+from render.base.arrays import Float
+from render.base.errors import InputError
+
+ALARM = 0.05
+"""p-value at which a check speaks."""
+
+
+@dataclass(frozen=True)
+class Halves:
+    """Two halves of the views solved apart: how much depth differs (rms, m), what was to be expected, and p."""
+
+    difference: float
+    expected: float
+    p: float
+
+    @property
+    def sentence(self) -> str:
+        if self.p >= ALARM:
+            return (
+                f"two halves of the views agree: {1e6 * self.difference:.0f} um apart in depth, "
+                f"{1e6 * self.expected:.0f} expected (p = {self.p:.2f})"
+            )
+        return (
+            f"two halves of the views differ by {1e6 * self.difference:.0f} um in depth where "
+            f"{1e6 * self.expected:.0f} were expected (p = {self.p:.1g}): something that is not modelled, such as a "
+            "lens with more terms, a bent board, or focus that moved, is in the views"
+        )
+
+
+def halves(adjusted: Adjusted, volumes: Sequence[Volume], prior: Prior | None = None) -> Halves | None:
+    """Every other view against the rest; None where a half does not determine the parameters, or there is no laser."""
+    solution, seen = adjusted.solution, adjusted.seen
+    parts = []
+    for parity in (0, 1):
+        bad = np.arange(seen.count) % 2 != parity
+        try:
+            parts.append(adjust(without_views(seen, bad), _of_views(solution.estimate, ~bad), solution.free, prior))
+        except (InputError, np.linalg.LinAlgError):
+            return None
+    used = np.nonzero(solution.free)[0]
+    off = (parts[0].estimate.shared - parts[1].estimate.shared)[used]
+    covariance = (parts[0].covariance + parts[1].covariance)[np.ix_(used, used)]
+    spread = np.sqrt(np.diag(covariance))
+    chi2 = float(off / spread @ np.linalg.solve(covariance / np.outer(spread, spread), off / spread))
+    squared, variance, count = 0.0, 0.0, 0
+    for volume in volumes:
+        q = normalise(volume.pixel, solution.estimate.intrinsics, solution.estimate.distortion)
+        jacobian = depth_jacobian(solution.estimate, volume, q)[:, used]
+        squared += float(np.sum((jacobian @ off) ** 2))
+        variance += float(np.einsum("ni,ij,nj->", jacobian, covariance, jacobian))
+        count += len(q)
+    count = max(count, 1)
+    return Halves(np.sqrt(squared / count), np.sqrt(variance / count), float(stats.chi2.sf(chi2, len(used))))
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Correlation of neighbouring corners' residuals; they share no noise, so that it should be none."""
+
+    correlation: float
+    p: float
+
+    @property
+    def sentence(self) -> str:
+        if self.p >= ALARM:
+            return f"residuals are white: neighbouring corners correlate by {self.correlation:.2f} (p = {self.p:.2f})"
+        return (
+            f"residuals of neighbouring corners go together ({self.correlation:.2f}, p = {self.p:.1g}): the lens or "
+            "the board is not as modelled; try more distortion terms, and see that the board is flat"
+        )
+
+
+def whiteness(adjusted: Adjusted) -> Whiteness:
+    """Of corners one square apart on the board, along rows, in the same view."""
+    seen, residual = adjusted.seen, adjusted.solution.corner_residual
+    used = seen.whitening[:, 0, 0] > 0.0
+    step = seen.target[1:] - seen.target[:-1]
+    distance = np.linalg.norm(step, axis=1)
+    near = distance < 1.5 * np.median(distance)
+    pair = (seen.view[1:] == seen.view[:-1]) & near & used[1:] & used[:-1]
+    products = np.sum(residual[1:][pair] * residual[:-1][pair], axis=1)
+    variance = float(np.mean(residual[used] ** 2))
+    correlation = float(products.mean() / (2.0 * variance))
+    # six of a pose's and some of the shared parameters are fitted to the residuals, which makes them go apart a little
+    error = np.sqrt(1.0 / (2.0 * len(products)))
+    return Whiteness(correlation, float(stats.norm.sf(correlation / error)))
+
+
+@dataclass(frozen=True)
+class LensTrial:
+    """A lens model: its terms, and the mean squared residual, in given sigmas, of views that it was not fitted to."""
+
+    terms: int
+    held_out: float
+    worse_by: float
+    """Than the best one, in standard errors of the difference."""
+
+
+def choose_lens(seen: Observations, start: Estimate, *, folds: int = 3) -> tuple[int, list[LensTrial]]:
+    """The fewest terms that are not clearly worse than the best, and every model's error of held-out views.
+
+    The camera is fitted to the other views and held; the left-out views' own poses are fitted, by corners alone.
+    """
+    corners_only = replace(
+        seen,
+        lasers=0,
+        laser_view=seen.laser_view[:0],
+        laser=seen.laser[:0],
+        laser_pixel=seen.laser_pixel[:0],
+        laser_weight=seen.laser_weight[:0],
+        along=seen.along[:0],
+    )
+    errors = {}
+    for terms in LENGTHS:
+        padded = np.zeros(terms)
+        padded[: min(terms, len(start.distortion))] = start.distortion[:terms]
+        lens = replace(start, distortion=padded, planes=np.zeros((0, 3)))
+        try:
+            errors[terms] = _held_out(corners_only, lens, folds)
+        except (InputError, np.linalg.LinAlgError):
+            continue
+    if not errors:
+        return len(start.distortion), []
+    best = min(errors, key=lambda terms: float(errors[terms].mean()))
+    trials = []
+    for terms, error in errors.items():
+        off = error - errors[best]
+        spread = float(off.std(ddof=1) / np.sqrt(len(off))) if len(off) > 1 else 0.0
+        trials.append(LensTrial(terms, float(error.mean()), float(off.mean()) / spread if spread > 0.0 else 0.0))
+    return next(trial.terms for trial in trials if trial.worse_by <= 1.0), trials
+
+
+def _held_out(seen: Observations, start: Estimate, folds: int) -> Float:
+    """(views,) mean squared residual of each view's corners when it is left out."""
+    out = np.empty(seen.count)
+    for fold in range(folds):
+        test = np.arange(seen.count) % folds == fold
+        fitted = adjust(without_views(seen, test), _of_views(start, ~test), free_parameters(start, warp=False)).estimate
+        there = without_views(seen, ~test)
+        held = replace(fitted, rotation=start.rotation[test], translation=start.translation[test])
+        nothing = np.zeros(len(held.shared), dtype=bool)
+        posed = adjust(there, held, nothing).estimate
+        squared = corners(there, posed).residual.reshape(-1, 2) ** 2
+        out[test] = [squared[there.view == i].mean() for i in range(there.count)]
+    return out
+
+
+def _of_views(estimate: Estimate, keep: np.ndarray) -> Estimate:
+    return replace(estimate, rotation=estimate.rotation[keep], translation=estimate.translation[keep])

@@ -1,0 +1,122 @@
+"""From a photograph to a view: which corners of the board are in it, and which of them can be trusted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.calibration.board import Board
+from analysis.calibration.corners import noise_of, refine
+from analysis.calibration.observations import View
+from render.base.arrays import Bool, Float
+from render.base.errors import InputError
+
+FEWEST = 8
+"""Corners that a view needs."""
+GLARE = 0.02
+"""Share of full-scale pixels about a corner above which it is dropped."""
+
+
+def grey(image: NDArray[Any]) -> Float:
+    """(h, w) or (h, w, 3) of any type -> (h, w) float64 of the same numbers; colours are averaged."""
+    return np.asarray(image if image.ndim == 2 else image.mean(axis=2), dtype=np.float64)
+
+
+def detect(image: NDArray[Any], board: Board, name: str) -> tuple[View, list[str]]:
+    """The board's corners with their covariances, and what was dropped, in words.
+
+    image (h, w) or (h, w, 3), any type. InputError: no board, too few of its corners, another number of squares.
+    """
+    values = grey(image)
+    shown = _eight_bit(values)
+    pixel, number = _charuco(shown, board) if board.kind == "charuco" else _checkerboard(shown, board)
+    noise = noise_of(values)
+    refined, covariance, good = refine(values, pixel, noise, board.clear)
+    notes = []
+    strayed = int(np.count_nonzero(~good))
+    if strayed:
+        notes.append(f"{strayed} corners without a clear crossing dropped")
+    glaring = good & _glare(image, refined)
+    if glaring.any():
+        notes.append(f"{int(glaring.sum())} corners in glare dropped")
+    good &= ~glaring
+    if np.count_nonzero(good) < FEWEST:
+        raise InputError(
+            "too few corners of the board are usable",
+            where=name,
+            found=f"{int(np.count_nonzero(good))} of {len(board.target)}",
+            allowed=f"{FEWEST} or more",
+            cure="show more of the board, sharp and without glare",
+        )
+    return View(name, refined[good], covariance[good], board.target[number[good]]), notes
+
+
+def on_board(view: View, board: Board, pixel: Float, margin: float) -> Bool:
+    """(m, 2) px -> (m,) on the board between its outermost seen corners, at least `margin` px from any square's edge.
+
+    A line that crosses from white to black is pulled to the white side, by far more than its sigma.
+    """
+    if len(pixel) == 0:
+        return np.zeros(0, dtype=bool)
+    homography, _ = cv2.findHomography(view.pixel, view.target)
+    beside = pixel + np.array([margin, 0.0])
+    place, stepped = (cv2.perspectiveTransform(each.reshape(1, -1, 2), homography)[0] for each in (pixel, beside))
+    least, greatest = view.target.min(axis=0), view.target.max(axis=0)
+    inside = np.all((place > least) & (place < greatest), axis=1)
+    first, last = place / board.square, stepped / board.square
+    back = 2.0 * first - last
+    clear = np.all((np.floor(first) == np.floor(last)) & (np.floor(first) == np.floor(back)), axis=1)
+    return np.asarray(inside & clear)
+
+
+def without_corners(view: View, near: Bool) -> View:
+    """The view without some of its corners (n,)."""
+    keep = ~near
+    return View(view.name, view.pixel[keep], view.covariance[keep], view.target[keep], view.stripes)
+
+
+def _eight_bit(values: Float) -> NDArray[np.uint8]:
+    low, high = float(np.quantile(values, 0.001)), float(np.quantile(values, 0.999))
+    return np.asarray(np.clip((values - low) * (255.0 / max(high - low, 1e-12)), 0, 255), dtype=np.uint8)
+
+
+def _checkerboard(shown: NDArray[np.uint8], board: Board) -> tuple[Float, NDArray[np.intp]]:
+    size = (board.columns, board.rows)
+    flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
+    found, corners = cv2.findChessboardCornersSB(shown, size, flags=flags)
+    if not found:
+        found, corners = cv2.findChessboardCornersSB(shown, size, flags=flags | cv2.CALIB_CB_EXHAUSTIVE)
+    if not found:
+        raise InputError(
+            "no checkerboard of that size is in the image",
+            allowed=f"{board.columns} x {board.rows} inner corners, all of them seen",
+            cure="count the corners where four squares meet, and show the whole board with a white margin",
+        )
+    pixel = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
+    return pixel, np.arange(len(pixel))
+
+
+def _charuco(shown: NDArray[np.uint8], board: Board) -> tuple[Float, NDArray[np.intp]]:
+    detector = cv2.aruco.CharucoDetector(board.charuco())
+    corners, numbers, _, markers = detector.detectBoard(shown)
+    if numbers is None or len(numbers) < FEWEST:
+        _, flipped, _, _ = detector.detectBoard(np.ascontiguousarray(shown[:, ::-1]))
+        if flipped is not None and len(flipped) >= FEWEST:
+            raise InputError("the board is mirrored", cure="turn off the mirroring of camera or converter")
+        seen = 0 if markers is None else len(markers)
+        cure = "check the dictionary and the numbers of squares; boards made before OpenCV 4.6 need the legacy layout"
+        raise InputError("no ChArUco board of that kind is in the image", found=f"{seen} of its markers", cure=cure)
+    return np.asarray(corners, dtype=np.float64).reshape(-1, 2), np.asarray(numbers, dtype=np.intp).ravel()
+
+
+def _glare(image: NDArray[Any], corner: Float) -> Bool:
+    """(n,): saturated about the corner."""
+    if not np.issubdtype(image.dtype, np.integer):
+        return np.zeros(len(corner), dtype=bool)
+    full = (image if image.ndim == 2 else image.max(axis=2)) >= np.iinfo(image.dtype).max
+    near = cv2.blur(full.astype(np.float32), (13, 13))
+    x, y = (np.clip(np.rint(corner[:, i]).astype(int), 0, full.shape[1 - i] - 1) for i in (0, 1))
+    return np.asarray(near[y, x] > GLARE)

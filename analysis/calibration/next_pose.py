@@ -1,0 +1,180 @@
+"""Where to hold the board next: the pose that lessens the depth's variance over the working volume most.
+
+A view adds information I to the shared parameters; with covariance C before, it is (C^-1 + I)^-1 after. The variance of
+depth, averaged over the volume, is the trace of that with the depth's derivatives, so that hundreds of poses are tried
+in a tenth of a second.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from analysis.calibration.adjust import view_information
+from analysis.calibration.depth import Volume, depth_jacobian
+from analysis.calibration.estimate import Estimate
+from analysis.calibration.lens import normalise, project
+from analysis.calibration.observations import Index, Observations
+from render.base.arrays import Bool, Float
+
+CORNERS = 5
+"""Corners a side of the board that stand for all of them in a trial."""
+POINTS = 24
+"""Laser points a line that stand for all of them."""
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The best pose of those tried, and the depth error (rms over the volume, m) before and after it."""
+
+    rotation: Float
+    """(3, 3) board to camera."""
+    centre: Float
+    """(3,) m, the board's middle in the camera frame."""
+    before: float
+    after: float
+
+    @property
+    def tilt(self) -> float:
+        """rad between the board's normal and the camera's axis."""
+        return float(np.arccos(np.clip(abs(self.rotation[2, 2]), 0.0, 1.0)))
+
+    @property
+    def gain(self) -> float:
+        """m by which the depth error falls."""
+        return self.before - self.after
+
+
+def advise(
+    estimate: Estimate,
+    information: Float,
+    free: Bool,
+    target: Float,
+    size: tuple[int, int],
+    volumes: list[Volume],
+    *,
+    most_tilt: float = np.radians(45.0),
+    sigmas: tuple[float, float] = (0.05, 0.05),
+) -> Advice:
+    """information (p, p) of the views so far; target (n, 2) m; most_tilt rad; sigmas px of corners and line.
+
+    Distances are those of the volumes.
+    """
+    depth = np.concatenate([volume.depth for volume in volumes])
+    poses = _candidates(estimate, target, (float(depth.min()), float(depth.max())), most_tilt)
+    told = _information(poses, target, size, sigmas)
+    used = np.nonzero(free)[0]
+    weight = _depth_weight(estimate, volumes)[np.ix_(used, used)]
+    inner = information[np.ix_(used, used)]
+    scale = 1.0 / np.sqrt(np.diag(inner))
+    both = np.outer(scale, scale)
+    trials = (inner + told[:, used][:, :, used]) * both
+    after = np.einsum("kij,ji->k", np.linalg.inv(trials), weight * both)
+    before = float(np.sum(np.linalg.inv(inner * both) * weight * both))
+    best = int(np.argmin(after))
+    centre = poses.rotation[best] @ np.append(target.mean(axis=0), 0.0) + poses.translation[best]
+    return Advice(poses.rotation[best], centre, float(np.sqrt(before)), float(np.sqrt(max(after[best], 0.0))))
+
+
+def _depth_weight(estimate: Estimate, volumes: list[Volume]) -> Float:
+    """(p, p) W with mean depth variance = trace(W covariance)."""
+    total, count = np.zeros((len(estimate.shared),) * 2), 0
+    for volume in volumes:
+        q = normalise(volume.pixel, estimate.intrinsics, estimate.distortion)
+        jacobian = depth_jacobian(estimate, volume, q)
+        total += jacobian.T @ jacobian
+        count += len(q)
+    return total / max(count, 1)
+
+
+def _candidates(estimate: Estimate, target: Float, depth: tuple[float, float], most_tilt: float) -> Estimate:
+    """Poses at three distances, tilted to eight sides, with the board's middle on the laser planes or on the axis."""
+    middle = np.append(0.5 * (target.min(axis=0) + target.max(axis=0)), 0.0)
+    rotation, translation = [], []
+    for z in np.linspace(depth[0], depth[1], 3):
+        on_plane = [np.array([(1.0 - m[2] * z) / m[0], 0.0, z]) for m in estimate.planes if abs(m[0]) > 1e-9]
+        places = [np.array([0.0, 0.0, z]), *on_plane]
+        for place in places:
+            for tilt in (0.0, 0.5 * most_tilt, most_tilt):
+                for side in np.arange(8 if tilt > 0.0 else 1) * (np.pi / 4.0):
+                    turn = Rotation.from_rotvec([tilt * np.cos(side), tilt * np.sin(side), 0.0]).as_matrix()
+                    rotation.append(turn)
+                    translation.append(place - turn @ middle)
+    return replace(estimate, rotation=np.array(rotation), translation=np.array(translation))
+
+
+def _information(poses: Estimate, target: Float, size: tuple[int, int], sigmas: tuple[float, float]) -> Float:
+    """(poses, p, p); a few corners and laser points stand for all, with their information."""
+    least, greatest = target.min(axis=0), target.max(axis=0)
+    count = len(poses.rotation)
+    x, y = np.meshgrid(*(np.linspace(least[i], greatest[i], CORNERS) for i in (0, 1)))
+    few = np.tile(np.column_stack([x.ravel(), y.ravel()]), (count, 1))
+    view = np.repeat(np.arange(count), CORNERS**2)
+    pixel, seen = _pixels(poses, view, few, size)
+    corner = np.sqrt(len(target) / CORNERS**2) / sigmas[0]
+    numbers, lasers = np.repeat(np.arange(count), POINTS), range(len(poses.planes))
+    laser_view = np.concatenate([np.empty(0, dtype=np.intp), *(numbers for _ in lasers)])
+    laser = np.repeat(np.arange(len(poses.planes)), len(numbers))
+    line = np.concatenate([np.empty((0, 2)), *(_line(poses, m, least, greatest).reshape(-1, 2) for m in poses.planes)])
+    on = np.all((line >= least) & (line <= greatest), axis=1)
+    line_pixel, line_seen = _pixels(poses, laser_view, line, size)
+    along = np.array([0 if abs(m[0]) >= abs(m[1]) else 1 for m in poses.planes], dtype=np.intp)[laser]
+    # each point stands for the scan lines up to the next
+    ends = line_pixel.reshape(-1, POINTS, 2)
+    rows = np.abs(np.nan_to_num(ends[:, -1] - ends[:, 0])) / (POINTS - 1)
+    rows = np.repeat(rows, POINTS, axis=0)[np.arange(len(along)), 1 - along]
+    middle = 0.5 * (least + greatest)
+    trial = Observations(
+        names=("",) * count,
+        lasers=len(poses.planes),
+        view=view,
+        pixel=pixel,
+        target=few,
+        whitening=np.eye(2) * (corner * seen)[:, None, None],
+        laser_view=laser_view,
+        laser=laser,
+        laser_pixel=np.nan_to_num(line_pixel),
+        laser_weight=np.where(on & line_seen, np.sqrt(rows) / sigmas[1], 0.0),
+        along=along,
+        centre=middle,
+        half=0.5 * (greatest - least),
+    )
+    # sorted by view, as sums by view need it
+    order = np.argsort(laser_view, kind="stable")
+    trial = replace(
+        trial,
+        **{
+            name: getattr(trial, name)[order]
+            for name in ("laser_view", "laser", "laser_pixel", "laser_weight", "along")
+        },
+    )
+    enough = np.bincount(view, weights=seen, minlength=count) >= 6
+    out = view_information(trial, poses, start=_rays(poses, laser_view[order], line[order]))
+    return np.where(enough[:, None, None], out, 0.0)
+
+
+def _line(poses: Estimate, m: Float, least: Float, greatest: Float) -> Float:
+    """(poses, POINTS, 2) m, places on each board's plane along the laser's line, over the board's diagonal."""
+    across = np.einsum("kij,i->kj", poses.rotation, m)[:, :2]
+    offset = 1.0 - poses.translation @ m
+    middle = 0.5 * (least + greatest)
+    squared = np.maximum(np.sum(across**2, axis=1), 1e-12)
+    foot = middle + across * ((offset - across @ middle) / squared)[:, None]
+    direction = np.column_stack([-across[:, 1], across[:, 0]]) / np.sqrt(squared)[:, None]
+    reach = 0.5 * np.linalg.norm(greatest - least) * np.linspace(-1.0, 1.0, POINTS)
+    return np.asarray(foot[:, None, :] + reach[None, :, None] * direction[:, None, :])
+
+
+def _rays(poses: Estimate, view: Index, place: Float) -> Float:
+    """(n, 2) normalised, of places (n, 2) on the flat boards of some views (n,); off where they are not ahead."""
+    flat = np.column_stack([place, np.zeros(len(place))])
+    point = np.einsum("nij,nj->ni", poses.rotation[view], flat) + poses.translation[view]
+    return np.asarray(point[:, :2] / np.maximum(point[:, 2:], 1e-3))
+
+
+def _pixels(poses: Estimate, view: Index, place: Float, size: tuple[int, int]) -> tuple[Float, Bool]:
+    """(n, 2) px, and (n,) inside the image."""
+    pixel, _, _ = project(_rays(poses, view, place), poses.intrinsics, poses.distortion)
+    return pixel, np.all((pixel >= 0.0) & (pixel <= np.array(size) - 1.0), axis=1)

@@ -1,0 +1,1 @@
+"""Calibration from photographs and in silico: files, boards to print, the calibration file, exchange with others."""

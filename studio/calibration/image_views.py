@@ -1,0 +1,183 @@
+"""From a folder of photographs to views: laser-on and laser-off images put together by name, boards and lines found."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.calibration.board import Board
+from analysis.calibration.detect import detect, grey, on_board, without_corners
+from analysis.calibration.observations import Stripe, View
+from analysis.line.estimate import estimate_noise
+from analysis.line.extract import extract
+from analysis.line.result import Flag
+from analysis.line.series.subtract import subtract_off
+from analysis.line.settings import ExtractionSettings
+from render.base.errors import InputError
+from studio.photographs.image_files import load_photograph
+
+SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".exr")
+ROLE = re.compile(r"(?P<name>.*?)[ _-](?P<role>off|on|laser(?P<laser>\d{1,2}))", re.IGNORECASE)
+FEWEST_POINTS = 10
+"""Points of a line on the board that a view needs to tell anything of a laser."""
+CLEAR_WIDTHS = 4.0
+"""Line widths (sigma) that the line keeps from the edges of squares."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """The photographs of one pose of the board."""
+
+    name: str
+    board: Path | None
+    """Laser off, or the one image for both."""
+    lasers: dict[int, Path] = field(default_factory=dict)
+    """Laser on, by its number."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """Views, what was wrong with files, and what else is to be told."""
+
+    views: tuple[View, ...]
+    size: tuple[int, int]
+    errors: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def shots(folder: Path) -> list[Shot]:
+    """By name: NAME_off and NAME_on, or NAME_off and NAME_laser0, NAME_laser1; a plain NAME is one image for both.
+
+    InputError: no folder, or none with images.
+    """
+    if not folder.is_dir():
+        raise InputError("there is no such folder", where=str(folder), cure="give the folder of the photographs")
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES and file.name[0] != ".")
+    if not files:
+        raise InputError("the folder holds no images", where=str(folder), allowed=", ".join(SUFFIXES))
+    found: dict[str, Shot] = {}
+    for file in files:
+        role = ROLE.fullmatch(file.stem)
+        name = role["name"] if role else file.stem
+        shot = found.get(name, Shot(name, None))
+        if role is None or role["role"].lower() == "off":
+            shot = replace(shot, board=file)
+        else:
+            shot = replace(shot, lasers={**shot.lasers, int(role["laser"] or 0): file})
+        found[name] = shot
+    return list(found.values())
+
+
+def views_of(
+    taken: Sequence[Shot],
+    board: Board,
+    settings: ExtractionSettings,
+    *,
+    lasers: bool,
+    progress: Callable[[float], None] = lambda done: None,
+) -> Found:
+    """Every shot whose files are good; a bad file is told, and the rest goes on.
+
+    lasers: the lines are looked for too. InputError: nothing is usable; the first reason is told.
+    """
+    views: list[View] = []
+    errors, notes = [], []
+    size: tuple[int, int] | None = None
+    seen: dict[bytes, str] = {}
+    for number, shot in enumerate(taken):
+        progress(number / len(taken))
+        file = shot.board or next(iter(shot.lasers.values()))
+        try:
+            image = load_photograph(file)
+            size = _same_size(image, size)
+            _check_new(image, seen, shot.name)
+            view, told = detect(image, board, shot.name)
+            if lasers:
+                view, more = _with_lines(view, image, shot, board, settings)
+                told += more
+        except InputError as error:
+            errors.append(f"{file}: {error.what if str(file) in error.where else error}")
+            continue
+        notes += [f"{shot.name}: {one}" for one in told]
+        views.append(view)
+    progress(1.0)
+    if not views:
+        first = errors[0] if errors else "no images"
+        raise InputError("no photograph is usable", found=f"{len(errors)} with faults", cure=f"the first: {first}")
+    assert size is not None
+    return Found(tuple(views), size, tuple(errors), tuple(notes))
+
+
+def _same_size(image: NDArray[Any], size: tuple[int, int] | None) -> tuple[int, int]:
+    own = (image.shape[1], image.shape[0])
+    if size is not None and own != size:
+        raise InputError(
+            "the image is of another size than the first",
+            found=f"{own[0]} x {own[1]} px",
+            allowed=f"{size[0]} x {size[1]} px",
+            cure="do not crop, turn or resize photographs",
+        )
+    return own
+
+
+def _check_new(image: NDArray[Any], seen: dict[bytes, str], name: str) -> None:
+    import hashlib
+
+    digest = hashlib.sha256(np.ascontiguousarray(image).tobytes()).digest()
+    if digest in seen:
+        raise InputError(f"the same photograph as {seen[digest]}", cure="every pose counts once")
+    seen[digest] = name
+
+
+def _with_lines(
+    view: View, image: NDArray[Any], shot: Shot, board: Board, settings: ExtractionSettings
+) -> tuple[View, list[str]]:
+    """The view with its laser lines; corners under a line that is in the board's own image are dropped."""
+    told, stripes = [], []
+    own = {0: shot.board} if shot.board is not None and not shot.lasers else shot.lasers
+    near = np.zeros(len(view.pixel), dtype=bool)
+    for laser, file in sorted(own.items()):
+        assert file is not None
+        with_line = image if file == shot.board else load_photograph(file)
+        if with_line.shape != image.shape:
+            raise InputError("laser-on and laser-off image are of different size or kind", where=str(file))
+        separate = file != shot.board and shot.board is not None
+        pixel, sigma, width = _line(with_line, image if separate else None, settings)
+        if not separate and len(pixel):
+            across = 0 if settings.axis == "rows" else 1
+            row = np.rint(view.pixel[:, 1 - across])
+            index = np.clip(np.searchsorted(pixel[:, 1 - across], row), 0, len(pixel) - 1)
+            near |= np.abs(view.pixel[:, across] - pixel[index, across]) < 10.0 + 4.0 * width
+        keep = on_board(view, board, pixel, CLEAR_WIDTHS * width + 2.0)
+        if np.count_nonzero(keep) < FEWEST_POINTS:
+            told.append(f"the line of laser {laser} is not on the board; only its corners are used")
+            continue
+        stripes.append(Stripe(laser, pixel[keep], sigma[keep], settings.axis))
+    if near.any() and np.count_nonzero(~near) >= 8:
+        told.append(f"{int(near.sum())} corners under the line dropped")
+        view = without_corners(view, near)
+    return replace(view, stripes=tuple(stripes)), told
+
+
+def _line(
+    image: NDArray[Any], off: NDArray[Any] | None, settings: ExtractionSettings
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """(m, 2) px, (m,) sigma px, and the line's typical width (sigma), px."""
+    noise = None
+    if off is not None:
+        image, saturation = subtract_off(image, off)
+        noise = estimate_noise(image, settings, saturation)
+    line = extract(
+        image if settings.channel != "mono" or image.ndim == 2 else grey(image), settings=settings, noise=noise
+    )
+    pixel, index, rank = line.pixels()
+    good = (line.flag[index, rank] == Flag.OK) & np.isfinite(line.sigma_u[index, rank])
+    width = line.width[index, rank][good]
+    typical = float(np.median(width)) if good.any() and np.isfinite(width).any() else 1.5
+    return pixel[good], np.maximum(line.sigma_u[index, rank][good], 1e-3), typical

@@ -1,0 +1,97 @@
+"""What a person reads of a calibration: parameters, depth, checks, and where to hold the board next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from analysis.calibration.calibrate import Calibrated
+from analysis.calibration.estimate import unit_plane
+from analysis.calibration.next_pose import Advice
+
+SMALL_GAIN = 0.03
+"""Of the depth error: what one more view should take off it to be worth while."""
+
+
+def parameter_rows(result: Calibrated) -> list[tuple[str, str, str]]:
+    """Name, value and sigma of everything that was estimated."""
+    estimate, covariance = result.estimate, result.adjusted.solution.covariance
+    sigma = np.sqrt(np.diag(covariance))
+    rows = []
+    for i, name in enumerate(estimate.names[: estimate.camera_count]):
+        digits = ".3f" if i < 4 else ".6g"
+        unit = " px" if i < 4 else ""
+        rows.append((name + unit, f"{estimate.shared[i]:{digits}}", f"{sigma[i]:.2g}"))
+    for i, m in enumerate(estimate.planes):
+        a, b, c, d = unit_plane(m)
+        own = estimate.plane_slice(i)
+        along = np.linalg.eigvalsh(covariance[own, own])[-1] ** 0.5 / np.linalg.norm(m)
+        rows.append((f"laser {i}: normal", f"{a:.6f} {b:.6f} {c:.6f}", f"{1e3 * along:.2g} mrad"))
+        by_d = m / np.linalg.norm(m) ** 3
+        rows.append(
+            (f"laser {i}: distance mm", f"{-1e3 * d:.4f}", f"{1e3 * np.sqrt(by_d @ covariance[own, own] @ by_d):.2g}")
+        )
+    warp = 1e6 * estimate.warp
+    at = estimate.camera_count
+    if result.adjusted.solution.free[at]:
+        rows.append(
+            ("board warp um", f"{warp[0]:.0f} {warp[1]:.0f}", f"{1e6 * sigma[at]:.2g} {1e6 * sigma[at + 1]:.2g}")
+        )
+    return rows
+
+
+def depth_rows(result: Calibrated, true: list[tuple[float, float]] | None) -> list[tuple[str, ...]]:
+    """For each laser: rms and greatest systematic error, that of the line's noise, and the true one if known; um."""
+    rows = []
+    for i, one in enumerate(result.depth):
+        random = float(np.sqrt(np.mean(one.random**2)))
+        cells = [one.rms, float(one.systematic.max()), random] + ([true[i][0]] if true else [])
+        span = f"laser {one.volume.laser}, {one.volume.depth.min():.3g} to {one.volume.depth.max():.3g} m"
+        rows.append((span, *(f"{1e6 * cell:.1f}" for cell in cells)))
+    return rows
+
+
+def check_rows(result: Calibrated, views: int) -> list[tuple[str, str]]:
+    """Sentences: residuals, halves, whiteness, choice of lens."""
+    adjusted = result.adjusted
+    residual = adjusted.solution.corner_residual
+    seen = adjusted.seen
+    used = seen.whitening[:, 0, 0] > 0.0
+    pixel = np.linalg.solve(seen.whitening[used], residual[used][:, :, None])[:, :, 0]
+    rms = float(np.sqrt(np.mean(np.sum(pixel**2, axis=1))))
+    rows = [
+        ("views", f"{adjusted.solution.estimate.rotation.shape[0]} of {views} used, {int(used.sum())} corners"),
+        ("reprojection", f"{rms:.3f} px rms; corners err {adjusted.corner_scale:.2f} times as told by their images"),
+    ]
+    if seen.lasers:
+        points = int(np.count_nonzero(seen.laser_weight))
+        rows.append(("lines", f"{points} points; they err {adjusted.laser_scale:.2f} times as told by their images"))
+    if result.halves is not None:
+        rows.append(("halves", result.halves.sentence))
+    rows.append(("residuals", result.whiteness.sentence))
+    if result.lens_trials:
+        tried = ", ".join(f"{one.terms}: {one.held_out:.3g}" for one in result.lens_trials)
+        terms = len(result.estimate.distortion)
+        rows.append(("lens", f"{terms} distortion terms, the fewest that are not worse on held-out views ({tried})"))
+    return rows
+
+
+def next_sentence(advice: Advice, target_um: float | None) -> str:
+    """Where to hold the board next and what it gains, or that it is enough."""
+    before, after = 1e6 * advice.before, 1e6 * advice.after
+    if target_um is not None and before <= target_um:
+        return f"enough: depth is known to {before:.1f} um, {target_um:g} um were asked for"
+    x, y, z = 1e3 * advice.centre
+    normal = advice.rotation[:, 2] * np.sign(advice.rotation[2, 2])
+    sides = []
+    if abs(normal[0]) > 0.1:
+        sides.append("right" if normal[0] < 0.0 else "left")
+    if abs(normal[1]) > 0.1:
+        sides.append("lower" if normal[1] < 0.0 else "upper")
+    turned = f"its {' and '.join(sides)} edge farther away" if sides else "facing the camera"
+    told = (
+        f"next: hold the board's middle {z:.0f} mm ahead, {abs(x):.0f} mm {'right' if x >= 0 else 'left'} and "
+        f"{abs(y):.0f} mm {'below' if y >= 0 else 'above'} of the camera's axis, tilted by "
+        f"{np.degrees(advice.tilt):.0f} deg, {turned}: depth error {before:.1f} -> {after:.1f} um"
+    )
+    little = advice.gain < SMALL_GAIN * advice.before
+    return told + ("; one more view gains little" if little and target_um is None else "")

@@ -1,0 +1,236 @@
+"""What `main.py calibrate` does: photographs or virtual boards to a calibration file, and how good it is."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from render.base.errors import InputError
+from studio.runtime.console import print_table, stage_progress
+from studio.runtime.streams import print_json
+
+if TYPE_CHECKING:
+    from analysis.calibration.calibrate import Calibrated, Known
+    from analysis.calibration.observations import View
+    from studio.project.project import Project
+
+PARTS = ("camera", "laser", "scanner")
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """As the command line has them; lengths in m, angles in degrees."""
+
+    board: str
+    out: Path | None
+    camera: Path | None
+    """Of a camera that is calibrated already."""
+    lens: str
+    axis: str
+    channel: str
+    nearest: float | None
+    farthest: float | None
+    most_tilt: float
+    target_um: float | None
+    views: int
+    seed: int
+    corner_sigma: float
+    line_sigma: float
+    export: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Material:
+    """What is calibrated from."""
+
+    views: list[View]
+    size: tuple[int, int]
+    lasers: int
+    errors: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: bool, **given: Any) -> int:
+    """`calibrate camera|laser|scanner FOLDER`, or `calibrate PROJECT`; returns how many files had faults.
+
+    InputError: nothing is usable, or what there is does not determine what is asked for.
+    """
+    from analysis.calibration.calibrate import Request, calibrate
+    from studio.calibration.board_text import board_text, parse_board
+    from studio.calibration.calibration_file import file_data, write_calibration
+    from studio.calibration.in_silico import true_depth_error, virtual_views
+    from studio.commands.commands import load_project
+
+    options = CalibrateOptions(**given)
+    board, truth = parse_board(options.board), None
+    known = _known(options) if what == "laser" else None
+    with stage_progress(quiet or as_json) as progress:
+        if what in PARTS and folder is not None:
+            material = _photographed(what, folder, options, progress)
+            out = options.out or folder / "calibration.json"
+        elif folder is None and what not in PARTS:
+            project, _ = load_project(Path(what))
+            depth = _depths(project, options)
+            views, truth = virtual_views(
+                project,
+                board,
+                options.views,
+                seed=options.seed,
+                depth=depth,
+                most_tilt=float(np.radians(options.most_tilt)),
+                sigmas=(options.corner_sigma, options.line_sigma),
+            )
+            camera = project.scene.camera
+            material = Material(views, (camera.width, camera.height), len(project.scene.lasers))
+            out = options.out or Path("scan-output") / "calibration.json"
+        else:
+            allowed = "camera FOLDER, laser FOLDER, scanner FOLDER, or a project alone"
+            raise InputError("not known what to calibrate", where="calibrate", found=what, allowed=allowed)
+        _check_size(material, options)
+        progress("adjustment", 0.0)
+        result = calibrate(
+            material.views,
+            board.target,
+            Request(
+                material.size,
+                material.lasers,
+                None if options.lens == "auto" else int(options.lens),
+                nearest=options.nearest,
+                farthest=options.farthest,
+                most_tilt=float(np.radians(options.most_tilt)),
+                known=known,
+            ),
+        )
+        progress("adjustment", 1.0)
+    data = file_data(result, material.size, board_text(board))
+    write_calibration(out, data)
+    files = [str(out), *_exported(out, data, options.export)]
+    true = None if truth is None else true_depth_error(result, truth)
+    if as_json:
+        extra = {"errors": list(material.errors), "notes": list(material.notes), "files": files}
+        print_json(
+            {
+                "ok": not material.errors,
+                **data,
+                **extra,
+                "next_pose": _advice_data(result),
+                "true_depth_rms_m": None if true is None else [one for one, _ in true],
+            }
+        )
+    else:
+        _print(result, material, true, options, quiet)
+        for file in files:
+            print(f"wrote {file}")
+    for error in material.errors:
+        print(f"error: {error}", file=sys.stderr)
+    return len(material.errors)
+
+
+def _photographed(what: str, folder: Path, options: CalibrateOptions, progress: Any) -> Material:
+    from analysis.line.extract import settings_of
+    from studio.calibration.image_views import shots, views_of
+
+    settings = settings_of(None, axis=options.axis, channel=options.channel)
+    taken = shots(folder)
+    with_lasers = what != "camera"
+    found = views_of(
+        taken, _board(options), settings, lasers=with_lasers, progress=lambda done: progress("photographs", done)
+    )
+    lasers = 1 + max((stripe.laser for view in found.views for stripe in view.stripes), default=-1)
+    if with_lasers and lasers == 0:
+        raise InputError(
+            "no photograph shows a laser's line on the board",
+            where=str(folder),
+            cure="name pairs NAME_on and NAME_off, or hold the board where the line crosses it",
+        )
+    return Material(list(found.views), found.size, lasers if with_lasers else 0, found.errors, found.notes)
+
+
+def _board(options: CalibrateOptions) -> Any:
+    from studio.calibration.board_text import parse_board
+
+    return parse_board(options.board)
+
+
+def _known(options: CalibrateOptions) -> Known:
+    from studio.calibration.calibration_file import read_calibration
+
+    if options.camera is None:
+        raise InputError("the laser alone needs a camera", where="--camera", allowed="a file of calibrate camera")
+    return read_calibration(options.camera)[1]
+
+
+def _check_size(material: Material, options: CalibrateOptions) -> None:
+    from studio.calibration.calibration_file import read_calibration
+
+    if options.camera is None:
+        return
+    camera = read_calibration(options.camera)[0]
+    if (camera.width, camera.height) != material.size:
+        found, allowed = "{} x {} px".format(*material.size), f"{camera.width} x {camera.height} px"
+        raise InputError("the photographs are not of that camera", where="--camera", found=found, allowed=allowed)
+
+
+def _depths(project: Project, options: CalibrateOptions) -> tuple[float, float]:
+    """m, nearest and farthest board: as asked, else 0.8 to 1.2 of where the first laser meets the camera's axis."""
+    plane = project.scene.laser_plane(0) if project.scene.lasers else np.array([0.0, 0.0, 1.0, -1.0])
+    middle = -plane[3] / plane[2] if abs(plane[2]) > 1e-6 and -plane[3] / plane[2] > 0.0 else 1.0
+    nearest = options.nearest or 0.8 * float(middle)
+    farthest = options.farthest or max(1.2 * float(middle), 1.2 * nearest)
+    if farthest <= nearest:
+        raise InputError("the farthest distance is not beyond the nearest", where="--farthest", found=farthest)
+    return nearest, farthest
+
+
+def _exported(out: Path, data: dict[str, Any], forms: tuple[str, ...]) -> list[str]:
+    from studio.calibration.exchange import ENDINGS, write_camera
+    from studio.project.calibration import CalibratedCamera
+
+    camera = CalibratedCamera.model_validate(data["camera"] | {"distortion": tuple(data["camera"]["distortion"])})
+    files = []
+    for form in forms:
+        path = out.with_name(f"{out.stem}_{ENDINGS[form]}")
+        write_camera(path, camera, form)
+        files.append(str(path))
+    return files
+
+
+def _advice_data(result: Calibrated) -> dict[str, Any] | None:
+    advice = result.advice
+    if advice is None:
+        return None
+    return {
+        "centre_m": advice.centre.tolist(),
+        "rotation": advice.rotation.tolist(),
+        "depth_rms_before_m": advice.before,
+        "depth_rms_after_m": advice.after,
+    }
+
+
+def _print(
+    result: Calibrated,
+    material: Material,
+    true: list[tuple[float, float]] | None,
+    options: CalibrateOptions,
+    quiet: bool,
+) -> None:
+    from studio.calibration.words import check_rows, depth_rows, next_sentence, parameter_rows
+
+    print_table("Calibration", parameter_rows(result), header=("parameter", "value", "sigma"))
+    if result.depth:
+        print()
+        header = ("depth error", "calibration um", "worst um", "line um", *(("true um",) if true else ()))
+        print_table("Depth over the working volume (rms)", depth_rows(result, true), header=header)
+    print()
+    print_table("Checks", check_rows(result, len(material.views)))
+    for fault in result.faults:
+        print(f"caution: {fault}")
+    if not quiet:
+        for note in (*material.notes, *result.adjusted.left_out):
+            print(note)
+    if result.advice is not None:
+        print(next_sentence(result.advice, options.target_um))

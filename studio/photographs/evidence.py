@@ -1,0 +1,345 @@
+"""Which way the line runs and what colour it has: by the evidence of a whole set of photographs.
+
+Shrunk images are searched for ridges, in every combination of the channels and along either axis. The ridges of each
+are chained (`selection/continuity.py`), and a combination scores by the share of scan lines on which its chain stands
+clear of everything else in the image:
+
+    score = mean over scan lines of max(0, (p - q) / (p + q)), over 1 + roughness
+
+p: strength of the ridge on the chain; q: that of the strongest rivals elsewhere; roughness: bend of the chain, px.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.line.detection.noise import image_saturation
+from analysis.line.result import Axis
+from analysis.line.selection.continuity import cheapest_chain
+
+Floats = NDArray[np.float32]
+Colour = Literal["mono", "red", "green", "blue"]
+
+AXES: tuple[Axis, ...] = ("rows", "columns")
+COLOURS: tuple[Colour, ...] = ("red", "green", "blue")
+LONG_SIDE = 480
+"""px of the shrunk images: enough to see a line of one pixel of the largest sensors, and little to compute."""
+SCALES = (1.0, 2.0, 4.0, 8.0)
+"""Gaussian sigmas of the ridge filters, px of the shrunk image: lines up to a few per cent of the image's width."""
+CANDIDATES = 5
+RIVAL = 0.9
+"""Quantile of the scan lines' strongest rivals: a lamp on a few scan lines does not hide a line on all of them."""
+COMPARABLE = 0.5
+"""A narrow line answers a filter twice its width with a third of its strength, a plateau with nearly all."""
+JUMP = 5.0
+"""px of the shrunk image from one scan line to the next, that a chain's piece ends at."""
+NEAR = 3.0
+"""Sigmas of the ridge's own filter within which another maximum is a part of it."""
+COLOURFUL = 0.5
+"""Share of the light that one channel must have for a line that is seen best without colours to have one."""
+TIE = 0.1
+"""Relative difference of scores below which the simpler combination, with the less noise, is taken."""
+WEAK = 0.5
+"""Score of the other axis over that of the one chosen, above which the choice is doubtful."""
+FAINT = 0.02
+"""Score below which no line stands out anywhere."""
+ENOUGH = 8
+"""Photographs of a set that are looked at."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Weights of the channels R, G, B."""
+
+    name: str
+    colour: Colour
+    weights: tuple[float, float, float]
+
+    @property
+    def difference(self) -> bool:
+        """One colour less the others: grey light is gone, and with a white core the line's middle."""
+        return min(self.weights) < 0.0
+
+    def of(self, image: NDArray[Any]) -> Floats:
+        """(h, w, 3) or (h, w) -> (h, w); of a mono image itself."""
+        if image.ndim == 2:
+            return image.astype(np.float32, copy=False)
+        mixed: Floats = cv2.transform(image.astype(np.float32, copy=False), np.array([self.weights], np.float32))
+        return mixed
+
+
+def _combinations() -> tuple[Combination, ...]:
+    third = 1.0 / 3.0
+    found = [Combination("mono", "mono", (third, third, third))]
+    for k, colour in enumerate(COLOURS):
+        alone = [0.0, 0.0, 0.0]
+        alone[k] = 1.0
+        found.append(Combination(colour, colour, (alone[0], alone[1], alone[2])))
+    for k, colour in enumerate(COLOURS):
+        less = [-0.5, -0.5, -0.5]
+        less[k] = 1.0
+        found.append(Combination(f"{colour} less the others", colour, (less[0], less[1], less[2])))
+    return tuple(found)
+
+
+COMBINATIONS = _combinations()
+"""The simplest first: of equals that is taken."""
+
+
+@dataclass(frozen=True)
+class Shrunk:
+    """An image (h, w) or (h, w, 3), where it is clipped and where it is closed (h, w), so many times smaller."""
+
+    image: Floats
+    saturated: NDArray[np.bool_]
+    closed: NDArray[np.bool_] | None
+    factor: int
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The line of one shrunk image by one combination: position and filter sigma (n,) in px of the whole image."""
+
+    u: NDArray[np.float64]
+    """At every scan line of the shrunk image; NaN: none, or no stronger than what is elsewhere."""
+    scale: NDArray[np.float64]
+    score: float
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What was chosen, and why."""
+
+    axis: Axis
+    combination: Combination
+    scores: dict[Axis, dict[str, float]]
+    """Mean over the photographs, by axis and combination that were allowed."""
+    second: float
+    """Score of a second line in the chosen combination."""
+    colour: Colour
+    """Of the laser: the combination's, or that of most of its light where another channel shows it more clearly."""
+
+    @property
+    def score(self) -> float:
+        return self.scores[self.axis][self.combination.name]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Doubts for a person."""
+        found = []
+        if self.score < FAINT:
+            found.append(
+                "no line stands out in the photographs, in any colour or direction: see the overlay, and give "
+                "--axis and --laser"
+            )
+        else:
+            for axis, scores in self.scores.items():
+                other = max(scores.values())
+                if axis != self.axis and other > WEAK * self.score:
+                    found.append(
+                        f"the line may run along the {self.axis} instead (evidence {other:.2f} for --axis {axis}, "
+                        f"{self.score:.2f} for {self.axis})"
+                    )
+        return found
+
+    def told(self) -> list[tuple[str, str]]:
+        """(what, choice and reason) for a person."""
+        best = {axis: max(scores.values()) for axis, scores in self.scores.items()}
+        axis = self.axis
+        axis_reason = ", ".join(f"{name} {score:.2f}" for name, score in best.items())
+        by_name = self.scores[self.axis]
+        ranked = sorted(by_name.items(), key=lambda item: -item[1])[:4]
+        reason = ", ".join(f"{name} {score:.2f}" for name, score in ranked) if len(by_name) > 1 else "given"
+        found = [
+            ("scan axis", f"{axis} ({axis_reason})"),
+            ("laser's colour", self.colour),
+            ("seen best in", f"{self.combination.name} ({reason})"),
+        ]
+        if self.second > WEAK * self.score:
+            found.append(("lines", f"a second line stands out (evidence {self.second:.2f}): --peaks 2 takes both"))
+        else:
+            found.append(("lines", f"one (evidence {self.score:.2f}; of a second {self.second:.2f})"))
+        return found
+
+
+def find_evidence(
+    shrunk: Sequence[Shrunk],
+    axis: Axis | None = None,
+    colour: Colour | None = None,
+) -> Evidence:
+    """Shrunk images of a set, one or more -> the choice that all of them support best.
+
+    axis and colour: given; None: any. The other axis is looked at even so: a choice that it speaks against is doubtful.
+    """
+    mono = all(one.image.ndim == 2 for one in shrunk)
+    allowed = [c for c in COMBINATIONS if colour is None or c.colour == colour]
+    allowed = allowed[:1] if mono else allowed
+    scores: dict[Axis, dict[str, float]] = {}
+    for tried in AXES:
+        scores[tried] = {}
+        for combination in allowed:
+            chains = [chain_of(one, combination, tried) for one in shrunk]
+            scores[tried][combination.name] = float(np.mean([chain.score for chain in chains]))
+    best_axis = axis if axis is not None else max(AXES, key=lambda way: max(scores[way].values()))
+    highest = max(scores[best_axis].values())
+    best = next(c for c in allowed if scores[best_axis][c.name] >= (1.0 - TIE) * highest)
+    seen = best.colour if mono or colour is not None else _colour_of(shrunk, best, best_axis)
+    second = float(np.mean([chains_of(one, best, best_axis, 2)[1].score for one in shrunk]))
+    return Evidence(best_axis, best, scores, second, seen)
+
+
+def _colour_of(shrunk: Sequence[Shrunk], combination: Combination, axis: Axis) -> Colour:
+    """The channel with most light along the chains, above that beside them; clipped pixels do not say."""
+    light = np.zeros(3)
+    for one in shrunk:
+        image, saturated, factor = one.image, one.saturated, one.factor
+        if image.ndim == 2:
+            continue
+        chain = chain_of(one, combination, axis)
+        there = np.flatnonzero(np.isfinite(chain.u))
+        turned, full = (image, saturated) if axis == "rows" else (image.swapaxes(0, 1), saturated.T)
+        x = np.arange(turned.shape[1])
+        off = np.abs(x - ((chain.u[there] + 0.5) / factor - 0.5)[:, None]) / (chain.scale[there] / factor)[:, None]
+        for row, distance in zip(there, off, strict=True):
+            near, beside = (distance < NEAR) & ~full[row], (distance > 2.0 * NEAR) & (distance < 4.0 * NEAR)
+            if near.any() and beside.any():
+                light += turned[row][near].mean(axis=0) - turned[row][beside].mean(axis=0)
+    best = int(np.argmax(light))
+    if combination.colour == "mono" and light[best] < COLOURFUL * float(light.sum()):
+        return "mono"
+    return COLOURS[best]
+
+
+def shrink(image: NDArray[Any], off: NDArray[Any] | None, closed: NDArray[np.bool_] | None = None) -> Shrunk:
+    """Image less its laser-off image; closed (h, w): pixels that nobody is to look at."""
+    factor = max(1, -(-max(image.shape[:2]) // LONG_SIDE))
+    full = image_saturation(image)
+    size = (max(1, image.shape[1] // factor), max(1, image.shape[0] // factor))
+
+    def small(values: NDArray[Any]) -> Floats:
+        values = np.ascontiguousarray(values[: size[1] * factor, : size[0] * factor])
+        if values.dtype.kind == "f":
+            values = np.nan_to_num(values.astype(np.float32, copy=False))
+        less: Floats = cv2.resize(values, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+        return less
+
+    less = small(image) if off is None else small(image) - small(off)
+    shut = None
+    if closed is not None:
+        shut = small(closed.astype(np.uint8) * 255) > 0
+        less[shut] = np.median(less[~shut], axis=0) if not shut.all() else 0.0
+    if full is None:
+        return Shrunk(less, np.zeros(less.shape[:2], np.bool_), shut, factor)
+    top = image if image.ndim == 2 else image.max(axis=2)
+    return Shrunk(less, small((top >= full).astype(np.uint8) * 255) >= 128, shut, factor)
+
+
+def chain_of(shrunk: Shrunk, combination: Combination, axis: Axis) -> Chain:
+    """The cheapest chain of ridges in a shrunk image, and how clear it stands."""
+    return chains_of(shrunk, combination, axis, 1)[0]
+
+
+def chains_of(shrunk: Shrunk, combination: Combination, axis: Axis, count: int) -> list[Chain]:
+    """As many chains, far from each other, the cheapest first."""
+    light, saturated, closed = combination.of(shrunk.image), shrunk.saturated, shrunk.closed
+    if axis == "columns":
+        light, saturated = np.ascontiguousarray(light.T), np.ascontiguousarray(saturated.T)
+        closed = None if closed is None else closed.T
+    if combination.difference:
+        # another laser's colour less this one's is a trough, and a white core in it would be a ridge
+        light = np.maximum(light, np.median(light, axis=1, keepdims=True))
+    if combination.difference and saturated.any():
+        # a core that is white in every channel leaves a hollow between two coloured flanks; what is saturated without
+        # them, as a window, stays as dark as it is
+        element = np.ones((1, 2 * int(4.0 * SCALES[-1]) + 1), np.uint8)
+        light = np.where(saturated, cv2.morphologyEx(light, cv2.MORPH_CLOSE, element), light)
+    u, strength, scale = ridge_peaks(light, closed)
+    found: list[Chain] = []
+    for _ in range(count):
+        choice = cheapest_chain(u, strength)
+        along, p, s = _at(choice, u), _at(choice, strength), _at(choice, scale)
+        score, clear, off = _clearness(along, p, s, u, strength)
+        u, strength = np.where(off, u, np.nan), np.where(off, strength, np.nan)
+        along = np.where(_clear_pieces(along, clear), along, np.nan)
+        found.append(Chain((along + 0.5) * shrunk.factor - 0.5, s * shrunk.factor, score))
+    return found
+
+
+def ridge_peaks(
+    light: Floats, closed: NDArray[np.bool_] | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """(n, w) -> (n, k) positions, strengths and filter sigmas of the strongest bright ridges across each row."""
+    response = np.zeros(light.shape, np.float32)
+    widest = np.zeros(light.shape, np.float32)
+    for scale in SCALES:
+        smooth = cv2.GaussianBlur(light, (0, 0), scale, borderType=cv2.BORDER_REPLICATE)
+        # Lindeberg (1998), eq. 42: with the power 3/2 a Gaussian ridge answers most at its own width
+        bent = -(scale**1.5) * cv2.Sobel(smooth, cv2.CV_32F, 2, 0, ksize=1, borderType=cv2.BORDER_REPLICATE)
+        widest[bent > response] = scale
+        np.maximum(response, bent, out=response)
+    if closed is not None:
+        response[cv2.dilate(closed.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0] = 0.0
+    inner = response[:, 1:-1]
+    peaked = np.where((inner >= response[:, :-2]) & (inner > response[:, 2:]) & (inner > 0), inner, 0)
+    count = min(CANDIDATES, peaked.shape[1])
+    order = np.argpartition(-peaked, count - 1, axis=1)[:, :count]
+    strength = np.take_along_axis(peaked, order, axis=1).astype(np.float64)
+    widths = np.take_along_axis(widest, order + 1, axis=1).astype(np.float64)
+    there = strength > 0
+    there &= ~_flanks(order, strength, widths)
+    left, right = np.take_along_axis(response, order, axis=1), np.take_along_axis(response, order + 2, axis=1)
+    bend = np.maximum(2.0 * strength - left - right, 1e-12)
+    u = order + 1.0 + 0.5 * (right - left) / bend
+    return np.where(there, u, np.nan), np.where(there, strength, np.nan), widths
+
+
+def _flanks(order: NDArray[np.intp], strength: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which candidates (n, k) are an edge of a wider ridge of comparable strength, as of a saturated plateau."""
+    apart = np.abs(order[:, :, None] - order[:, None, :])
+    wider = scale[:, None, :] > scale[:, :, None]
+    within = apart < 2.0 * scale[:, None, :]
+    return np.asarray((wider & within & (strength[:, None, :] > COMPARABLE * strength[:, :, None])).any(axis=2))
+
+
+def _at(choice: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    picked = np.take_along_axis(values, np.maximum(choice, 0)[:, None], axis=1)[:, 0]
+    return np.where(choice >= 0, picked, np.nan)
+
+
+def _clearness(
+    found: NDArray[np.float64],
+    p: NDArray[np.float64],
+    scale: NDArray[np.float64],
+    u: NDArray[np.float64],
+    strength: NDArray[np.float64],
+) -> tuple[float, NDArray[np.float64], NDArray[np.bool_]]:
+    """Score of a chain (n,) among the candidates (n, k), how clear it is (n,), and which of these are no part of it."""
+    there = np.isfinite(found)
+    if there.sum() < 3:
+        return 0.0, np.zeros(len(found)), np.isfinite(u)
+    everywhere = np.interp(np.arange(len(found)), np.flatnonzero(there), found[there])
+    wide = np.interp(np.arange(len(found)), np.flatnonzero(there), scale[there])
+    elsewhere = np.isfinite(u) & (np.abs(u - everywhere[:, None]) > NEAR * wide[:, None] + 1.0)
+    rivals = np.where(elsewhere, strength, 0.0).max(axis=1)
+    q = max(float(np.quantile(rivals, RIVAL)), 1e-12)
+    clear = np.where(there, np.maximum(0.0, (p - q) / (p + q)), 0.0)
+    neighbours = there[:-2] & there[1:-1] & there[2:]
+    bends = np.abs(found[:-2] - 2.0 * found[1:-1] + found[2:])[neighbours]
+    roughness = float(np.mean(bends)) if len(bends) else 1.0
+    return float(np.mean(clear)) / (1.0 + roughness), clear, elsewhere
+
+
+def _clear_pieces(found: NDArray[np.float64], clear: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which scan lines (n,) are on a piece of the chain that stands clear of the rivals on most of its length."""
+    there = np.flatnonzero(np.isfinite(found))
+    kept = np.zeros(len(found), np.bool_)
+    far = (np.diff(there) > 1) | (np.abs(np.diff(found[there])) > JUMP)
+    for piece in np.split(there, np.flatnonzero(far) + 1):
+        kept[piece] = bool(len(piece)) and float(np.median(clear[piece])) > 0.0
+    return kept

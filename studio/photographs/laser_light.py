@@ -1,0 +1,217 @@
+"""The image that is measured: one channel of a colour photograph, or several, with what is clipped marked as clipped.
+
+Selecting and measuring are two things. A colour less the others shows where the laser's light is, in room light too;
+but it is hollow where the line's core is white, and in a JPEG it has half the resolution. There the channel measures
+that scatters least about a smooth line, within the band that the colour selects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.line.detection.noise import NoiseModel, image_saturation
+from analysis.line.extract import extract
+from analysis.line.result import Axis
+from analysis.line.series.subtract import subtract_off
+from analysis.line.settings import ExtractionSettings
+from studio.photographs.evidence import COLOURS, Chain, Colour
+
+Channel = Literal["mono", "luminance", "red", "green", "blue", "difference"]
+
+LOSSY_FULL = 250.0
+"""DN: a JPEG scatters what is clipped at 255 by a few numbers."""
+RUN, RUNS = 32, 8
+"""Scan lines of a run, and runs, on which channels are compared."""
+LAG = 4
+"""Scan lines between positions compared: a JPEG's and a demosaiced colour is alike on neighbouring ones."""
+ROOM, SPARE = 8.0, 24.0
+"""Half width of the band about the line: so many sigmas of its ridge, and px."""
+BRIDGE = 12
+"""Scan lines of the shrunk image that the band goes on where its chain has none: as far as a chain may skip."""
+TIE = 0.1
+"""Relative difference of scatter below which the first of two channels is taken."""
+MOST_FOUND = 0.9
+"""A channel that finds fewer than this share of the most is none to measure with."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """A mono image and the DN from which on it is clipped; None: nothing is, or its type tells."""
+
+    image: NDArray[Any]
+    saturation: float | None
+    open: NDArray[np.bool_] | None = None
+    """(h, w) where the image is the photograph's own; None: everywhere."""
+
+    @property
+    def seen(self) -> NDArray[Any]:
+        """The image with NaN where it is not the photograph's own: what its noise is told by."""
+        return self.image if self.open is None else np.where(self.open, self.image, np.float32(np.nan))
+
+
+def laser_light(
+    image: NDArray[Any], off: NDArray[Any] | None, channel: Channel, colour: Colour, lossy: bool = False
+) -> Light:
+    """Image (h, w) or (h, w, 3), less its laser-off image -> what `channel` measures. InputError: as `subtract_off`.
+
+    "mono" is the sum of all channels, "difference" twice the laser's less the others; they and the luminance are
+    clipped where a channel that carries them is.
+    """
+    if image.ndim == 2:
+        return _less(image, off, image_saturation(image))
+    full = image_saturation(image)
+    if full is not None and lossy and image.dtype == np.uint8:
+        full = LOSSY_FULL
+    if channel in COLOURS:
+        k = COLOURS.index(channel)
+        return _less(
+            np.ascontiguousarray(image[..., k]), None if off is None else np.ascontiguousarray(off[..., k]), full
+        )
+    clipped = image[..., 0]
+    if channel == "difference":
+        assert colour != "mono"
+        weights = np.full(3, -1.0)
+        weights[COLOURS.index(colour)] = 2.0
+        clipped = image[..., COLOURS.index(colour)]
+    elif channel == "luminance":
+        weights, clipped = np.array([0.299, 0.587, 0.114]), image.max(axis=2)
+    else:
+        weights, clipped = np.ones(3), image.max(axis=2)
+    mixed = _mixed(image, weights)
+    if full is None:
+        return _less(mixed, None if off is None else _mixed(off, weights), None)
+    top = max(full, float(np.nanmax(mixed)))
+    mixed[clipped >= full] = top
+    return _less(mixed, None if off is None else _mixed(off, weights), top)
+
+
+def _mixed(image: NDArray[Any], weights: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(h, w, 3) -> (h, w); whole numbers stay whole, so that the noise of rounding is known."""
+    mixed: NDArray[np.float32] = cv2.transform(image.astype(np.float32, copy=False), weights[None, :])
+    return np.rint(mixed) if image.dtype.kind == "u" else mixed
+
+
+def _less(image: NDArray[Any], off: NDArray[Any] | None, full: float | None) -> Light:
+    if off is None:
+        return Light(image, full)
+    return Light(*subtract_off(image, off, full))
+
+
+def channels_to_try(colour: Colour, difference: bool, lossy: bool) -> tuple[Channel, ...]:
+    """Which may measure, the one with the least foreign light first."""
+    whole: Channel = "luminance" if lossy else "mono"
+    if colour == "mono":
+        return (whole, *COLOURS)
+    others = [one for one in COLOURS if one != colour]
+    first: tuple[Channel, ...] = ("difference",) if difference and not lossy else ()
+    return (*first, colour, whole, *others)
+
+
+def scatter_of(
+    image: NDArray[Any],
+    off: NDArray[Any] | None,
+    chain: Chain,
+    channel: Channel,
+    colour: Colour,
+    axis: Axis,
+    lossy: bool,
+) -> tuple[float, int]:
+    """How far positions measured in a channel scatter about a smooth line, px, and how many were found.
+
+    Upright pieces of the image about the chain are measured; inf: too few.
+    """
+    pieces = _pieces(image, off, chain, axis)
+    if pieces is None:
+        return np.inf, 0
+    light = laser_light(*pieces, channel, colour, lossy)
+    steps = np.abs(np.diff(light.image.astype(np.float32), axis=1))
+    dark = 1.05 * float(np.median(steps)) + 0.3  # half a DN of rounding in each of two neighbours
+    gain = max(float(np.nanmax(light.image)), 1.0) / 1e4
+    noise = NoiseModel(gain=gain, read_noise=dark / gain, saturation=light.saturation)
+    line = extract(light.image, settings=ExtractionSettings(), noise=noise, threads=1)
+    u = np.where(line.valid, line.u, np.nan)[:, 0].reshape(-1, RUN)
+    bends = u[:, : -2 * LAG] - 2.0 * u[:, LAG:-LAG] + u[:, 2 * LAG :]
+    bends = np.abs(bends[np.isfinite(bends)])
+    if len(bends) < RUN // 2:
+        return np.inf, int(np.isfinite(u).sum())
+    return 1.4826 * float(np.median(bends)) / 6.0**0.5, int(np.isfinite(u).sum())
+
+
+def _pieces(
+    image: NDArray[Any], off: NDArray[Any] | None, chain: Chain, axis: Axis
+) -> tuple[NDArray[Any], NDArray[Any] | None] | None:
+    """Runs of scan lines about the chain, one below the other: (RUN n, w) or (RUN n, w, 3)."""
+    if axis == "columns":
+        image = image.swapaxes(0, 1)
+        off = None if off is None else off.swapaxes(0, 1)
+    low, high = band(chain, *image.shape[:2])
+    there = (high > low).reshape(-1)
+    starts = [s for s in range(0, len(image) - RUN + 1, RUN) if there[s : s + RUN].all()]
+    if not starts:
+        return None
+    starts = [starts[k] for k in np.unique(np.linspace(0, len(starts) - 1, RUNS).astype(int))]
+    width = min(image.shape[1], max(int(np.median(high[there] - low[there])), 32))
+    middles = [int(np.clip((low[s] + high[s + RUN - 1]) // 2 - width // 2, 0, image.shape[1] - width)) for s in starts]
+    cut = [(slice(s, s + RUN), slice(m, m + width)) for s, m in zip(starts, middles, strict=True)]
+    return (
+        np.concatenate([image[one] for one in cut]),
+        None if off is None else np.concatenate([off[one] for one in cut]),
+    )
+
+
+def band(chain: Chain, count: int, width: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and past-the-last pixel (count,) of each scan line that may be the line's; equal: none."""
+    n = len(chain.u)
+    there = np.flatnonzero(np.isfinite(chain.u))
+    empty = np.zeros(count, np.intp)
+    if len(there) < 2:
+        return empty, empty
+    factor = max(1, count // n)
+    from scipy.ndimage import distance_transform_edt
+
+    distance = distance_transform_edt(~np.isfinite(chain.u))
+    rows = np.arange(count)
+    at = (rows + 0.5) / factor - 0.5
+    middle = np.interp(at, there, chain.u[there])
+    half = ROOM * np.interp(at, there, chain.scale[there]) + SPARE
+    near = distance[np.clip(rows // factor, 0, n - 1)] <= BRIDGE
+    low = np.where(near, np.clip(np.floor(middle - half), 0, width), 0).astype(np.intp)
+    high = np.where(near, np.clip(np.ceil(middle + half) + 1, 0, width), 0).astype(np.intp)
+    return low, np.maximum(low, high)
+
+
+def banded(light: Light, chains: Sequence[Chain], axis: Axis) -> Light:
+    """The light within the bands of the chains, on level ground: what is beside them is no line's and hides none."""
+    upright = light.image if axis == "rows" else light.image.T
+    level = np.array(upright, np.float32)
+    inside = np.zeros(upright.shape, np.bool_)
+    x = np.arange(upright.shape[1])
+    for chain in chains:
+        low, high = band(chain, *upright.shape)
+        inside |= (x >= low[:, None]) & (x < high[:, None])
+    rows = np.flatnonzero(inside.any(axis=1))
+    widest = int(inside.sum(axis=1).max()) if len(rows) else 0
+    if widest:
+        # each row's pixels of the band side by side, those of narrower bands taken more than once
+        order = np.argsort(~inside[rows], axis=1, kind="stable")[:, :widest]
+        order = np.take_along_axis(order, np.arange(widest) % inside[rows].sum(axis=1)[:, None], axis=1)
+        ground = np.median(np.take_along_axis(level[rows], order, axis=1), axis=1)
+        level[rows] = np.where(inside[rows], level[rows], np.rint(ground)[:, None])
+    level[~inside.any(axis=1)] = float(np.median(level[rows])) if widest else 0.0
+    turned = (level, inside) if axis == "rows" else (level.T, inside.T)
+    full = image_saturation(light.image) if light.saturation is None else light.saturation
+    return Light(turned[0], full, turned[1])
+
+
+def without(light: Light, closed: NDArray[np.bool_]) -> Light:
+    """The light with what a mask closes (h, w) taken out."""
+    pixels = np.array(light.image, np.float32)
+    pixels[closed] = np.nan
+    full = image_saturation(light.image) if light.saturation is None else light.saturation
+    return Light(pixels, full, ~closed if light.open is None else light.open & ~closed)

@@ -1,0 +1,194 @@
+"""What a set of photographs shows of its line, before any of them is measured: axis, colour, channel, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.line.detection.channel import check_image
+from analysis.line.result import Axis
+from analysis.line.series.subtract import subtract_off
+from analysis.line.settings import ExtractionSettings
+from render.base.errors import InputError
+from studio.photographs.evidence import (
+    COLOURS,
+    ENOUGH,
+    FAINT,
+    Colour,
+    Evidence,
+    Shrunk,
+    chain_of,
+    find_evidence,
+    shrink,
+)
+from studio.photographs.image_files import Photograph, load_photograph, read_photograph
+from studio.photographs.laser_light import MOST_FOUND, TIE, Channel, channels_to_try, scatter_of
+from studio.photographs.off_images import pair_offs
+from studio.photographs.region import Region
+
+TRIED = 3
+"""Photographs on which channels are compared."""
+KEPT = 2**25
+"""Pixels of photographs that are kept in memory from looking to measuring."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What is not to be found by the photographs themselves; None: by evidence."""
+
+    axis: Axis | None = None
+    colour: Colour | None = None
+    channel: Channel | None = None
+    off: tuple[Path, ...] = ()
+    region: Region = field(default_factory=Region)
+    shape: Literal["plane", "sphere"] = "plane"
+    """Of what points are to lie on, for the report."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the photographs of a set are to be measured, and what is said of it."""
+
+    settings: ExtractionSettings
+    evidence: Evidence | None
+    channel: Channel
+    region: Region
+    offs: dict[Path, Path | None]
+    told: list[tuple[str, str]]
+    warnings: list[str]
+    named: str | None = None
+    """The colour that was asked for, which every photograph must have."""
+    kept: dict[Path, Photograph] = field(default_factory=dict)
+
+    @property
+    def banded(self) -> bool:
+        """A colour selects, and a channel that also sees other light measures."""
+        return self.evidence is not None and self.evidence.combination.difference and self.channel != "difference"
+
+    def record(self) -> dict[str, Any]:
+        """For programs: what was chosen, and why."""
+        evidence = self.evidence
+        return {
+            "axis": self.settings.axis,
+            "colour": None if evidence is None else evidence.colour,
+            "seen_in": None if evidence is None else evidence.combination.name,
+            "measured_in": self.channel,
+            "evidence": {} if evidence is None else evidence.scores,
+            "told": dict(self.told),
+            "warnings": self.warnings,
+        }
+
+    def read(self, path: Path) -> tuple[Photograph, NDArray[Any] | None]:
+        """A photograph and its laser-off image, of one shape. InputError: one of them cannot be read."""
+        taken = self.kept.pop(path, None) or read_photograph(path)
+        off = self.offs.get(path)
+        return taken, None if off is None else alike(taken.pixels, _recent(off))
+
+
+_recent = lru_cache(maxsize=2)(load_photograph)
+"""One laser-off image serves many photographs."""
+
+
+def alike(image: NDArray[Any], off: NDArray[Any]) -> NDArray[Any]:
+    """The laser-off image as colour where only the other shows colour. InputError: another size or type."""
+    if image.ndim == 3 and off.ndim == 2:
+        off = np.repeat(off[..., None], 3, axis=2)
+    if image.shape[:2] != off.shape[:2] or image.dtype != off.dtype:
+        subtract_off(image, off)  # raises
+    return off if image.ndim == off.ndim else off.mean(axis=2).astype(off.dtype)
+
+
+def look_at(paths: Sequence[Path], settings: ExtractionSettings, wishes: Wishes) -> Look:
+    """Image files of one set -> how to measure them. Unreadable ones are passed over: who measures them tells.
+
+    InputError: laser-off images that do not go with the images.
+    """
+    partners, how = pair_offs(paths, wishes.off)
+    offs = dict(zip(paths, partners, strict=True))
+    look = Look(settings, None, wishes.channel or "mono", wishes.region, offs, [], [], _named(wishes))
+    seen: list[tuple[Photograph, NDArray[Any] | None, Shrunk]] = []
+    kept: dict[Path, Photograph] = {}
+    turned: list[str] = []
+    spread = np.unique(np.linspace(0, len(paths) - 1, min(ENOUGH, len(paths))).astype(int))
+    for path in (paths[k] for k in spread):
+        try:
+            taken, off = look.read(path)
+            image = mosaic(wishes.region.part(check_image(taken.pixels)), settings)
+            dark = None if off is None else mosaic(wishes.region.part(off), settings)
+            closed = None if settings.pattern is not None else wishes.region.closed
+            seen.append((Photograph(image, "", taken.lossy), dark, shrink(image, dark, closed)))
+        except InputError:
+            continue
+        turned += [taken.turned] if taken.turned else []
+        if sum(one.pixels.size for one in kept.values()) + taken.pixels.size < KEPT:
+            kept[path] = taken
+    told = wishes.region.told() + ([("laser off", how)] if how else [])
+    if turned:
+        told.append(("upright", f"{', '.join(dict.fromkeys(turned))}, as EXIF says"))
+    settings = settings.model_copy(update={"axis": wishes.axis or settings.axis})
+    if not seen:
+        return replace(look, settings=settings, told=told)
+    evidence = find_evidence([shrunk for _, _, shrunk in seen], wishes.axis, wishes.colour)
+    told = evidence.told() + told
+    settings = settings.model_copy(update={"axis": evidence.axis, "channel": "auto"})
+    look = replace(look, settings=settings, told=told, warnings=evidence.warnings, kept=kept)
+    if settings.pattern is not None:
+        found = evidence.colour if evidence.colour != "mono" else "auto"
+        return replace(look, settings=settings.model_copy(update={"channel": found}))
+    channel, why = _measuring(seen, evidence, wishes.channel)
+    if any(image.pixels.ndim == 3 for image, _, _ in seen):
+        told.append(("measured in", f"{channel} ({why})"))
+    return replace(look, evidence=evidence, channel=channel)
+
+
+def _named(wishes: Wishes) -> str | None:
+    return next((one for one in (wishes.channel, wishes.colour) if one in COLOURS), None)
+
+
+def mosaic(image: NDArray[Any], settings: ExtractionSettings) -> NDArray[Any]:
+    """A raw image (h, w) with a Bayer pattern -> colours (h/2, w/2, 3) to look at; others as they are."""
+    if settings.pattern is None or image.ndim != 2:
+        return image
+    height, width = image.shape[0] // 2 * 2, image.shape[1] // 2 * 2
+    planes: dict[str, list[NDArray[Any]]] = {letter: [] for letter in "RGB"}
+    for k, letter in enumerate(settings.pattern):
+        planes[letter].append(image[k // 2 : height : 2, k % 2 : width : 2])
+    return np.stack([np.mean(planes[letter], axis=0) for letter in "RGB"], axis=2).astype(np.float32)
+
+
+def _measuring(
+    seen: Sequence[tuple[Photograph, NDArray[Any] | None, Shrunk]], evidence: Evidence, wished: Channel | None
+) -> tuple[Channel, str]:
+    """The channel that scatters least about a smooth line, of those that see nearly all of it; and the reason."""
+    coloured = [one for one in seen if one[0].pixels.ndim == 3]
+    if wished is not None or not coloured:
+        return wished or "mono", "given"
+    lossy = any(image.lossy for image, _, _ in coloured)
+    names = channels_to_try(evidence.colour, evidence.combination.difference, lossy)
+    if evidence.score < FAINT / 10.0:
+        return names[0], "by default"
+    scatters: dict[Channel, list[float]] = {name: [] for name in names}
+    counts = dict.fromkeys(names, 0)
+    order = np.argsort([-chain_of(one[2], evidence.combination, evidence.axis).score for one in coloured])
+    for image, off, shrunk in (coloured[k] for k in order[:TRIED]):
+        chain = chain_of(shrunk, evidence.combination, evidence.axis)
+        for name in names:
+            scatter, found = scatter_of(
+                image.pixels, off, chain, name, evidence.colour, evidence.axis, lossy=image.lossy
+            )
+            scatters[name].append(scatter)
+            counts[name] += found
+    typical = {name: float(np.median(scatters[name])) for name in names}
+    enough = [name for name in names if counts[name] >= MOST_FOUND * max(counts.values()) > 0]
+    least = min((typical[name] for name in enough), default=np.inf)
+    if not np.isfinite(least):
+        return names[0], "by default"
+    best = next(name for name in enough if typical[name] <= (1.0 + TIE) * least)
+    listed = ", ".join(f"{name} {typical[name]:.2f}" for name in names if np.isfinite(typical[name]))
+    return best, f"scatter along the line, px: {listed}"

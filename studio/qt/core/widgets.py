@@ -1,0 +1,61 @@
+"""Small widgets that several panels are made of."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtWidgets import QBoxLayout, QLabel, QProgressBar, QPushButton, QSplitter, QWidget
+
+
+class ElidedLabel(QLabel):
+    """One line that may have too little room: it is shortened then, and its tip has the whole."""
+
+    def __init__(self, mode: Qt.TextElideMode = Qt.TextElideMode.ElideRight) -> None:
+        super().__init__()
+        self.mode = mode
+        self.setMinimumWidth(1)
+
+    def setText(self, text: str) -> None:
+        super().setText(text)
+        self.setToolTip(text)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter, area = QPainter(self), self.contentsRect()
+        shown = self.fontMetrics().elidedText(self.text(), self.mode, area.width())
+        self.style().drawItemText(
+            painter, area, int(self.alignment()), self.palette(), self.isEnabled(), shown, self.foregroundRole()
+        )
+
+
+def text_button(text: str, tip: str = "", name: str = "") -> QPushButton:
+    """name: for the style sheet."""
+    button = QPushButton(text)
+    button.setObjectName(name)
+    button.setToolTip(tip)
+    return button
+
+
+def thin_bar() -> QProgressBar:
+    """How far a job is, in thousandths; its words stand beside it."""
+    bar = QProgressBar(maximum=1000, textVisible=False)
+    bar.setMaximumHeight(10)
+    return bar
+
+
+def flush(layout: QBoxLayout, *widgets: QWidget) -> QBoxLayout:
+    """Fill a layout edge to edge, without room around or between."""
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(0)
+    for widget in widgets:
+        layout.addWidget(widget)
+    return layout
+
+
+def upper_and_lower(upper: QWidget, lower: QWidget, sizes: tuple[int, int]) -> QSplitter:
+    """Two widgets with a line between them that can be dragged; of more height the upper one takes three quarters."""
+    split = QSplitter(Qt.Orientation.Vertical)
+    for widget, share in ((upper, 3), (lower, 1)):
+        split.addWidget(widget)
+        split.setStretchFactor(split.indexOf(widget), share)
+    split.setSizes(list(sizes))
+    return split

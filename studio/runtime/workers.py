@@ -1,0 +1,151 @@
+"""Tasks handed to processes of this machine or to a Dask cluster; each result comes back as its task ends.
+
+What a worker does is a function of a task and of "asked to stop"; both it and its tasks can be pickled.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing.synchronize import Event
+from typing import Any, TypeVar
+
+from render.base.errors import Cancelled, InputError
+from render.base.threads import Cancel, thread_count
+from render.run import never
+
+T = TypeVar("T", bound=Hashable)
+R = TypeVar("R")
+Work = Callable[[T, Cancel], R]
+MOST_LOST = 3
+"""Times that a task may take its worker with it before it is given up."""
+POLL = 0.2
+"""s between looks at Ctrl-C."""
+
+
+@dataclass(frozen=True)
+class Engine:
+    """workers: processes here, None for one a processor; scheduler: address of a Dask cluster in place of them."""
+
+    workers: int | None = None
+    scheduler: str | None = None
+
+
+EVERY_PROCESSOR = Engine()
+
+
+@dataclass(frozen=True)
+class Team:
+    """Workers that wait for tasks."""
+
+    submit: Callable[[Any], Future[Any]]
+    together: int
+    """Tasks to hand out at a time: few, so that long work takes no memory."""
+
+    def results(self, tasks: Sequence[T], cancelled: Cancel, what: str) -> Iterator[tuple[T, Any]]:
+        """Each task with its result, as it ends. what: "the study", whose tasks they are.
+
+        InputError: workers are lost again and again at one task. Cancelled: so asked.
+        """
+        waiting, lost = list(reversed(tasks)), dict[T, int]()
+        running: dict[Future[Any], T] = {}
+        while waiting or running:
+            if cancelled():
+                raise Cancelled
+            while waiting and len(running) < self.together:
+                task = waiting.pop()
+                running[self.submit(task)] = task
+            done, _ = wait(running, timeout=POLL, return_when=FIRST_COMPLETED)
+            for future in done:
+                task = running.pop(future)
+                try:
+                    yield task, future.result()
+                except (BrokenProcessPool, ConnectionError) as error:
+                    lost[task] = lost.get(task, 0) + 1
+                    if lost[task] >= MOST_LOST:
+                        raise InputError(
+                            f"workers of {what} end before their work is done",
+                            found=f"{type(error).__name__}, {MOST_LOST} times at one render",
+                            cure="give it fewer --workers, as each takes memory; what was done is kept",
+                        ) from None
+                    waiting.append(task)
+
+
+@contextmanager
+def team(engine: Engine, work: Work[Any, Any], begin: Callable[[], None], cancelled: Cancel) -> Iterator[Team]:
+    """Workers that do `work`. begin: what each process does first, and this one before any (kernels are compiled once).
+
+    InputError: no scheduler answers.
+    """
+    if engine.scheduler is not None:
+        from studio.runtime.cluster import cluster
+
+        with cluster(engine.scheduler, work) as (submit, together):
+            yield Team(submit, together)
+        return
+    count = thread_count(engine.workers)
+    begin()
+    if count == 1:
+        yield Team(partial(_here, work, cancelled), 1)
+        return
+    pool = _Pool(count, work, begin)
+    try:
+        yield Team(pool.submit, 2 * count)
+    finally:
+        pool.close()
+
+
+def _here(work: Work[Any, Any], cancelled: Cancel, task: Any) -> Future[Any]:
+    """Work in this process."""
+    done: Future[Any] = Future()
+    done.set_result(work(task, cancelled))
+    return done
+
+
+class _Pool:
+    """Processes that are started anew where one was lost."""
+
+    def __init__(self, count: int, work: Work[Any, Any], begin: Callable[[], None]) -> None:
+        self.count, self.work, self.begin = count, work, begin
+        self.context = multiprocessing.get_context("spawn")  # a fork would copy threads' locks
+        self.stop = self.context.Event()
+        self.executor = self._start()
+
+    def _start(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self.count, self.context, initializer=_begin, initargs=(self.begin, self.stop))
+
+    def submit(self, task: Any) -> Future[Any]:
+        try:
+            return self.executor.submit(_in_worker, self.work, task)
+        except BrokenProcessPool:
+            self.executor.shutdown(wait=False, cancel_futures=True)
+            self.executor = self._start()
+            return self.executor.submit(_in_worker, self.work, task)
+
+    def close(self) -> None:
+        """What is under way is given up, so that work that was stopped ends at once."""
+        self.stop.set()
+        self.executor.shutdown(wait=True, cancel_futures=True)
+
+
+_stopped: Cancel = never
+"""In a worker: the driver gives up."""
+
+
+def _in_worker(work: Work[Any, Any], task: Any) -> Any:
+    return work(task, _stopped)
+
+
+def _begin(begin: Callable[[], None], stop: Event) -> None:
+    """In each process: Ctrl-C is the driver's to hear, and kernels are loaded before anything is timed."""
+    global _stopped
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _stopped = stop.is_set
+    begin()

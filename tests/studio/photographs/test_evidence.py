@@ -1,0 +1,208 @@
+"""What a set of photographs says of itself: axis, colour, channel; white cores, room light, JPEG, masks and turns."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+
+import main
+from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
+
+SCENES: dict[str, tuple[Scene, int | None]] = {
+    "green in the dark": (Scene(), None),
+    "red in room light": (Scene(colour=0, room=50.0), None),
+    "blue in room light": (Scene(colour=2, peak=200.0, room=40.0), None),
+    "green, white core": (Scene(peak=2500.0, room=30.0), None),
+    "red, wide white core": (Scene(colour=0, peak=3000.0, sigma=5.0, room=30.0), None),
+    "red, JPEG 70": (Scene(colour=0, peak=200.0, room=40.0), 70),
+    "green, JPEG 85": (Scene(room=40.0), 85),
+    "green, white core, JPEG 95": (Scene(peak=2500.0, room=30.0), 95),
+    "upright": (Scene(colour=0, slope=0.0, bend=0.0, room=40.0), None),
+}
+WRONG = 1.0
+"""px off the truth that makes a row false: far beyond sigma, and less than the line's half width."""
+
+
+def extract(*arguments: object) -> Result:
+    return CliRunner().invoke(main.cli, ["extract", *map(str, arguments), "--quiet", "--json"])
+
+
+def answer(*arguments: object) -> dict[str, Any]:
+    done = extract(*arguments)
+    assert done.exit_code == 0, done.output
+    return dict(json.loads(done.stdout))
+
+
+def positions(path: Path, count: int = HEIGHT, across: str = "u") -> tuple[Any, Any]:
+    """(count,) position and sigma of the first peak, NaN where there is none."""
+    found = np.full((2, count), np.nan)
+    with path.open() as file:
+        for row in csv.DictReader(file):
+            if row["rank"] == "0" and row[across]:
+                first = row["row"] if "row" in row else row["column"]
+                found[:, int(first)] = float(row[across]), float(row["sigma_u"])
+    return found[0], found[1]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_colour_and_axis_are_told_by_the_photograph_and_the_line_is_found(name: str, tmp_path: Path) -> None:
+    scene, quality = SCENES[name]
+    path = tmp_path / ("a.png" if quality is None else "a.jpg")
+    write(path, photograph(scene, seed=len(name)), quality)
+    told = answer(path)
+    assert told["chosen"]["axis"] == "rows" and not told["chosen"]["warnings"]
+    assert told["chosen"]["colour"] == ("red", "green", "blue")[scene.colour]
+    u, _ = positions(tmp_path / "a_line.csv")
+    error = np.abs(u - scene.centre)
+    assert np.isfinite(u).mean() >= 0.98
+    assert np.mean(error[np.isfinite(error)] > WRONG) <= 0.001
+    assert np.nanmedian(error) < 0.25
+
+
+def test_a_white_core_is_not_measured_in_the_difference_which_is_hollow(tmp_path: Path) -> None:
+    scene = Scene(peak=2500.0, room=30.0)
+    write(tmp_path / "a.png", photograph(scene, seed=1))
+    told = answer(tmp_path / "a.png")["chosen"]
+    assert told["seen_in"] == "green less the others" and told["measured_in"] in ("red", "blue")
+    chosen, _ = positions(tmp_path / "a_line.csv")
+    good = np.isfinite(chosen)
+    assert np.sqrt(np.mean((chosen - scene.centre)[good] ** 2)) < 0.1
+    # held to the difference, the same photograph is measured worse or hardly at all
+    answer(tmp_path / "a.png", "--channel", "difference", "--out", tmp_path / "hollow")
+    hollow, _ = positions(tmp_path / "hollow" / "a_line.csv")
+    rms = [np.sqrt(np.nanmean((u - scene.centre) ** 2)) for u in (chosen, hollow)]
+    assert rms[0] < 0.9 * rms[1] or np.isfinite(hollow).mean() < 0.9
+
+
+def test_the_colours_of_a_jpeg_never_measure_alone(tmp_path: Path) -> None:
+    write(tmp_path / "a.jpg", photograph(Scene(colour=0, room=50.0), seed=2), 90)
+    told = answer(tmp_path / "a.jpg")["chosen"]
+    assert told["seen_in"] == "red less the others" and told["measured_in"] != "difference"
+
+
+def test_a_level_line_is_measured_by_columns_and_the_table_says_so(tmp_path: Path) -> None:
+    scene = Scene(room=40.0)
+    write(tmp_path / "a.png", np.ascontiguousarray(photograph(scene, seed=3).transpose(1, 0, 2)))
+    assert answer(tmp_path / "a.png")["chosen"]["axis"] == "columns"
+    assert (tmp_path / "a_line.csv").read_text().startswith("column,rank,u,v,")
+    v, _ = positions(tmp_path / "a_line.csv", across="v")
+    assert np.nanmedian(np.abs(v - scene.centre)) < 0.25
+    forced = answer(tmp_path / "a.png", "--axis", "rows", "--out", tmp_path / "rows")
+    assert "may run along the rows" in forced["chosen"]["warnings"][0]
+
+
+def test_the_set_decides_where_one_photograph_cannot(tmp_path: Path) -> None:
+    seen, weak = Scene(colour=0, room=40.0), Scene(colour=0, peak=2.0, room=40.0)
+    for k, scene in enumerate((seen, seen, weak)):
+        write(tmp_path / f"{k}.png", photograph(scene, seed=k))
+    chosen = answer(*sorted(tmp_path.glob("*.png")))["chosen"]
+    assert (chosen["axis"], chosen["colour"]) == ("rows", "red")
+
+
+def test_a_photograph_without_a_line_is_told_as_one(tmp_path: Path) -> None:
+    write(tmp_path / "a.png", photograph(Scene(), seed=4, laser=False))
+    told = answer(tmp_path / "a.png")
+    assert any("no line stands out" in text for text in told["chosen"]["warnings"])
+
+
+def test_laser_off_images_go_by_name_in_order_or_one_for_all(tmp_path: Path) -> None:
+    scene = Scene(colour=0, peak=60.0, room=60.0)
+    for name in ("a", "b"):
+        write(tmp_path / f"{name}.png", photograph(scene, seed=5))
+        write(tmp_path / f"{name}_off.png", photograph(scene, seed=6, laser=False))
+    images = tmp_path / "a.png", tmp_path / "b.png"
+    offs = "--off", tmp_path / "b_off.png", "--off", tmp_path / "a_off.png"
+    told = answer(*images, *offs)["chosen"]
+    assert told["told"]["laser off"] == "one for each, by name"
+    u, _ = positions(tmp_path / "a_line.csv")
+    assert np.isfinite(u).mean() > 0.98 and np.nanmedian(np.abs(u - scene.centre)) < 0.3
+    assert "one for all" in answer(*images, "--off", tmp_path / "a_off.png")["chosen"]["told"]["laser off"]
+    write(tmp_path / "c.png", photograph(scene, seed=5))
+    refused = extract(*images, tmp_path / "c.png", *offs)
+    assert refused.exit_code == 2 and "one for all" in refused.stderr
+
+
+def test_only_the_region_and_what_the_mask_leaves_is_looked_at(tmp_path: Path) -> None:
+    left, right = Scene(peak=90.0, bend=0.0, slope=0.0), Scene(peak=200.0, bend=0.0, slope=0.0)
+    image = np.hstack([photograph(left, seed=7), photograph(right, seed=8)])
+    write(tmp_path / "a.png", image)
+    whole, _ = (answer(tmp_path / "a.png"), positions(tmp_path / "a_line.csv"))[1]
+    assert np.nanmedian(whole) == pytest.approx(570.0, abs=0.1)
+    answer(tmp_path / "a.png", "--roi", "100,50,150,200", "--out", tmp_path / "roi")
+    part, _ = positions(tmp_path / "roi" / "a_line.csv")
+    assert np.nanmedian(part) == pytest.approx(170.0, abs=0.1)
+    assert np.flatnonzero(np.isfinite(part)).tolist() == list(range(50, 250))
+    mask = np.zeros(image.shape[:2], np.uint8)
+    mask[:, 100:300] = 255
+    cv2.imwrite(str(tmp_path / "mask.png"), mask)
+    answer(tmp_path / "a.png", "--mask", tmp_path / "mask.png", "--out", tmp_path / "masked")
+    masked, _ = positions(tmp_path / "masked" / "a_line.csv")
+    assert np.nanmedian(masked) == pytest.approx(170.0, abs=0.1) and np.isfinite(masked).mean() > 0.98
+    for option, value, text in (
+        ("--roi", "700,0,200,100", "leaves the image"),
+        ("--roi", "1,2", "not a region"),
+        ("--mask", tmp_path / "a_line.png", "no such image"),
+    ):
+        refused = extract(tmp_path / "a.png", option, value)
+        assert refused.exit_code == 2 and text in refused.stderr and "Traceback" not in refused.output
+
+
+def test_two_lines_are_told_and_each_is_a_chain_of_its_own(tmp_path: Path) -> None:
+    first, second = Scene(bend=0.0), Scene(bend=0.0, slope=0.12, peak=140.0)
+    image = np.maximum(photograph(first, seed=9), np.roll(photograph(second, seed=10), 60, axis=1))
+    write(tmp_path / "a.png", image)
+    told = answer(tmp_path / "a.png", "--peaks", "2")
+    assert "second line" in told["chosen"]["told"]["lines"]
+    with (tmp_path / "a_line.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    found = [np.array([float(row["u"] or "nan") for row in rows if row["rank"] == rank]) for rank in ("0", "1")]
+    near = sorted(found, key=lambda one: float(np.nanmedian(one)))
+    for line, centre in zip(near, (first.centre, second.centre + 60.0), strict=True):
+        assert np.isfinite(line).mean() > 0.98 and np.nanmax(np.abs(line - centre)) < WRONG
+
+
+@pytest.mark.parametrize("orientation", [3, 6, 8])
+def test_a_photograph_is_turned_as_exif_says(orientation: int, tmp_path: Path) -> None:
+    image = photograph(Scene(), seed=11)
+    stored = {3: image[::-1, ::-1], 6: np.rot90(image), 8: np.rot90(image, -1)}[orientation]
+    exif = Image.Exif()
+    exif[0x0112] = orientation
+    Image.fromarray(np.ascontiguousarray(stored)).save(tmp_path / "a.jpg", quality=95, exif=exif)
+    told = answer(tmp_path / "a.jpg")["chosen"]
+    assert "as EXIF says" in told["told"]["upright"] and told["axis"] == "rows"
+    u, _ = positions(tmp_path / "a_line.csv")
+    assert np.nanmedian(np.abs(u - Scene().centre)) < 0.25
+
+
+def test_no_position_is_less_certain_than_the_line_is_wide(tmp_path: Path) -> None:
+    rng = np.random.default_rng(12)
+    image = photograph(Scene(peak=7.0), seed=12).astype(float)
+    image += rng.normal(scale=3.0, size=image.shape)
+    write(tmp_path / "a.png", np.clip(np.round(image), 0, 255).astype(np.uint8))
+    told = answer(tmp_path / "a.png", "--select", "strongest")["images"][0]
+    with (tmp_path / "a_line.csv").open() as file:
+        for row in csv.DictReader(file):
+            assert not row["u"] or float(row["sigma_u"]) <= float(row["width"])
+    assert sum(told["flags"].values()) == HEIGHT
+
+
+def test_the_overlay_shows_points_on_the_line_and_marks_what_has_none(tmp_path: Path) -> None:
+    image = photograph(Scene(bend=0.0, slope=0.0), seed=13)
+    image[200:] = photograph(Scene(), seed=14, laser=False)[200:]
+    write(tmp_path / "a.png", image)
+    told = answer(tmp_path / "a.png", "--overlay")["images"][0]
+    drawn = cv2.imread(told["overlay"])
+    scale = 2
+    green = (drawn[..., 1] > 200) & (drawn[..., 0] < 60) & (drawn[..., 2] < 60)
+    rows, columns = np.nonzero(green[: scale * HEIGHT, : scale * 400])
+    assert len(rows) > 200 and abs(np.median(columns) - scale * 170.5) < scale and rows.max() < scale * 201
+    assert drawn[scale * 250, scale * 400 + 5].tolist() == [70, 70, 70]  # no line there
+    assert answer(tmp_path / "a.png", "--overlay")["images"][0]["overlay"] == told["overlay"]  # its own file

@@ -1,0 +1,101 @@
+"""Nothing that is to be read is cut off, on a small screen and where everything is drawn half as large again."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QTextDocument
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, QToolButton, QWidget
+
+from studio.project.document import FieldPath
+from studio.qt.core.session import Render
+from studio.qt.shell.window import MainWindow
+from studio.qt.shell.workspaces import WORKSPACES
+from tests.studio.qt.small_session import small_project, small_render
+
+SCREENS = {"1366 x 768": (1366, 768), "1920 x 1200 at 1.5": (1280, 800)}
+ITEMS: tuple[FieldPath, ...] = (
+    ("scene", "rig", "lasers", 0),
+    ("scene", "rig", "camera"),
+    ("scene", "objects", 0),
+    ("sensor",),
+    ("render",),
+    ("extraction",),
+)
+BAR = 32
+"""px of a screen's height that its own bar takes."""
+
+
+def needed(widget: QWidget) -> int | None:
+    """px of width that its text takes; None: it has none, or a long one that it shortens itself or wraps."""
+    if isinstance(widget, QLabel):
+        text = widget.text()
+        if not text or widget.wordWrap() or widget.toolTip():
+            return None
+        if Qt.mightBeRichText(text):
+            document = QTextDocument()
+            document.setDefaultFont(widget.font())
+            document.setDocumentMargin(0)
+            document.setHtml(text)
+            return round(document.idealWidth())
+        return max(widget.fontMetrics().horizontalAdvance(line) for line in text.split("\n"))
+    if isinstance(widget, QComboBox):
+        return widget.fontMetrics().horizontalAdvance(widget.currentText()) + 24 if not widget.isEditable() else None
+    if isinstance(widget, QAbstractButton) and widget.text() and not _icon_alone(widget):
+        shown = re.sub("&(.)", r"\1", widget.text())
+        return widget.fontMetrics().horizontalAdvance(shown)
+    return None
+
+
+def _icon_alone(button: QAbstractButton) -> bool:
+    return (
+        isinstance(button, QToolButton)
+        and button.toolButtonStyle() == Qt.ToolButtonStyle.ToolButtonIconOnly
+        and (not button.icon().isNull())
+    )
+
+
+def cut_off(window: MainWindow) -> list[str]:
+    """Texts that have less room than they take, with their panel."""
+    found = []
+    for key, dock in window.docks.items():
+        if not dock.isVisible():
+            continue
+        for widget in dock.findChildren(QWidget):
+            wanted = needed(widget) if widget.isVisible() else None
+            seen = widget.visibleRegion().boundingRect()
+            if wanted is None or seen.isEmpty():  # below the edge of what is scrolled
+                continue
+            if min(widget.width(), seen.width()) < wanted:
+                text = widget.currentText() if isinstance(widget, QComboBox) else widget.text()  # type: ignore[attr-defined]
+                found.append(f"{key}: {text!r} has {min(widget.width(), seen.width())} of {wanted} px")
+    return found
+
+
+@pytest.mark.parametrize("screen", SCREENS.values(), ids=list(SCREENS))
+def test_no_text_of_any_panel_is_cut_off(window: MainWindow, screen: tuple[int, int]) -> None:
+    width, height = screen
+    before = window.size()
+    found: dict[object, list[str]] = {}
+    world, frame = small_render()
+    window.session.add_render(Render(1, small_project(), world, frame))
+    for each in WORKSPACES:
+        window.switch_to(each.key)
+        window.rearrange()
+        window.resize(width, height - BAR)
+        items = ITEMS if each.key == "setup" else ITEMS[:1]
+        for item, extra in [*((item, ()) for item in items), (ITEMS[0], ("motion", "log"))]:
+            window.session.select(item)
+            for key in extra:
+                window.show_panel(key)
+            for _ in range(3):
+                QApplication.processEvents()
+            assert window.width() <= width and window.height() <= height, f"{each.key} is larger than the screen"
+            cut = cut_off(window)
+            if cut:
+                found[each.key, item, extra] = cut
+        window.rearrange()
+    window.resize(before)
+    assert not found, "\n".join(f"{where}: {text}" for where, texts in found.items() for text in texts)
