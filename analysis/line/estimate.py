@@ -36,6 +36,9 @@ STRAY = 4.0
 """Robust sigmas of second differences beyond which they are edges."""
 TRIAL = 0.01
 """Relative variance of the light whose effect is tried."""
+BESIDE, FAR, MORE = 6.0, 3, 1.25
+"""Widths of the line beside which there is only background; pixels apart whose noise is as good as independent; and
+times the mean square difference of neighbours from which that of such pixels says that neighbours are alike."""
 STEADY = 0.1
 """Change of the gain's logarithm at which splitting ends."""
 FULL_WELL = 1e4
@@ -62,7 +65,8 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings, saturation
         image[np.isfinite(image)] % 1.0
     )  # so is the difference of two integer images
     numbers = NoiseModel(
-        step=1.0 if integer else 0.0, saturation=image_saturation(image) if saturation is None else saturation
+        step=1.0 if integer else 0.0,
+        saturation=image_saturation(image) if saturation is None else saturation,
     )
     lines = scan_lines(sample, settings, numbers)
     signal, mask, _ = lines.read(0, lines.count)
@@ -84,7 +88,23 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings, saturation
     # numbers that are not whole have no full scale, and the line's peak may be far below it
     split = _split(lines, raised, start, FARTHEST if integer else FARTHEST_SCALED, settings)
     noise = model(_balanced(lines, model, start, settings)) if split is None else split
-    return _told_by_neighbours(lines, noise, settings)
+    noise = _told_by_neighbours(lines, noise, settings)
+    # a photograph in colour is demosaiced, whatever its background tells
+    return noise.model_copy(update={"alike": True}) if image.ndim == 3 or _alike(lines, noise, settings) else noise
+
+
+def _alike(lines: Lines, noise: NoiseModel, settings: ExtractionSettings) -> bool:
+    """The noise beside the line differs less between neighbouring pixels than between those that are apart."""
+    line = measure(replace(lines, noise=noise), settings, threads=1)
+    signal, mask, _ = lines.read(0, lines.count)
+    far = np.abs(np.arange(signal.shape[1]) - line.u[:, :1]) > BESIDE * line.width[:, :1] + 2.0
+    ground = np.where(far & (mask == 0), signal, np.nan)
+    step = noise.step / noise.gain
+    for values in (ground, ground[: len(ground) // RUN * RUN].reshape(-1, RUN, ground.shape[1]).swapaxes(1, 2)):
+        near, apart = (_mean_square_step(values, lag, step) for lag in (1, FAR))
+        if near is not None and apart is not None and apart > MORE * near:
+            return True
+    return False
 
 
 def _balanced(lines: Lines, model: Callable[[float], NoiseModel], start: float, settings: ExtractionSettings) -> float:
@@ -232,6 +252,17 @@ def _full_scale(image: NDArray[Any]) -> float:
     if image.dtype.kind != "u":
         return highest if highest > 0 else 1.0
     return float(min(scale for scale in FULL_SCALES if scale >= highest))
+
+
+def _mean_square_step(values: NDArray[np.float32], lag: int, step: float) -> float | None:
+    """(..., n), NaN where not usable -> mean square of steps to the `lag`th neighbour, edges clipped; None: too few."""
+    steps = np.subtract(values[..., lag:], values[..., :-lag], dtype=np.float64)
+    steps = steps[np.isfinite(steps)]
+    if steps.size < CHANCE**2:
+        return None
+    steps = np.abs(steps - np.median(steps))  # a slope is no noise
+    sigma = 1.4826 * (float(np.median(steps)) + 0.5 * step)
+    return float(np.mean(steps[steps <= STRAY * sigma] ** 2))
 
 
 def _difference_variance(values: NDArray[np.float32], step: float) -> float:

@@ -18,6 +18,7 @@ from analysis.line.result import Line
 from analysis.line.selection.continuity import pick, select_chain
 from analysis.line.selection.geometry import WorkingVolume, consistent
 from analysis.line.settings import ExtractionSettings, Select
+from analysis.line.shared_noise import with_shared_noise
 from render.base.errors import InputError
 from render.base.finite import check_finite
 
@@ -38,10 +39,11 @@ def extract(
     """Image (h, w) or (h, w, 3), uint8, uint16, float32 or float64 -> Line with arrays (n, peaks).
 
     changes: single settings by their name, such as method="phase", in place of those in `settings`. noise turns DN into
-    electrons; without it, it is estimated from the image (`estimate_noise`). variance (h, w) e-^2 replaces that of the
-    noise model, for images that were combined from others. With a selection other than "strongest", or a working
-    volume, one peak of several candidates is taken: arrays (n, 1), `candidates` holds the rest. Scan lines without a
-    position carry a flag that says why.
+    electrons; without it, it is estimated from the image (`estimate_noise`), and what neighbouring pixels have in
+    common from the positions (`shared_noise`). variance (h, w) e-^2 replaces that of the noise model, for images that
+    were combined from others. With a selection other than "strongest", or a working volume, one peak of several
+    candidates is taken: arrays (n, 1), `candidates` holds the rest. Scan lines without a position carry a flag that
+    says why.
     Raises InputError: an image of the wrong type, shape or size, without a finite pixel, a channel it does not have,
     settings out of range.
     """
@@ -62,7 +64,8 @@ def extract(
     # fused exposures hold so many electrons that no lens draws a line which is a Gaussian to their noise
     line = replace(measure(lines, wanted, threads, judge=variance is None), note=note)
     check_finite("line", positions=line.u[line.valid])
-    return line if alone else select(line, chosen.select, volume)
+    line = line if alone else select(line, chosen.select, volume)
+    return with_shared_noise(line) if noise.alike else line
 
 
 def select(candidates: Line, how: Select, volume: WorkingVolume | None = None) -> Line:

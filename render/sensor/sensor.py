@@ -52,7 +52,7 @@ class Processing(Model):
         0.02,
         label="Denoising range",
         help="Sigma in light, as a share of full scale, that counts as alike.",
-        gt=0,
+        ge=1e-4,
         le=1,
     )
     tone: Literal["linear", "gamma", "srgb"] = quantity("linear", label="Tone curve")

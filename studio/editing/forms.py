@@ -44,7 +44,8 @@ LABELS = {"T_rig_camera": "Pose on the rig", "T_rig_laser": "Pose on the rig", "
           "T_world_object": "Pose in the world", "T_world_light": "Pose in the world"}  # fmt: skip
 NAMES = {"MeshFile": "Mesh file", "FromMesh": "From the mesh file", "PointLight": "Point", "Waist": "Focused",
          "RectangleLight": "Rectangle", "NoMotion": "None, a single frame", "Divergence": "Diverging",
-         "Texture": "Image", "GreyTexture": "Image", "PoseList": "List of poses"}  # fmt: skip
+         "Texture": "Image", "GreyTexture": "Image", "PoseList": "List of poses",
+         "Processing": "Photograph", "srgb": "sRGB"}  # fmt: skip
 
 
 class _Required:
@@ -220,8 +221,8 @@ def choice_label(value: Any) -> str:
 
 def words(name: str) -> str:
     """WeldTee, weld_tee, weld-tee -> Weld tee; what is written in capitals stays."""
-    if name.isupper():
-        return name
+    if name.isupper() or name in NAMES:
+        return NAMES.get(name, name)
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", " ", name).translate(BLANKS).lower()
     return spaced[:1].upper() + spaced[1:]
 

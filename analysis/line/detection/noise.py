@@ -49,6 +49,13 @@ class NoiseModel(Model):
         le=1,
     )
 
+    alike: bool = quantity(
+        False,
+        label="Alike in neighbours",
+        help="Neighbouring pixels share noise, as demosaicing, denoising and JPEG make them: how much of it moves the "
+        "line is asked of the positions.",
+    )
+
     @field_validator("scintillation")
     @classmethod
     def _is_a_covariance(cls, table: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:

@@ -92,5 +92,6 @@ def fuse(images: Sequence[NDArray[Any]], exposure_times: Sequence[float], noise:
         step=0.0,
         scintillation=noise.scintillation,  # the same grains in every exposure
         fineness=noise.fineness,
+        alike=noise.alike,
     )
     return Fused(electrons.astype(np.float32), variance.astype(np.float32), model)

@@ -1,0 +1,168 @@
+"""What a photograph's positions scatter beyond what its pixels tell, and how far along the line they err alike.
+
+Demosaicing, denoising, sharpening, JPEG and speckle make the noise of neighbouring pixels alike. A fit takes what is
+alike for the line, and its residuals are too small: sigma by single pixels is too small as well. The positions
+themselves tell it. Over a run of scan lines a surface is smooth, here a cubic, and what is left,
+
+    r = R e,   R = 1 - P (P' P)^-1 P',   E[r r'] = sum over lags k of c_k R T_k R'
+
+with e the errors in sigmas, P the cubic and T_k ones on the k-th diagonals, gives moments of r that are linear in the
+covariances c_k. These are weighted as normal likelihood weighs white errors (C. R. Rao, J. Multivariate Analysis 1,
+445, 1971). c_0 is what sigma's square would have to be multiplied with, 1 + 2 (c_1 + c_2 ...) / c_0 how many scan
+lines err alike. What c_0 is above 1 is parted, by non-negative least squares over the scan lines, into a share of
+sigma's square and a variance of its own. Shape finer than a run counts as noise: of a sensor whose pixels are
+independent a rough surface is told, and nothing is asked here.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from analysis.line.result import Line
+from render.base.arrays import Float
+
+RUNS = (32, 64)
+"""Scan lines in a run: the longer, if a cubic still follows the line there."""
+SHAPE = 2.0
+"""Times the variance of the shorter runs from which the longer ones show shape: that which a cubic does not follow
+grows by 256 with a run of twice the length, noise that is alike over many scan lines by little."""
+FILLED, FEWEST_RUNS = 0.6, 4
+"""Share of a run with positions, and runs, below which nothing is said."""
+DEGREE = 3
+LAGS = 4
+"""Runs are so many times as long as the distances that are told apart."""
+STRAY = 4.0
+"""Robust standard deviations from its run's cubic at which a position is a stray."""
+EDGE, JUMP = 3.0, 1.0
+"""Times the median variance from which a run shows an edge; so does a scatter of so many widths of the line."""
+SURE, KNOWN = 3.0, 0.2
+"""Standard errors from which a variance is believed to be above the one told, and how well that is known at best."""
+
+
+@dataclass(frozen=True)
+class SharedNoise:
+    """sigma^2 = (1 + share) sigma_told^2 + variance."""
+
+    share: float
+    """What grows with the noise told: that of pixels which is alike."""
+    variance: float
+    """px^2: what does not, such as speckle, and colours that are filled in."""
+    length: float
+    """Scan lines that err alike."""
+
+    def added_to(self, line: Line) -> Line:
+        """The line with larger sigmas and correlation lengths."""
+        told = np.ones_like(line.u) if line.correlation_length is None else line.correlation_length
+        sigma = np.sqrt((1.0 + self.share) * line.sigma_u**2 + self.variance)
+        return replace(line, sigma_u=sigma, correlation_length=np.maximum(told, self.length))
+
+
+def with_shared_noise(line: Line) -> Line:
+    """A line (n, k) whose pixels share noise -> the same with what its first peaks scatter beyond their sigma_u, in
+    all peaks; as it is where they scatter as they tell, or are too few.
+    """
+    noise = shared_noise(line.u[:, 0], line.sigma_u[:, 0], line.width[:, 0])
+    if noise is None:
+        return line
+    candidates = None if line.candidates is None else noise.added_to(line.candidates)
+    return replace(noise.added_to(line), candidates=candidates)
+
+
+def shared_noise(u: Float, sigma: Float, width: Float) -> SharedNoise | None:
+    """Positions, sigmas and widths (n,) px -> what they scatter beyond their sigmas, and how far alike.
+
+    None: as they tell and independently, as far as can be sure, or too few positions.
+    """
+    runs: list[_Run] = []
+    before = math.inf
+    for length in RUNS:
+        longer = _runs(u, sigma, width, length)
+        typical = float(np.median([run.variance for run in longer])) if longer else math.inf
+        smooth = [run for run in longer if run.variance <= EDGE * typical]
+        if len(smooth) < FEWEST_RUNS or typical > SHAPE * max(before, 1.0):
+            break
+        runs, before = smooth, typical
+    if not runs:
+        return None
+    moments = np.sum([run.moments for run in runs], axis=0)
+    design = np.sum([run.design for run in runs], axis=0)
+    covariance = np.linalg.lstsq(design, moments, rcond=1e-9)[0]
+    variance = max(float(covariance[0]), 1e-300)
+    # of white errors: twice the squared mean over the degrees of freedom
+    error = float(np.sqrt(2.0 / design[0, 0]))
+    more = variance - 1.0 > SURE * error + KNOWN
+    if not (more or covariance[1] > SURE * error * max(variance, 1.0)):
+        return None
+    below = np.flatnonzero(covariance[1:] <= 0.0)
+    shared = float(covariance[1 : 1 + (int(below[0]) if len(below) else len(covariance) - 1)].sum())
+    share, added = _parted(runs, variance - 1.0) if more else (0.0, 0.0)
+    return SharedNoise(share, added, max(1.0 + 2.0 * shared / variance, 1.0))
+
+
+def _parted(runs: list[_Run], excess: float) -> tuple[float, float]:
+    """What the squares are above 1 in the mean, as a share of sigma^2 and in px^2, by where they are."""
+    squares = np.concatenate([run.squares for run in runs])
+    inverse = np.concatenate([run.inverse for run in runs])
+    mean = float(inverse.mean())
+    design = np.stack([np.ones_like(inverse), inverse / mean], axis=1)
+    share, added = nnls(design, (1.0 + excess) / squares.mean() * squares - 1.0)[0]
+    total = share + added
+    if total <= 0.0:
+        return excess, 0.0
+    return float(share / total * excess), float(added / total * excess / mean)
+
+
+@dataclass(frozen=True)
+class _Run:
+    moments: Float
+    """(lags,) sums of products of what a cubic leaves, in sigmas."""
+    design: Float
+    """(lags, lags) what covariances of 1 at each distance would make of them."""
+    squares: Float
+    """(n,) of what the cubic leaves, in sigmas."""
+    inverse: Float
+    """(n,) 1 / sigma^2, px^-2."""
+
+    @property
+    def variance(self) -> float:
+        return float(self.moments[0] / self.design[0, 0])
+
+
+def _runs(u: Float, sigma: Float, width: Float, length: int) -> list[_Run]:
+    """Those without jumps."""
+    starts = range(0, len(u) - length + 1, length)
+    found = [_run(*(values[start : start + length] for values in (u, sigma, width))) for start in starts]
+    return [run for run in found if run is not None]
+
+
+def _run(u: Float, sigma: Float, width: Float) -> _Run | None:
+    """None: too few positions, or a jump among them."""
+    there = np.isfinite(u) & np.isfinite(sigma) & (sigma > 0.0)
+    if there.sum() < FILLED * len(u):
+        return None
+    rest = _residual_maker(np.flatnonzero(there), len(u)) @ u[there]
+    scale = 1.4826 * np.median(np.abs(rest))
+    there[there] = np.abs(rest) <= STRAY * scale
+    if there.sum() < FILLED * len(u) or scale > JUMP * np.median(width[there]):
+        return None
+    at = np.flatnonzero(there)
+    left = _residual_maker(at, len(u))
+    scaled = left @ u[there] / sigma[there]
+    apart = np.abs(at[:, None] - at[None, :])
+    lags = [(apart == k).astype(np.float64) for k in range(len(u) // LAGS)]
+    spread = [left @ lag @ left for lag in lags]
+    flat = np.stack([lag.ravel() for lag in lags])
+    moments = np.array([scaled @ lag @ scaled for lag in lags])
+    design = flat @ np.stack([one.ravel() for one in spread]).T
+    return _Run(moments, design, scaled**2, sigma[there] ** -2)
+
+
+def _residual_maker(at: NDArray[np.intp], length: int) -> Float:
+    """(n, n) that takes the cubic out of positions on the scan lines `at` (n,) of a run."""
+    powers = np.vander(at / length - 0.5, DEGREE + 1)
+    return np.asarray(np.eye(len(at)) - powers @ np.linalg.pinv(powers))
