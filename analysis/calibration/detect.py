@@ -16,6 +16,8 @@ from render.base.errors import InputError
 
 FEWEST = 8
 """Corners that a view needs."""
+THICKEST_LINE = 15
+"""px of a laser's line that is taken away where it hides the board."""
 GLARE = 0.02
 """Share of full-scale pixels about a corner above which it is dropped."""
 
@@ -87,6 +89,9 @@ def _checkerboard(shown: NDArray[np.uint8], board: Board) -> tuple[Float, NDArra
     size = (board.columns, board.rows)
     flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
     found, corners = cv2.findChessboardCornersSB(shown, size, flags=flags)
+    if not found:  # a laser's line across it, which is bright and narrow, may hide the board
+        thinned = cv2.morphologyEx(shown, cv2.MORPH_OPEN, np.ones((1, THICKEST_LINE), dtype=np.uint8))
+        found, corners = cv2.findChessboardCornersSB(thinned, size, flags=flags)
     if not found:
         found, corners = cv2.findChessboardCornersSB(shown, size, flags=flags | cv2.CALIB_CB_EXHAUSTIVE)
     if not found:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from render.base.arrays import Float
-from render.camera.distortion import tilt_matrix
+from render.camera.distortion import fold_radii, tilt_matrix, undistort_points
 
 LENGTHS = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that a lens model may have."""
@@ -96,14 +96,10 @@ def project(q: Float, intrinsics: Float, k: Float) -> tuple[Float, Float, Float]
 
 
 def normalise(pixels: Float, intrinsics: Float, k: Float) -> Float:
-    """(n, 2) px -> (n, 2) normalised, by Newton steps that start at the undistorted camera's answer."""
-    q = (pixels - intrinsics[2:]) / intrinsics[:2]
-    if len(k) == 0 or not np.any(k):
-        return np.asarray(q)
-    for _ in range(20):
-        there, by_q, _ = project(q, intrinsics, k)
-        step = np.linalg.solve(by_q, (pixels - there)[:, :, None])[:, :, 0]
-        q = q + step
-        if np.abs(step).max(initial=0.0) < 1e-15:
-            break
-    return np.asarray(q)
+    """(n, 2) px -> (n, 2) normalised; beyond the fold of the distortion, the nearest that there is within it."""
+    q = np.ascontiguousarray((pixels - intrinsics[2:]) / intrinsics[:2])
+    if not np.any(k):
+        return q
+    padded = np.zeros(14)
+    padded[: len(k)] = k
+    return np.asarray(undistort_points(q, padded, fold_radii(padded), 1e-10 / float(intrinsics[:2].max()))[0])

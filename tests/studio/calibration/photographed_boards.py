@@ -16,7 +16,7 @@ from tests.analysis.calibration.boards import truth
 SIZE = (640, 512)
 BOARD = "checkerboard:8x6:40mm"
 COLUMNS, ROWS, SQUARE = 8, 6, 0.040
-FINE = 3
+FINE = 2
 
 
 def scanner(views: int, seed: int = 1) -> Estimate:
@@ -31,34 +31,46 @@ def scanner(views: int, seed: int = 1) -> Estimate:
     )
 
 
-def photograph(there: Estimate, number: int, rng: np.random.Generator, *, line: bool) -> np.ndarray:
-    """(512, 640) uint8 of one pose, with or without the laser's line."""
-    side_u, side_v = (np.arange(n * FINE) / FINE - 0.5 + 0.5 / FINE for n in SIZE)
-    u, v = np.meshgrid(side_u, side_v)
+def rays(there: Estimate) -> np.ndarray:
+    """(512 FINE, 640 FINE, 3) directions of the pixels' parts."""
+    u, v = np.meshgrid(*((np.arange(n * FINE) + 0.5) / FINE - 0.5 for n in SIZE))
     q = normalise(np.column_stack([u.ravel(), v.ravel()]), there.intrinsics, there.distortion)
-    rays = np.column_stack([q, np.ones(len(q))])
+    return np.dstack([q.reshape(*u.shape, 2), np.ones(u.shape)])
+
+
+def board_light(there: Estimate, number: int, directions: np.ndarray) -> np.ndarray:
+    """(512, 640) what the camera gets of the board in one pose, without noise."""
     rotation, translation = there.rotation[number], there.translation[number]
-    depth = (rotation[:, 2] @ translation) / (rays @ rotation[:, 2])
-    place = ((rays * depth[:, None] - translation) @ rotation)[:, :2] / SQUARE
-    dark = (np.floor(place).astype(int).sum(axis=1) % 2 == 0) & np.all(place > -1.0, axis=1)
-    dark &= (place[:, 0] < COLUMNS) & (place[:, 1] < ROWS)
-    bright = np.where(dark, 60.0, 130.0).reshape(u.shape)
-    image = cv2.GaussianBlur(bright, (0, 0), 0.7 * FINE).reshape(SIZE[1], FINE, SIZE[0], FINE).mean(axis=(1, 3))
-    if line:
-        corners = np.array([[-1.0, -1.0], [COLUMNS, ROWS]]) * SQUARE
-        whole = exact_view("", there, number, corners, SIZE)
-        for stripe in whole.stripes:
-            for at, row in zip(stripe.pixel[:, 0], np.rint(stripe.pixel[:, 1]).astype(int), strict=True):
-                image[row] += 100.0 * np.exp(-0.5 * ((np.arange(SIZE[0]) - at) / 1.3) ** 2)
-    noisy = image + rng.normal(size=image.shape) * np.sqrt(0.3 + 0.01 * image)
-    return np.asarray(np.clip(np.rint(noisy), 0, 255), dtype=np.uint8)
+    depth = (rotation[:, 2] @ translation) / (directions @ rotation[:, 2])
+    x, y = (depth * (directions @ rotation[:, i]) - translation @ rotation[:, i] for i in (0, 1))
+    x, y = np.floor(x / SQUARE), np.floor(y / SQUARE)
+    dark = ((x + y) % 2 == 0) & (x >= -1.0) & (y >= -1.0) & (x < COLUMNS) & (y < ROWS)
+    image = cv2.GaussianBlur(np.where(dark, 60.0, 130.0), (0, 0), 0.7 * FINE)
+    return np.asarray(image.reshape(SIZE[1], FINE, SIZE[0], FINE).mean(axis=(1, 3)))
+
+
+def with_line(there: Estimate, number: int, image: np.ndarray) -> np.ndarray:
+    """The same with the laser's line on the board, 1.3 px wide (sigma)."""
+    corners = np.array([[-1.0, -1.0], [COLUMNS, ROWS]]) * SQUARE
+    out = image.copy()
+    for stripe in exact_view("", there, number, corners, SIZE).stripes:
+        rows = np.rint(stripe.pixel[:, 1]).astype(int)
+        out[rows] += 100.0 * np.exp(-0.5 * ((np.arange(SIZE[0]) - stripe.pixel[:, :1]) / 1.3) ** 2)
+    return out
+
+
+def noisy(image: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """8 bit."""
+    drawn = image + rng.normal(size=image.shape) * np.sqrt(4.0 + 0.05 * image)
+    return np.asarray(np.clip(np.rint(drawn), 0, 255), dtype=np.uint8)
 
 
 def write_folder(folder: Path, there: Estimate, *, pairs: bool = True) -> None:
     """pose_00_off.png and pose_00_on.png of every pose; or pose_00.png with the line alone."""
-    rng = np.random.default_rng(5)
+    rng, directions = np.random.default_rng(5), rays(there)
     for i in range(len(there.rotation)):
+        light = board_light(there, i, directions)
         if pairs:
-            cv2.imwrite(str(folder / f"pose_{i:02}_off.png"), photograph(there, i, rng, line=False))
+            cv2.imwrite(str(folder / f"pose_{i:02}_off.png"), noisy(light, rng))
         name = f"pose_{i:02}_on.png" if pairs else f"pose_{i:02}.png"
-        cv2.imwrite(str(folder / name), photograph(there, i, rng, line=True))
+        cv2.imwrite(str(folder / name), noisy(with_line(there, i, light), rng))

@@ -1,0 +1,226 @@
+"""A calibration tells what is wrong with it: wrong views, a wrong lens, sets of views that cannot do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.calibration.adjust import adjust, view_information
+from analysis.calibration.calibrate import Request, calibrate
+from analysis.calibration.checks import choose_lens, halves, whiteness
+from analysis.calibration.degenerate import complaints
+from analysis.calibration.depth import depth_error, depth_jacobian, working_volume
+from analysis.calibration.estimate import Estimate, free_parameters
+from analysis.calibration.lens import normalise
+from analysis.calibration.next_pose import advise
+from analysis.calibration.observations import View, gather
+from analysis.calibration.robust import Adjusted, adjust_robustly
+from analysis.calibration.virtual import exact_view, noisy
+from tests.analysis.calibration.boards import SIZE, target, truth, views_of
+
+EXTENT = target()
+
+
+def adjusted(there: Estimate, views: list[View]) -> Adjusted:
+    return adjust_robustly(gather(views, EXTENT), there, free_parameters(there, warp=True))
+
+
+def test_a_wrong_line_a_bad_view_and_stray_corners_are_left_out_by_name() -> None:
+    there = truth(1, 12, terms=4)
+    views = noisy(views_of(there), np.random.default_rng(1))
+    views[2].stripes[0].pixel[:, 0] += 8.0
+    moved = views[5].pixel + np.random.default_rng(2).normal(size=views[5].pixel.shape) * 3.0
+    views[5] = replace(views[5], pixel=moved)
+    views[7].pixel[3] += [2.0, -1.0]
+    found = adjusted(there, views)
+    told = "\n".join(found.left_out)
+    assert "view 2: the line of laser 0" in told and "view 5: its corners" in told and "view 7: 1 stray" in told
+    error = found.solution.estimate.shared - there.shared
+    sigma = np.sqrt(np.diag(found.solution.covariance))
+    assert np.all(np.abs(error) < 4.5 * sigma)
+    assert found.corner_scale < 1.1 and found.laser_scale < 1.1
+
+
+def test_clean_views_lose_nothing() -> None:
+    there = truth(2, 12, terms=4, lasers=2)
+    assert adjusted(there, noisy(views_of(there), np.random.default_rng(3))).left_out == ()
+
+
+def volume_error(there: Estimate, found: Estimate) -> tuple[float, np.ndarray]:
+    volume = working_volume(there, 0, SIZE, 0.7, 1.0)
+    depths = []
+    for one in (there, found):
+        q = normalise(volume.pixel, one.intrinsics, one.distortion)
+        depths.append(1.0 / (q @ one.planes[0][:2] + one.planes[0][2]))
+    return float(np.mean((depths[1] - depths[0]) ** 2)), depths[0]
+
+
+def test_depth_errs_as_is_told() -> None:
+    there = truth(4, 6, terms=4)
+    exact, rng = views_of(there, laser_step=64), np.random.default_rng(5)
+    free, squares, told = free_parameters(there, warp=False), [], []
+    volume = working_volume(there, 0, SIZE, 0.7, 1.0)
+    q = normalise(volume.pixel, there.intrinsics, there.distortion)
+    jacobian = depth_jacobian(there, volume, q)
+    first = adjust(gather(exact, EXTENT), there, free)
+    for _ in range(60):
+        found = adjust(gather(noisy(exact, rng), EXTENT), there, free)
+        squares.append(volume_error(there, found.estimate)[0])
+        told.append(depth_error(found.estimate, found.covariance, volume, 0.05).rms)
+    # a sum of few chi-square variables: of the mean of 60 the spread is worked out
+    variances = np.linalg.eigvalsh(jacobian @ first.covariance @ jacobian.T / len(q))
+    spread = np.sqrt(2.0 * np.sum(variances**2) / 60) / variances.sum()
+    assert abs(np.mean(squares) / np.mean(np.square(told)) - 1.0) < 3.0 * spread
+
+
+def bent(there: Estimate, views: list[View], pixels: float) -> list[View]:
+    """The same seen through a lens that bends the image by so many px at its edge, along a wave no model has."""
+    out = []
+    for view in views:
+        x = (view.pixel - there.intrinsics[2:]) / 1224.0
+        wave = pixels * np.column_stack([np.sin(4.0 * x[:, 1]), np.sin(4.0 * x[:, 0])])
+        out.append(replace(view, pixel=view.pixel + wave))
+    return out
+
+
+def test_a_lens_that_is_not_as_modelled_is_told_and_a_good_one_is_not() -> None:
+    alarms, missed, p_halves = 0, 0, []
+    for seed in range(12):
+        there = truth(seed, 20)
+        exact = [exact_view(f"view {i}", there, i, target(), SIZE, laser_step=128) for i in range(20)]
+        rng = np.random.default_rng(100 + seed)
+        good = adjusted(there, noisy(exact, rng))
+        alarms += whiteness(good).p < 0.05
+        pair = halves(good, [working_volume(there, 0, SIZE, 0.7, 1.0)])
+        assert pair is not None
+        p_halves.append(pair.p)
+        missed += whiteness(adjusted(there, noisy(bent(there, exact, 0.1), rng))).p >= 0.05
+    assert alarms <= 3 and missed == 0  # of 12 at 5 %: four or more come once in 500
+    assert np.min(p_halves) > 1e-3 and 0.2 < np.mean(p_halves) < 0.8
+
+
+def test_the_fewest_terms_that_do_are_chosen() -> None:
+    there = replace(truth(6, 12), distortion=np.array([-0.1, 0.1, 0.0, 0.0]))
+    there = replace(there, intrinsics=np.array([1800.0, 1800.0, 1223.5, 1023.5]))
+    views = [exact_view(f"view {i}", there, i, target(), SIZE, laser_step=128) for i in range(12)]
+    seen = gather(noisy(views, np.random.default_rng(7)), EXTENT)
+    terms, trials = choose_lens(seen, there)
+    assert terms == 4
+    assert trials[0].terms == 0 and trials[0].worse_by > 3.0
+
+
+def of_set(**given: object) -> list[str]:
+    seed = int(given.pop("seed", 0))
+    change = given.pop("change", lambda there: there)
+    there = change(truth(seed, 20, **given))
+    return complaints(views_of(there, laser_step=32), there, SIZE)
+
+
+def coinciding(there: Estimate) -> Estimate:
+    """All boards at one place, so that the line is always the same."""
+    return replace(
+        there,
+        rotation=np.repeat(there.rotation[:1], 20, axis=0),
+        translation=np.repeat([[0.0, 0.0, 0.86]], 20, axis=0),
+    )
+
+
+def pencil(there: Estimate) -> Estimate:
+    """Boards that turn about one line of the laser plane, vertical at 0.86 m."""
+    m = there.planes[0]
+    x = (1.0 - m[2] * 0.86) / m[0]
+    turns = [
+        np.array([[np.cos(a), 0, np.sin(a)], [0, 1.0, 0], [-np.sin(a), 0, np.cos(a)]])
+        for a in np.linspace(-0.6, 0.6, 20)
+    ]
+    return replace(there, rotation=np.array(turns), translation=np.repeat([[x, 0.0, 0.86]], 20, axis=0))
+
+
+def one_axis(there: Estimate) -> Estimate:
+    return replace(there, rotation=pencil(there).rotation)
+
+
+def parallel(there: Estimate) -> Estimate:
+    return replace(there, rotation=np.repeat(pencil(there).rotation[:1], 20, axis=0))
+
+
+def central(there: Estimate) -> Estimate:
+    return replace(there, translation=np.array([0.0, 0.0, 4.0]) + 0.5 * there.translation)
+
+
+def aside(there: Estimate) -> Estimate:
+    return replace(there, translation=there.translation + np.array([-0.25, 0.0, 0.25]))
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"tilt": (0.0, 3.0)}, "all boards face the camera"),
+        ({"change": parallel}, "all boards are parallel"),
+        ({"change": one_axis}, "tilted about one axis only"),
+        ({"depth": (0.85, 0.86)}, "at one distance"),
+        ({"change": central}, "corners cover"),
+        ({"change": aside}, "hardly meet"),
+        ({"change": coinciding}, "coincide"),
+        ({"change": pencil}, "turn about the line"),
+    ],
+)
+def test_each_degenerate_set_has_its_sentence(given: dict[str, object], sentence: str) -> None:
+    assert any(sentence in one for one in of_set(**given))
+
+
+def test_of_200_good_sets_none_is_blamed() -> None:
+    blamed = []
+    for seed in range(200):
+        there = truth(seed, 12)
+        views = [exact_view(f"view {i}", there, i, target(), SIZE, laser_step=24) for i in range(12)]
+        blamed += complaints(views, there, SIZE)
+    assert blamed == []
+
+
+def test_the_advised_pose_gains_what_was_told_and_more_than_chance() -> None:
+    there = truth(9, 6, terms=4)
+    views = views_of(there)
+    free = free_parameters(there, warp=True)
+    volumes = [working_volume(there, 0, SIZE, 0.7, 1.0)]
+    first = adjust(gather(views, EXTENT), there, free)
+    told = advise(there, first.information, free, target(), SIZE, volumes, sigmas=(0.05, 0.05))
+    assert told.before == pytest.approx(depth_error(there, first.covariance, volumes[0], 0.05).rms, rel=1e-6)
+
+    def after(pose: Estimate) -> float:
+        more = exact_view("next", pose, len(pose.rotation) - 1, target(), SIZE)
+        both = adjust(gather([*views, more], EXTENT), pose, free)
+        return depth_error(there, both.covariance, volumes[0], 0.05).rms
+
+    def with_pose(rotation: np.ndarray, translation: np.ndarray) -> Estimate:
+        return replace(
+            there,
+            rotation=np.concatenate([there.rotation, rotation[None]]),
+            translation=np.concatenate([there.translation, translation[None]]),
+        )
+
+    reached = after(with_pose(told.rotation, told.centre))
+    assert reached == pytest.approx(told.after, rel=0.15)
+    others = truth(10, 8)
+    by_chance = [after(with_pose(others.rotation[i], others.translation[i])) for i in range(8)]
+    assert reached < np.min(by_chance)
+
+
+def test_information_of_views_adds_up_to_that_of_all() -> None:
+    there = truth(11, 5, lasers=2)
+    seen = gather(views_of(there), EXTENT)
+    whole = adjust(seen, there, free_parameters(there, warp=True)).information
+    np.testing.assert_allclose(view_information(seen, there).sum(axis=0), whole, atol=1e-6 * np.abs(whole).max())
+
+
+def test_the_whole_way_tells_what_to_photograph_where_nothing_can_be_found() -> None:
+    there = truth(12, 20, tilt=(0.0, 0.5), depth=(0.85, 0.851), lasers=1)
+    views = noisy(views_of(there, laser_step=64), np.random.default_rng(13))
+    try:
+        found = calibrate(views, target(), Request(SIZE, 1, 5))
+    except Exception as error:  # either way it is told what to photograph
+        assert "tilted" in str(error)
+    else:
+        assert any("tilted by 20 to 40 deg" in one for one in found.faults)

@@ -1,0 +1,144 @@
+"""`main.py calibrate`: from photographs to a calibration that a project loads, bad files named, and in silico."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from analysis.calibration.estimate import unit_plane
+from analysis.line.result import Line
+from main import cli
+from render.base.errors import InputError
+from studio.project.project import Project
+from studio.scan.stages import triangulate_line
+from tests.studio.calibration.photographed_boards import BOARD, scanner, write_folder
+
+VIEWS = 8
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("photographs")
+    write_folder(made, scanner(VIEWS))
+    return made
+
+
+def run(*words: str) -> tuple[int, dict[str, object]]:
+    result = CliRunner().invoke(cli, [*words, "--json"])
+    return result.exit_code, json.loads(result.stdout)
+
+
+def test_photographs_of_a_scanner_give_its_camera_and_laser(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "calibration.json"
+    code, told = run("calibrate", "scanner", str(folder), "--board", BOARD, "--lens", "4", "--out", str(out))
+    assert code == 0, told
+    there = scanner(VIEWS)
+    found = [told["camera"][name] for name in ("fx", "fy", "cx", "cy")]
+    sigma = np.sqrt(np.diag(np.array(told["camera_covariance"])))
+    assert np.all(np.abs(np.array(found) - there.intrinsics) < 4.0 * sigma[:4])
+    assert sigma[0] < 2.0
+    plane = np.array(told["planes"][0])
+    error = plane - unit_plane(there.planes[0])
+    spread = np.sqrt(np.diag(np.array(told["covariances"][0]))[4:8])
+    assert np.all(np.abs(error) < 4.0 * spread)
+    assert np.abs(error[:3]).max() < 2e-3 and abs(error[3]) < 1e-3
+    assert told["next_pose"]["depth_rms_after_m"] < told["next_pose"]["depth_rms_before_m"]
+    # one scale of the corners' errors, told by the images themselves
+    assert told["checks"]["corner_sigma_factor"] < 1.6
+
+    data = json.loads(Project.load("plane").to_text())
+    data["scene"]["rig"]["camera"] |= {"width": 640, "height": 512}
+    (tmp_path / "project.json").write_text(json.dumps(data | {"calibration": "calibration.json"}))
+    project = Project.load(tmp_path)
+    assert project.calibration.camera is not None and project.calibration.camera.fx == pytest.approx(found[0])
+    assert project.calibration.covariance(0).shape == (12, 12)
+
+
+def test_the_laser_alone_is_found_with_a_camera_that_is_known(folder: Path, tmp_path: Path) -> None:
+    camera, out = tmp_path / "camera.json", tmp_path / "laser.json"
+    code, first = run("calibrate", "camera", str(folder), "--board", BOARD, "--lens", "4", "--out", str(camera))
+    assert code == 0 and not first["planes"]
+    code, told = run("calibrate", "laser", str(folder), "--board", BOARD, "--camera", str(camera), "--out", str(out))
+    assert code == 0, told
+    assert np.abs(np.array(told["planes"][0]) - unit_plane(scanner(VIEWS).planes[0])).max() < 2e-3
+
+
+def test_a_bad_photograph_is_named_and_the_rest_goes_on(tmp_path: Path) -> None:
+    write_folder(tmp_path, scanner(6), pairs=False)
+    (tmp_path / "broken.png").write_bytes(b"no image")
+    cv2.imwrite(str(tmp_path / "empty.png"), np.full((512, 640), 90, np.uint8))
+    cv2.imwrite(str(tmp_path / "small.png"), cv2.imread(str(tmp_path / "pose_00.png"))[:400])
+    (tmp_path / "zz_again.png").write_bytes((tmp_path / "pose_03.png").read_bytes())
+    out = tmp_path / "calibration.json"
+    code, told = run("calibrate", "scanner", str(tmp_path), "--board", BOARD, "--lens", "4", "--out", str(out))
+    assert code == 2
+    assert out.exists()
+    text = "\n".join(told["errors"])
+    assert len(told["errors"]) == 4, text
+    for name, words in (
+        ("broken", "not an image"),
+        ("empty", "no checkerboard"),
+        ("small", "another size"),
+        ("zz_again", "same photograph as pose_03"),
+    ):
+        assert any(name in line and words in line for line in told["errors"]), text
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["camera", "nowhere", "--board", BOARD], "no such folder"),
+        (["camera", ".", "--board", "chess:3"], "not a board"),
+        (["laser", ".", "--board", BOARD], "needs a camera"),
+        (["everything", ".", "--board", BOARD], "not known what to calibrate"),
+    ],
+)
+def test_what_cannot_be_done_is_one_message(words: list[str], message: str, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, told = run("calibrate", *words)
+    assert code == 2 and message in told["error"]["message"]
+
+
+def test_a_project_is_calibrated_in_silico_beside_its_truth(tmp_path: Path) -> None:
+    Project.load("plane").save(tmp_path / "project.json")
+    out = tmp_path / "calibration.json"
+    code, told = run("calibrate", str(tmp_path), "--views", "14", "--lens", "0", "--out", str(out), "--seed", "2")
+    assert code == 0, told
+    # of the few parameters that make the depth error the rms is a chi variable: within 2.5 of what was told
+    assert told["true_depth_rms_m"][0] < 2.5 * told["checks"]["depth_rms_m"][0]
+    assert told["checks"]["depth_rms_m"][0] < 1e-4
+
+
+def test_points_of_a_calibrated_project_are_off_by_as_much_as_they_tell(tmp_path: Path) -> None:
+    exact = Project.load("plane")
+    exact.save(tmp_path / "project.json")
+    out = tmp_path / "calibration.json"
+    code, _ = run("calibrate", str(tmp_path / "project.json"), "--views", "10", "--lens", "5", "--out", str(out))
+    assert code == 0
+    data = json.loads((tmp_path / "project.json").read_text()) | {"calibration": "calibration.json"}
+    (tmp_path / "project.json").write_text(json.dumps(data))
+    project = Project.load(tmp_path / "project.json")
+    full = np.full((project.scene.camera.height, 1), 1.0)
+    found = []
+    for u in (900.0, 1200.0, 1500.0):
+        line = Line("rows", "likelihood", u * full, 0.0 * full, full, full, full, full, np.zeros(full.shape, np.uint8))
+        told, truth = triangulate_line(project, line, 0, 0), triangulate_line(exact, line, 0, 0)
+        found.append((told.depth_z - truth.depth_z) / told.sigma_depth_systematic)
+    # all points share a few errors: the mean square is at most as uncertain as one squared normal number
+    assert 1e-3 < np.mean(np.square(found)) < 9.0
+
+
+def test_a_project_names_only_calibration_files(tmp_path: Path) -> None:
+    data = json.loads(Project.load("plane").to_text())
+    (tmp_path / "project.json").write_text(json.dumps(data | {"calibration": "other.json"}))
+    (tmp_path / "other.json").write_text("{}")
+    with pytest.raises(InputError, match="no calibration"):
+        Project.load(tmp_path / "project.json")
+    (tmp_path / "project.json").write_text(json.dumps(data | {"calibration": "../other.json"}))
+    with pytest.raises(InputError, match="leaves the project folder"):
+        Project.load(tmp_path / "project.json")
