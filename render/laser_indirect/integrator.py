@@ -46,7 +46,9 @@ from render.world.world import World
 LEAST_PASS = 1 << 12
 """Light paths in a pass of the first wave: at least, more in a large image; and half of its camera paths."""
 LOOK_PATHS = 1 << 11
+"""Light paths in a pass of a first look, which only guides. Chosen, not tuned."""
 PILOT_PATHS = 1 << 13
+"""Light paths in a pass of the pilot. Chosen, not tuned."""
 
 CUMULATIVE_KINDS = {
     "interreflection": INTERREFLECTION,

@@ -59,7 +59,7 @@ def test_the_plan_is_the_same_on_any_number_of_threads_and_says_what_it_is(groov
 def test_what_one_frame_needs_is_computed_in_all(groove, monkeypatch, share, computed):
     """A share that only the last frame has, of one that is negligible below 2 %."""
     scene, world = groove
-    nothing = {kind.share: (0.0, 0.0) for kind in LADDER}
+    nothing = {kind.field: (0.0, 0.0) for kind in LADDER}
 
     measured = IndirectLight.measured
 

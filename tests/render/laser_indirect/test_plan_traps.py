@@ -13,7 +13,7 @@ from scipy.stats import binom
 from scipy.stats import t as student
 
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.guiding import specular_pixels
+from render.laser_indirect.guiding import find_specular_pixels
 from render.laser_indirect.integrator import indirect_image, indirect_pilot
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
 from render.laser_indirect.transport_plan import pilot_shares, plan_of
@@ -146,7 +146,7 @@ def test_light_behind_glass_thinner_than_the_rays_that_look_for_it_is_found():
 )
 def test_every_pixel_that_shows_glass_is_known(thin):
     _, (world, camera, laser, pose, _) = setting([WALL, thin], [GREY, GLASS], camera=CAMERA)
-    specular = specular_pixels(world, world.surface_at((laser.wavelength_nm,) * 3), camera, pose)
+    specular = find_specular_pixels(world, world.surface_at((laser.wavelength_nm,) * 3), camera, pose)
     steps = (np.arange(4) + 0.5) / 4 - 0.5
     seen = np.zeros((camera.height, camera.width), bool)
     v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(float)
