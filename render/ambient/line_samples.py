@@ -38,7 +38,7 @@ REACH = 2
 LINES_KNOWN = 0.95
 """Share of the scan lines that are known at least as well as is told."""
 FAR = 4.0
-"""Times the samples that are allowed: samples that go where the deviations are do with less than a pilot says."""
+"""Times the samples that are allowed: with as many foreseen, lines are still known to about twice the goal."""
 PILOT, GROWTH, PASSES = 2, 4.0, 12
 """Samples of each half on every pixel at first; most by which a pass multiplies those of a scan line; most passes."""
 
@@ -85,22 +85,10 @@ def foreseen_samples(band: Band, coarse: CoarseImage) -> float:
     return float(needed[: math.ceil(LINES_KNOWN * len(needed))].sum())
 
 
-def is_out_of_reach(film: PixelSamples, paths: CameraPaths, band: Band, most: int, run: Run) -> bool:
-    """By a first few samples of the band: far more than `most` would be needed. Raises Cancelled."""
-    _pilot(film, paths, band, run)
-    deviations = line_deviations(film, band)
-    worst = float(np.quantile(deviations, LINES_KNOWN)) if len(deviations) else 0.0
-    return film.total * worst**2 > FAR * most
-
-
-def _pilot(film: PixelSamples, paths: CameraPaths, band: Band, run: Run) -> None:
-    for level in range(1, PILOT + 1):
-        film.add(paths, band.pixels, np.full((len(band.pixels), 2), level, np.int32), run.between(0.0, 0.3))
-
-
 def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, run: Run) -> None:
     """Samples of the band until each scan line meets the goal, or `most` are spent. Raises Cancelled."""
-    _pilot(film, paths, band, run)
+    for level in range(1, PILOT + 1):
+        film.add(paths, band.pixels, np.full((len(band.pixels), 2), level, np.int32), run.between(0.0, 0.3))
     for _ in range(PASSES):
         count = _wanted(film, band)
         more = count - film.done[band.pixels]

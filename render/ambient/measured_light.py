@@ -16,7 +16,6 @@ from render.ambient.line_samples import (
     Band,
     band_of,
     foreseen_samples,
-    is_out_of_reach,
     line_deviations,
     sample_band,
 )
@@ -70,10 +69,7 @@ def measured_images(
     yield _image(coarse, film, band, begun=False)
     if len(band.pixels):
         part, left = run.between(0.5, 1.0), budget - coarse.samples
-        hopeless = target is not None and (
-            foreseen_samples(band, coarse) > FAR * left or is_out_of_reach(film, paths, band, left, part)
-        )
-        if target is not None and hopeless:
+        if target is not None and foreseen_samples(band, coarse) > FAR * left:
             yield from ambient_images(placed, target=target, **instead, run=part)
             return
         sample_band(film, paths, band, left, part)

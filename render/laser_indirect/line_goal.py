@@ -261,13 +261,13 @@ def pooled(values: Float, lit: NDArray[np.bool_]) -> Float:
 
 
 def pooled_alike(values: Float, before: Float, lit: NDArray[np.bool_]) -> Float:
-    """(lines,) mean over the POOLED lit lines whose variance was next to each one's before; apart of those that were
-    known worst, which may miss the goal. 0 where nothing is lit."""
-    out, lines = np.zeros_like(values), np.flatnonzero(lit)
+    """(lines,) mean over the POOLED lit lines whose variance was next to each one's before. Those that were known
+    worst, which may miss the goal, speak for themselves alone."""
+    lines = np.flatnonzero(lit)
     ranked = lines[np.argsort(before[lines], kind="stable")]
-    for some in np.split(ranked, [len(ranked) - int(UNMET * len(ranked))]):
-        if len(some):
-            out[some] = _windows(values[some]) / _windows(np.ones(len(some)))
+    others, out = ranked[: len(ranked) - int(UNMET * len(ranked))], np.where(lit, values, 0.0)
+    if len(others):
+        out[others] = _windows(values[others]) / _windows(np.ones(len(others)))
     return out
 
 

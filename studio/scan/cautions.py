@@ -12,6 +12,9 @@ from render.frame import Frame
 from studio.preview.inspection import view_warnings
 from studio.project.project import Project
 
+NAMED = 3
+"""Fields that a note names one by one."""
+
 
 class Cautions:
     """Of one scan; `look` at every frame, then ask for the `notes`."""
@@ -64,3 +67,29 @@ class Cautions:
             if issubclass(one.category, UserWarning):
                 self._heard.setdefault(str(one.message))
         self._caught.clear()
+
+
+def is_aimed(frame: Frame) -> bool:
+    """Some of the frame's light is rendered, or left out, by what it does to the measured line."""
+    return any(one.of == "line" for one in frame.quality) or any(step.moves is not None for step in frame.plan.steps)
+
+
+def light_note(rendered: Project, measured: Project) -> list[str]:
+    """Of light that was rendered for the line as `rendered` measures it: one sentence where `measured`, of the same
+    scene but for powers and lens, does so otherwise."""
+    other = []
+    for name in ("sensor", "extraction"):
+        before, now = getattr(rendered, name), getattr(measured, name)
+        other += [
+            f"{name}.{field}" for field in type(now).model_fields if getattr(before, field) != getattr(now, field)
+        ]
+    for i, (a, b) in enumerate(zip(rendered.scene.lasers, measured.scene.lasers, strict=True)):
+        other += [f"lasers[{i}].power"] if a.power != b.power else []
+    goal = rendered.render.goal
+    if goal is None or not other:
+        return []
+    named = ", ".join(other[:NAMED]) + (f" and {len(other) - NAMED} more" if len(other) > NAMED else "")
+    return [
+        f"The light was rendered for another measurement (other: {named}), in which its noise moves the line by less "
+        f"than {goal.depth:g} of its sigma; here it may be more. Render with these settings, or with render.goal null."
+    ]

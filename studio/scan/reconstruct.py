@@ -14,7 +14,7 @@ from render.world.world import build_world
 from studio.project.date_and_time import now
 from studio.project.project import Project
 from studio.scan import scan_folder
-from studio.scan.cautions import Cautions
+from studio.scan.cautions import Cautions, is_aimed, light_note
 from studio.scan.measuring import Measuring
 from studio.scan.redevelop import Development, development
 from studio.scan.remarks import result_remarks
@@ -60,6 +60,7 @@ def _measured(
     cautions = Cautions(project, image_scale, how.laser_power)
     with clock.stage("loading meshes"), cautions.listening():
         first = world = build_world(project.scene, root, 0)
+    aimed = False
     with closing(Measuring(project, out, clock, threads, len(found.frames))) as measuring:
         for n in clock.frames(len(found.frames)):
             path = found.frames[n]
@@ -72,6 +73,7 @@ def _measured(
                     "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
                 )
             world = step_world(project, root, frame.step, None if frame.step == 0 else world)
+            aimed |= is_aimed(frame)
             cautions.look(frame, (*frame.warnings, *scene_warnings(world, project.scene, frame.step)))
             measuring.add(frame, world, develop_step(project, frame, clock, threads, how.laser_power))
         measuring.finish()
@@ -80,7 +82,7 @@ def _measured(
         with scan_folder.replacing(found, out) as measured:
             files = measuring.write_points(out)
             figures = summarise(measuring.record)
-            notes = cautions.notes(figures)
+            notes = [*cautions.notes(figures), *(light_note(found.project, how.powered) if aimed else ())]
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
             measured["remarks"] = result_remarks(measuring.record)
             if (requested.sensor, requested.extraction) != (found.project.sensor, found.project.extraction):

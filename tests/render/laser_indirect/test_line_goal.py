@@ -49,6 +49,49 @@ def test_the_error_is_that_of_the_mean_of_all_passes(common: float) -> None:
     assert mean < errors.error(weights) / MARGIN < mean * 1.15
 
 
+def test_a_few_bad_lines_do_not_speak_for_those_about_them() -> None:
+    """One line in thirty is ten times as noisy: they may miss the goal, and the others are known as they are."""
+    rng, errors, without = np.random.default_rng(4), LineErrors.of(importance(), 0), LineErrors.of(importance(), 0)
+    weights = 0.0
+    for size in (1, 1, 2, 4):
+        alike = passes(rng)
+        bad = [buffer._replace(image=buffer.image.copy(), touched=buffer.touched.copy()) for buffer in alike]
+        for buffer in bad:
+            rows = buffer.image.reshape(HEIGHT, WIDTH)[::30]
+            rows[:] = 5.0 + 10.0 * (rows - 5.0)
+        errors.add(bad, weight=float(size), size=float(size))
+        without.add(alike, weight=float(size), size=float(size))
+        weights += 4.0 * size
+    assert errors.error(weights) == pytest.approx(without.error(weights), rel=0.2)
+
+
+def test_light_that_few_passes_hold_counts_for_all_lines_that_it_may_meet() -> None:
+    """A hundredth of the lines has all of it in each pass, other ones each time: no line is known."""
+    rng, errors = np.random.default_rng(5), LineErrors.of(importance(), 0)
+    for _ in range(3):
+        buffers = [empty_buffer(HEIGHT * WIDTH) for _ in range(4)]
+        for buffer in buffers:
+            for row in rng.choice(HEIGHT, HEIGHT // 100, replace=False):
+                buffer.image[row * WIDTH + LINE.start] = 100.0
+            buffer.touched[:] = True
+        errors.add(buffers, 1.0, 1.0)
+    # variance of a pass p (1 - p) 100^2 with p = 0.01, of the mean of 12 of them; pooled over 25 lines three times
+    expected = MARGIN * 100.0 * np.sqrt(0.01 * 0.99 / 12.0)
+    assert 0.8 * expected < errors.error(12.0) < 2.5 * expected
+
+
+def test_a_goal_is_out_of_reach_far_beyond_where_the_render_ends() -> None:
+    def judged(error: float, image_error: float, paths: int = 1000, most: float = 1e6) -> bool:
+        errors = LineErrors.of(importance(), 0)
+        errors.judge(error, image_error, paths, most)
+        return errors.out_of_reach
+
+    # paths grow as the square of the error: those for the line, beside those for the image or the limit
+    assert not judged(error=10.0, image_error=10.0) and not judged(error=1.0, image_error=0.5)
+    assert judged(error=10.0, image_error=3.0) and judged(error=100.0, image_error=1e3)
+    assert not judged(error=np.inf, image_error=1.0)
+
+
 def test_waves_of_before_count_by_those_that_were_measured() -> None:
     """Projected anew after two waves of four: the two that follow tell of all."""
     rng, all_of_them, later = np.random.default_rng(2), LineErrors.of(importance(), 0), LineErrors.of(importance(), 0)
@@ -81,7 +124,9 @@ def test_a_bright_dot_where_a_peak_could_appear_is_an_error() -> None:
 def test_what_a_checkpoint_keeps_gives_the_same_error() -> None:
     rng, errors = np.random.default_rng(3), LineErrors.of(importance(peaks=0.01), 0)
     errors.add(passes(rng), 1.0, 1.0)
+    errors.judge(1e6, 1.0, 4, 8.0)
     again = LineErrors.of_arrays(errors.arrays())
+    assert again.out_of_reach
     buffers = passes(rng)
     for one in (errors, again):
         one.add(buffers, 2.0, 2.0)

@@ -14,6 +14,7 @@ from render.laser.laser import Divergence
 from render.scene.lights import Environment
 from render.scene.motion import LinearStage
 from render.scene.scene import SceneObject
+from render.scene.settings import DepthGoal
 from render.scene.shape import Plane
 from render.sensor.sensor import BandPass
 from studio.preview.inspection import inspect
@@ -105,6 +106,24 @@ def test_frames_in_which_the_sheet_has_left_the_part_are_counted(plane: Project,
     motion = LinearStage(moves="objects", step=(0.27, 0.0, 0.0), steps=2)
     done = run_scan(replaced(plane, ("scene", "motion"), motion), ROOT, out=tmp_path, options=ScanOptions(report=False))
     assert any("in 1 of 2 frames no part of the line" in text for text in done.manifest["notes"])
+
+
+def test_light_that_was_rendered_for_another_measurement_is_told(plane: Project, tmp_path: Path) -> None:
+    """By what differs; not where no goal in depth says what the light is for."""
+    clock = Clock(lambda stage, done: None, lambda: False)
+    dim = replaced(plane, ("sensor", "exposure_time"), 0.5 * plane.sensor.exposure_time)
+    for goal, told in ((DepthGoal(), 1), (None, 0)):
+        out = tmp_path / str(told)
+        # four samples a pixel leave room for a look at the lines
+        lit = replaced(replaced(plane, ("render", "ambient_samples"), 4), ("render", "goal"), goal)
+        run_scan(lit, ROOT, out=out, options=ScanOptions(report=False))
+        found = scan_folder.open_folder(out)
+        other = replaced(lit, ("sensor",), dim.sensor)
+        notes = reconstruct_folder(found, other, ROOT, out / "again", clock, report=False)["notes"]
+        named = [note for note in notes if "another measurement (other: sensor.exposure_time)" in note]
+        assert len(named) == told
+        same = reconstruct_folder(found, lit, ROOT, out / "same", clock, report=False)["notes"]
+        assert not any("another measurement" in note for note in same)
 
 
 @pytest.mark.parametrize("scale", ["x", 0, -1.0, None, [1]])
