@@ -13,6 +13,7 @@ from analysis.study.cause import cause
 from analysis.study.intervals import Interval, mean_interval
 from analysis.study.pareto import Front, bootstrapped_front
 from studio.project.project import Project
+from studio.study.bounds import Bound, bounds
 from studio.study.cells import Point, measured_along, methods_of, search_of
 from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
 from studio.study.store import Row
@@ -66,6 +67,8 @@ class Answer:
     """Of a bisection, by method."""
     budgets: tuple[ErrorBudget, ...] = ()
     """Of effects, by method."""
+    bounds: tuple[Bound, ...] = ()
+    """Of a chart of speed: what no method can beat."""
 
 
 def answers(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Answer]:
@@ -85,7 +88,12 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
     )
     front = bootstrapped_front(times, errors) if sweep.chart == "speed" and spots else None
     return Answer(
-        sweep, spots, front, _broken(study, number, bases, rows, groups), _budgets(sweep, study, bases, groups)
+        sweep,
+        spots,
+        front,
+        _broken(study, number, bases, rows, groups),
+        _budgets(sweep, study, bases, groups),
+        bounds(study, sweep, bases, list(dict.fromkeys(spot.point for spot in spots))),
     )
 
 

@@ -11,6 +11,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from analysis.report.colour import INK, MUTED, method_colour, method_name
 from analysis.report.style import figure
 from studio.study.answers import Answer, Spot
+from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
 from studio.study.measures import MEASURES, Measure
 from studio.study.study import Parameter, Value
@@ -158,11 +159,23 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
             place = spot.seconds, spot.measure.mean * measure.scale
             axes.plot(*place, "o", ms=12, mfc="none", mec=INK)
             _note(axes, f"knee, {front.knee_probability[front.knee]:.0%} sure", place, INK, 7.0, (9, -11))
+    for bound in answer.bounds:
+        _bound(axes, bound, len(answer.bounds) > 1, measure)
     what = "frame" if answer.sweep.time == "frame" else "line's extraction"
     axes.set(xscale="log", yscale="log", xlabel=f"processor time of a {what} (s)", ylabel=_axis_label(measure))
     _roomy(axes)
     if not named and len(methods) > 1:
         axes.legend()
+
+
+def _bound(axes: Any, bound: Bound, several: bool, measure: Measure) -> None:
+    """A line of what no method can beat, named at its left end."""
+    height = bound.all * measure.scale
+    words = "Cramér-Rao bound" if bound.speckle is None else "Cramér-Rao bound and speckle"
+    at = f", {', '.join(map(shown, bound.point))}" if several else ""
+    axes.axhline(height, color=MUTED, lw=0.9, ls=(0, (1, 2)))
+    across = axes.get_yaxis_transform()
+    axes.annotate(words + at, (0.01, height), (0, 3), across, "offset points", fontsize=6.0, color=MUTED)
 
 
 def _note(axes: Any, text: str, place: tuple[float, float], colour: str, size: float, off: tuple[int, int]) -> None:

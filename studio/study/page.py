@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,6 +15,7 @@ from analysis.report.style import png_uri
 from render.base.files import atomic_write
 from studio.project.project import Project
 from studio.study.answers import Answer, Broken, answers
+from studio.study.bounds import Bound
 from studio.study.budget_table import HEADER, page_rows, sentences_of, write_budgets
 from studio.study.charts import chart, field_label, shown
 from studio.study.labels import field_labels
@@ -50,6 +52,7 @@ def write_page(
             }
         )
         write_budgets(folder, answer.budgets, number + 1)
+        write_bounds(folder, answer, number + 1)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=jinja2.StrictUndefined
     )
@@ -69,6 +72,7 @@ def write_page(
 def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
     """What a sweep found, in words."""
     said = [_breakdown_sentence(one, answer, labels) for one in answer.broken] + sentences_of(answer.budgets)
+    said += [_bound_sentence(one, answer, labels) for one in answer.bounds]
     front = answer.front
     if front is not None and front.knee is not None:
         spot = answer.spots[front.knee]
@@ -97,6 +101,29 @@ def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -
         return f"{name}: {limit} is not kept even at {parameter} {shown(ended.first_bad)}."
     interval = f"95 % interval {shown(ended.low)} to {shown(ended.high)}"
     return f"{name}: {limit} holds up to {parameter} {shown(ended.value)} ({interval}); beyond, {found.cause}."
+
+
+def _bound_sentence(found: Bound, answer: Answer, labels: dict[str, str]) -> str:
+    pairs = zip(answer.sweep.vary, found.point, strict=True)
+    where = ", ".join(f"{field_label(one, labels)} {shown(value)}" for one, value in pairs)
+    at = f" at {where}" if len(answer.bounds) > 1 else ""
+    measure = MEASURES[answer.sweep.measure]
+    photons = f"{found.photons * measure.scale:.3g} {measure.unit}"
+    speckle = "" if found.speckle is None else f", and speckle {found.speckle * measure.scale:.3g} {measure.unit}"
+    return f"No method does better{at}: photon and read noise alone leave a depth sigma of {photons}{speckle}."
+
+
+def write_bounds(folder: Path, answer: Answer, number: int) -> None:
+    """`bounds_N.csv`, in m, of a chart that has some."""
+    if not answer.bounds:
+        return
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*(one.field for one in answer.sweep.vary), "photons_m", "speckle_m"])
+    for one in answer.bounds:
+        writer.writerow([*one.point, one.photons, "" if one.speckle is None else one.speckle])
+    with atomic_write(folder / f"bounds_{number}.csv") as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
 
 
 def _header(answer: Answer, labels: dict[str, str]) -> list[str]:
