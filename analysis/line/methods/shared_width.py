@@ -66,7 +66,7 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> Float | None:
         return None
     density = np.exp((total - total.max(axis=1, keepdims=True)) / scatter) * STEPS
     apart = (PRIOR_WIDTHS[:, None] - PRIOR_WIDTHS) / SPREAD
-    density = density / density.sum(axis=1, keepdims=True) @ np.exp(-0.5 * apart**2)
+    density = _weighed(density / density.sum(axis=1, keepdims=True), np.exp(-0.5 * apart**2))
     return np.where(needed[:, None], np.log(density + LEAST), 0.0)
 
 
@@ -74,19 +74,25 @@ def _moments(log: Float) -> tuple[Float, Float]:
     """Mean and variance, px and px^2, of the width by the logarithm of its density (n, m)."""
     density = np.exp(log - log.max(axis=1, keepdims=True)) * STEPS
     density /= density.sum(axis=1, keepdims=True)
-    mean = density @ PRIOR_WIDTHS
-    return mean, np.maximum(density @ PRIOR_WIDTHS**2 - mean**2, 1e-12)
+    mean = _weighed(density, PRIOR_WIDTHS[None])[:, 0]
+    return mean, np.maximum(_weighed(density, PRIOR_WIDTHS[None] ** 2)[:, 0] - mean**2, 1e-12)
+
+
+def _weighed(values: Float, weights: Float) -> Float:
+    """(n, m), (k, m) -> (n, k): sums over m, to the bit the same wherever in an image a scan line is."""
+    return np.stack([(values * row).sum(axis=1) for row in weights], axis=1)
 
 
 def _new_places(u: Float, sigma_u: Float) -> Float:
-    """How far each line's place in its pixel differs from that of the one before: 1 on average if by chance.
+    """How far each line's place in its pixel differs from that of the ones beside it: 1 on average if by chance.
 
     Twelve times the squared distance, the shorter way round, where it is no matter of noise.
     """
     step = np.diff(u, prepend=np.nan)
     apart = (step - np.rint(step)) ** 2
     noise = sigma_u**2 + np.append(np.nan, sigma_u[:-1]) ** 2
-    return np.where(apart > STEP**2 * noise, 12.0 * apart, 0.0)
+    moved = np.where(apart > STEP**2 * noise, 12.0 * apart, 0.0)
+    return 0.5 * (moved + np.append(moved[1:], 0.0))
 
 
 def _of_neighbours(values: Float) -> Float:
