@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.calibration.board import Board
-from analysis.calibration.detect import detect, grey, on_board, without_corners
+from analysis.calibration.detect import detect, on_board, without_corners
 from analysis.calibration.observations import Stripe, View
 from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
@@ -26,6 +27,8 @@ SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".exr")
 ROLE = re.compile(r"(?P<name>.*?)[ _-](?P<role>off|on|laser(?P<laser>\d{1,2}))", re.IGNORECASE)
 FEWEST_POINTS = 10
 """Points of a line on the board that a view needs to tell anything of a laser."""
+WIDEST_LINE = 25
+"""px of a line that stands on the board's own image."""
 CLEAR_WIDTHS = 4.0
 """Line widths (sigma) that the line keeps from the edges of squares."""
 
@@ -173,11 +176,17 @@ def _line(
     if off is not None:
         image, saturation = subtract_off(image, off)
         noise = estimate_noise(image, settings, saturation)
-    line = extract(
-        image if settings.channel != "mono" or image.ndim == 2 else grey(image), settings=settings, noise=noise
-    )
+    elif image.ndim == 2:
+        image = _without_squares(image, settings.axis)
+    line = extract(image, settings=settings, noise=noise)
     pixel, index, rank = line.pixels()
     good = (line.flag[index, rank] == Flag.OK) & np.isfinite(line.sigma_u[index, rank])
     width = line.width[index, rank][good]
     typical = float(np.median(width)) if good.any() and np.isfinite(width).any() else 1.5
     return pixel[good], np.maximum(line.sigma_u[index, rank][good], 1e-3), typical
+
+
+def _without_squares(image: NDArray[Any], axis: str) -> NDArray[np.float32]:
+    """What is bright and narrow along the scan lines: the laser's line, without the board's squares."""
+    across = (1, WIDEST_LINE) if axis == "rows" else (WIDEST_LINE, 1)
+    return np.asarray(cv2.morphologyEx(image.astype(np.float32), cv2.MORPH_TOPHAT, np.ones(across, dtype=np.uint8)))
