@@ -15,7 +15,8 @@ from analysis.line.detection.matched_filter import response_gain
 from analysis.line.methods.blais_rioux import measure_zero_crossing
 from analysis.line.methods.centre_of_mass import measure_centroid
 from analysis.line.methods.derivative import STEGER, ZERO_CROSSING, measure_derivative_zero
-from analysis.line.methods.gaussian_fit import LEAST_SQUARES, LIKELIHOOD, measure_gaussian
+from analysis.line.methods.fisher_scoring import LEAST_SQUARES, LIKELIHOOD
+from analysis.line.methods.gaussian_fit import measure_gaussian
 from analysis.line.methods.half_energy import measure_half_energy
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.phase import measure_phase

@@ -22,7 +22,8 @@ from analysis.line.detection.detect import (
     SLOPE,
     WIDTH,
 )
-from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE, profile
+from analysis.line.methods.fisher_scoring import LIKELIHOOD, solve, optimise
+from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE
 from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
 from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width
 from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, measure_with_glow, widen_saturated
@@ -39,11 +40,6 @@ from analysis.line.methods.two_lines import UNKNOWNS
 from analysis.line.methods.window import slope_variance
 from analysis.line.result import Flag
 
-LEAST_SQUARES, LIKELIHOOD = range(2)
-"""Variants."""
-ITERATIONS = 30
-SMALL_STEP, ACCEPTED_STEP = 1e-5, 1e-3
-"""Squared standard deviations: stop at the first; out of iterations the second will do (scoring is linear at worst)."""
 RESOLVED, FINE = 0.3, 0.35
 """px; a line that is narrower than COARSE, and whose width may as well be below the first (4 sigma), is not a matter of
 a fit; if it is also narrower than the second on average over what its width may be, it is flagged."""
@@ -52,143 +48,6 @@ SPECKLED = 0.06
 contrast no longer holds. By seeded trials of f/5.6 to f/11 on lines of 0.8 to 4 px."""
 JUDGED = 0.01
 """Relative variance of the light from which no fit is judged: what scintillates strongly keeps to no profile."""
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _cost(y: Array, floor: Array, g: Array, n: int, p: Array, likelihood: bool) -> float:
-    """Twice the negative log likelihood up to a constant, or the sum of squares."""
-    total = 0.0
-    for i in range(n):
-        mu = p[0] * g[i] + p[3]
-        if likelihood:
-            m = max(mu + floor[i], 0.1 * floor[i])
-            total += 2.0 * (m - (y[i] + floor[i]) * math.log(m))
-        else:
-            total += (y[i] - mu) ** 2
-    return total
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _normal(
-    y: Array, floor: Array, shape: Array, n: int, p: Array, likelihood: bool, hessian: Array, score: Array
-) -> None:
-    """Fisher information (4, 4) and score (4,) for p = amplitude, centre, sigma, background."""
-    for j in range(4):
-        score[j] = 0.0
-        for k in range(4):
-            hessian[j, k] = 0.0
-    for i in range(n):
-        g = shape[0, i]
-        mu = p[0] * g + p[3]
-        weight = 1.0 / max(mu + floor[i], 0.1 * floor[i]) if likelihood else 1.0
-        d1, d2 = p[0] * shape[1, i], p[0] * shape[2, i]
-        w0, w1, w2 = weight * g, weight * d1, weight * d2
-        hessian[0, 0] += w0 * g
-        hessian[1, 0] += w1 * g
-        hessian[1, 1] += w1 * d1
-        hessian[2, 0] += w2 * g
-        hessian[2, 1] += w2 * d1
-        hessian[2, 2] += w2 * d2
-        hessian[3, 0] += w0
-        hessian[3, 1] += w1
-        hessian[3, 2] += w2
-        hessian[3, 3] += weight
-        rest = y[i] - mu
-        score[0] += w0 * rest
-        score[1] += w1 * rest
-        score[2] += w2 * rest
-        score[3] += weight * rest
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _solve(hessian: Array, damping: float, right: Array, factor: Array, out: Array) -> bool:
-    """(H + damping diag H) out = right by Cholesky on the lower triangle; False where H is not positive definite."""
-    for i in range(4):
-        for j in range(i + 1):
-            total = hessian[i, j] * (1.0 + damping) if i == j else hessian[i, j]
-            for k in range(j):
-                total -= factor[i, k] * factor[j, k]
-            if i == j:
-                if not total > 1e-14 * hessian[i, i]:
-                    return False
-                factor[i, i] = math.sqrt(total)
-            else:
-                factor[i, j] = total / factor[j, j]
-    for i in range(4):
-        total = right[i]
-        for k in range(i):
-            total -= factor[i, k] * out[k]
-        out[i] = total / factor[i, i]
-    for i in range(3, -1, -1):
-        total = out[i]
-        for k in range(i + 1, 4):
-            total -= factor[k, i] * out[k]
-        out[i] = total / factor[i, i]
-    return True
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _hold_sigma(hessian: Array, score: Array) -> None:
-    """Take sigma out of the unknowns."""
-    for j in range(4):
-        if j < 2:
-            hessian[2, j] = 0.0
-        elif j == 3:
-            hessian[3, 2] = 0.0
-    hessian[2, 2] = 1.0
-    score[2] = 0.0
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _optimise(
-    pixel: Array, n: int, p: Array, narrowest: float, options: Options, shape: Array, trial_shape: Array, hessian: Array
-) -> bool:
-    """Refine p in place on pixels (4, n); on return `shape` and `hessian` belong to p. True if converged.
-
-    A known width is held, and one at the lower bound that would go below it.
-    """
-    likelihood, integrated = options.variant == LIKELIHOOD, options.integrated
-    x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
-    score, step, trial, factor = np.zeros(4), np.zeros(4), np.empty(4), np.zeros((4, 4))
-    profile(x, n, p[1], p[2], integrated, shape)
-    cost = _cost(y, floor, shape[0], n, p, likelihood)
-    damping, decrement, scale = 1e-4, np.inf, 1.0
-    converged = improved = False
-    for _ in range(ITERATIONS):
-        _normal(y, floor, shape, n, p, likelihood, hessian, score)
-        if options.known_width or (p[2] <= narrowest and score[2] < 0.0):
-            _hold_sigma(hessian, score)
-        scale = 1.0 if likelihood else max(cost / n, 1e-12 * p[0] * p[0])
-        improved = False
-        while damping < 1e8:
-            if _solve(hessian, damping, score, factor, step):
-                decrement = 0.0
-                for j in range(4):
-                    trial[j] = p[j] + step[j]
-                    decrement += step[j] * score[j]
-                trial[2] = p[2] if options.known_width else max(trial[2], narrowest)
-                if trial[0] > 0.0 and x[0] - 1.0 <= trial[1] <= x[n - 1] + 1.0 and trial[2] < 3.0 * (x[n - 1] - x[0]):
-                    profile(x, n, trial[1], trial[2], integrated, trial_shape)
-                    trial_cost = _cost(y, floor, trial_shape[0], n, trial, likelihood)
-                    small = decrement <= SMALL_STEP * scale
-                    if trial_cost <= cost or small:
-                        improved = True
-                        converged = small and damping < 1e-2
-                        for j in range(4):
-                            p[j] = trial[j]
-                        for j in range(n):
-                            for m in range(3):
-                                shape[m, j] = trial_shape[m, j]
-                        cost = trial_cost
-                        damping = max(0.1 * damping, 1e-9)
-                        break
-            damping = max(10.0 * damping, 1e-3)
-        if converged or not improved:
-            break
-    _normal(y, floor, shape, n, p, likelihood, hessian, score)
-    if options.known_width or (p[2] <= narrowest and score[2] < 0.0):
-        _hold_sigma(hessian, score)
-    return converged or (improved and decrement <= ACCEPTED_STEP * scale)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -239,7 +98,7 @@ def _is_coarse(pixel: Array, n: int, p: Array, options: Options, hessian: Array)
         return bool(p[2] < RESOLVED)
     row, unit = np.empty(4), np.zeros(4)
     unit[2] = 1.0
-    if not _solve(hessian, 0.0, unit, np.zeros((4, 4)), row):
+    if not solve(hessian, 0.0, unit, np.zeros((4, 4)), row):
         return True
     # of least squares the Hessian is that of pixels of unit variance
     variance = 1.0 if options.variant == LIKELIHOOD else 0.5 * p[0] + max(p[3], 0.0) + pixel[FLOOR, n // 2]
@@ -322,7 +181,7 @@ def _asymmetry(pixel: Array, n: int, p: Array, held: bool, shape: Array, hessian
         cross[1] += weight * p[0] * shape[1, i]
         cross[2] += 0.0 if held else weight * p[0] * shape[2, i]
         cross[3] += weight
-    if not _solve(hessian, 0.0, cross, np.zeros((4, 4)), projected):
+    if not solve(hessian, 0.0, cross, np.zeros((4, 4)), projected):
         return 0.0
     for j in range(4):
         square -= cross[j] * projected[j]
@@ -349,7 +208,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         count = _gather(pixels, y, seed, middle, half, pixel)
         if count < 5:
             return Flag.TOO_FEW_PIXELS.value
-        converged = _optimise(pixel, count, p, narrowest, options, shape, trial_shape, hessian)
+        converged = optimise(pixel, count, p, narrowest, options, shape, trial_shape, hessian)
         if not converged:
             break
     if min(p[1], seed[CENTRE]) < 0.5 or max(p[1], seed[CENTRE]) > w - 1.5:
@@ -382,7 +241,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         return Flag.OUT_OF_WINDOW.value
     factor, row, unit = np.zeros((4, 4)), np.empty(4), np.zeros(4)
     unit[1] = 1.0
-    if not _solve(hessian, 0.0, unit, factor, row):
+    if not solve(hessian, 0.0, unit, factor, row):
         return Flag.NOT_CONVERGED.value
     chi2 = _chi2_and_influence(pixel, count, p, likelihood, shape, row, scattered, weight)
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
@@ -399,7 +258,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         _measure_saturated(pixels, y, seed, count, p, chi2, options, out)
     elif likelihood and not options.known_width and p[2] < WIDEST:
         unit[1], unit[2] = 0.0, 1.0
-        if _solve(hessian, 0.0, unit, factor, row):
+        if solve(hessian, 0.0, unit, factor, row):
             _tell_width(p[2], row[2], out)
     if flag == Flag.OK.value and speckled > SPECKLED * p[2]:
         return Flag.SPECKLED.value

@@ -28,7 +28,8 @@ from analysis.line.detection.detect import (
     WIDTH,
 )
 from analysis.line.detection.noise import NoiseModel
-from analysis.line.methods.gaussian_fit import LIKELIHOOD, measure_gaussian
+from analysis.line.methods.fisher_scoring import LIKELIHOOD
+from analysis.line.methods.gaussian_fit import measure_gaussian
 from analysis.line.methods.seed_loop import COLUMNS, ROOM, Options, Pixels, seed_kernel
 from analysis.line.result import Flag, Line, positioned
 from render.base.arrays import Float
