@@ -22,7 +22,7 @@ from analysis.line.detection.detect import (
     SLOPE,
     WIDTH,
 )
-from analysis.line.methods.fisher_scoring import LIKELIHOOD, solve, optimise
+from analysis.line.methods.fisher_scoring import LIKELIHOOD, optimise, solve
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE
 from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
 from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width
