@@ -22,6 +22,7 @@ from analysis.line.selection.geometry import WorkingVolume
 from analysis.line.series.hdr import Fused, fuse
 from analysis.line.series.subtract import subtract_off
 from analysis.line.settings import ExtractionSettings
+from analysis.line.shared_noise import with_shared_noise
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from studio.photographs.evidence import chains_of, shrink
@@ -70,9 +71,13 @@ def extract_photograph(
         noise = estimate_noise(light.seen, settings, light.saturation)
         alone = settings.select == "strongest" and volume is None
         wanted = settings if alone else settings.model_copy(update={"peaks": max(settings.peaks, CANDIDATES)})
-        line = extract(light.image, settings=wanted, select="strongest", noise=noise, threads=threads)
+        # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
+        shared = noise.alike or whole.ndim == 3 or taken.lossy
+        plain = noise.model_copy(update={"alike": False})
+        line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
         line = placed(unsure_dropped(line), whole.shape, look.region.corner)
         line = line if alone else selected(line, settings, volume)
+        line = with_shared_noise(line) if shared else line
         around = light.image
         if around.shape != whole.shape[:2]:
             x, y = look.region.corner
