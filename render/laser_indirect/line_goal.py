@@ -27,11 +27,11 @@ Weigh = Callable[[Float32], Importance]
 POOLED = 25
 """Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one. In the
 first wave neighbours, later those that were known alike before: a few bad ones would else speak for all about them."""
-MARGIN = 2.0
+MARGIN = 2.5
 """On the deviation that a few passes tell: rare bright paths are in few of them, and narrow lines move unevenly."""
-UNMET = 0.05
-"""Share of the lit scan lines that may miss the goal: those about a bright corner would keep all others waiting. At the
-sample's full size 0.01 takes ten times the paths, and the median row is then known seventy times better than asked."""
+UNMET = 0.03
+"""Share of the lit scan lines that may miss the goal as far as passes tell, so that in truth less than 5 % do: those
+about a bright corner would keep all others waiting."""
 FAR = 8.0
 """Times the light paths after which the render ends in any case: more of them put the goal out of reach. Guided by it
 the variance falls sooner than the first passes say, as much as tenfold where rows glitter."""
