@@ -1,0 +1,141 @@
+"""Strangers' photographs: ours, by defaults alone, beside a centre of mass and a ridge filter of OpenCV.
+
+BLAZER_PHOTOGRAPHS names a folder with a folder for each set; skipped without. There is no truth: a row is right where
+two of the three methods agree and their neighbours go on, and false where one is elsewhere than that line, also across
+its gaps; beyond it nothing is judged. A file region.txt in a set, "x,y,w,h" in px, says where its line can be: what is
+found elsewhere is false. Scatter is that about a parabola through a short piece of line.
+
+    BLAZER_PHOTOGRAPHS=/tmp/sets python -m pytest -m validation -s tests/validation/test_photographs.py
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.typing import NDArray
+
+import main
+from studio.photographs.image_files import load_photograph
+from tests.studio.photographs.test_evidence import positions
+from tests.validation.opencv_line import centre_of_mass, light_of, steger
+
+pytestmark = pytest.mark.validation
+
+Floats = NDArray[np.float64]
+
+AGREE, FAR = 8.0, 6.0
+"""px between two methods that mean one line: a colour difference is that far off a white core; px from the running
+middle of its neighbours beyond which a row is none of it."""
+RUN, PIECE = 31, 17
+"""Rows of the running middle, and of a straight piece."""
+KINDS = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"}
+
+
+def sets() -> list[Path]:
+    root = os.environ.get("BLAZER_PHOTOGRAPHS")
+    return sorted(path for path in Path(root).iterdir() if path.is_dir()) if root else []
+
+
+def reference(methods: list[Floats]) -> Floats:
+    """(n,): where two methods agree and the line goes on, NaN elsewhere."""
+    found = np.stack(methods)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows without any
+        middle = np.nanmedian(found, axis=0)
+        near = np.abs(found[:, None] - found[None]) <= AGREE
+        agreed = (near.sum(axis=(0, 1)) - np.isfinite(found).sum(axis=0)) >= 2
+        pairs = np.where(near.sum(axis=1) >= 2, found, np.nan)
+        middle = np.where(agreed, np.nanmean(pairs, axis=0), np.nan)
+        windows = np.lib.stride_tricks.sliding_window_view(np.pad(middle, RUN // 2, constant_values=np.nan), RUN)
+        running = np.nanmedian(windows, axis=1)
+    full = np.isfinite(windows).mean(axis=1) >= 0.5
+    return np.where(agreed & full & (np.abs(middle - running) <= FAR), middle, np.nan)
+
+
+def across_gaps(true: Floats) -> Floats:
+    """(n,): the line also where its gaps are shorter than a run, NaN elsewhere."""
+    there = np.flatnonzero(np.isfinite(true))
+    if not len(there):
+        return true
+    rows = np.arange(len(true))
+    after = np.clip(np.searchsorted(there, rows), 0, len(there) - 1)
+    before = np.clip(np.searchsorted(there, rows, side="right") - 1, 0, None)
+    inside = (there[after] - there[before] <= RUN) & (there[0] <= rows) & (rows <= there[-1])
+    return np.where(inside, np.interp(rows, there, true[there]), np.nan)
+
+
+def region_of_set(folder: Path, axis: str, count: int) -> tuple[Floats, Floats]:
+    """(n,) first and last position that the line can have on each scan line."""
+    low, high = np.zeros(count), np.full(count, np.inf)
+    if (folder / "region.txt").exists():
+        x, y, w, h = map(int, (folder / "region.txt").read_text().split(","))
+        (at, size), (first, rows) = ((x, w), (y, h)) if axis == "rows" else ((y, h), (x, w))
+        low, high = np.full(count, np.inf), np.full(count, -np.inf)
+        low[first : first + rows], high[first : first + rows] = at, at + size
+    return low, high
+
+
+def scatter(u: Floats, true: Floats) -> Floats:
+    """Distance of each row's position from a straight line through its piece, in its own degrees of freedom, px."""
+    good = np.where(np.abs(u - true) <= AGREE, u, np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(good, PIECE)
+    windows = windows[::PIECE][np.isfinite(windows[::PIECE]).all(axis=1)]
+    if not len(windows):
+        return np.full((0, PIECE), np.nan)
+    x = np.arange(PIECE) - PIECE // 2
+    basis = np.linalg.qr(np.stack([np.ones(PIECE), x, x**2], axis=1))[0]
+    left = windows - windows @ basis @ basis.T
+    return left * np.sqrt(PIECE / (PIECE - 3.0))
+
+
+def table(folder: Path, files: list[Path], out: Path) -> dict[str, tuple[float, float, float]]:
+    """Method -> rows right, rows false (shares of the rows that have a line), scatter px; and prints it."""
+    done = CliRunner().invoke(main.cli, ["extract", *map(str, files), "--out", str(out), "--json", "--quiet"])
+    answer = json.loads(done.stdout)
+    chosen = answer["chosen"]
+    sums: dict[str, list[list[float]]] = {}
+    ratios: list[float] = []
+    for row in answer["images"]:
+        image = load_photograph(Path(row["image"]))
+        light = light_of(image, chosen["colour"] or "mono", chosen["axis"])
+        ours, sigma = positions(Path(row["file"]), len(light), "u" if chosen["axis"] == "rows" else "v")
+        methods = {"ours": ours, "centre of mass": centre_of_mass(light), "Steger": steger(light)}
+        allowed = region_of_set(folder, chosen["axis"], len(light))
+        true = reference([np.where((u >= allowed[0]) & (u <= allowed[1]), u, np.nan) for u in methods.values()])
+        have = np.isfinite(true)
+        for name, u in methods.items():
+            right = have & (np.abs(u - true) <= AGREE)
+            wrong = (np.abs(u - across_gaps(true)) > AGREE) | (u < allowed[0]) | (u > allowed[1])
+            left = scatter(u, true)
+            rms = 1.4826 * float(np.median(np.abs(left))) if left.size else np.nan
+            sums.setdefault(name, []).append([right.sum(), wrong.sum(), have.sum(), rms])
+        left = scatter(ours, true)
+        told = np.nanmedian(sigma[have & np.isfinite(ours)]) if (have & np.isfinite(ours)).any() else np.nan
+        if left.size:
+            ratios.append(1.4826 * float(np.median(np.abs(left))) / told)
+    print(f"\n{folder.name}: {len(answer['images'])} photographs, {chosen['told']}")
+    found = {}
+    for name, rows in sums.items():
+        right, wrong, have, _ = np.nansum(rows, axis=0)
+        typical = float(np.nanmedian([row[3] for row in rows]))
+        found[name] = right / max(have, 1), wrong / max(right + wrong, 1), typical
+        print(f"  {name:15s} right {found[name][0]:7.2%}  false {found[name][1]:7.2%}  scatter {typical:.3f} px")
+    if ratios:
+        print(f"  scatter over sigma {np.median(ratios):.2f}")
+    return found
+
+
+@pytest.mark.skipif(not sets(), reason="BLAZER_PHOTOGRAPHS names no folder of photographs")
+@pytest.mark.parametrize("folder", sets(), ids=lambda folder: folder.name)
+def test_defaults_find_more_and_invent_less_than_opencv(folder: Path, tmp_path: Path) -> None:
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in KINDS)
+    found = table(folder, files, tmp_path)
+    ours = found["ours"]
+    assert ours[0] >= max(found[name][0] for name in ("centre of mass", "Steger")) - 0.005
+    assert ours[1] <= min(found[name][1] for name in ("centre of mass", "Steger")) + 0.001
