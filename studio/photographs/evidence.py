@@ -308,6 +308,8 @@ def _flanks(order: NDArray[np.intp], strength: NDArray[np.float64], scale: NDArr
 
 
 def _at(choice: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    if values.shape[1] == 0:  # an image of one or two pixels has no maxima
+        return np.full(len(choice), np.nan)
     picked = np.take_along_axis(values, np.maximum(choice, 0)[:, None], axis=1)[:, 0]
     return np.where(choice >= 0, picked, np.nan)
 

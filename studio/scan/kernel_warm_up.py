@@ -261,7 +261,7 @@ def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Mater
 
 def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     """By next to no paths of every kind, for the image; and its ambient light for what is measured as well."""
-    from render.ambient.measured_light import measured_images
+    from render.ambient.measured_light import LEAST_SAMPLES, measured_images
     from render.importance import Importance
     from render.render import render_world
     from render.world.placed import PlacedScene
@@ -270,7 +270,7 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     world, run, camera = build_world(scene, Path()), Run(cancelled=cancelled), scene.camera
     frame = render_world(world, scene, settings=_few(transport), run=run)
     everywhere = Importance((), np.ones((camera.height, camera.width), np.float32))
-    list(measured_images(PlacedScene(world, scene), everywhere, most=2, run=run))
+    list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
     return frame
 
 

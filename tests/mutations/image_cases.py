@@ -53,13 +53,15 @@ def image(sources: Sources, place: Path, rng: Random, harm: bool) -> list[str]:
     if use == "geometry":
         return ["extract", name, "--geometry", "--project", "project.json", *common]
     settings = [
-        word for option in ("method", "laser", "axis", "pattern", "select") for word in _valid("extract", option, rng)
+        word
+        for option in ("method", "laser", "axis", "channel", "pattern", "select")
+        for word in _valid("extract", option, rng)
     ]
     return ["extract", name, *(settings if harm else ()), *common]
 
 
 def _valid(command: str, name: str, rng: Random) -> list[str]:
     """One of an option's own choices, or nothing."""
-    option = next(option for option in main.cli.commands[command].params if option.name == name)
+    option = next(option for option in main.cli.commands[command].params if f"--{name}" in option.opts)
     known = list(option.type.choices) if isinstance(option.type, click.Choice) else METHODS
     return [f"--{name}", rng.choice(known)] if rng.random() < 0.25 else []

@@ -45,19 +45,20 @@ def test_the_error_is_that_of_the_mean_of_all_passes(common: float) -> None:
     weight = np.linspace(-1.0, 1.0, 8)
     one = DEVIATION**2 * np.sum(weight**2) + common**2 * np.sum(weight[:4]) ** 2
     mean = np.sqrt(one * 4.0 * (1 + 1 + 4 + 16)) / weights
-    # of 25 rows with 12 degrees of freedom the variance is known to 8 %; the error is that of the worst row of 100
-    assert mean < errors.error(weights) / MARGIN < mean * 1.15
+    # waves of weight 1, 1, 4, 16 give a line 5.3 degrees of freedom; of the 13 at the end of a ranking, the fewest that
+    # are taken together, the deviation is known to 8.5 %. The error is that of nearly the worst line: three times that.
+    assert mean < errors.error(weights) / MARGIN < mean * 1.26
 
 
 def test_a_few_bad_lines_do_not_speak_for_those_about_them() -> None:
-    """One line in thirty is ten times as noisy: they may miss the goal, and the others are known as they are."""
+    """One line in forty is ten times as noisy: they may miss the goal, and the others are known as they are."""
     rng, errors, without = np.random.default_rng(4), LineErrors.of(importance(), 0), LineErrors.of(importance(), 0)
     weights = 0.0
     for size in (1, 1, 2, 4):
         alike = passes(rng)
         bad = [buffer._replace(image=buffer.image.copy(), touched=buffer.touched.copy()) for buffer in alike]
         for buffer in bad:
-            rows = buffer.image.reshape(HEIGHT, WIDTH)[::30]
+            rows = buffer.image.reshape(HEIGHT, WIDTH)[::40]
             rows[:] = 5.0 + 10.0 * (rows - 5.0)
         errors.add(bad, weight=float(size), size=float(size))
         without.add(alike, weight=float(size), size=float(size))

@@ -31,7 +31,8 @@ def test_the_remarks_are_those_of_the_report() -> None:
     clock = Clock(lambda *_: None, lambda: False)
     frame = render_step(project, world, 0, clock)
     images = develop_step(project, frame, clock, None)
-    found = {"gaussian": measure_step(project, frame, world, images, clock, None, "gaussian")}
+    # its sigma knows nothing of the phase in the pixel, which is most of the error of so narrow a line
+    found = {"centre_of_mass": measure_step(project, frame, world, images, clock, None, "centre_of_mass")}
     result = frame_result(project, frame, found, images)
     assert np.array_equal(result.lasers[0].image, images[0].pixels)
     said = remarks(total(record_of(project.scene, [result]).chosen()))

@@ -74,9 +74,14 @@ def test_a_weight_says_how_far_light_moves_a_row_over_the_allowed(world: World) 
     assert alike.mean() >= 0.95 and np.corrcoef(told, moved)[0, 1] > 0.95
 
 
-def test_the_goal_is_reached_in_nineteen_rows_of_twenty(frame: Frame, world: World) -> None:
-    """Rendered with other seeds, the reflections put each row elsewhere: by less than the goal."""
-    project = project_of()
+def test_the_goal_is_reached_in_nineteen_rows_of_twenty(world: World) -> None:
+    """Rendered with other seeds, the reflections put each row elsewhere: by less than the goal.
+
+    Of a line that its pixels resolve: a narrower one shares its width with its neighbours, whose light moves it too.
+    """
+    sheet = project_of().scene.lasers[0].sheet
+    project = project_of().replaced({"scene.rig.lasers[0].sheet.full_angle": 2.0 * sheet.full_angle})
+    frame = rendered(project, world)
     goal, placed = goal_of(project, 2), PlacedScene(world, project.scene, 0)
     assert goal is not None and frame.importance is not None
     aim = Aim(0, frame.importance, lambda light: goal(replace(frame, laser_indirect=(light,))))

@@ -210,7 +210,7 @@ class TestMeasuringFrames:
         project = replaced(project, ("scene", "rig", "lasers", 0, "name"), "violet")
         project = replaced(project, ("scene", "objects", 0, "name"), "part")
         project = replaced(project, ("sensor", "dsnu"), 0.0)
-        project = replaced(project, ("extraction", "method"), "gaussian")
+        project = replaced(project, ("extraction", "method"), "phase")
         dim = replaced(project, ("scene", "rig", "lasers", 0, "power"), project.scene.lasers[0].power / 10)
         for name, chosen in (("same", project), ("dim", dim)):
             reconstruct(made, chosen, made / name)
@@ -237,7 +237,7 @@ class TestMeasuringFrames:
 
     def test_what_the_points_were_measured_with_is_kept_for_the_report(self, made: Path) -> None:
         assert scan_folder.measured_project(scan_folder.open_folder(made / "out")) == small(made)
-        other = replaced(small(made), ("extraction", "method"), "centre_of_mass")
+        other = replaced(small(made), ("extraction", "method"), "phase")
         reconstruct(made, other, made / "out")
         assert scan_folder.measured_project(scan_folder.open_folder(made / "out")) == other
         rebuild_report(made / "out", threads=1, quiet=True, as_json=False)
