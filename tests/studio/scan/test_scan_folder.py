@@ -206,11 +206,14 @@ class TestMeasuringFrames:
         assert not (original / "refused").exists()
 
     def test_names_sensor_and_extraction_are_free_and_the_power_scales_the_light(self, made: Path) -> None:
+        file = made / "project" / "project.json"
+        wide = Project.load(file)  # a line that its pixels resolve, so that its sigma is noise
+        scan(file, made / "out", project=replaced(wide, ("scene", "rig", "lasers", 0, "sheet", "full_angle"), 0.02))
         project = Project.load(made / "out" / "scan_project.json")
         project = replaced(project, ("scene", "rig", "lasers", 0, "name"), "violet")
         project = replaced(project, ("scene", "objects", 0, "name"), "part")
         project = replaced(project, ("sensor", "dsnu"), 0.0)
-        project = replaced(project, ("extraction", "method"), "phase")
+        project = replaced(project, ("extraction", "method"), "gaussian")
         dim = replaced(project, ("scene", "rig", "lasers", 0, "power"), project.scene.lasers[0].power / 10)
         for name, chosen in (("same", project), ("dim", dim)):
             reconstruct(made, chosen, made / name)
@@ -237,7 +240,7 @@ class TestMeasuringFrames:
 
     def test_what_the_points_were_measured_with_is_kept_for_the_report(self, made: Path) -> None:
         assert scan_folder.measured_project(scan_folder.open_folder(made / "out")) == small(made)
-        other = replaced(small(made), ("extraction", "method"), "phase")
+        other = replaced(small(made), ("extraction", "method"), "centre_of_mass")
         reconstruct(made, other, made / "out")
         assert scan_folder.measured_project(scan_folder.open_folder(made / "out")) == other
         rebuild_report(made / "out", threads=1, quiet=True, as_json=False)
