@@ -39,13 +39,17 @@ TRIAL = 0.01
 BESIDE, FAR, MORE = 6.0, 3, 1.25
 """Widths of the line beside which there is only background; pixels apart whose noise is as good as independent; and
 times the mean square difference of neighbours from which that of such pixels says that neighbours are alike."""
+APART = 9
+"""Pixels between two of which not both are in one block of a JPEG, nor within reach of a smoothing filter."""
 STEADY = 0.1
 """Change of the gain's logarithm at which splitting ends."""
 FULL_WELL = 1e4
 """Electrons taken for the highest number when no line says better."""
 
 
-def estimate_noise(image: NDArray[Any], settings: ExtractionSettings, saturation: float | None = None) -> NoiseModel:
+def estimate_noise(
+    image: NDArray[Any], settings: ExtractionSettings, saturation: float | None = None, *, processed: bool = False
+) -> NoiseModel:
     """Checked image (h, w) or (h, w, 3) -> NoiseModel that explains the noise of its background and its line.
 
     Noise without light is that of the differences of neighbours along the scan line, edges clipped out. The gain is
@@ -53,6 +57,7 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings, saturation
     Speckle and other noise that multiplies the light, and how alike neighbouring pixels have it, become the model's
     scintillation. What the Gaussian model cannot follow (a lens with tails) counts as noise. Of fewer than 32 scan
     lines all of it is taken for a count. saturation: DN, of an image that does not tell it by its type.
+    processed: a camera has smoothed the image, so that neighbours differ by less than its noise; pixels apart tell it.
 
     InputError: the image has two numbers only, which say nothing of noise or of the line's profile.
     """
@@ -71,7 +76,10 @@ def estimate_noise(image: NDArray[Any], settings: ExtractionSettings, saturation
     lines = scan_lines(sample, settings, numbers)
     signal, mask, _ = lines.read(0, lines.count)
     colours = 1.5 if lines.channel in COLOURS and image.ndim == 3 else 1.0  # variance of a colour difference
-    dark_variance = _difference_variance(np.where(mask & MISSING, np.nan, signal), numbers.step) / colours
+    known = np.where(mask & MISSING, np.nan, signal)
+    dark_variance = _difference_variance(known, numbers.step, (1, 2)) / colours
+    if processed:
+        dark_variance = max(dark_variance, _difference_variance(known, numbers.step, (APART,)) / colours)
     level = max(float(np.median(sample[np.isfinite(sample)])), 0.0)
 
     still = max(dark_variance - numbers.step**2 / 12.0, 0.0)
@@ -265,9 +273,9 @@ def _mean_square_step(values: NDArray[np.float32], lag: int, step: float) -> flo
     return float(np.mean(steps[steps <= STRAY * sigma] ** 2))
 
 
-def _difference_variance(values: NDArray[np.float32], step: float) -> float:
-    """(n, w), NaN where not usable -> variance of a pixel, from neighbours or, on a Bayer row, next but one."""
-    for lag in (1, 2):
+def _difference_variance(values: NDArray[np.float32], step: float, lags: tuple[int, ...]) -> float:
+    """(n, w), NaN where not usable -> variance of a pixel, from the first of some lags at which pixels are known."""
+    for lag in lags:
         steps = np.subtract(values[:, lag:], values[:, :-lag], dtype=np.float64)
         known = np.isfinite(steps).any(axis=1)
         steps = np.abs(steps[known] - np.nanmedian(steps[known], axis=1, keepdims=True))  # a slope is no noise

@@ -32,6 +32,12 @@ TURNS = {
 """What EXIF asks a viewer to do."""
 
 
+LEAST_SIDE, MOST_SIDE = 16, 1024
+"""px of the piece of an image by which its colour is judged."""
+COARSE = 0.7
+"""Ratio of colour's change to brightness's, which is 1.4 for independent channels."""
+
+
 @dataclass(frozen=True)
 class Photograph:
     """An image file, upright."""
@@ -41,7 +47,7 @@ class Photograph:
     turned: str
     """What was done because EXIF asks for it; empty: nothing."""
     lossy: bool
-    """A colour JPEG: most have their colour at half resolution, and none keeps what is clipped at one number."""
+    """A colour JPEG, or what was one: colour at half resolution, and clipped pixels are not at one number."""
 
 
 def load_photograph(path: Path) -> NDArray[Any]:
@@ -72,7 +78,25 @@ def read_photograph(path: Path) -> Photograph:
         image = np.ascontiguousarray(image[..., 0] if grey else image[:, :, 2::-1])
     elif image.ndim == 3:
         image = np.ascontiguousarray(image[..., 0])
-    return Photograph(upright(image, orientation), TURNS.get(orientation, ""), lossy and image.ndim == 3)
+    lossy = image.ndim == 3 and (lossy or has_coarse_colour(image))
+    return Photograph(upright(image, orientation), TURNS.get(orientation, ""), lossy)
+
+
+def has_coarse_colour(image: NDArray[Any]) -> bool:
+    """Whether the colour of an 8-bit image (h, w, 3) changes less from pixel to pixel than its brightness does.
+
+    That of independent channels changes more; half the resolution, of a JPEG that was stored as a PNG, say, leaves a
+    tenth to a half of it.
+    """
+    if image.dtype != np.uint8 or min(image.shape[:2]) < LEAST_SIDE:
+        return False
+    part = image[tuple(slice(max((n - MOST_SIDE) // 2, 0), (n + MOST_SIDE) // 2) for n in image.shape[:2])]
+    part = part.astype(np.int16)
+
+    def bends(values: NDArray[np.int16]) -> float:
+        return float(np.mean(np.abs(values[:, 2:] - 2 * values[:, 1:-1] + values[:, :-2])))
+
+    return bends(part[..., 0] - part[..., 2]) < COARSE * bends(part[..., 1])
 
 
 def upright(image: NDArray[Any], orientation: int) -> NDArray[Any]:

@@ -68,11 +68,12 @@ def extract_photograph(
         light = measured_light(whole, off, look, taken.lossy)
         if light is None:
             return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
-        noise = estimate_noise(light.seen, settings, light.saturation)
+        processed = whole.ndim == 3 or taken.lossy
+        noise = estimate_noise(light.seen, settings, light.saturation, processed=processed)
         alone = settings.select == "strongest" and volume is None
         wanted = settings if alone else settings.model_copy(update={"peaks": max(settings.peaks, CANDIDATES)})
         # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
-        shared = noise.alike or whole.ndim == 3 or taken.lossy
+        shared = noise.alike or processed
         plain = noise.model_copy(update={"alike": False})
         line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
         line = placed(unsure_dropped(line), whole.shape, look.region.corner)
