@@ -115,7 +115,9 @@ def _checked(data: bytes, where: str) -> tuple[int, bool]:
 
     InputError: more pixels than MAX_PIXELS, or several pages.
     """
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image, ImageFile, UnidentifiedImageError
+
+    ImageFile.LOAD_TRUNCATED_IMAGES = False  # WeasyPrint sets it for the whole program
 
     try:
         with Image.open(io.BytesIO(data)) as image:

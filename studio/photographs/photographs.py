@@ -68,12 +68,11 @@ def extract_photograph(
         light = measured_light(whole, off, look, taken.lossy)
         if light is None:
             return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
-        processed = whole.ndim == 3 or taken.lossy
-        noise = estimate_noise(light.seen, settings, light.saturation, processed=processed)
+        noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy)
         alone = settings.select == "strongest" and volume is None
         wanted = settings if alone else settings.model_copy(update={"peaks": max(settings.peaks, CANDIDATES)})
         # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
-        shared = noise.alike or processed
+        shared = noise.alike or whole.ndim == 3 or taken.lossy
         plain = noise.model_copy(update={"alike": False})
         line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
         line = placed(unsure_dropped(line), whole.shape, look.region.corner)
