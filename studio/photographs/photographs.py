@@ -25,6 +25,7 @@ from analysis.line.settings import ExtractionSettings
 from analysis.line.shared_noise import with_shared_noise
 from render.base.errors import InputError
 from render.base.files import atomic_write
+from studio.photographs.completion import completed
 from studio.photographs.evidence import chains_of, shrink
 from studio.photographs.laser_light import Light, banded, laser_light, without
 from studio.photographs.photograph_set import Look
@@ -36,6 +37,9 @@ PLATEAU = 32
 """Pixels of one number that a sensor's limit makes, and chance does not."""
 SATURATED_SHARE = 0.5
 """Of the scan lines; an exposure with more of them is no base to estimate noise from."""
+
+FITS = ("auto", "likelihood", "gaussian")
+"""Methods that a profile may defeat."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,10 @@ def extract_photograph(
         line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
         line = placed(unsure_dropped(line), whole.shape, look.region.corner)
         line = line if alone else selected(line, settings, volume)
+        if settings.select == "continuous" and settings.peaks == 1 and settings.method in FITS:
+            plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
+            centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
+            line = completed(line, placed(centres, whole.shape, look.region.corner))
         line = with_shared_noise(line) if shared else line
         around = light.image
         if around.shape != whole.shape[:2]:
@@ -98,7 +106,7 @@ def measured_light(whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lo
             raise InputError("the image has no such channel", where="channel", found=look.named, allowed=allowed)
         colour = "mono" if look.evidence is None else look.evidence.colour
         light = laser_light(image, off, look.channel, colour, lossy)
-    if look.banded and image.ndim == 3:
+    if look.banded:
         assert look.evidence is not None
         shrunk = shrink(image, off, closed)
         chains = chains_of(shrunk, look.evidence.combination, look.evidence.axis, look.settings.peaks)

@@ -1,0 +1,67 @@
+"""Scan lines on which a fit fails beside ones on which it does not: the centre of their light, where the line goes on.
+
+Real lines are clipped, granular and not Gaussian; a fit of such a profile may not converge. A centre of mass always has
+an answer, but knows neither whether it is the line's nor how wrong it is. Both are told by the scan lines about it: it
+has to lie where the line goes on, and errs as it does where the fit is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.line.result import Flag, Line
+
+FEWEST = 32
+"""Scan lines with both positions by which the second is judged."""
+GAP = 16
+"""Scan lines that the line may go on without a fit."""
+FILLED = (Flag.REJECTED, Flag.NOT_CONVERGED, Flag.TOO_WIDE, Flag.OUT_OF_WINDOW, Flag.TOO_FEW_PIXELS, Flag.UNSURE)
+"""Reasons that say nothing against there being a line."""
+
+
+def completed(line: Line, centres: Line) -> Line:
+    """A line (n, 1) by a fit, and the same by its centre of mass -> the line, with centres (flag MISFIT) where it has
+    none.
+
+    Their sigma is how far centres scatter about the fits where there are both, beside the centre's own.
+    """
+    fitted = np.flatnonzero(line.valid[:, 0])
+    both = np.flatnonzero(line.valid[:, 0] & centres.valid[:, 0])
+    apart = np.abs(centres.u[both, 0] - line.u[both, 0])
+    if len(both) < FEWEST:
+        return line
+    scatter, width = 1.4826 * float(np.median(apart)), float(np.median(line.width[fitted, 0]))
+    if not scatter < width:
+        return line
+    rows = np.flatnonzero(np.isin(line.flag[:, 0], FILLED) & centres.valid[:, 0])
+    after = np.searchsorted(fitted, rows)
+    rows, after = rows[(after > 0) & (after < len(fitted))], after[(after > 0) & (after < len(fitted))]
+    first, last = fitted[after - 1], fitted[after]
+    expected = np.interp(rows, fitted, line.u[fitted, 0])
+    near = np.abs(centres.u[rows, 0] - expected) <= np.maximum(width, np.abs(line.u[last, 0] - line.u[first, 0]))
+    rows = rows[near & (last - first <= GAP)]
+    own = np.nan_to_num(centres.sigma_u[rows, 0])
+
+    def with_values(values: NDArray[np.float64], found: Any) -> NDArray[np.float64]:
+        out = values.copy()
+        out[rows, 0] = found
+        return out
+
+    flag = line.flag.copy()
+    flag[rows, 0] = np.uint8(Flag.MISFIT)
+    length = line.correlation_length
+    return replace(
+        line,
+        u=with_values(line.u, centres.u[rows, 0]),
+        sigma_u=with_values(line.sigma_u, np.hypot(scatter, own)),
+        width=with_values(line.width, width),
+        amplitude=with_values(line.amplitude, centres.amplitude[rows, 0]),
+        background=with_values(line.background, centres.background[rows, 0]),
+        chi2=with_values(line.chi2, np.nan),
+        correlation_length=None if length is None else with_values(length, 1.0),
+        flag=flag,
+    )
