@@ -1,0 +1,68 @@
+"""Scan lines on which the fit failed: their centre of mass, with the sigma that it turns out to have."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.line.result import Flag, Line
+from studio.photographs.completion import GAP, completed
+
+COUNT, WIDTH, SCATTER = 400, 2.0, 0.3
+
+
+def lines(seed: int = 1) -> tuple[Line, Line, np.ndarray]:
+    """A line by a fit that is nearly exact, the same by centres that scatter by SCATTER, and the truth."""
+    rng = np.random.default_rng(seed)
+    truth = 50.0 + 0.1 * np.arange(COUNT)
+
+    def line(sigma: float) -> Line:
+        values = {name: np.full((COUNT, 1), 1.0) for name in ("amplitude", "background", "chi2", "correlation_length")}
+        u = (truth + sigma * rng.standard_normal(COUNT))[:, None]
+        told, width = np.full((COUNT, 1), 0.01), np.full((COUNT, 1), WIDTH)
+        flag = np.zeros((COUNT, 1), np.uint8)
+        return Line("rows", "likelihood", u, sigma_u=told, width=width, flag=flag, **values)
+
+    return line(0.01), line(SCATTER), truth
+
+
+def without(line: Line, rows: np.ndarray, flag: Flag) -> Line:
+    u, flags = line.u.copy(), line.flag.copy()
+    u[rows], flags[rows] = np.nan, flag
+    return replace(line, u=u, flag=flags)
+
+
+def test_what_a_fit_leaves_out_is_filled_with_a_sigma_that_holds() -> None:
+    fits, centres, truth = lines()
+    gone = np.arange(5, COUNT - 5, 4)
+    found = completed(without(fits, gone, Flag.NOT_CONVERGED), centres)
+    assert found.valid.all() and np.all(found.flag[gone] == Flag.MISFIT)
+    ratio = (found.u[gone, 0] - truth[gone]) / found.sigma_u[gone, 0]
+    assert abs(np.std(ratio) - 1.0) < 4.0 / np.sqrt(2 * len(gone)) + 0.1  # the scatter is known to some 5 % itself
+    kept = np.setdiff1d(np.arange(COUNT), gone)
+    assert np.array_equal(found.u[kept], fits.u[kept]) and np.array_equal(found.sigma_u[kept], fits.sigma_u[kept])
+
+
+def test_what_lies_off_the_line_or_beyond_its_ends_or_a_long_gap_is_not_taken() -> None:
+    fits, centres, _ = lines()
+    stray, gap = np.array([50, 60]), np.arange(200, 202 + GAP)
+    ends = np.r_[:10, COUNT - 10 : COUNT]
+    u = centres.u.copy()
+    u[stray] += 10.0 * WIDTH
+    line = without(fits, np.concatenate([stray, gap, ends]), Flag.REJECTED)
+    found = completed(line, replace(centres, u=u))
+    assert not found.valid[stray].any() and not found.valid[gap].any() and not found.valid[ends].any()
+
+
+def test_scan_lines_without_a_peak_stay_without_one() -> None:
+    fits, centres, _ = lines()
+    found = completed(without(fits, np.arange(100, 105), Flag.NO_PEAK), centres)
+    assert np.all(found.flag[100:105] == Flag.NO_PEAK)
+
+
+def test_centres_that_err_by_more_than_the_line_is_wide_complete_nothing() -> None:
+    fits, centres, _ = lines()
+    wild = replace(centres, u=centres.u + 20.0 * np.random.default_rng(2).standard_normal((COUNT, 1)))
+    line = without(fits, np.arange(100, 105), Flag.NOT_CONVERGED)
+    assert completed(line, wild) is line
