@@ -28,6 +28,7 @@ from render.base.files import atomic_write
 from studio.photographs.completion import completed
 from studio.photographs.evidence import chains_of, shrink
 from studio.photographs.laser_light import Light, banded, laser_light, without
+from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
 from studio.scan.line_extraction import note_of
 from studio.scan.own_files import check_replaceable, line_columns
@@ -86,6 +87,7 @@ def extract_photograph(
             centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
             line = completed(line, placed(centres, whole.shape, look.region.corner))
         line = with_shared_noise(line) if shared else line
+        line = with_mosaic(line, look.channel) if taken.lossy else line
         around = light.image
         if around.shape != whole.shape[:2]:
             x, y = look.region.corner
