@@ -32,6 +32,8 @@ LONG_SIDE = 480
 """px of the shrunk images: enough to see a line of one pixel of the largest sensors, and little to compute."""
 SCALES = (1.0, 2.0, 4.0, 8.0)
 """Gaussian sigmas of the ridge filters, px of the shrunk image: lines up to a few per cent of the image's width."""
+BRIGHTEST = 1e12
+"""Of an image of floating point: sums of its squares have to be numbers as well."""
 CANDIDATES = 5
 RIVAL = 0.9
 """Quantile of the scan lines' strongest rivals: a lamp on a few scan lines does not hide a line on all of them."""
@@ -224,8 +226,10 @@ def shrink(image: NDArray[Any], off: NDArray[Any] | None, closed: NDArray[np.boo
 
     def small(values: NDArray[Any]) -> Floats:
         values = np.ascontiguousarray(values[: size[1] * factor, : size[0] * factor])
-        if values.dtype.kind == "f":
-            values = np.nan_to_num(values.astype(np.float32, copy=False))
+        if values.dtype.kind == "f" and not (values.min() >= -BRIGHTEST and values.max() <= BRIGHTEST):  # or NaN
+            values = np.nan_to_num(np.clip(values, -BRIGHTEST, BRIGHTEST))
+        if values.dtype == np.float64:
+            values = values.astype(np.float32)
         less: Floats = cv2.resize(values, size, interpolation=cv2.INTER_AREA).astype(np.float32)
         return less
 

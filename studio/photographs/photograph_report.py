@@ -127,12 +127,15 @@ def _fits(
     ]:
         if fit is None:
             continue
-        text = f"{name}: {micrometres(fit[0].rms)} RMS from a fitted {what}, {fit[1]:.2f} times sigma"
+        text = f"{name}: {micrometres(fit[0].rms)} RMS from a fitted {what}"
+        ratio = fit[1] if np.isfinite(fit[1]) else None
+        if ratio is not None:  # some methods tell no sigma
+            text += f", {ratio:.2f} times sigma"
         text += f", {percent(fit[0].strays)} strays"
         radius = None if np.isnan(fit[0].radius) else fit[0].radius
         if radius is not None:
             text += f", radius {radius * 1e3:.3f} mm"
-        row = {"of": name, "shape": what, "rms_m": fit[0].rms, "over_sigma": fit[1], "strays": fit[0].strays}
+        row = {"of": name, "shape": what, "rms_m": fit[0].rms, "over_sigma": ratio, "strays": fit[0].strays}
         found.append(row | {"radius_m": radius, "text": text})
     return found
 

@@ -121,6 +121,8 @@ def look_at(paths: Sequence[Path], settings: ExtractionSettings, wishes: Wishes)
             taken, off = look.read(path)
             image = mosaic(wishes.region.part(check_image(taken.pixels)), settings)
             dark = None if off is None else mosaic(wishes.region.part(off), settings)
+            if not image.size:  # a raw image of less than two pixels a side
+                continue
             closed = None if settings.pattern is not None else wishes.region.closed
             seen.append((Photograph(image, "", taken.lossy), dark, shrink(image, dark, closed)))
         except InputError:
@@ -159,7 +161,13 @@ def mosaic(image: NDArray[Any], settings: ExtractionSettings) -> NDArray[Any]:
     planes: dict[str, list[NDArray[Any]]] = {letter: [] for letter in "RGB"}
     for k, letter in enumerate(settings.pattern):
         planes[letter].append(image[k // 2 : height : 2, k % 2 : width : 2])
-    return np.stack([np.mean(planes[letter], axis=0) for letter in "RGB"], axis=2).astype(np.float32)
+    colours = np.empty((height // 2, width // 2, 3), np.float32)
+    for k, letter in enumerate("RGB"):
+        colours[..., k] = planes[letter][0]
+        for more in planes[letter][1:]:
+            colours[..., k] += more
+        colours[..., k] /= len(planes[letter])
+    return colours
 
 
 def _measuring(
