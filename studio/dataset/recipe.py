@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import json
 import math
@@ -11,9 +10,9 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from render.base.errors import InputError
 from render.base.model import Model, quantity
 from studio.project.project import Project
+from studio.project.ready_made import file_of, names_in
 from studio.project.strict_json import read_object
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.project.validation_messages import input_error
@@ -135,7 +134,7 @@ class Recipe(Model):
 
         InputError: one message for all that is wrong with it.
         """
-        file = recipe_file(path)
+        file = file_of(path, FOLDER, "recipe")
         data = read_object(file, "recipe")
         try:
             return cls.model_validate_json(json.dumps(data), strict=True), file.parent
@@ -148,27 +147,9 @@ class Recipe(Model):
         return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
 
-def recipe_file(path: Path | str) -> Path:
-    """The file meant by a path or by a ready-made recipe's name. InputError: neither."""
-    file = Path(path)
-    if file.exists() or file.suffix or len(file.parts) != 1:
-        return file
-    ready = FOLDER / f"{file.name}.json"
-    if ready.is_file():
-        return ready
-    names = ready_made()
-    near = difflib.get_close_matches(file.name, names, n=1)
-    raise InputError(
-        "there is no such recipe",
-        found=str(path),
-        allowed=f"a file, or a ready-made one: {', '.join(names)}",
-        cure=f"did you mean {near[0]}?" if near else "",
-    )
-
-
 def ready_made() -> list[str]:
     """Names of the recipes that come with the program."""
-    return sorted(file.stem for file in FOLDER.glob("*.json"))
+    return names_in(FOLDER)
 
 
 def base_of(recipe: Recipe, root: Path) -> Project:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,6 +23,7 @@ from analysis.line.series.hdr import Fused, fuse
 from analysis.line.series.subtract import subtract_off
 from analysis.line.settings import ExtractionSettings
 from analysis.line.shared_noise import with_shared_noise
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from studio.photographs.completion import completed
@@ -132,20 +133,18 @@ def unsure_dropped(line: Line) -> Line:
     if not unsure.any():
         return line
 
-    def kept(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def kept(values: Float) -> Float:
         return np.where(unsure, np.nan, values)
 
-    return replace(
-        line,
-        u=kept(line.u),
-        sigma_u=kept(line.sigma_u),
-        width=kept(line.width),
-        amplitude=kept(line.amplitude),
-        background=kept(line.background),
-        chi2=kept(line.chi2),
-        correlation_length=None if line.correlation_length is None else kept(line.correlation_length),
-        flag=np.where(unsure, np.uint8(Flag.UNSURE), line.flag).astype(np.uint8),
-    )
+    return _changed(line, kept, np.where(unsure, np.uint8(Flag.UNSURE), line.flag).astype(np.uint8))
+
+
+def _changed(line: Line, change: Callable[[Float], Float], flag: NDArray[np.uint8]) -> Line:
+    """The line with all its numbers (n, k) changed alike."""
+    names = ("u", "sigma_u", "width", "amplitude", "background", "chi2")
+    numbers: dict[str, Any] = {name: change(getattr(line, name)) for name in names}
+    length = None if line.correlation_length is None else change(line.correlation_length)
+    return replace(line, **numbers, correlation_length=length, flag=flag)
 
 
 def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
@@ -155,24 +154,15 @@ def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
         return line
     along, first = corner if line.axis == "rows" else corner[::-1]
 
-    def whole(values: NDArray[np.float64], shift: float = 0.0) -> NDArray[np.float64]:
+    def whole(values: Float) -> Float:
         out = np.full((count, values.shape[1]), np.nan)
-        out[first : first + len(values)] = values + shift
+        out[first : first + len(values)] = values
         return out
 
     flag = np.full((count, line.flag.shape[1]), np.uint8(Flag.NO_PIXELS))
     flag[first : first + len(line.flag)] = line.flag
-    return replace(
-        line,
-        u=whole(line.u, along),
-        sigma_u=whole(line.sigma_u),
-        width=whole(line.width),
-        amplitude=whole(line.amplitude),
-        background=whole(line.background),
-        chi2=whole(line.chi2),
-        correlation_length=None if line.correlation_length is None else whole(line.correlation_length),
-        flag=flag,
-    )
+    found = _changed(line, whole, flag)
+    return replace(found, u=found.u + along)
 
 
 def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolume | None) -> Line:

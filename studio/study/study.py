@@ -17,6 +17,7 @@ from render.base.errors import InputError
 from render.base.files import inside
 from render.base.model import Model, quantity
 from studio.project.project import Project
+from studio.project.ready_made import file_of, names_in
 from studio.project.strict_json import read_object
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.project.validation_messages import input_error
@@ -172,7 +173,7 @@ class Study(Model):
 
         InputError: one message for all that is wrong with it.
         """
-        file = study_file(path)
+        file = file_of(path, FOLDER, "study")
         data = read_object(file, "study file")
         try:
             return cls.model_validate_json(json.dumps(data), strict=True), file.parent
@@ -207,27 +208,9 @@ def program_digest() -> str:
     return digest.hexdigest()
 
 
-def study_file(path: Path | str) -> Path:
-    """The file meant by a path or by a ready-made study's name. InputError: neither."""
-    file = Path(path)
-    if file.exists() or file.suffix or len(file.parts) != 1:
-        return file
-    ready = FOLDER / f"{file.name}.json"
-    if ready.is_file():
-        return ready
-    names = ready_made()
-    near = difflib.get_close_matches(file.name, names, n=1)
-    raise InputError(
-        "there is no such study",
-        found=str(path),
-        allowed=f"a file, or a ready-made one: {', '.join(names)}",
-        cure=f"did you mean {near[0]}?" if near else "",
-    )
-
-
 def ready_made() -> list[str]:
     """Names of the studies that come with the program."""
-    return sorted(file.stem for file in FOLDER.glob("*.json"))
+    return names_in(FOLDER)
 
 
 def base_project(name: str, root: Path) -> Project:
