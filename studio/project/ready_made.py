@@ -19,11 +19,13 @@ def file_of(path: Path | str, folder: Path, what: str) -> Path:
     what: "study", for the message.
     """
     file = Path(path)
-    if file.exists() or file.suffix or len(file.parts) != 1:
+    if file.is_file() or file.suffix or len(file.parts) != 1:
         return file
     ready, names = folder / f"{file.name}.json", names_in(folder)
-    if ready.is_file():
+    if ready.is_file():  # also where a folder has that name, as a project's may
         return ready
+    if file.exists():
+        return file
     near = difflib.get_close_matches(file.name, names, n=1)
     raise InputError(
         f"there is no such {what}",

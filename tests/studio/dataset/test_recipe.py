@@ -82,3 +82,15 @@ def test_a_base_outside_the_recipe_s_folder_and_an_unknown_field_are_refused(tmp
 def test_ready_made_recipes_are_valid(name: str) -> None:
     recipe, root = Recipe.load(name)
     assert base_of(recipe, root).render.goal is None and recipe.about
+
+
+def test_a_folder_of_its_name_does_not_hide_a_ready_made_recipe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "groove").mkdir()
+    (tmp_path / "plane").write_text('{"base": "sphere"}')
+    monkeypatch.chdir(tmp_path)
+    assert Recipe.load("groove")[0].base == "v_groove"
+    assert Recipe.load("plane")[0].base == "sphere"
+    with pytest.raises(InputError, match="no such recipe"):
+        Recipe.load("grove")
