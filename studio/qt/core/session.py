@@ -18,7 +18,7 @@ from render.sensor.develop import Image
 from render.world.world import World
 from studio.project.document import Document, FieldPath
 from studio.project.project import Project
-from studio.scan.redevelop import is_stale
+from studio.scan.redevelop import Development, is_stale
 from studio.scan.scan import Measurement
 from studio.scan.scan_results import ScanResults
 
@@ -56,6 +56,8 @@ class Render:
     """Where a report of it was written last."""
     scan: ScanResults | None = None
     """The scan that the frame is a step of; None: it was rendered alone."""
+    made_from: dict[str, tuple[Frame, Development]] = field(default_factory=dict)
+    """Frame and settings that "images" and "measurements" are of: while light refines, both lag behind."""
     cell: str = ""
     """Key of the study's cell that it is: developed and measured by its own `source`, whatever the open project has."""
 
@@ -67,6 +69,11 @@ class Render:
     def developed_by(self, now: Project) -> Project:
         """The project, at full scale, by whose sensor, power and extraction it is developed and measured."""
         return self.source if self.cell and self.source is not None else now
+
+    def is_measured(self, how: Development) -> bool:
+        """Images and measurements are of the present frame, developed like this."""
+        made = [self.made_from.get(what) for what in ("images", "measurements")]
+        return all(one is not None and one[0] is self.frame and one[1] == how for one in made)
 
     def repeatable(self, now: Project) -> bool:
         """A run of its first step gives the same images: those of a step follow the scan's plan, a cell its study's."""
@@ -207,7 +214,7 @@ class Session(QObject):
         """Another step of a scan that is among the renders; what was measured of the one before goes with it."""
         for i, other in enumerate(self.renders):
             if other.scan is scan:
-                self.renders[i] = replace(other, frame=frame, world=world, measurements={}, images=[])
+                self.renders[i] = replace(other, frame=frame, world=world, measurements={}, images=[], made_from={})
                 self.shown = self.renders[i] if self.shown is other else self.shown
                 self.renders_changed.emit()
                 return

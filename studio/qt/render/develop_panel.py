@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 from analysis.line.settings import Method
 from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
 from render.base.threads import Cancel
+from render.frame import Frame
 from render.sensor.develop import Image
 from studio.project.document import FieldPath
 from studio.qt.core.jobs import JobRunner
@@ -42,7 +43,7 @@ REST_MS = 120
 class DevelopPanel(QWidget):
     """Edits the sensor and the lasers' power in the project; follows every change with new images and measures."""
 
-    _images_ready = Signal(object, object, float, str)
+    _images_ready = Signal(object, object, object, float, str)
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -51,7 +52,7 @@ class DevelopPanel(QWidget):
         self.develop_seconds = 0.0
         self._told_of: Render | None = None
         """The render that brightness and measures are of."""
-        self._to_measure: tuple[Render, Development, list[Image], tuple[Method, ...]] | None = None
+        self._to_measure: tuple[Render, Frame, Development, list[Image], tuple[Method, ...]] | None = None
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
         self._rest.setInterval(REST_MS)
@@ -243,19 +244,21 @@ class DevelopPanel(QWidget):
             told = brightness(images, names) + (f"\ndefocus by {blur}" if blur != "nothing" else "")
             told += f"\n{OF_A_CELL}" if render.cell else ""
             render.noise = noise
-            self._images_ready.emit(render, images, seconds, told)
+            self._images_ready.emit(render, (frame, how), images, seconds, told)
             return images
 
         def then(images: list[Image]) -> None:
-            self._to_measure = (render, how, images, methods)
+            self._to_measure = (render, frame, how, images, methods)
             self._rest.start()
 
         self._rest.stop()
         self.runner.cancel("measure")
         self.runner.run("develop", "developing", work, then)
 
-    def _take_images(self, render: Render, images: list[Image], seconds: float, told: str) -> None:
-        render.images = images
+    def _take_images(
+        self, render: Render, made_from: tuple[Frame, Development], images: list[Image], seconds: float, told: str
+    ) -> None:
+        render.images, render.made_from["images"] = images, made_from
         self.develop_seconds = seconds
         if render is self.session.shown:
             self.told.setText(told)
@@ -264,15 +267,15 @@ class DevelopPanel(QWidget):
     def _measure(self) -> None:
         if self._to_measure is None or self.runner.job("develop") is not None:
             return
-        render, how, images, methods = self._to_measure
+        render, frame, how, images, methods = self._to_measure
         self._to_measure = None
-        frame, world = render.frame, render.world
+        world = render.world
 
         def work(progress: Progress, cancelled: Cancel) -> dict[str, list[Measurement]]:
             return measure_again(frame, world, how, images, methods, cancelled=cancelled)
 
         def then(found: dict[str, list[Measurement]]) -> None:
-            render.measurements = found
+            render.measurements, render.made_from["measurements"] = found, (frame, how)
             if render is self.session.shown:
                 self._tell_measures(found)
                 self.session.measured.emit()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, get_args
 
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from analysis.line.settings import Method
 from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import show_trouble, suggested
@@ -16,8 +19,11 @@ from studio.qt.core.session import Session
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress
 from studio.runtime.preferences import PreferencesFile
-from studio.scan.redevelop import development
+from studio.scan.redevelop import Development, develop_again, development, measure_again
 from studio.scan.remarks import scale_notes
+
+if TYPE_CHECKING:
+    from studio.scan.export import Exported
 
 KINDS = {
     "export_html": ("Report (*.html)", ".html", "report"),
@@ -80,7 +86,8 @@ class ExportActions(QObject):
             return
         now = render.developed_by(self.session.project)
         how = development(render.project, now, render.image_scale)
-        what = export.Exported(
+        kind, current, noise = KINDS[key][2], render.is_measured(how), render.noise
+        shown = export.Exported(
             how.powered,
             render.project,
             self.session.document.root,
@@ -98,10 +105,11 @@ class ExportActions(QObject):
             "image": export.export_image,
             "points": export.export_points,
         }
-        writer = writers[KINDS[key][2]]
+        writer = writers[kind]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
             progress(path.name, 0.0)  # how far it is, nobody knows
+            what = shown if current or kind == "frame" else _measured(shown, how, noise, cancelled)
             return export.export_unless(cancelled, writer, path, what)
 
         notes = scale_notes(render.scanner_scale)
@@ -135,3 +143,12 @@ class ExportActions(QObject):
     def _tell(self, written: list[Path], notes: tuple[str, ...]) -> None:
         names = ", ".join(str(path) for path in written)
         self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes]))
+
+
+def _measured(shown: Exported, how: Development, noise: bool, cancelled: Cancel) -> Exported:
+    """Developed and measured like this: what is shown lags behind a setting just changed, or light just refined."""
+    images = develop_again(shown.frame, how, noise=noise, cancelled=cancelled)
+    others = [method for method in get_args(Method) if method in shown.measurements]
+    methods = tuple(dict.fromkeys([how.project.extraction.method, *others]))
+    found = measure_again(shown.frame, shown.world, how, images, methods, cancelled=cancelled)
+    return replace(shown, images=tuple(images), measurements=found)

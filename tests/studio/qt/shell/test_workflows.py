@@ -51,11 +51,12 @@ def drag_in_view(view: QWidget, start: QPointF, end: QPointF) -> None:
 
 def rendered(window: MainWindow, qtbot: QtBot) -> Render:
     """Wait until the render is done and measured."""
-    session = window.session
+    session, develop = window.session, window.panels["develop"]
 
     def done() -> bool:
         shown = session.shown
-        return shown is not None and shown.final and len(shown.measurements) == 3 and not window.runner.busy
+        idle = not window.runner.busy and not develop.busy  # type: ignore[attr-defined]
+        return shown is not None and shown.final and len(shown.measurements) == 3 and idle
 
     qtbot.waitUntil(done, timeout=60_000)
     assert session.shown is not None
