@@ -11,7 +11,7 @@ from analysis.line.result import Line
 from analysis.measures import means
 from tests.analysis.line.line_images import electrons, expected, exposed
 
-READ_NOISE, ROWS, IMAGES = 2.5, 400, 12
+READ_NOISE, ROWS, IMAGES = 2.5, 300, 8
 
 
 def narrow(sigma: float, signal: float, seed: int, step: float) -> tuple[Line, np.ndarray]:
@@ -32,7 +32,7 @@ def test_the_shared_width_is_not_drawn_to_the_steps_that_it_is_looked_for_at(sig
 
 @pytest.mark.parametrize("sigma", [0.25, 0.3])
 def test_means_of_narrow_lines_do_not_scatter_more_than_told(sigma):
-    """Over 10 scan lines the variance was 1.8 to 2.9 times what was told, over 100 up to 25 times."""
+    """Over 10 scan lines the variance was 1.8 to 4 times what was told, over 100 up to 25 times."""
     found: dict[int, list[tuple[float, float]]] = {10: [], 100: []}
     for seed in range(IMAGES):
         line, error = narrow(sigma, 1000.0, seed, step=0.0013)
@@ -51,15 +51,15 @@ def test_means_of_narrow_lines_do_not_scatter_more_than_told(sigma):
 
 def test_the_correlation_length_holds_both_parts():
     """Of lines that share all of it: the triangle of windows of 65; of none: that which they have."""
-    one = np.ones((400, 1))
+    one = np.ones((ROWS, 1))
     line, _ = narrow(0.25, 1000.0, 1, 0.0)
     whole = Line("rows", "", one, one, one, one, one, one, line.flag, length_apart=2.0 * one, shared_u=one)
     assert whole.correlation_length is not None
-    assert whole.correlation_length[200, 0] == pytest.approx(65.0)
+    assert whole.correlation_length[150, 0] == pytest.approx(65.0)
     apart = Line("rows", "", one, one, one, one, one, one, line.flag, length_apart=2.0 * one, shared_u=0.0 * one)
     np.testing.assert_array_equal(apart.correlation_length, 2.0)
     half = Line(
         "rows", "", one, one, one, one, one, one, line.flag, length_apart=2.0 * one, shared_u=np.sqrt(0.5) * one
     )
     assert half.correlation_length is not None
-    assert half.correlation_length[200, 0] == pytest.approx(0.5 * 2.0 + 0.5 * 65.0)
+    assert half.correlation_length[150, 0] == pytest.approx(0.5 * 2.0 + 0.5 * 65.0)
