@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.line.result import overlap
 from render.base.arrays import Float
 
 Mask = NDArray[np.bool_]
@@ -99,21 +100,33 @@ def shared_rows(length: Float, count: int) -> Float:
 
 
 def means(
-    error: Float, sigma: Float, length: Float, index: NDArray[np.intp], rank: NDArray[np.intp], count: int
+    error: Float,
+    sigma: Float,
+    length: Float,
+    shared: Float,
+    index: NDArray[np.intp],
+    rank: NDArray[np.intp],
+    count: int,
 ) -> tuple[Float, Float]:
-    """Means of (m,) errors over `count` neighbouring scan lines, and their predicted sigma, from sigma and length (m,).
+    """Means of (m,) errors over `count` neighbouring scan lines, and their predicted sigma.
+
+    From sigma, `Line.length_apart` and what lines share by their width, as `Line.shared_u` in the unit of the error
+    (m,).
 
     Of the strongest peaks, and of runs without a gap; index, rank: as in `measure`.
     """
     order = np.lexsort((rank, index))
     lines, first = np.unique(index[order], return_index=True)
     at = order[first]
-    e, variance = error[at], sigma[at] ** 2 * shared_rows(length[at], count) / count
+    e, common = error[at], np.nan_to_num(shared[at])
+    variance = np.maximum(sigma[at] ** 2 - common**2, 0.0) * shared_rows(length[at], count) / count
     begins = np.flatnonzero(lines % count == 0)
     begins = begins[begins + count <= len(lines)]
     begins = begins[lines[begins + count - 1] - lines[begins] == count - 1]
     runs = begins[:, None] + np.arange(count)
-    return np.asarray(e[runs].mean(axis=1)), np.asarray(np.sqrt(variance[runs].mean(axis=1)))
+    alike = overlap(np.arange(count)[:, None] - np.arange(count))
+    together = np.sum((common[runs] @ alike) * common[runs], axis=1) / count**2
+    return np.asarray(e[runs].mean(axis=1)), np.asarray(np.sqrt(variance[runs].mean(axis=1) + together))
 
 
 def _autocorrelation(error: Float, index: NDArray[np.intp], rank: NDArray[np.intp]) -> float:

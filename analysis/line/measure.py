@@ -20,7 +20,16 @@ from analysis.line.methods.gaussian_fit import measure_gaussian
 from analysis.line.methods.half_energy import measure_half_energy
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.phase import measure_phase
-from analysis.line.methods.seed_loop import COLUMNS, CORRELATION_LENGTH, ROOM, TOLD, Options, Pixels, seed_kernel
+from analysis.line.methods.seed_loop import (
+    COLUMNS,
+    CORRELATION_LENGTH,
+    ROOM,
+    SHARED,
+    TOLD,
+    Options,
+    Pixels,
+    seed_kernel,
+)
 from analysis.line.methods.shared_width import width_priors
 from analysis.line.methods.steger_2d import HALO, NORMAL_CENTROID, RIDGE, fill_gaps, measure_ridge
 from analysis.line.methods.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, measure_three_pixels
@@ -119,11 +128,13 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
         out[start:stop][again], flags[start:stop][again] = measured[again], found[again]
 
     map_chunks(work, lines.count, TALL_CHUNK if halo else CHUNK, threads)
+    together = np.zeros((lines.count, settings.peaks))
     if not options.known_width:
         shared = [width_priors(out[:, k, TOLD:], out[:, k, 0], out[:, k, 1]) for k in range(settings.peaks)]
         if any(one is not None for one in shared):
             none = np.zeros((lines.count, len(PRIOR_WIDTHS)))
-            priors = np.stack([none if one is None else one for one in shared], axis=1)
+            priors = np.stack([none if one is None else one[0] for one in shared], axis=1)
+            together = np.stack([none[:, 0] if one is None else one[1] for one in shared], axis=1)
             map_chunks(lambda start, stop: work(start, stop, priors), lines.count, CHUNK, threads)
     # a position that says less than a guess along the whole scan line is none
     lost = out[..., 1] > lines.image.shape[1] / np.sqrt(12.0)
@@ -132,4 +143,5 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
         np.ascontiguousarray(out[..., j]) for j in range(CORRELATION_LENGTH + 1)
     )
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
-    return replace(line, correlation_length=length)
+    common = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
+    return replace(line, length_apart=length, shared_u=common if common.any() else None)

@@ -51,8 +51,16 @@ class Flag(IntEnum):
     """sigma_u is above the line's own width: where the line is, the pixels do not say."""
 
 
+NEIGHBOURS = 32
+"""Scan lines on either side that a narrow line shares its width with."""
+
 CAUTIOUS = (Flag.SATURATED, Flag.UNRESOLVED, Flag.BLENDED, Flag.MISFIT, Flag.SPECKLED)
 """Flags of positions that the model of a line on level ground does not hold for; sigma_u says what that costs."""
+
+
+def overlap(distance: NDArray[np.int64] | int) -> Float:
+    """Correlation of the width that scan lines so far apart share: the part of their neighbours that both have."""
+    return np.asarray(np.maximum(1.0 - np.abs(distance) / (2.0 * NEIGHBOURS + 1.0), 0.0))
 
 
 def positioned(flag: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -68,8 +76,10 @@ class Line:
     reason, `sigma_u` its standard deviation, NaN where a method cannot say, `width` the line's Gaussian sigma, both
     px; `amplitude` and `background` in electrons (DN / gain); `chi2` the reduced chi-square of the fit, NaN for methods
     without one. Neighbouring scan lines may err alike, by speckle or smoothing: the variance of a mean over many, n, is
-    sigma_u^2 `correlation_length` / n; 1 where they do not, None where it is not known. `note` tells what "auto" picked
-    and why; `candidates` are the peaks that one was selected from.
+    sigma_u^2 `correlation_length` / n; 1 where they do not, None where it is not known. It is made of two parts:
+    `shared_u`, px, is how far, and to which side, one standard deviation of the width that narrow lines share moves the
+    position, None where none do; `length_apart` is the correlation length of what is left of sigma_u. `note` tells what
+    "auto" picked and why; `candidates` are the peaks that one was selected from.
     """
 
     axis: Axis
@@ -82,7 +92,8 @@ class Line:
     chi2: Float
     flag: NDArray[np.uint8]
     note: str = ""
-    correlation_length: Float | None = None
+    length_apart: Float | None = None
+    shared_u: Float | None = None
     candidates: Line | None = None
 
     @property
@@ -94,6 +105,27 @@ class Line:
     def valid(self) -> NDArray[np.bool_]:
         """(n, k): has a position."""
         return positioned(self.flag)
+
+    @property
+    def variance_apart(self) -> Float:
+        """(n, k) px^2: of sigma_u what scan lines do not share by their width."""
+        return self.sigma_u**2 if self.shared_u is None else np.maximum(self.sigma_u**2 - self.shared_u**2, 0.0)
+
+    @property
+    def correlation_length(self) -> Float | None:
+        """(n, k) scan lines that err alike, of all that sigma_u holds; None: not known."""
+        if self.length_apart is None or self.shared_u is None:
+            return self.length_apart
+        shared = np.nan_to_num(self.shared_u)
+        reach, rows = 2 * NEIGHBOURS, len(shared)
+        padded = np.pad(shared, ((reach, reach), (0, 0)))
+        total = shared.copy()
+        for distance in range(1, reach + 1):  # both sides at once: upside down it is the same to the last bit
+            total += overlap(distance) * (padded[reach - distance :][:rows] + padded[reach + distance :][:rows])
+        # neighbours that err to the other side may leave less than nothing of a single one
+        own = self.variance_apart * self.length_apart
+        both = (own + np.maximum(shared * total, 0.0)) / self.sigma_u**2
+        return np.asarray(np.where(shared == 0.0, self.length_apart, both))
 
     def pixels(self) -> tuple[Float, NDArray[np.intp], NDArray[np.intp]]:
         """Valid peaks as (m, 2) pixels (u, v) in the image, with their scan line (m,) and rank (m,)."""

@@ -57,9 +57,9 @@ class SharedNoise:
 
     def added_to(self, line: Line) -> Line:
         """The line with larger sigmas and correlation lengths."""
-        told = np.ones_like(line.u) if line.correlation_length is None else line.correlation_length
+        told = np.ones_like(line.u) if line.length_apart is None else line.length_apart
         sigma = np.sqrt((1.0 + self.share) * line.sigma_u**2 + self.variance)
-        return replace(line, sigma_u=sigma, correlation_length=np.maximum(told, self.length))
+        return replace(line, sigma_u=sigma, length_apart=np.maximum(told, self.length))
 
 
 def with_shared_noise(line: Line) -> Line:

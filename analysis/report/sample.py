@@ -24,12 +24,13 @@ ROW = np.dtype(
         ("index", "i8"), ("rank", "i4"), ("flag", "u1"), ("valid", "?"), ("width", "f8"), ("world", "f8", 3),
         ("position", "f8"), ("depth", "f8"), ("distance", "f8"), ("sheet_bias", "f8"),
         ("sigma_position", "f8"), ("sigma_depth", "f8"), ("sigma_distance", "f8"),
-        ("pixel_depth", "f8"), ("pixel_distance", "f8"), ("sigma_systematic", "f8"), ("alike", "f8"),
+        ("pixel_depth", "f8"), ("pixel_distance", "f8"), ("sigma_systematic", "f8"), ("alike", "f8"), ("shared", "f8"),
     ]
 )  # fmt: skip
 """Fields of a point: `index`, `rank`, `flag`, `width` (px) of its peak; whether it is `valid`; its position at step 0
 (`world`, m); its errors and their predicted sigma (px, m); the sheet's bias of the position (px); the errors in m for
-one pixel; the calibration's part of sigma in depth, m; and the correlation length (`alike`), scan lines.
+one pixel; the calibration's part of sigma in depth, m; the correlation length (`alike`), scan lines,
+of what is not the error in depth that narrow lines have in common (`shared`), m.
 """
 
 MOST_LINES = 1 << 18
@@ -52,7 +53,10 @@ def rows_of(extraction: Extraction, scene: Scene, step: int) -> Rows:
     rows["sheet_bias"] = errors.sheet_bias
     rows["sigma_position"], rows["sigma_depth"] = points.sigma_pixel, points.sigma_depth
     rows["sigma_distance"] = errors.sigma_distance
-    rows["sigma_systematic"], rows["alike"] = points.sigma_depth_systematic, points.correlation_length
+    rows["sigma_systematic"] = points.sigma_depth_systematic
+    rows["alike"] = 1.0 if line.length_apart is None else line.length_apart[points.index, points.rank]
+    shared = 0.0 if line.shared_u is None else line.shared_u[points.index, points.rank]
+    rows["shared"] = shared * points.gradient[:, 2]
     rows["pixel_depth"] = np.abs(points.gradient[:, 2])
     rows["pixel_distance"] = np.linalg.norm(points.gradient, axis=1)
     return rows

@@ -34,7 +34,10 @@ def term_rows(rows: Rows) -> list[tuple[str, list[str]]]:
     told = [("each point: noise", _cells(error, random))]
     for number in MEANS:
         told.append(
-            (f"mean of {number} scan lines: noise", _cells(*means(error, random, rows["alike"], *where, number)))
+            (
+                f"mean of {number} scan lines: noise",
+                _cells(*means(error, random, rows["alike"], rows["shared"], *where, number)),
+            )
         )
     if np.any(systematic > 0.0):
         known = systematic[np.isfinite(error) & np.isfinite(systematic)]

@@ -53,7 +53,7 @@ def completed(line: Line, centres: Line) -> Line:
 
     flag = line.flag.copy()
     flag[rows, 0] = np.uint8(Flag.MISFIT)
-    length = line.correlation_length
+    length, shared = line.length_apart, line.shared_u
     return replace(
         line,
         u=with_values(line.u, centres.u[rows, 0]),
@@ -62,6 +62,7 @@ def completed(line: Line, centres: Line) -> Line:
         amplitude=with_values(line.amplitude, centres.amplitude[rows, 0]),
         background=with_values(line.background, centres.background[rows, 0]),
         chi2=with_values(line.chi2, np.nan),
-        correlation_length=None if length is None else with_values(length, 1.0),
+        length_apart=None if length is None else with_values(length, 1.0),
+        shared_u=None if shared is None else with_values(shared, 0.0),
         flag=flag,
     )

@@ -25,7 +25,7 @@ def with_mosaic(line: Line, channel: Channel) -> Line:
     All scan lines err alike by that much: so the correlation length becomes as long as the line, in its share.
     """
     extra = FILLED_IN.get(channel, 0.0) ** 2
-    told = np.ones_like(line.u) if line.correlation_length is None else line.correlation_length
-    variance = line.sigma_u**2
+    told = np.ones_like(line.u) if line.length_apart is None else line.length_apart
+    variance = line.variance_apart
     length = (variance * told + extra * max(int(line.valid.sum()), 1)) / (variance + extra)
-    return replace(line, sigma_u=np.sqrt(variance + extra), correlation_length=length) if extra else line
+    return replace(line, sigma_u=np.sqrt(line.sigma_u**2 + extra), length_apart=length) if extra else line

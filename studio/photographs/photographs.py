@@ -143,8 +143,9 @@ def _changed(line: Line, change: Callable[[Float], Float], flag: NDArray[np.uint
     """The line with all its numbers (n, k) changed alike."""
     names = ("u", "sigma_u", "width", "amplitude", "background", "chi2")
     numbers: dict[str, Any] = {name: change(getattr(line, name)) for name in names}
-    length = None if line.correlation_length is None else change(line.correlation_length)
-    return replace(line, **numbers, correlation_length=length, flag=flag)
+    for name in ("length_apart", "shared_u"):
+        numbers[name] = None if getattr(line, name) is None else change(getattr(line, name))
+    return replace(line, **numbers, flag=flag)
 
 
 def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
@@ -187,7 +188,8 @@ def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolu
         amplitude=side_by_side("amplitude"),
         background=side_by_side("background"),
         chi2=side_by_side("chi2"),
-        correlation_length=None if candidates.correlation_length is None else side_by_side("correlation_length"),
+        length_apart=None if candidates.length_apart is None else side_by_side("length_apart"),
+        shared_u=None if candidates.shared_u is None else side_by_side("shared_u"),
         flag=side_by_side("flag"),
         candidates=candidates,
     )

@@ -30,6 +30,7 @@ from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, me
 from analysis.line.methods.scintillation import position_variance, shared_variance
 from analysis.line.methods.seed_loop import (
     CORRELATION_LENGTH,
+    SHARED,
     TOLD,
     Array,
     Options,
@@ -113,7 +114,7 @@ def _measure_narrow(
     x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
     told = np.empty((2, PRIOR_WIDTHS.shape[0]))
     told[:] = np.nan
-    out[1] = posterior(pixel, n, p, options.known_width, options.integrated, shape, seed[PRIOR:], told)
+    out[1], out[SHARED] = posterior(pixel, n, p, options.known_width, options.integrated, shape, seed[PRIOR:], told)
     if not math.isfinite(p[1]) or not math.isfinite(out[1]):
         out[:] = np.nan
         return Flag.NOT_CONVERGED.value

@@ -118,19 +118,22 @@ def _over_places(
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _prior_at(prior: Array, s: float) -> float:
-    """The prior (m,) of PRIOR_WIDTHS at a width between two of them."""
-    j = 0
-    while j < prior.shape[0] - 2 and PRIOR_WIDTHS[j + 1] < s:
+    """The prior (m,) of PRIOR_WIDTHS at a width between two of them, by the parabola through the nearest three: a
+    straight line would prefer the steps."""
+    j = 1
+    while j < prior.shape[0] - 2 and PRIOR_WIDTHS[j] + PRIOR_WIDTHS[j + 1] < 2.0 * s:
         j += 1
-    t = (s - PRIOR_WIDTHS[j]) / (PRIOR_WIDTHS[j + 1] - PRIOR_WIDTHS[j])
-    return float(prior[j] + t * (prior[j + 1] - prior[j]))
+    left, middle, right = PRIOR_WIDTHS[j - 1], PRIOR_WIDTHS[j], PRIOR_WIDTHS[j + 1]
+    below, above = (prior[j] - prior[j - 1]) / (middle - left), (prior[j + 1] - prior[j]) / (right - middle)
+    return float(prior[j] + (s - middle) * (below + (s - left) * (above - below) / (right - left)))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _over_widths(
     pixel: Array, n: int, p: Array, widths: Array, prior: Array, integrated: bool, room: Array, told: Array
-) -> tuple[float, float, float, float]:
-    """Mean and variance of the place, and of the width, over some widths (m,); told (2, m): `_over_places` of each."""
+) -> tuple[float, float, float, float, float]:
+    """Mean and variance of the place, and of the width, and their covariance, over some widths (m,); told (2, m):
+    `_over_places` of each."""
     m, centre = widths.shape[0], p[1]
     place, spread, log = np.empty(m), np.empty(m), np.empty(m)
     trial = p.copy()
@@ -144,7 +147,7 @@ def _over_widths(
         left, right = widths[max(j - 1, 0)], widths[min(j + 1, m - 1)]
         log[j] = told[1, j] + _prior_at(prior, widths[j]) + math.log(right - left)
         best = max(best, log[j])
-    total = mean = square = mean_s = square_s = 0.0
+    total = mean = square = mean_s = square_s = both = 0.0
     for j in range(m):
         weight, apart = math.exp(log[j] - best), place[j] - centre
         total += weight
@@ -152,16 +155,17 @@ def _over_widths(
         square += weight * (apart * apart + spread[j])
         mean_s += weight * widths[j]
         square_s += weight * widths[j] * widths[j]
+        both += weight * apart * widths[j]
     mean, mean_s = mean / total, mean_s / total
     variance, variance_s = square / total - mean * mean, square_s / total - mean_s * mean_s
-    return centre + mean, max(variance, 0.0), mean_s, max(variance_s, 0.0)
+    return centre + mean, max(variance, 0.0), mean_s, max(variance_s, 0.0), both / total - mean * mean_s
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def posterior(
     pixel: Array, n: int, p: Array, known_width: bool, integrated: bool, shape: Array, prior: Array, told: Array
-) -> float:
-    """Pixels (4, n) of a fit p (4,), amplitude, centre, width, background -> sigma_u.
+) -> tuple[float, float]:
+    """Pixels (4, n) of a fit p (4,), amplitude, centre, width, background -> sigma_u, covariance of centre and width.
 
     p becomes the posterior's mean; the background stays. known_width: p[2] is held. shape (3, n): the profile on
     return. prior (m,): logarithm of the prior at PRIOR_WIDTHS. told (2, m): what the pixels say of each, at the best
@@ -172,10 +176,11 @@ def posterior(
         m = max(p[3] + floor[i], 0.1 * floor[i])
         shape[1, i] = (pixel[ELECTRONS, i] + floor[i]) * math.log(m) - m
     trial = p.copy()
+    both = 0.0
     if known_width:
         _, _, p[1], variance = _over_places(pixel, n, trial, p[1] - FARTHEST, p[1] + FARTHEST, integrated, shape)
     else:
-        mean, variance, width, spread = _over_widths(pixel, n, p, PRIOR_WIDTHS, prior, integrated, shape, told)
+        mean, variance, width, spread, both = _over_widths(pixel, n, p, PRIOR_WIDTHS, prior, integrated, shape, told)
         highest = 0.0
         for j in range(PRIOR_WIDTHS.shape[0]):
             highest = max(highest, told[0, j]) if j > 0 else told[0, j]
@@ -190,13 +195,13 @@ def posterior(
             step = (width + reach - low) / (WIDTHS - 1)
             for j in range(WIDTHS):
                 fine[j] = low + j * step
-            mean, variance, width, spread = _over_widths(pixel, n, p, fine, prior, integrated, shape, unused)
+            mean, variance, width, spread, both = _over_widths(pixel, n, p, fine, prior, integrated, shape, unused)
         p[1], p[2] = mean, width
     trial[0], trial[1], trial[2] = p[0], p[1], p[2]
     _log_likelihood(pixel[POSITION], pixel[ELECTRONS], floor, n, trial, integrated, shape)
     p[0] = trial[0]
     profile(pixel[POSITION], n, p[1], p[2], integrated, shape)
-    return math.sqrt(variance)
+    return math.sqrt(variance), both
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

@@ -32,6 +32,8 @@ NARROWEST_SATURATED = 0.35
 """px; the wings of a narrower line are within a pixel."""
 STARTS = (10.0, 100.0)
 """Hidden peaks over the full well that the fit is begun with."""
+SATURATING, ITS_PLACE, ITS_WIDTH = 300.0, 0.32, 0.2
+"""The same where the glow saturates too, by GLOW and its place: half the plateau from its middle, and its width."""
 ITERATIONS = 40
 SMALL = 1e-4
 """Squared standard deviations: a smaller step ends the iteration."""
@@ -131,11 +133,22 @@ def _fit(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def _misfits(pixel: Array, n: int, p: Array, options: Options, shape: Array, jacobian: Array) -> bool:
+    """Whether p (6,) leaves more over than noise does."""
+    _model(pixel, n, p, options.integrated, shape, jacobian)
+    chi2 = 0.0
+    for i in range(n):
+        variance = max(jacobian[6, i] + pixel[FLOOR, i], 0.1 * abs(pixel[FLOOR, i]), 1e-9)
+        chi2 += (pixel[ELECTRONS, i] - jacobian[6, i]) ** 2 / variance
+    return bool(deviate(chi2, n - UNKNOWNS) >= UNLIKELY)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def measure_with_glow(pixels: Pixels, seed: Array, n: int, single: Array, options: Options, out: Array) -> None:
     """A saturated line and the glow beside it, on pixels.room[:4] (4, n) -> out; as it is where the two do not fit.
 
-    single (4,): the fit of the line alone. Its distance and its own sigma are part of sigma_u where chi-square says
-    that neither holds.
+    single (4,): the fit of the line alone. Its distance and its own sigma, and that the line may be anywhere within the
+    plateau, are part of sigma_u where chi-square says that neither holds.
     """
     if n <= UNKNOWNS:
         return
@@ -144,9 +157,19 @@ def measure_with_glow(pixels: Pixels, seed: Array, n: int, single: Array, option
     hessian, jacobian = np.empty((UNKNOWNS, UNKNOWNS)), np.empty((UNKNOWNS + 1, n))
     full = seed[AMPLITUDE] * math.exp(-min(0.5 * (seed[PLATEAU] / seed[WIDTH]) ** 2, 12.0))
     cost = np.inf
-    for start in range(len(STARTS) + 1):  # of the line alone, which may be the glow, or of the plateau's width
+    # of the line alone, which may be the glow; of the plateau's width; and, where neither fits, on either side of a
+    # glow that saturates
+    for start in range(len(STARTS) + 3):
+        if start == len(STARTS) + 1 and (cost == np.inf or not _misfits(pixel, n, p, options, shape, jacobian)):
+            break
         trial[:4], trial[4:] = single, 0.0
-        if start > 0:
+        if start > len(STARTS):
+            side = 1.0 if start == len(STARTS) + 1 else -1.0
+            trial[0], trial[1] = full * SATURATING, seed[CENTRE] - side * ITS_PLACE * seed[PLATEAU]
+            trial[4 if side < 0.0 else 5] = GLOW
+            if not options.known_width:
+                trial[2] = max(ITS_WIDTH * seed[PLATEAU], NARROWEST_SATURATED)
+        elif start > 0:
             over = STARTS[start - 1]
             trial[0], trial[1] = full * over, seed[CENTRE]
             if not options.known_width:
@@ -181,6 +204,6 @@ def measure_with_glow(pixels: Pixels, seed: Array, n: int, single: Array, option
     # the inverse information is that of the counts and of what the prior leaves open of the glow
     spread = row[1] * max(chi2 / freedom, 1.0) + max(shared, 0.0)
     if deviate(chi2, freedom) >= UNLIKELY:
-        spread += out[1] * out[1] + (p[1] - single[1]) ** 2
+        spread += out[1] * out[1] + (p[1] - single[1]) ** 2 + seed[PLATEAU] ** 2 / 3.0
     out[0], out[1], out[2], out[3], out[4] = p[1], math.sqrt(spread), p[2], p[0], p[3]
     out[5] = chi2 / freedom

@@ -4,8 +4,9 @@
 
 pixels holds the scan line y and those around it, seed where `detect` saw a peak and how wide and high it is, flag
 what it said of it (OK or SATURATED). The kernel writes out (COLUMNS,): u, sigma_u, width, amplitude, background,
-chi2, correlation length, and what the pixels of a narrow line say of its width (`shared_width`), NaN where it has none,
-and returns the flag that the peak keeps. An out without a position stays NaN.
+chi2, correlation length, and of a narrow line how its place and width vary together, and what its pixels say of its
+width (`shared_width`), NaN where it has none, and returns the flag that the peak keeps. An out without a position stays
+NaN.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from render.base.arrays import Float32
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-CORRELATION_LENGTH, TOLD = 6, 7
-"""Columns of out: scan lines; from TOLD on the logarithm of the likelihood of each of PRIOR_WIDTHS at the place that is
-likeliest, and then that over all places."""
+CORRELATION_LENGTH, SHARED, TOLD = 6, 7, 8
+"""Columns of out: scan lines; covariance of place and width, px^2, of a narrow line; from TOLD on the logarithm of the
+likelihood of each of PRIOR_WIDTHS at the place that is likeliest, and then that over all places."""
 COLUMNS = TOLD + 2 * len(PRIOR_WIDTHS)
 """Of out."""
 ROOM = 11

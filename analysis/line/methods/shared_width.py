@@ -15,12 +15,12 @@ Bayesian Data Analysis, 5.4, with the spread as given).
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from analysis.line.detection.detect import PRIOR_WIDTHS
+from analysis.line.result import NEIGHBOURS
 from render.base.arrays import Float
 
-NEIGHBOURS = 32
-"""Scan lines on either side."""
 FEWEST = 8
 STRANGE = 4.0
 """Standard deviations from which a scan line does not share its neighbours' width."""
@@ -30,22 +30,31 @@ SURE = 0.02
 """px; a line that tells its own width better needs no neighbours."""
 WIDEST = 0.5
 """px; a wider line is resolved by itself."""
-STEPS = np.gradient(PRIOR_WIDTHS)
+FINE_STEP = 0.005
+FINE_WIDTHS = np.arange(PRIOR_WIDTHS[0], PRIOR_WIDTHS[-1], FINE_STEP)
+"""px; many lines tell their width better than to a step of PRIOR_WIDTHS."""
+BETWEEN = CubicSpline(PRIOR_WIDTHS, np.eye(len(PRIOR_WIDTHS)))(FINE_WIDTHS)
+"""(f, m): from a smooth function at PRIOR_WIDTHS to FINE_WIDTHS."""
 STEP = 3.0
 """Standard deviations from which a line is at another place in its pixel than the one before."""
 LEAST = 1e-30
 """Relative density of a width that the neighbours rule out."""
 
 
-def width_priors(told: Float, u: Float, sigma_u: Float) -> Float | None:
+def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] | None:
     """What scan lines tell of their width (n, 2 m), NaN where there is no narrow line, and their positions and sigmas
     (n,), px -> the logarithm of the density of each of the m PRIOR_WIDTHS by a line's neighbours, all 0 where a line
-    needs none or does not share theirs; None: none needs any."""
+    needs none or does not share theirs; and what makes of the covariance of place and width the error that a line has
+    in common with its neighbours, 1/px, 0 where nothing is shared. None: none needs any.
+
+    By the delta method: the neighbours' width is uncertain by V, and one line's by V + SPREAD^2, so that a position
+    moves by cov(c, s) sqrt(V) / (V + SPREAD^2) for one standard deviation of what all of them are wrong by together.
+    """
     known = np.isfinite(told).all(axis=1) & np.isfinite(u) & np.isfinite(sigma_u)
     if known.sum() < FEWEST:
         return None
     best, mass = np.split(np.where(known[:, None], told, 0.0), 2, axis=1)
-    own, variance = _moments(mass)
+    own, variance = _moments(mass, PRIOR_WIDTHS)
     moved = _new_places(np.where(known, u, np.nan), sigma_u)
     alike = known
     for _ in range(2):
@@ -53,7 +62,8 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> Float | None:
         count = _of_neighbours(alike.astype(np.float64))
         independent = 1.0 + _of_neighbours(moved)
         total = at_best + np.minimum(independent / np.maximum(count, 1.0), 1.0)[:, None] * places
-        shared, _ = _moments(total)
+        log = _weighed(total, BETWEEN)
+        shared, _ = _moments(log, FINE_WIDTHS)
         enough = known & (count >= FEWEST)
         with np.errstate(divide="ignore", invalid="ignore"):
             apart = (own - shared) ** 2 / variance
@@ -64,18 +74,22 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> Float | None:
     needed = enough & alike & (shared < WIDEST) & (variance * scatter > SURE**2)
     if not needed.any():
         return None
-    density = np.exp((total - total.max(axis=1, keepdims=True)) / scatter) * STEPS
-    apart = (PRIOR_WIDTHS[:, None] - PRIOR_WIDTHS) / SPREAD
+    log = (log - log.max(axis=1, keepdims=True)) / scatter
+    _, variance = _moments(log, FINE_WIDTHS)
+    variance += FINE_STEP**2 / 12.0
+    density = np.exp(log)
+    apart = (PRIOR_WIDTHS[:, None] - FINE_WIDTHS) / SPREAD
     density = _weighed(density / density.sum(axis=1, keepdims=True), np.exp(-0.5 * apart**2))
-    return np.where(needed[:, None], np.log(density + LEAST), 0.0)
+    shared = np.where(needed, np.sqrt(variance) / (variance + SPREAD**2), 0.0)
+    return np.where(needed[:, None], np.log(density + LEAST), 0.0), shared
 
 
-def _moments(log: Float) -> tuple[Float, Float]:
-    """Mean and variance, px and px^2, of the width by the logarithm of its density (n, m)."""
-    density = np.exp(log - log.max(axis=1, keepdims=True)) * STEPS
+def _moments(log: Float, widths: Float) -> tuple[Float, Float]:
+    """Mean and variance, px and px^2, of the width by the logarithm of its density (n, m) at widths (m,)."""
+    density = np.exp(log - log.max(axis=1, keepdims=True)) * np.gradient(widths)
     density /= density.sum(axis=1, keepdims=True)
-    mean = _weighed(density, PRIOR_WIDTHS[None])[:, 0]
-    return mean, np.maximum(_weighed(density, PRIOR_WIDTHS[None] ** 2)[:, 0] - mean**2, 1e-12)
+    mean = _weighed(density, widths[None])[:, 0]
+    return mean, np.maximum(_weighed(density, widths[None] ** 2)[:, 0] - mean**2, 1e-12)
 
 
 def _weighed(values: Float, weights: Float) -> Float:

@@ -62,7 +62,8 @@ def pick(candidates: Line, choice: Int) -> Line:
         amplitude=taken(candidates.amplitude),
         background=taken(candidates.background),
         chi2=taken(candidates.chi2),
-        correlation_length=None if candidates.correlation_length is None else taken(candidates.correlation_length),
+        length_apart=None if candidates.length_apart is None else taken(candidates.length_apart),
+        shared_u=None if candidates.shared_u is None else taken(candidates.shared_u),
         flag=flag,
         candidates=candidates,
     )

@@ -18,7 +18,7 @@ def lines(seed: int = 1) -> tuple[Line, Line, np.ndarray]:
     truth = 50.0 + 0.1 * np.arange(COUNT)
 
     def line(sigma: float) -> Line:
-        values = {name: np.full((COUNT, 1), 1.0) for name in ("amplitude", "background", "chi2", "correlation_length")}
+        values = {name: np.full((COUNT, 1), 1.0) for name in ("amplitude", "background", "chi2", "length_apart")}
         u = (truth + sigma * rng.standard_normal(COUNT))[:, None]
         told, width = np.full((COUNT, 1), 0.01), np.full((COUNT, 1), WIDTH)
         flag = np.zeros((COUNT, 1), np.uint8)
