@@ -29,6 +29,7 @@ from render.base.files import atomic_write
 from studio.photographs.completion import completed
 from studio.photographs.evidence import chains_of, shrink
 from studio.photographs.laser_light import Light, banded, laser_light, without
+from studio.photographs.line_ends import ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
 from studio.scan.line_extraction import note_of
@@ -87,6 +88,8 @@ def extract_photograph(
             plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
             centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
             line = completed(line, placed(centres, whole.shape, look.region.corner))
+        if settings.select == "continuous":
+            line = ended(line)
         line = with_shared_noise(line) if shared else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
         around = light.image
