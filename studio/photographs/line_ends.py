@@ -64,19 +64,21 @@ def _past(rows: NDArray[np.intp], u: Floats, width: Floats, amplitude: Floats) -
                 past[inward[: _first(width[inward], amplitude[inward])]] = True
         elif len(piece) <= NEXT and len(long):
             nearest = long[np.argsort(np.abs(long - piece.mean()), kind="stable")[:NEXT]]
-            ours = np.array([np.median(width[piece]), np.median(amplitude[piece])])
-            past[piece] = not _alike(*ours, float(np.median(width[nearest])), float(np.median(amplitude[nearest])))
+            past[piece] = not _alike(
+                float(np.median(width[piece])), float(np.median(amplitude[piece])), width[nearest], amplitude[nearest]
+            )
     return past
 
 
 def _first(width: Floats, amplitude: Floats) -> int:
     """From the end of a piece inward: how many scan lines are past it; 0 where it fades for longer than blur does."""
-    there = [
-        _alike(width[k], amplitude[k], *(float(np.median(x[k + 1 : k + 1 + NEXT])) for x in (width, amplitude)))
-        for k in range(NEXT + SURE)
-    ]
+    there = []
+    for k in range(NEXT + SURE):
+        inside = slice(k + 1, k + 1 + NEXT)
+        there.append(_alike(width[k], amplitude[k], width[inside], amplitude[inside]))
     return next((k for k in range(NEXT) if all(there[k : k + SURE])), 0)
 
 
-def _alike(width: float, amplitude: float, other_width: float, other_amplitude: float) -> bool:
-    return amplitude >= HALF * other_amplitude and other_width / WIDER <= width <= WIDER * other_width
+def _alike(width: float, amplitude: float, widths: Floats, amplitudes: Floats) -> bool:
+    usual = float(np.median(widths))
+    return amplitude >= HALF * float(np.median(amplitudes)) and usual / WIDER <= width <= WIDER * usual
