@@ -251,8 +251,13 @@ def shrink(image: NDArray[Any], off: NDArray[Any] | None, closed: NDArray[np.boo
         less[shut] = np.median(less[~shut], axis=0) if not shut.all() else 0.0
     if full is None:
         return Shrunk(less, np.zeros(less.shape[:2], np.bool_), shut, factor)
-    top = image if image.ndim == 2 else image.max(axis=2)
+    top = image if image.ndim == 2 else brightest(image)
     return Shrunk(less, small((top >= full).astype(np.uint8) * 255) >= 128, shut, factor)
+
+
+def brightest(image: NDArray[Any]) -> NDArray[Any]:
+    """(h, w, 3) -> (h, w), the largest of the channels; a maximum along an axis of three is many times slower."""
+    return np.asarray(np.maximum(np.maximum(image[..., 0], image[..., 1]), image[..., 2]))
 
 
 def chain_of(shrunk: Shrunk, combination: Combination, axis: Axis) -> Chain:
