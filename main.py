@@ -160,7 +160,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 @METHOD
 @click.option("--laser", "colour", type=COLOUR, help="Its colour  [default: auto].")
 @photographed
-@click.option("--peaks", type=int, default=1, show_default=True, help="Peaks kept on each scan line.")
+@click.option("--peaks", type=int, help="Peaks kept on each scan line  [default: as many as lines stand out].")
 @SELECT
 @click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5. One table.")
 @click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table.")

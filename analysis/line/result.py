@@ -49,6 +49,8 @@ class Flag(IntEnum):
     """A few grains of speckle make up the line, and one may be taken for all of it; sigma_u is up to 40 % small."""
     UNSURE = 16
     """sigma_u is above the line's own width: where the line is, the pixels do not say."""
+    PAST_END = 17
+    """Less than half of the light beside it, or of another width: blur past the line's end."""
 
 
 NEIGHBOURS = 32

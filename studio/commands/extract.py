@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -126,6 +126,8 @@ def _prepared(images: tuple[Path, ...], options: ImageOptions, given: dict[str, 
     wishes = wishes_of(given)
     if given.get("select") is None:
         given["select"] = "continuous"
+    if given.get("peaks") is None and given["select"] == "continuous" and options.hdr is None:
+        wishes = replace(wishes, count_lines=True)
     settings, volume = settings_of(None, channel=wishes.colour, axis=wishes.axis, **given), None
     if settings.geometry:
         if options.project is None:

@@ -2,7 +2,8 @@
 
 Real lines are clipped, granular and not Gaussian; a fit of such a profile may not converge. A centre of mass always has
 an answer, but knows neither whether it is the line's nor how wrong it is. Both are told by the scan lines about it: it
-has to lie where the line goes on, and errs as it does where the fit is known.
+has to lie where the line goes on, between fits or on a smooth chain with centres beside fits, and errs as it does where
+the fit is known.
 """
 
 from __future__ import annotations
@@ -14,11 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.result import Flag, Line
+from analysis.line.selection.continuity import select_chain
 
 FEWEST = 32
 """Scan lines with both positions by which the second is judged."""
 GAP = 16
 """Scan lines that the line may go on without a fit."""
+AGREED = 0.25
+"""Share of a chain of centres that is beside fits, from which all of it is the line."""
+BEND = 1.0
+"""Widths from one scan line to the next at which a chain of centres ends."""
 FILLED = (Flag.REJECTED, Flag.NOT_CONVERGED, Flag.TOO_WIDE, Flag.OUT_OF_WINDOW, Flag.TOO_FEW_PIXELS, Flag.UNSURE)
 """Reasons that say nothing against there being a line."""
 
@@ -43,7 +49,7 @@ def completed(line: Line, centres: Line) -> Line:
     first, last = fitted[after - 1], fitted[after]
     expected = np.interp(rows, fitted, line.u[fitted, 0])
     near = np.abs(centres.u[rows, 0] - expected) <= np.maximum(width, np.abs(line.u[last, 0] - line.u[first, 0]))
-    rows = rows[near & (last - first <= GAP)]
+    rows = np.union1d(rows[near & (last - first <= GAP)], _on_chain(line, centres, width))
     own = np.nan_to_num(centres.sigma_u[rows, 0])
 
     def with_values(values: NDArray[np.float64], found: Any) -> NDArray[np.float64]:
@@ -66,3 +72,17 @@ def completed(line: Line, centres: Line) -> Line:
         shared_u=None if shared is None else with_values(shared, 0.0),
         flag=flag,
     )
+
+
+def _on_chain(line: Line, centres: Line, width: float) -> NDArray[np.intp]:
+    """Scan lines without a fit where the centres go on as one smooth chain with those that are beside fits."""
+    chain = select_chain(centres)
+    rows = np.flatnonzero(chain.valid[:, 0])
+    u = chain.u[rows, 0]
+    near = np.abs(u - line.u[rows, 0]) <= width  # NaN, without a fit, is not near
+    found = [np.zeros(0, np.intp)]
+    far = (np.diff(rows) > GAP) | (np.abs(np.diff(u)) > BEND * width * np.diff(rows))
+    for piece in np.split(np.arange(len(rows)), np.flatnonzero(far) + 1):
+        if near[piece].sum() >= max(FEWEST, AGREED * len(piece)):
+            found.append(rows[piece][np.isin(line.flag[rows[piece], 0], FILLED)])
+    return np.concatenate(found)

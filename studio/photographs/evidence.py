@@ -51,6 +51,8 @@ WEAK = 0.5
 """Score of the other axis over that of the one chosen, above which the choice is doubtful."""
 FAINT = 0.02
 """Score below which no line stands out anywhere."""
+SECOND = 0.25
+"""Score from which a second line, clearer of all else than the first is of it, is taken as well."""
 ENOUGH = 8
 """Photographs of a set that are looked at."""
 
@@ -132,6 +134,11 @@ class Evidence:
         return self.scores[self.axis][self.combination.name]
 
     @property
+    def lines(self) -> int:
+        """Two where the first line's only rival is a second one, which is as clear of everything else."""
+        return 2 if self.second > max(self.score, SECOND) else 1
+
+    @property
     def warnings(self) -> list[str]:
         """Doubts for a person."""
         found = []
@@ -163,8 +170,12 @@ class Evidence:
             ("laser's colour", self.colour),
             ("seen best in", f"{self.combination.name} ({reason})"),
         ]
-        if self.second > WEAK * self.score:
-            found.append(("lines", f"a second line stands out (evidence {self.second:.2f}): --peaks 2 takes both"))
+        if self.lines == 2:
+            found.append(("lines", f"a second line stands out (evidence {self.score:.2f} and {self.second:.2f})"))
+        elif self.second > WEAK * self.score:
+            found.append(
+                ("lines", f"a second line stands out weakly (evidence {self.second:.2f}): --peaks 2 takes both")
+            )
         else:
             found.append(("lines", f"one (evidence {self.score:.2f}; of a second {self.second:.2f})"))
         return found
@@ -240,8 +251,13 @@ def shrink(image: NDArray[Any], off: NDArray[Any] | None, closed: NDArray[np.boo
         less[shut] = np.median(less[~shut], axis=0) if not shut.all() else 0.0
     if full is None:
         return Shrunk(less, np.zeros(less.shape[:2], np.bool_), shut, factor)
-    top = image if image.ndim == 2 else image.max(axis=2)
+    top = image if image.ndim == 2 else brightest(image)
     return Shrunk(less, small((top >= full).astype(np.uint8) * 255) >= 128, shut, factor)
+
+
+def brightest(image: NDArray[Any]) -> NDArray[Any]:
+    """(h, w, 3) -> (h, w), the largest of the channels; a maximum along an axis of three is many times slower."""
+    return np.asarray(np.maximum(np.maximum(image[..., 0], image[..., 1]), image[..., 2]))
 
 
 def chain_of(shrunk: Shrunk, combination: Combination, axis: Axis) -> Chain:

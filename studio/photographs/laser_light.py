@@ -20,7 +20,7 @@ from analysis.line.extract import extract
 from analysis.line.result import Axis
 from analysis.line.series.subtract import subtract_off
 from analysis.line.settings import ExtractionSettings
-from studio.photographs.evidence import COLOURS, Chain, Colour
+from studio.photographs.evidence import COLOURS, Chain, Colour, brightest
 
 Channel = Literal["mono", "luminance", "red", "green", "blue", "difference"]
 
@@ -80,9 +80,9 @@ def laser_light(
         weights[COLOURS.index(colour)] = 2.0
         clipped = image[..., COLOURS.index(colour)]
     elif channel == "luminance":
-        weights, clipped = np.array([0.299, 0.587, 0.114]), image.max(axis=2)
+        weights, clipped = np.array([0.299, 0.587, 0.114]), brightest(image)
     else:
-        weights, clipped = np.ones(3), image.max(axis=2)
+        weights, clipped = np.ones(3), brightest(image)
     mixed = _mixed(image, weights)
     if full is None:
         return _less(mixed, None if off is None else _mixed(off, weights), None)
@@ -199,8 +199,9 @@ def banded(light: Light, chains: Sequence[Chain], axis: Axis) -> Light:
     widest = int(inside.sum(axis=1).max()) if len(rows) else 0
     if widest:
         # each row's pixels of the band side by side, those of narrower bands taken more than once
-        order = np.argsort(~inside[rows], axis=1, kind="stable")[:, :widest]
-        order = np.take_along_axis(order, np.arange(widest) % inside[rows].sum(axis=1)[:, None], axis=1)
+        counts = inside[rows].sum(axis=1)
+        starts = np.cumsum(counts) - counts
+        order = np.nonzero(inside)[1][starts[:, None] + np.arange(widest) % counts[:, None]]
         ground = np.median(np.take_along_axis(level[rows], order, axis=1), axis=1)
         level[rows] = np.where(inside[rows], level[rows], np.rint(ground)[:, None])
     level[~inside.any(axis=1)] = float(np.median(level[rows])) if widest else 0.0

@@ -49,6 +49,8 @@ class Wishes:
     region: Region = field(default_factory=Region)
     shape: Literal["plane", "sphere"] = "plane"
     """Of what points are to lie on, for the report."""
+    count_lines: bool = False
+    """As many peaks as lines stand out, whatever the settings say."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,8 @@ def look_at(paths: Sequence[Path], settings: ExtractionSettings, wishes: Wishes)
     evidence = find_evidence([shrunk for _, _, shrunk in seen], wishes.axis, wishes.colour)
     told = evidence.told() + told
     settings = settings.model_copy(update={"axis": evidence.axis, "channel": "auto"})
+    if wishes.count_lines:
+        settings = settings.model_copy(update={"peaks": evidence.lines})
     look = replace(look, settings=settings, told=told, warnings=evidence.warnings, kept=kept)
     if settings.pattern is not None:
         found = evidence.colour if evidence.colour != "mono" else "auto"

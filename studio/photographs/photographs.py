@@ -26,9 +26,10 @@ from analysis.line.shared_noise import with_shared_noise
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
-from studio.photographs.completion import completed
+from studio.photographs.completion import FILLED, completed
 from studio.photographs.evidence import chains_of, shrink
 from studio.photographs.laser_light import Light, banded, laser_light, without
+from studio.photographs.line_ends import ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
 from studio.scan.line_extraction import note_of
@@ -83,10 +84,13 @@ def extract_photograph(
         line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
         line = placed(unsure_dropped(line), whole.shape, look.region.corner)
         line = line if alone else selected(line, settings, volume)
-        if settings.select == "continuous" and settings.peaks == 1 and settings.method in FITS:
+        fits = settings.select == "continuous" and settings.peaks == 1 and settings.method in FITS
+        if fits and np.isin(line.flag, FILLED).any():
             plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
             centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
             line = completed(line, placed(centres, whole.shape, look.region.corner))
+        if settings.select == "continuous":
+            line = ended(line)
         line = with_shared_noise(line) if shared else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
         around = light.image

@@ -106,7 +106,7 @@ class Score:
     normalised: float
     axis: str
     colour: str | None
-    """None: the command does not tell."""
+    """None: nothing was measured."""
 
 
 def photograph(trouble: Trouble, seed: int = 1) -> Photograph:
@@ -189,10 +189,10 @@ def measured(path: Path, folder: Path, *options: str) -> tuple[dict, np.ndarray]
     """What `main.py extract` tells of an image file, and (n, 3) positions: across the scan axis, along it, sigma."""
     arguments = ["extract", str(path), "--out", str(folder), "--json", "--threads", "2", *options]
     result = CliRunner().invoke(cli, arguments)
-    told = json.loads(result.stdout)
-    if not told.get("images"):
-        return {"axis": "none", "message": told}, np.zeros((0, 3))
-    told = told["images"][0]
+    answer = json.loads(result.stdout)
+    if not answer.get("images"):
+        return {"axis": "none", "message": answer}, np.zeros((0, 3))
+    told = {**answer["images"][0], "colour": answer["chosen"]["colour"]}
     with open(told["file"], newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["u"]]
     u, v, sigma = (np.array([float(row[name] or "nan") for row in rows]) for name in ("u", "v", "sigma_u"))
@@ -202,7 +202,7 @@ def measured(path: Path, folder: Path, *options: str) -> tuple[dict, np.ndarray]
 
 def score(taken: Photograph, told: dict, positions: np.ndarray) -> Score:
     """Positions (n, 3) against the truth."""
-    colour = next((told[key] for key in ("colour", "laser_colour", "laser") if told.get(key)), None)
+    colour = told.get("colour")
     near = max(NEAR, taken.sigma)
     truth = np.concatenate(taken.truth)
     if told["axis"] != taken.axis or not len(positions):

@@ -44,15 +44,27 @@ def test_what_a_fit_leaves_out_is_filled_with_a_sigma_that_holds() -> None:
     assert np.array_equal(found.u[kept], fits.u[kept]) and np.array_equal(found.sigma_u[kept], fits.sigma_u[kept])
 
 
-def test_what_lies_off_the_line_or_beyond_its_ends_or_a_long_gap_is_not_taken() -> None:
+def test_what_lies_off_the_line_or_is_scattered_beyond_its_ends_or_in_a_long_gap_is_not_taken() -> None:
     fits, centres, _ = lines()
     stray, gap = np.array([50, 60]), np.arange(200, 202 + GAP)
     ends = np.r_[:10, COUNT - 10 : COUNT]
+    lost = np.concatenate([gap, ends])
     u = centres.u.copy()
     u[stray] += 10.0 * WIDTH
-    line = without(fits, np.concatenate([stray, gap, ends]), Flag.REJECTED)
+    u[lost] = np.random.default_rng(3).uniform(0.0, 600.0, (len(lost), 1))
+    line = without(fits, np.concatenate([stray, lost]), Flag.REJECTED)
     found = completed(line, replace(centres, u=u))
-    assert not found.valid[stray].any() and not found.valid[gap].any() and not found.valid[ends].any()
+    assert not found.valid[stray].any() and found.valid[gap].mean() < 0.2 and not found.valid[ends].any()
+
+
+def test_a_smooth_chain_of_centres_carries_the_line_on_where_no_fit_does() -> None:
+    fits, centres, truth = lines()
+    lost = np.arange(250, COUNT)
+    found = completed(without(fits, lost, Flag.NOT_CONVERGED), centres)
+    assert found.valid[lost].all() and np.abs(found.u[lost, 0] - truth[lost]).max() < 5.0 * SCATTER
+    # as long as enough of it is beside fits
+    few = completed(without(fits, np.arange(60, COUNT), Flag.NOT_CONVERGED), centres)
+    assert few.valid.sum() == 60
 
 
 def test_scan_lines_without_a_peak_stay_without_one() -> None:

@@ -159,7 +159,7 @@ def test_two_lines_are_told_and_each_is_a_chain_of_its_own(tmp_path: Path) -> No
     first, second = Scene(bend=0.0), Scene(bend=0.0, slope=0.12, peak=140.0)
     image = np.maximum(photograph(first, seed=9), np.roll(photograph(second, seed=10), 60, axis=1))
     write(tmp_path / "a.png", image)
-    told = answer(tmp_path / "a.png", "--peaks", "2")
+    told = answer(tmp_path / "a.png")
     assert "second line" in told["chosen"]["told"]["lines"]
     with (tmp_path / "a_line.csv").open() as file:
         rows = list(csv.DictReader(file))

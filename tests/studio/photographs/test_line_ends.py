@@ -1,0 +1,72 @@
+"""Light past the end of a line is no line, and a line that fades of itself keeps its ends."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from analysis.line.result import Flag, Line
+from studio.photographs.line_ends import ended
+
+COUNT, FIRST, LAST = 200, 40, 159
+
+
+def line_of(amplitude: np.ndarray, u: np.ndarray | None = None, width: np.ndarray | None = None) -> Line:
+    """(COUNT, 1) found where its light is above 0.5."""
+    found = (amplitude > 0.5)[:, None]
+    u = np.full(COUNT, 50.0) if u is None else u
+    width = np.full(COUNT, 2.0) if width is None else width
+
+    def column(values: np.ndarray) -> np.ndarray:
+        return np.where(found, values[:, None], np.nan)
+
+    flag = np.where(found, np.uint8(Flag.OK), np.uint8(Flag.NO_PEAK)).astype(np.uint8)
+    tenth = np.full(COUNT, 0.1)
+    return Line(
+        "rows",
+        "likelihood",
+        column(u),
+        column(tenth),
+        column(width),
+        column(amplitude),
+        column(tenth),
+        column(tenth),
+        flag,
+    )
+
+
+def test_a_blurred_line_ends_where_half_of_its_light_is_left() -> None:
+    sharp = np.zeros(COUNT)
+    sharp[FIRST : LAST + 1] = 300.0
+    for blur in (0.7, 1.5, 3.0):
+        line = line_of(gaussian_filter1d(sharp, blur))
+        assert line.valid.sum() > LAST - FIRST + 3
+        kept = ended(line)
+        assert np.flatnonzero(kept.valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
+        assert set(kept.flag[line.valid & ~kept.valid]) == {Flag.PAST_END}
+        assert np.isnan(kept.u[~kept.valid]).all()
+
+
+def test_what_begins_at_an_end_with_another_width_is_not_the_line() -> None:
+    width = np.where(np.arange(COUNT) < FIRST, 9.0, 1.5)
+    u = 50.0 + np.where(np.arange(COUNT) < FIRST, 3.0 * (FIRST - np.arange(COUNT)), 0.0)
+    light = np.where(np.arange(COUNT) >= FIRST - 8, 200.0, 0.0)
+    assert np.flatnonzero(ended(line_of(light, u, width)).valid[:, 0])[0] == FIRST
+
+
+def test_a_line_that_fades_slowly_or_is_dark_in_its_middle_stays_whole() -> None:
+    rng = np.random.default_rng(5)
+    rows = np.arange(COUNT)
+    fading = 200.0 * np.exp(-0.5 * ((rows - 100.0) / 60.0) ** 2) * rng.gamma(100.0, 0.01, COUNT)
+    dark = np.where(np.abs(rows - 100) < 20, 10.0, 200.0)
+    for light in (fading, dark):
+        line = line_of(light)
+        assert ended(line).valid.sum() == line.valid.sum()
+
+
+def test_a_short_piece_far_off_is_the_line_only_if_it_is_as_bright() -> None:
+    for light, stays in ((20.0, False), (150.0, True)):
+        amplitude, u = np.full(COUNT, 200.0), np.full(COUNT, 50.0)
+        amplitude[150:], u[150:] = 0.0, 90.0
+        amplitude[155:165] = light
+        assert bool(ended(line_of(amplitude, u)).valid[155:165].all()) is stays
