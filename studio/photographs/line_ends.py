@@ -31,7 +31,7 @@ def ended(line: Line) -> Line:
     past = np.zeros(line.u.shape, np.bool_)
     for k in range(line.u.shape[1]):
         rows = np.flatnonzero(line.valid[:, k])
-        past[rows, k] = _past(rows, *(values[rows, k] for values in (line.u, line.width, line.amplitude)))
+        past[rows, k] = _past(rows, line.u[rows, k], line.width[rows, k], _seen(line, rows, k))
     if not past.any():
         return line
 
@@ -46,9 +46,16 @@ def ended(line: Line) -> Line:
         amplitude=kept(line.amplitude),
         background=kept(line.background),
         chi2=kept(line.chi2),
-        correlation_length=None if line.correlation_length is None else kept(line.correlation_length),
+        length_apart=None if line.length_apart is None else kept(line.length_apart),
+        shared_u=None if line.shared_u is None else kept(line.shared_u),
         flag=np.where(past, np.uint8(Flag.PAST_END), line.flag).astype(np.uint8),
     )
+
+
+def _seen(line: Line, rows: NDArray[np.intp], k: int) -> Floats:
+    """Amplitudes (m,) of a line's scan lines; a saturated one's is the least that saturates: the fit's is a guess."""
+    amplitude, saturated = line.amplitude[rows, k], line.flag[rows, k] == Flag.SATURATED
+    return np.where(saturated, amplitude[saturated].min(initial=np.inf), amplitude)
 
 
 def _past(rows: NDArray[np.intp], u: Floats, width: Floats, amplitude: Floats) -> NDArray[np.bool_]:
