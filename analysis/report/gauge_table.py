@@ -48,8 +48,8 @@ def tolerance_text(lower: float | None, upper: float | None, unit: str) -> str:
     if lower is None and upper is None:
         return NONE
     scale, name = scale_and_unit(unit)
-    ends = [NONE if end is None else f"{scale * end:+g}" for end in (lower, upper)]
-    return f"{' / '.join(ends)} {name}"
+    ends = [NONE if end is None else f"{scale * end:+.4g}" for end in (lower, upper)]
+    return f"{' / '.join(ends)}{'' if name == '°' else ' '}{name}"
 
 
 def cells(row: Mapping[str, Any]) -> list[str]:
