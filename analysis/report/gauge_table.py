@@ -10,15 +10,16 @@ from analysis.gauges.gauge import TITLES
 from analysis.report.units import NONE, digits
 
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
-MARKS = {"pass": "✓ pass", "fail": "✗ fail", "undecided": "? undecided"}
+MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0undecided"}
 """Never by colour alone."""
+PLAIN = str.maketrans({"µ": "u", "°": " deg", "–": "-", "✓": "", "✗": "", "?": "", "\u00a0": " "})  # noqa: RUF001
 FEWEST, MOST = 2, 6
 """Digits after the point, of mm or degrees."""
 
 
 def scale_and_unit(unit: str) -> tuple[float, str]:
-    """Factor from SI, and the unit that people read: mm and degrees."""
-    return (math.degrees(1.0), "°") if unit == "rad" else (1e3, "mm")
+    """Factor from SI, and what follows the number that people read: mm or degrees."""
+    return (math.degrees(1.0), "°") if unit == "rad" else (1e3, "\u00a0mm")
 
 
 def value_text(value: float | None, sigma: float | None, unit: str) -> str:
@@ -26,7 +27,7 @@ def value_text(value: float | None, sigma: float | None, unit: str) -> str:
     if value is None or not math.isfinite(value):
         return NONE
     scale, name = scale_and_unit(unit)
-    return f"{scale * value:.{decimals(sigma, unit)}f}{'' if name == '°' else ' '}{name}"
+    return f"{scale * value:.{decimals(sigma, unit)}f}{name}"
 
 
 def decimals(sigma: float | None, unit: str) -> int:
@@ -40,7 +41,7 @@ def small_text(value: float | None, unit: str) -> str:
     """A sigma or an error: um, or thousandths of a degree as degrees."""
     if value is None or not math.isfinite(value):
         return NONE
-    return f"{digits(math.degrees(value))}°" if unit == "rad" else f"{digits(value * 1e6)} µm"
+    return f"{digits(math.degrees(value))}°" if unit == "rad" else f"{digits(value * 1e6)}\u00a0µm"
 
 
 def tolerance_text(lower: float | None, upper: float | None, unit: str) -> str:
@@ -49,7 +50,7 @@ def tolerance_text(lower: float | None, upper: float | None, unit: str) -> str:
         return NONE
     scale, name = scale_and_unit(unit)
     ends = [NONE if end is None else f"{scale * end:+.4g}" for end in (lower, upper)]
-    return f"{' / '.join(ends)}{'' if name == '°' else ' '}{name}"
+    return f"{' / '.join(ends)}{name}"
 
 
 def cells(row: Mapping[str, Any]) -> list[str]:
@@ -69,6 +70,11 @@ def cells(row: Mapping[str, Any]) -> list[str]:
         small_text(row["error"], unit),
         NONE if ratio is None else f"{ratio:+.2f}",
     ]
+
+
+def plain_cells(row: Mapping[str, Any]) -> list[str]:
+    """The same for a terminal, which may know ASCII alone."""
+    return [cell.translate(PLAIN).strip() for cell in cells(row)]
 
 
 def reasons(rows: list[dict[str, Any]]) -> list[str]:

@@ -325,7 +325,7 @@ def _print_results(result: dict[str, Any]) -> None:
     if result.get("measures"):
         from analysis.report import gauge_table
 
-        found = [(row["name"], *gauge_table.cells(row)) for row in result["measures"]]
+        found = [(row["name"], *gauge_table.plain_cells(row)) for row in result["measures"]]
         print_table("Measures", found, header=("Measure", *gauge_table.COLUMNS))
         for text in gauge_table.reasons(result["measures"]):
             print(f"not measured: {text}")
