@@ -32,7 +32,7 @@ def test_sigma_covers_and_nothing_is_biased(kind: str) -> None:
             told.append((reading.value - exact) / reading.sigma)
     low, high = binom.ppf([0.0005, 0.9995], TRIALS, 0.9545)
     assert low <= np.count_nonzero(np.abs(told) <= 2.0) <= high
-    assert abs(np.mean(told)) < 0.1 + 3.3 / np.sqrt(TRIALS)
+    assert abs(np.mean(told)) < 3.3 / np.sqrt(TRIALS)
 
 
 @pytest.mark.parametrize("kind", ["step", "angle"])
