@@ -70,8 +70,9 @@ class Points:
     """Random standard deviation of the position along the scan line, px."""
     correlation_length: Float
     """Scan lines that err alike, as in `Line`; 1 where that is not known."""
-    covariance_systematic: Float | None
-    """(m, 3, 3) m^2, camera frame, from the calibration; None: the calibration is taken as exact."""
+    calibration: Float | None
+    """(m, 3, k) m, camera frame: how each of k independent errors of the calibration, all of variance 1, moves the
+    point; None: the calibration is taken as exact."""
     flag: NDArray[np.uint8]
 
     @property
@@ -90,11 +91,16 @@ class Points:
         return np.asarray(np.linalg.norm(self.gradient, axis=1) * self.sigma_pixel)
 
     @property
+    def covariance_systematic(self) -> Float | None:
+        """(m, 3, 3) m^2, camera frame, from the calibration; None: it is taken as exact."""
+        return None if self.calibration is None else self.calibration @ self.calibration.transpose(0, 2, 1)
+
+    @property
     def sigma_systematic(self) -> Float:
         """(m,) m, root of the summed variances that the calibration gives the point; 0 where it is taken as exact."""
-        if self.covariance_systematic is None:
+        if self.calibration is None:
             return np.zeros(len(self.flag))
-        return np.asarray(np.sqrt(np.trace(self.covariance_systematic, axis1=1, axis2=2)))
+        return np.asarray(np.sqrt((self.calibration**2).sum(axis=(1, 2))))
 
     @property
     def sigma_depth(self) -> Float:
@@ -104,9 +110,9 @@ class Points:
     @property
     def sigma_depth_systematic(self) -> Float:
         """(m,) m, standard deviation of `depth_z` by the calibration; 0 where it is taken as exact."""
-        if self.covariance_systematic is None:
+        if self.calibration is None:
             return np.zeros(len(self.flag))
-        return np.asarray(np.sqrt(self.covariance_systematic[:, 2, 2]))
+        return np.asarray(np.linalg.norm(self.calibration[:, 2], axis=1))
 
     @property
     def covariance(self) -> Float:
@@ -165,7 +171,7 @@ def triangulate(
         correlation_length=np.ones(len(pixel))
         if line.correlation_length is None
         else line.correlation_length[index, rank],
-        covariance_systematic=None
+        calibration=None
         if calibration_covariance is None
         else _systematic(camera, pixel, q, point, facing, dpoint, calibration_covariance),
         flag=flag,
@@ -201,7 +207,11 @@ def _systematic(
     if covariance.shape not in ((size, size), (whole, whole)):
         raise ValueError(f"calibration_covariance has shape {covariance.shape}; allowed: ({size}, {size})")
     jacobian = calibration_jacobian(camera, pixel, q, point, facing, dpoint)[:, :, : len(covariance)]
-    return np.asarray(jacobian @ covariance @ jacobian.transpose(0, 2, 1))
+    # by way of the correlations, as the variances are of px^2, m^2 and 1
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    divisor = np.where(scale > 0.0, scale, 1.0)
+    variance, mode = np.linalg.eigh(covariance / divisor[:, None] / divisor)
+    return np.asarray((jacobian * scale) @ (mode * np.sqrt(np.maximum(variance, 0.0))))
 
 
 def _unit_plane(plane: Float) -> tuple[Float, float]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.error import Errors
+from analysis.gauges.read import Reading
 from analysis.line.result import Line
 from analysis.triangulate import Points
 from render.base.arrays import Float, Int
@@ -60,6 +61,8 @@ class FrameResult:
     """`Frame.quality`; over the frames errors are averaged, work and losses summed."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage, s, of this frame: those of `Frame.seconds` and those after it. Summed over the frames."""
+    readings: tuple[Reading, ...] = field(default=(), kw_only=True)
+    """Of the project's measures, by the first method."""
     counts: Counts = field(default_factory=dict)
     """`Frame.counts`; over the frames they are summed or averaged as their kind says."""
 
@@ -95,6 +98,8 @@ class ReportInput:
     """Pixels a side of what was measured, over those of the scanner."""
     created: str = ""
     """Date and time of the run, as it shall be printed."""
+    measures: tuple[dict[str, Any], ...] = ()
+    """The part's measures, as the scan's record has them."""
     run: str = ""
     """What was run, for a program that reads the page: any text; empty: it is not told."""
 

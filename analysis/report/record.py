@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.gauges.read import Reading
 from analysis.measures import Measures
 from analysis.report.model import FrameResult, frame_rmse
 from analysis.report.sample import IMAGE, MOST_LINES, ROW, Rows, Sample, rows_of
@@ -51,6 +52,8 @@ class ScanRecord:
         """folder: for the file of frames, as `Spool`. most_lines: scan lines that the sample holds."""
         self.scene = scene
         self.steps: list[StepResult] = []
+        self.readings: list[Reading] = []
+        """Of the project's measures, in the order of the steps."""
         self.seconds: dict[str, float] = {}
         """Wall time of the frames by stage, s."""
         self.counts: dict[Quantity, tuple[float, int]] = {}
@@ -73,6 +76,7 @@ class ScanRecord:
             self._sample.add(i, max(len(one.line.u) for one in laser.extractions), rows)
             firsts.append(rows[0])
         self.steps.append(_step(frame, firsts))
+        self.readings += frame.readings
         for stage, spent in frame.seconds.items():
             self.seconds[stage] = self.seconds.get(stage, 0.0) + spent
         for quantity, value in (*frame.counts.items(), *self._group_counts(frame)):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.report import picture, plain_picture
+from analysis.report import gauge_table, picture, plain_picture
 from analysis.report.colour import method_colour, method_name
 from analysis.report.columns import columns, sentence_height, table_height
 from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
@@ -124,6 +124,9 @@ def _content(report: ReportInput) -> dict[str, Any]:
         "steps_cut": cut,
         "details": details,
         "details_left_out": f"{more} more lasers are in the tables below." if more > 0 else "",
+        "gauge_columns": gauge_table.COLUMNS,
+        "gauge_rows": [(row["name"], gauge_table.cells(row)) for row in report.measures],
+        "gauge_reasons": gauge_table.reasons(list(report.measures)),
         "measure_tables": measure_tables(report),
         "measure_columns": MEASURE_COLUMNS,
         "term_tables": term_tables(report),

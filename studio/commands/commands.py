@@ -322,6 +322,13 @@ def _print_results(result: dict[str, Any]) -> None:
     title = result["name"] + ("" if scale == 1.0 else f", image scale {scale:g}: not the scanner's figures")
     if rows:
         print_table(title, rows, header=header)
+    if result.get("measures"):
+        from analysis.report import gauge_table
+
+        found = [(row["name"], *gauge_table.plain_cells(row)) for row in result["measures"]]
+        print_table("Measures", found, header=("Measure", *gauge_table.COLUMNS))
+        for text in gauge_table.reasons(result["measures"]):
+            print(f"not measured: {text}")
     for row in result.get("results", [])[:1]:
         if row["sampled_scan_lines"] < row["scan_lines"]:
             sample = f"a sample of {row['sampled_scan_lines']} of {row['scan_lines']} scan lines"

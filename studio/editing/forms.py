@@ -36,7 +36,7 @@ Kind = Literal[
 
 ITEMS = (Camera, Scene, Sensor, RenderSettings, ExtractionSettings, LineLaser, SceneObject, PointLight, RectangleLight)
 """What the scene tree shows as items of their own, and so no form of another item repeats."""
-HIDDEN = ("kind", "source", "schema_version", "sha256", "calibration")
+HIDDEN = ("kind", "source", "schema_version", "sha256", "calibration", "measures")
 FINE_UNITS = {(Camera, "pixel_pitch"): "um", (Waist, "radius"): "um", (Divergence, "full_angle"): "mrad"}
 PLAIN = Unit()
 BLANKS = str.maketrans("_-", "  ")

@@ -12,6 +12,7 @@ from typing import Any, Literal, Self
 from pydantic import PrivateAttr, ValidationError, model_validator
 from pydantic_core import to_jsonable_python
 
+from analysis.gauges.gauge import MOST_GAUGES, Gauge
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 from render.base.files import atomic_write, inside, remove_unfinished, sha256
@@ -48,6 +49,9 @@ class Project(Model):
     render: RenderSettings = RenderSettings()
     extraction: ExtractionSettings = ExtractionSettings()
     calibration: Calibration = Calibration()
+    measures: tuple[Gauge, ...] = quantity(
+        (), label="Measures", help="Dimensions of the part, read off every profile.", max_length=MOST_GAUGES
+    )
     _folder: Path = PrivateAttr(default_factory=Path)
 
     @model_validator(mode="after")
@@ -70,6 +74,22 @@ class Project(Model):
                 f"extraction asks for {asked}, which needs raw images, and sensor.processing makes photographs; "
                 "allowed: one of the two"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _every_measure_has_its_profile(self) -> Self:
+        lasers, steps = len(self.scene.lasers), self.scene.frame_count
+        names = [gauge.name for gauge in self.measures]
+        for i, gauge in enumerate(self.measures):
+            wrong = ""
+            if gauge.laser >= lasers:
+                wrong = f"laser is {gauge.laser}; allowed: less than {lasers}, the number of lasers"
+            elif gauge.step is not None and gauge.step >= steps:
+                wrong = f"step is {gauge.step}; allowed: less than {steps}, the number of steps"
+            elif gauge.name in names[:i]:
+                wrong = f"name is {gauge.name!r}, as of another; allowed: each name once"
+            if wrong:
+                raise ValueError(f"measures[{i}].{wrong}")
         return self
 
     @property

@@ -17,6 +17,7 @@ from render.sensor.develop import Image
 from render.world.world import World
 from studio.project.date_and_time import now
 from studio.project.project import Project
+from studio.scan.gauging import write_measures
 from studio.scan.results import compared_methods, measure_frame, report_input
 from studio.scan.spacetime_window import Passing, Sweep, Taken
 from studio.scan.stages import Clock
@@ -93,11 +94,17 @@ class Measuring:
         return notes[:MOST_NOTES]
 
     def write_points(self, out: Path) -> list[Path]:
-        """points.ply and points.csv of all frames and lasers, by the project's method, at the first step's pose."""
+        """points.ply and points.csv of all frames and lasers, by the project's method, at the first step's pose.
+
+        And measures.csv, where the project has measures.
+        """
         with self._clock.stage("writing points"):
             write_ply(out / "points.ply", self._points)
             write_csv(out / "points.csv", self._points)
-        return [out / "points.ply", out / "points.csv"]
+            if not self._project.measures:
+                return [out / "points.ply", out / "points.csv"]
+            write_measures(out / "measures.csv", self.record.readings)
+        return [out / "points.ply", out / "points.csv", out / "measures.csv"]
 
     def write_reports(
         self,

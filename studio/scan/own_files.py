@@ -37,6 +37,26 @@ RIDGE_COLUMNS = (
     "significance",
     "flag",
 )
+MEASURE_COLUMNS = (
+    "name",
+    "kind",
+    "unit",
+    "laser",
+    "step",
+    "value",
+    "sigma_random",
+    "sigma_systematic",
+    "sigma",
+    "points",
+    "truth",
+    "error",
+    "error_in_sigmas",
+    "nominal",
+    "lower",
+    "upper",
+    "verdict",
+    "reason",
+)
 POINT_COLUMNS = tuple(title(name) for name in UNITS)
 FORMER_COLUMNS = (
     ("scan_line", *OF_A_POSITION),
@@ -58,7 +78,14 @@ FORMER_COLUMNS = (
 """Of versions before this one."""
 TABLES = tuple(
     ",".join(columns).encode()
-    for columns in (line_columns("rows"), line_columns("columns"), RIDGE_COLUMNS, POINT_COLUMNS, *FORMER_COLUMNS)
+    for columns in (
+        line_columns("rows"),
+        line_columns("columns"),
+        RIDGE_COLUMNS,
+        POINT_COLUMNS,
+        MEASURE_COLUMNS,
+        *FORMER_COLUMNS,
+    )
 )
 
 

@@ -15,12 +15,16 @@ from studio.project.date_and_time import now
 from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions, is_aimed, light_note
+from studio.scan.gauging import measures_record
 from studio.scan.measuring import Measuring
 from studio.scan.redevelop import Development, development
 from studio.scan.remarks import result_remarks
 from studio.scan.run_record import ended_by_clock, run_text
 from studio.scan.stages import Clock, develop_step, step_world
 from studio.scan.summary import summarise
+
+MEASURED_WITH = ("sensor", "extraction", "measures")
+"""Parts of a project that may be others than those that its frames were rendered with."""
 
 
 def reconstruct_folder(
@@ -83,10 +87,11 @@ def _measured(
             files = measuring.write_points(out)
             figures = summarise(measuring.record)
             notes = [*cautions.notes(figures), *(light_note(found.project, how.powered) if aimed else ())]
+            measured["measures"] = measures_record(project.measures, measuring.record.readings)
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
             measured["remarks"] = result_remarks(measuring.record)
-            if (requested.sensor, requested.extraction) != (found.project.sensor, found.project.extraction):
-                measured["measured_with"] = requested.model_dump(mode="json", include={"sensor", "extraction"})
+            if any(getattr(requested, name) != getattr(found.project, name) for name in MEASURED_WITH):
+                measured["measured_with"] = requested.model_dump(mode="json", include=set(MEASURED_WITH))
             if report:
                 created = str(found.manifest.get("created", now()))
                 # another laser power scales the frames' light, which a render with that power repeats but for rounding
@@ -101,6 +106,7 @@ def _measured(
         "files": [str(path) for path in files],
         "image_scale": image_scale,
         "results": measured["results"],
+        "measures": measured["measures"],
         "notes": notes,
         "extraction": measured["extraction"],
         "seconds": clock.seconds,

@@ -83,7 +83,13 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
     scene = scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": camera})})
     # the frame's exact line is along its own axis
     extraction = now.extraction.model_copy(update={"axis": rendered.extraction.axis})
-    update = {"scene": scene, "sensor": now.sensor, "extraction": extraction, "seed": now.seed}
+    update = {
+        "scene": scene,
+        "sensor": now.sensor,
+        "extraction": extraction,
+        "seed": now.seed,
+        "measures": tuple(one for one in now.measures if one.laser < len(scene.lasers)),
+    }
     powers = [laser.power for laser in now.scene.lasers]
     if len(powers) != len(scene.lasers):
         powers = [laser.power for laser in scene.lasers]
@@ -94,7 +100,8 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
 
 
 def is_developed_otherwise(rendered: Project, now: Project, image_scale: float = 1.0) -> bool:
-    """`now` develops or measures a frame of `rendered` otherwise than that itself does."""
+    """`now` develops a frame of `rendered`, or finds its line, otherwise than that itself does."""
+    rendered, now = (one.model_copy(update={"measures": ()}) for one in (rendered, now))
     how, before = development(rendered, now, image_scale), development(rendered, rendered)
     return (how.project.model_copy(update={"seed": rendered.seed}), how.laser_power) != (
         before.project,

@@ -13,6 +13,7 @@ from render.base.errors import InputError
 from render.frame import Frame
 from render.sensor.develop import Image
 from studio.project.project import Project
+from studio.scan.gauging import readings
 from studio.scan.stages import Measurement
 
 __all__ = ["best", "frame_remarks", "frame_result", "result_remarks", "scale_head", "scale_name", "scale_notes"]
@@ -55,7 +56,13 @@ def frame_result(
         extractions = tuple(Extraction(one.line, one.points, one.errors) for one in found)
         lasers.append(LaserResult(curve, extractions, images[i].grey if i < len(images) else None))
     return FrameResult(
-        frame.step, tuple(lasers), plan=frame.plan, quality=frame.quality, seconds=frame.seconds, counts=frame.counts
+        frame.step,
+        tuple(lasers),
+        plan=frame.plan,
+        quality=frame.quality,
+        seconds=frame.seconds,
+        readings=readings(project, frame, best(measurements, project)),
+        counts=frame.counts,
     )
 
 

@@ -15,6 +15,7 @@ from render.frame import Frame
 from render.sensor.develop import Image
 from render.world.world import World
 from studio.project.project import Project
+from studio.scan.gauging import measures_record, readings
 from studio.scan.spacetime_window import Passing
 from studio.scan.stages import Clock, Measurement, measure_step
 
@@ -53,7 +54,13 @@ def measure_frame(  # noqa: PLR0913
     spent = {name: seconds - before.get(name, 0.0) for name, seconds in clock.seconds.items()}
     seconds = {**frame.seconds, **{name: value for name, value in spent.items() if value > 0.0}}
     return FrameResult(
-        frame.step, tuple(lasers), plan=frame.plan, quality=frame.quality, seconds=seconds, counts=frame.counts
+        frame.step,
+        tuple(lasers),
+        plan=frame.plan,
+        quality=frame.quality,
+        seconds=seconds,
+        readings=readings(project, frame, own),
+        counts=frame.counts,
     )
 
 
@@ -96,6 +103,7 @@ def report_input(
         notes=tuple(notes),
         created=created,
         image_scale=image_scale,
+        measures=tuple(measures_record(project.measures, record.readings)),
         run=run,
     )
 

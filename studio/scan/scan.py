@@ -20,6 +20,7 @@ from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
 from studio.scan.frame_writer import FrameWriter
+from studio.scan.gauging import measures_record
 from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
 from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
@@ -120,6 +121,7 @@ def run_scan(
             written.files += measuring.write_points(out)
             result["profiles_per_second"] = profile_rate(measuring.record, clock.seconds)
             result["results"] = summarise(measuring.record)
+            result["measures"] = measures_record(project.measures, measuring.record.readings)
             result["remarks"] = result_remarks(measuring.record)
         result["notes"] = cautions.notes(result.get("results", ()))
 

@@ -27,9 +27,9 @@ from studio.scan.own_files import check_replaceable, is_own
 from studio.scan.rendered_from import check_rendered_from, differences, made_of
 
 MANIFEST, PROJECT = "scan.json", "scan_project.json"
-POINTS, REPORT = ("points.ply", "points.csv"), ("report.html", "report.pdf")
+POINTS, REPORT = ("points.ply", "points.csv", "measures.csv"), ("report.html", "report.pdf")
 FORMAT, FORMAT_VERSION = "blazer-scan", 2
-MEASURED = ("results", "extraction", "notes", "remarks", "measured_with")
+MEASURED = ("results", "measures", "extraction", "notes", "remarks", "measured_with")
 """What a manifest tells of points, beside the report's files."""
 FRAME = re.compile(r"frame_(\d{4,})(\.state\.npz|\.png|\.exr|\.json)")
 """A PNG goes before the files that tell whose it is."""
@@ -168,7 +168,7 @@ def image_scale_of(found: ScanFolder) -> float:
 
 
 def measured_project(found: ScanFolder) -> Project:
-    """The project with the sensor and extraction that the folder's points were measured with, which may be others.
+    """The project with the sensor, extraction and measures of the folder's points, which may be others than its own.
 
     InputError: the manifest's record of them is none.
     """
@@ -176,9 +176,11 @@ def measured_project(found: ScanFolder) -> Project:
     if record is None:
         return found.project
     data = found.project.model_dump(mode="json")
-    if not isinstance(record, dict) or not record.keys() <= {"sensor", "extraction"}:
+    if not isinstance(record, dict) or not record.keys() <= {"sensor", "extraction", "measures"}:
         where = f"{found.folder / MANIFEST}: measured_with"
-        raise InputError("the settings of the measurement are none", where=where, allowed="sensor and extraction")
+        raise InputError(
+            "the settings of the measurement are none", where=where, allowed="sensor, extraction and measures"
+        )
     return Project.from_data({**data, **record}, f"{found.folder / MANIFEST}: measured_with")
 
 

@@ -166,7 +166,7 @@ def is_unfinished(folder: Path, project: Project) -> bool:
 
 
 def _comparable(project: Project) -> Project:
-    """Without what changes no measure: the name, how well it is rendered, and mesh digests, which only files have."""
+    """Without what changes no point: the name, how well it is rendered, and mesh digests, which only files have."""
     objects = tuple(
         item.model_copy(update={"shape": item.shape.model_copy(update={"sha256": None})})
         if isinstance(item.shape, MeshFile)
@@ -174,7 +174,9 @@ def _comparable(project: Project) -> Project:
         for item in project.scene.objects
     )
     scene = project.scene.model_copy(update={"objects": objects})
-    return project.model_copy(update={"name": "project", "scene": scene, "render": RenderSettings(), "seed": 0})
+    return project.model_copy(
+        update={"name": "project", "scene": scene, "render": RenderSettings(), "seed": 0, "measures": ()}
+    )
 
 
 def _add(sums: dict[str, Float], piece: Cloud) -> None:

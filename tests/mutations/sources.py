@@ -20,6 +20,12 @@ from tests.mutations.images import Image
 
 VERSIONS = Path(__file__).resolve().parents[1] / "studio" / "projects"
 WIDTH = 48
+MEASURES = [
+    {"name": "step", "kind": "step", "regions": [[-0.2, -0.01], [0.01, 0.2]], "nominal": 0.0, "upper": 0.001},
+    {"name": "peak", "kind": "peak", "regions": [[-0.2, -0.01], [0.01, 0.2]], "step": 0},
+    {"name": "v", "kind": "v_depth", "regions": [[-0.2, -0.1], [-0.1, 0.0], [0.0, 0.2]], "nominal": 0.0, "lower": 0.0},
+    {"name": "arc", "kind": "radius", "regions": [[-0.2, 0.2]]},
+]
 SCANS = {"still": "plane", "moving": "scan"}
 
 
@@ -88,6 +94,7 @@ def small(data: dict[str, Any]) -> dict[str, Any]:
             item["shape"]["segments"] = 64
     if data["scene"].get("motion", {}).get("kind") == "linear":
         data["scene"]["motion"]["steps"] = 2
+    data["measures"] = MEASURES
     return data
 
 

@@ -1,0 +1,177 @@
+"""Curves through a part of a profile by generalised least squares, with the derivative of their parameters.
+
+A point moves along its own direction d when the line in the image does, so that it misses the curve F(P, theta) = 0 by
+e = F / (dF/dP . d) of its sigmas; e^T C^-1 e is least, C the correlation of the points (Aitken, Proc. R. Soc.
+Edinburgh 55, 1935). Points that miss by more than 5 sigma are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.gauges.profile import Profile
+from analysis.measures import robust_sigma
+from render.base.arrays import Float
+
+Curve = Callable[[Float, Float], tuple[Float, Float, Float]]
+"""(m, 2) points and (p,) parameters -> F (m,), dF/dP (m, 2), dF/dtheta (m, p)."""
+ITERATIONS = 30
+ROUNDS = 4
+OUTLIER_SIGMAS = 5.0
+GRAZING = 1e-3
+"""Sine of the angle between curve and d below which a point slides along the curve and tells nothing of it."""
+BEYOND_CHANCE = 3.0
+"""Sigmas by which the sum of squares exceeds its mean before it tells of more than the predicted noise."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Axes along and across a part of the profile, about its middle."""
+
+    centre: Float
+    axes: Float
+    """(2, 2): rows are the directions along, and across towards the laser."""
+
+    def local(self, position: Float) -> Float:
+        return np.asarray((position - self.centre) @ self.axes.T)
+
+    def out(self, local: Float) -> Float:
+        return np.asarray(local @ self.axes + self.centre)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A curve through points of a profile."""
+
+    theta: Float
+    """(p,) parameters, lengths in m, in the frame."""
+    sigma: Float
+    """(p,) their random sigma."""
+    gradient: Float
+    """(p, m, 2) their derivative by the position of each point of the profile; 0 where a point is not used."""
+    here: NDArray[np.bool_]
+    """(m,) the points that are used."""
+    frame: Frame
+    ratio: float
+    """Of the residuals to what the sigmas predict, at least 1, and 1 as long as chance explains them (R. T. Birge,
+    Phys. Rev. 40, 1932)."""
+
+
+def frame_of(position: Float) -> Frame:
+    """Axes by the greatest spread of (m, 2) points; along goes to the right, or up."""
+    centre = position.mean(axis=0)
+    along = np.linalg.svd(position - centre, full_matrices=False)[2][0]
+    along = along if (along[0], along[1]) > (0.0, 0.0) else -along
+    return Frame(centre, np.array([along, [-along[1], along[0]]]))
+
+
+def polynomial(degree: int) -> Curve:
+    """Across as a polynomial of along: theta are its coefficients, the constant first."""
+    powers = np.arange(degree + 1)
+
+    def curve(local: Float, theta: Float) -> tuple[Float, Float, Float]:
+        along, across = local.T
+        by_theta = -(along[:, None] ** powers)
+        slope = (theta[1:] * powers[1:] * along[:, None] ** (powers[1:] - 1)).sum(axis=1)
+        return across + by_theta @ theta, np.stack([-slope, np.ones(len(along))], axis=1), by_theta
+
+    return curve
+
+
+def two_levels(upper: NDArray[np.bool_]) -> Curve:
+    """Two parallel lines, the points where `upper` (m,) on the second: constant, slope, and step (ISO 5436-1)."""
+
+    def curve(local: Float, theta: Float) -> tuple[Float, Float, Float]:
+        along, across = local.T
+        by_theta = -np.stack([np.ones(len(along)), along, upper], axis=1)
+        by_point = np.stack([np.full(len(along), -theta[1]), np.ones(len(along))], axis=1)
+        return across + by_theta @ theta, by_point, by_theta
+
+    return curve
+
+
+def circle(local: Float, theta: Float) -> tuple[Float, Float, Float]:
+    """Centre along and across, and radius."""
+    beside = local - theta[:2]
+    distance = np.maximum(np.linalg.norm(beside, axis=1), 1e-12)
+    outwards = beside / distance[:, None]
+    return distance - theta[2], outwards, np.column_stack([-outwards, -np.ones(len(local))])
+
+
+def circle_start(local: Float) -> Float:
+    """By linear least squares of x^2 + y^2 (Kasa, IEEE Trans. Instrum. Meas. 25, 1976)."""
+    scale = float(np.abs(local).max()) or 1.0
+    unit = local / scale
+    found = np.linalg.lstsq(np.column_stack([2.0 * unit, np.ones(len(unit))]), (unit**2).sum(axis=1), rcond=None)[0]
+    return np.asarray(scale * np.append(found[:2], math.sqrt(max(found[2] + found[:2] @ found[:2], 1e-12))))
+
+
+def fit(
+    profile: Profile,
+    here: NDArray[np.bool_],
+    curve_of: Callable[[NDArray[np.bool_]], Curve],
+    start: Callable[[Float], Float],
+    axes: Float | None = None,
+) -> Fit:
+    """Curve through the points of a profile where `here` (m,).
+
+    curve_of: its curve, from the (m,) points used; start: (n, 2) local points -> (p,) first parameters; axes: of the
+    frame, in place of those of the points.
+    """
+    frame = frame_of(profile.position[here])
+    frame = frame if axes is None else Frame(frame.centre, axes)
+    for _ in range(ROUNDS):
+        part = profile.taken(here)
+        local, direction = frame.local(part.position), part.random @ frame.axes.T
+        curve, whitening = curve_of(here), part.whitening()
+        theta = start(local)
+        for _ in range(ITERATIONS):
+            e, by_theta, _ = _misses(curve, local, direction, theta)
+            change = np.linalg.lstsq(_white(whitening, by_theta), -_white(whitening, e), rcond=None)[0]
+            theta = theta + change
+            if np.all(np.abs(change) <= 1e-9 * np.abs(theta) + 1e-12):
+                break
+        e, by_theta, by_point = _misses(curve, local, direction, theta)
+        white = _white(whitening, e)
+        wrong = np.abs(e) > OUTLIER_SIGMAS * max(1.0, robust_sigma(e))
+        if not wrong.any() or len(e) - np.count_nonzero(wrong) <= len(theta):
+            break
+        here = here.copy()
+        here[np.flatnonzero(here)[wrong]] = False
+    solved = np.asarray(np.linalg.pinv(_white(whitening, by_theta)), dtype=np.float64)
+    gradient = np.zeros((len(theta), len(profile.index), 2))
+    gradient[:, here] = -(_gain(whitening, solved)[:, :, None] * by_point) @ frame.axes
+    free = len(e) - len(theta)
+    chi2 = float(white @ white)
+    ratio = math.sqrt(chi2 / free) if chi2 > free + BEYOND_CHANCE * math.sqrt(2.0 * free) else 1.0
+    return Fit(theta, np.linalg.norm(solved, axis=1), gradient, here, frame, ratio)
+
+
+def _misses(curve: Curve, local: Float, direction: Float, theta: Float) -> tuple[Float, Float, Float]:
+    """Of (n,) points, in sigmas: e, and its derivatives by theta (n, p) and by the local position (n, 2)."""
+    value, by_point, by_theta = curve(local, theta)
+    step = np.einsum("ij,ij->i", by_point, direction)
+    least = GRAZING * np.linalg.norm(by_point, axis=1) * np.linalg.norm(direction, axis=1)
+    step = np.where(np.abs(step) < least, np.copysign(least, step), step)
+    return value / step, by_theta / step[:, None], by_point / step[:, None]
+
+
+def _white(whitening: tuple[Float, Float], values: Float) -> Float:
+    """W applied to (n,) or (n, p)."""
+    diagonal, below = (one.reshape(-1, *[1] * (values.ndim - 1)) for one in whitening)
+    found = diagonal * values
+    found[1:] += below[1:] * values[:-1]
+    return np.asarray(found)
+
+
+def _gain(whitening: tuple[Float, Float], solved: Float) -> Float:
+    """(p, n): how the parameters answer to e, from the (p, n) solution of the whitened problem."""
+    diagonal, below = whitening
+    gain = solved * diagonal
+    gain[:, :-1] += solved[:, 1:] * below[1:]
+    return np.asarray(gain)

@@ -1,0 +1,88 @@
+"""What is measured of a part: a dimension by its name, the parts of the profile that it is made of, its tolerance."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from render.base.model import Model, quantity
+
+Kind = Literal["step", "width", "angle", "radius", "v_depth", "peak", "straightness", "point_to_point"]
+Verdict = Literal["pass", "fail", "undecided"]
+REGIONS: dict[Kind, tuple[str, ...]] = {
+    "step": ("lower side", "upper side"),
+    "width": ("reference", "left flank", "right flank"),
+    "angle": ("first line", "second line"),
+    "radius": ("arc",),
+    "v_depth": ("reference", "left flank", "right flank"),
+    "peak": ("reference", "peak"),
+    "straightness": ("line",),
+    "point_to_point": ("first point", "second point"),
+}
+"""Kind -> what each of its regions is."""
+TITLES: dict[Kind, str] = {
+    "step": "Step height",
+    "width": "Width",
+    "angle": "Angle",
+    "radius": "Radius",
+    "v_depth": "V depth",
+    "peak": "Peak height",
+    "straightness": "Straightness (bow)",
+    "point_to_point": "Point to point",
+}
+MOST_GAUGES = 64
+Place = Annotated[float, Field(ge=-100.0, le=100.0)]
+Region = tuple[Place, Place]
+
+
+class Gauge(Model):
+    """A measure of the part. Its sizes are m, an angle's rad."""
+
+    name: str = quantity("measure", label="Name", min_length=1, max_length=80)
+    kind: Kind = quantity("step", label="Kind", help="What is measured.")
+    laser: int = quantity(0, label="Laser", help="In whose profile: 0 is the rig's first.", ge=0, le=63)
+    step: int | None = quantity(None, label="Step", help="Of the motion; empty: every one.", ge=0, le=1_000_000)
+    regions: tuple[Region, ...] = quantity(
+        unit="m", label="Regions", help="From and to across the fan, as the profile's plot has it.", max_length=3
+    )
+    nominal: float | None = quantity(None, unit="m", label="Nominal", help="m; of an angle rad.", ge=-100, le=100)
+    lower: float | None = quantity(
+        None, unit="m", label="Lower limit", help="Deviation from the nominal: m; of an angle rad.", ge=-100, le=100
+    )
+    upper: float | None = quantity(
+        None, unit="m", label="Upper limit", help="Deviation from the nominal: m; of an angle rad.", ge=-100, le=100
+    )
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        wanted = REGIONS[self.kind]
+        if len(self.regions) != len(wanted):
+            raise ValueError(
+                f"regions: {len(self.regions)} of them; allowed for {self.kind}: {len(wanted)} ({', '.join(wanted)})"
+            )
+        for i, (low, high) in enumerate(self.regions):
+            if not high > low:
+                raise ValueError(f"regions[{i}] goes from {low} m to {high} m; allowed: the second is the larger")
+        if self.nominal is None and (self.lower is not None or self.upper is not None):
+            raise ValueError("lower and upper are deviations from nominal, which is missing; give it, or none of them")
+        if self.lower is not None and self.upper is not None and self.lower > self.upper:
+            raise ValueError(f"lower is {self.lower} and upper {self.upper}; allowed: lower is not above upper")
+        return self
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Of the value."""
+        return "rad" if self.kind == "angle" else "m"
+
+    def verdict(self, value: float, sigma: float) -> Verdict | None:
+        """ISO 14253-1 with U = 2 sigma: proved within, proved outside, or neither; None: no tolerance, or no value."""
+        if self.nominal is None or (self.lower is None and self.upper is None) or not math.isfinite(value + sigma):
+            return None
+        low = -math.inf if self.lower is None else self.nominal + self.lower
+        high = math.inf if self.upper is None else self.nominal + self.upper
+        uncertainty = 2.0 * sigma
+        if value - uncertainty >= low and value + uncertainty <= high:
+            return "pass"
+        return "fail" if value + uncertainty < low or value - uncertainty > high else "undecided"

@@ -1,0 +1,114 @@
+"""The profile in the plane of a laser, and the covariance of whatever is worked out from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_banded
+
+from analysis.error import Errors
+from analysis.triangulate import Points
+from render.base.arrays import Float
+from render.base.pose import transform_points
+from render.frame import LaserCurve
+
+NEARLY_ONE = 1.0 - 1e-9
+ANY_SIGMA = 1e-6
+"""m, of a truth without measured points beside it: all its points weigh alike."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """(m,) points in the order of their scan lines; all lengths in m.
+
+    A point errs by `random` times a number of variance 1, which falls off along the scan lines as an autoregressive
+    sequence of first order does, and by `systematic` times k independent numbers that all points share.
+    """
+
+    position: Float
+    """(m, 2): across the fan, and height, towards the laser, of which the laser is the zero."""
+    random: Float
+    """(m, 2): the point's displacement by one random sigma of the line in the image."""
+    systematic: Float
+    """(m, 2, k): by one sigma of each thing that is common to all points."""
+    index: NDArray[np.intp]
+    """(m,) scan line."""
+    correlation_length: Float
+    """(m,) scan lines that err alike, as of `Points`."""
+
+    def within(self, low: float, high: float) -> NDArray[np.bool_]:
+        """(m,) across the fan between two places, m."""
+        return np.asarray((self.position[:, 0] >= low) & (self.position[:, 0] <= high))
+
+    def taken(self, here: NDArray[np.bool_]) -> Profile:
+        """The part of it at (m,) points."""
+        return Profile(
+            self.position[here],
+            self.random[here],
+            self.systematic[here],
+            self.index[here],
+            self.correlation_length[here],
+        )
+
+    def whitening(self) -> tuple[Float, Float]:
+        """(m,) diagonal and (m,) subdiagonal of the W for which W C W^T = 1, C the correlation of the random errors.
+
+        Lengths L give the correlation r of neighbours by L = (1 + r) / (1 - r), as in `analysis.measures.shared_rows`.
+        """
+        r = np.clip((self.correlation_length - 1.0) / (self.correlation_length + 1.0), 0.0, NEARLY_ONE)
+        gap = np.diff(self.index)
+        # of two peaks on one scan line each has its own noise
+        rho = np.where(gap > 0, np.sqrt(r[1:] * r[:-1]) ** np.maximum(gap, 1), 0.0)
+        diagonal, below = np.ones(len(r)), np.zeros(len(r))
+        diagonal[1:] = 1.0 / np.sqrt(1.0 - rho**2)
+        below[1:] = -rho * diagonal[1:]
+        return diagonal, below
+
+    def sigmas(self, gradient: Float) -> tuple[float, float]:
+        """Random and systematic sigma of a quantity whose derivative by the points' positions is (m, 2)."""
+        diagonal, below = self.whitening()
+        amplitude = np.einsum("ij,ij->i", gradient, self.random)
+        banded = np.stack([np.append(0.0, below[1:]), diagonal])
+        random = float(np.linalg.norm(solve_banded((0, 1), banded, amplitude)))
+        systematic = float(np.linalg.norm(np.einsum("ij,ijk->k", gradient, self.systematic)))
+        return random, systematic
+
+
+def measured_profile(points: Points, errors: Errors | None, T_laser_camera: Float) -> Profile:
+    """Profile of the points that have coordinates and a sigma.
+
+    With `errors`, what the sheet's own width moves the line by, known from the truth, counts as one systematic error.
+    """
+    here = points.valid & np.isfinite(points.sigma_pixel) & (points.sigma_pixel > 0.0)
+    order = np.flatnonzero(here)[np.argsort(points.index[here], kind="stable")]
+    to_plane = np.stack([T_laser_camera[1, :3], -T_laser_camera[2, :3]])
+    by_pixel = points.gradient[order] @ to_plane.T
+    shared = [] if points.calibration is None else [np.einsum("ij,mjk->mik", to_plane, points.calibration[order])]
+    if errors is not None:
+        shared.append((by_pixel * np.nan_to_num(errors.sheet_bias[order])[:, None])[:, :, None])
+    return Profile(
+        position=_in_plane(T_laser_camera, points.camera[order]),
+        random=by_pixel * points.sigma_pixel[order, None],
+        systematic=np.concatenate([np.zeros((len(order), 2, 0)), *shared], axis=2),
+        index=points.index[order],
+        correlation_length=np.nan_to_num(points.correlation_length[order], nan=1.0),
+    )
+
+
+def true_profile(curve: LaserCurve, T_laser_camera: Float, measured: Profile) -> Profile:
+    """The exact line, where it is lit; its points weigh as the measured ones beside them."""
+    position = _in_plane(T_laser_camera, curve.point[curve.irradiance > 0.0])
+    order = np.argsort(measured.position[:, 0], kind="stable")
+    weight = np.tile([0.0, ANY_SIGMA], (len(position), 1))
+    if len(order):
+        across = measured.position[order, 0]
+        weight = np.stack([np.interp(position[:, 0], across, measured.random[order, k]) for k in (0, 1)], axis=1)
+    index = np.asarray(curve.index[curve.irradiance > 0.0], dtype=np.intp)
+    return Profile(position, weight, np.zeros((len(position), 2, 0)), index, np.ones(len(position)))
+
+
+def _in_plane(T_laser_camera: Float, camera: Float) -> Float:
+    laser = transform_points(T_laser_camera, camera)
+    return np.stack([laser[:, 1], -laser[:, 2]], axis=1)

@@ -1,0 +1,192 @@
+"""What a gauge reads off a profile: the value, its sigma by the delta method, and the truth by the same definition."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
+from analysis.gauges.gauge import REGIONS, Gauge, Verdict
+from analysis.gauges.profile import Profile
+from render.base.arrays import Float
+
+Mask = NDArray[np.bool_]
+NAN = float("nan")
+FLATTEST = 1e-6
+"""Angle, rad, between two lines below which they do not cross anywhere near."""
+SPARE = 2
+"""Points that a curve needs beyond its parameters."""
+PARAMETERS = {"radius": 3, "straightness": 3, "peak": 3}
+"""Of the curve in the last region; elsewhere, and in the others, lines."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One measure in one frame; m, of an angle rad. NaN where there is none."""
+
+    gauge: Gauge
+    step: int
+    value: float = NAN
+    sigma_random: float = NAN
+    """Of the line's position in the image, with its correlation along the line."""
+    sigma_systematic: float = NAN
+    """Of what all points share: calibration, and the sheet's own width where the truth tells it."""
+    points: int = 0
+    """Used."""
+    truth: float = NAN
+    """Of the exact line, by the same definition."""
+    reason: str = ""
+    """Why there is no value."""
+
+    @property
+    def sigma(self) -> float:
+        return math.hypot(self.sigma_random, self.sigma_systematic)
+
+    @property
+    def error(self) -> float:
+        """Value minus truth."""
+        return self.value - self.truth
+
+    @property
+    def error_in_sigmas(self) -> float:
+        return self.error / self.sigma if self.sigma > 0.0 else NAN
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """As of `Gauge.verdict`."""
+        return self.gauge.verdict(self.value, self.sigma)
+
+
+def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> Reading:
+    """The gauge's value in the profile of its laser at a step, and in the exact one."""
+    found = _value(gauge, measured)
+    if isinstance(found, str):
+        return Reading(gauge, step, truth=_true_value(gauge, truth), reason=found)
+    value, gradient, fits = found
+    random, systematic = measured.sigmas(gradient)
+    used = np.count_nonzero(np.any([one.here for one in fits], axis=0))
+    ratio = max(one.ratio for one in fits)
+    return Reading(gauge, step, value, ratio * random, systematic, int(used), _true_value(gauge, truth))
+
+
+def _true_value(gauge: Gauge, truth: Profile | None) -> float:
+    found = "" if truth is None else _value(gauge, truth)
+    return NAN if isinstance(found, str) else found[0]
+
+
+def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | str:
+    """Value, its derivative by the points' positions (m, 2), and the curves that it is of; or why there is none."""
+    parts = [profile.within(*region) for region in gauge.regions]
+    for name, part, region in zip(REGIONS[gauge.kind], parts, gauge.regions, strict=True):
+        least = PARAMETERS.get(gauge.kind, 2) + SPARE
+        if (there := np.count_nonzero(part)) < least:
+            where = f"{region[0] * 1e3:.6g} to {region[1] * 1e3:.6g} mm"
+            return f"too few points in the region {name!r} ({where}): {there}; at least {least} are needed"
+    fits, function = _curves(gauge, profile, parts)
+    theta = [one.theta for one in fits]
+    value = function(theta)
+    if not math.isfinite(value):
+        return NOTHING.get(gauge.kind, "the lines in its regions do not cross")
+    gradient = np.zeros((len(profile.index), 2))
+    for k, one in enumerate(fits):
+        for j, sigma in enumerate(np.maximum(one.sigma, 1e-15)):
+            # over one sigma of the parameter, so that the derivative is that of where the parameter may be
+            ends = []
+            for side in (sigma, -sigma):
+                moved = theta[k].copy()
+                moved[j] += side
+                ends.append(function([*theta[:k], moved, *theta[k + 1 :]]))
+            change = math.remainder(ends[0] - ends[1], math.tau) if gauge.kind == "angle" else ends[0] - ends[1]
+            gradient += change / (2.0 * sigma) * one.gradient[j]
+    if not np.all(np.isfinite(gradient)):
+        return NOTHING.get(gauge.kind, "the lines in its regions do not cross")
+    return value, gradient, fits
+
+
+NOTHING = {
+    "peak": "the profile has no peak within its region",
+    "radius": "no circle fits the points",
+    "step": "no two levels fit the points",
+}
+"""Kind -> why a value is none; the others are of lines that cross."""
+Function = Callable[[Sequence[Float]], float]
+
+
+def _curves(gauge: Gauge, profile: Profile, parts: list[Mask]) -> tuple[list[Fit], Function]:
+    """The curves that a value is of, and the value of their parameters."""
+    match gauge.kind:
+        case "step":
+            whole = parts[0] | parts[1]
+            fits = [fit(profile, whole, lambda here: two_levels(parts[1][here]), lambda local: _zeros(3))]
+            return fits, lambda theta: theta[0][2] / math.sqrt(1.0 + theta[0][1] ** 2)
+        case "radius":
+            return [fit(profile, parts[0], lambda here: circle, circle_start)], lambda theta: abs(theta[0][2])
+        case "straightness":
+            bow = _polynomial(profile, parts[0], 2)
+            low, high = gauge.regions[0]
+            length = (high - low) / max(bow.frame.axes[0, 0], 1e-6)
+            return [bow], lambda theta: -theta[0][2] * (length / 2.0) ** 2
+        case "peak":
+            line = _polynomial(profile, parts[0], 1)
+            fits = [line, _polynomial(profile, parts[1], 2, line.frame.axes)]
+            return fits, lambda theta: _height_of_peak(fits, theta, gauge.regions[1])
+        case _:
+            fits = [_polynomial(profile, part, 1) for part in parts]
+            return fits, lambda theta: _of_lines(gauge, [_line(*pair) for pair in zip(fits, theta, strict=True)])
+
+
+def _polynomial(profile: Profile, part: Mask, degree: int, axes: Float | None = None) -> Fit:
+    return fit(profile, part, lambda here: polynomial(degree), lambda local: _zeros(degree + 1), axes)
+
+
+def _zeros(count: int) -> Float:
+    return np.zeros(count)
+
+
+def _line(one: Fit, theta: Float) -> tuple[Float, Float]:
+    """A point of the line and its direction, to the right or up."""
+    along = np.array([1.0, theta[1]]) @ one.frame.axes
+    return one.frame.out(np.array([0.0, theta[0]])), along / np.linalg.norm(along)
+
+
+def _of_lines(gauge: Gauge, lines: list[tuple[Float, Float]]) -> float:
+    """The value of two or three lines."""
+    (p, u), (q, v) = lines[:2]
+    if gauge.kind == "angle":
+        return math.atan2(_cross(u, v), float(u @ v))
+    if gauge.kind == "point_to_point":
+        middles = [0.5 * (low + high) for low, high in gauge.regions]
+        ends = [point + along * _over(x - point[0], along[0]) for x, (point, along) in zip(middles, lines, strict=True)]
+        return float(np.linalg.norm(ends[1] - ends[0]))
+    r, w = lines[2]
+    if gauge.kind == "width":
+        return float(np.linalg.norm(_crossing(p, u, r, w) - _crossing(p, u, q, v)))
+    return -_cross(u, _crossing(q, v, r, w) - p)
+
+
+def _height_of_peak(fits: list[Fit], theta: Sequence[Float], region: tuple[float, float]) -> float:
+    """Where the parabola runs along the reference line, over that line; NaN: not within the region."""
+    point, along = _line(fits[0], theta[0])
+    frame, (a, b, q) = fits[1].frame, theta[1]
+    right, up = frame.axes @ along
+    t = _over(_over(up, right) - b, 2.0 * q)
+    top = frame.out(np.array([t, a + b * t + q * t**2]))
+    return _cross(along, top - point) if region[0] <= top[0] <= region[1] else NAN
+
+
+def _crossing(p: Float, u: Float, q: Float, v: Float) -> Float:
+    """Where the lines through p along u and through q along v cross; NaN: they are parallel."""
+    sine = _cross(u, v)
+    return p + u * (_cross(q - p, v) / sine if abs(sine) > FLATTEST else NAN)
+
+
+def _cross(a: Float, b: Float) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+def _over(a: float, b: float) -> float:
+    return float(a / b) if b != 0.0 else NAN

@@ -1,0 +1,82 @@
+"""The table of the part's measures, for page and console: value, sigma, tolerance, verdict, error against the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from analysis.gauges.gauge import TITLES
+from analysis.report.units import NONE, digits
+
+COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
+MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0undecided"}
+"""Never by colour alone."""
+PLAIN = str.maketrans({"µ": "u", "°": " deg", "–": "-", "✓": "", "✗": "", "?": "", "\u00a0": " "})  # noqa: RUF001
+FEWEST, MOST = 2, 6
+"""Digits after the point, of mm or degrees."""
+
+
+def scale_and_unit(unit: str) -> tuple[float, str]:
+    """Factor from SI, and what follows the number that people read: mm or degrees."""
+    return (math.degrees(1.0), "°") if unit == "rad" else (1e3, "\u00a0mm")
+
+
+def value_text(value: float | None, sigma: float | None, unit: str) -> str:
+    """With as many digits as its sigma allows: two of it."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    scale, name = scale_and_unit(unit)
+    return f"{scale * value:.{decimals(sigma, unit)}f}{name}"
+
+
+def decimals(sigma: float | None, unit: str) -> int:
+    """Digits after the point, in `scale_and_unit`'s unit, of a value of that sigma."""
+    if sigma is None or not sigma > 0.0:
+        return 4
+    return min(max(FEWEST, 1 - math.floor(math.log10(scale_and_unit(unit)[0] * sigma))), MOST)
+
+
+def small_text(value: float | None, unit: str) -> str:
+    """A sigma or an error: um, or thousandths of a degree as degrees."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    return f"{digits(math.degrees(value))}°" if unit == "rad" else f"{digits(value * 1e6)}\u00a0µm"
+
+
+def tolerance_text(lower: float | None, upper: float | None, unit: str) -> str:
+    """ "-0.1 / +0.1 mm"."""
+    if lower is None and upper is None:
+        return NONE
+    scale, name = scale_and_unit(unit)
+    ends = [NONE if end is None else f"{scale * end:+.4g}" for end in (lower, upper)]
+    return f"{' / '.join(ends)}{name}"
+
+
+def cells(row: Mapping[str, Any]) -> list[str]:
+    """Of COLUMNS, from an entry of the scan's record of measures."""
+    unit, ratio = row["unit"], row["error_in_sigmas"]
+    several = row["readings"] > 1
+    verdict = MARKS.get(row["verdict"] or "", "not measured" if row["reason"] else NONE)
+    if several:
+        verdict += f", worst of {row['readings']}: step {row['step']}"
+    return [
+        TITLES[row["kind"]],
+        value_text(row["value"], row["sigma"], unit),
+        small_text(row["sigma"], unit),
+        value_text(row["nominal"], row["sigma"], unit),
+        tolerance_text(row["lower"], row["upper"], unit),
+        verdict,
+        small_text(row["error"], unit),
+        NONE if ratio is None else f"{ratio:+.2f}",
+    ]
+
+
+def plain_cells(row: Mapping[str, Any]) -> list[str]:
+    """The same for a terminal, which may know ASCII alone."""
+    return [cell.translate(PLAIN).strip() for cell in cells(row)]
+
+
+def reasons(rows: list[dict[str, Any]]) -> list[str]:
+    """Why measures have no value, a sentence each."""
+    return [f"{row['name']}: {row['reason']}" for row in rows if row["reason"]]

@@ -1,0 +1,79 @@
+"""The project's measures: read off every frame, told in a few numbers each, and written as a table."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from analysis.gauges.gauge import Gauge
+from analysis.gauges.profile import Profile, measured_profile, true_profile
+from analysis.gauges.read import Reading, read
+from render.base.files import atomic_write
+from render.base.pose import invert
+from render.frame import Frame
+from studio.project.project import Project
+from studio.scan.own_files import MEASURE_COLUMNS
+from studio.scan.stages import Measurement
+
+FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error", "error_in_sigmas")
+
+
+def profiles(project: Project, frame: Frame, found: Measurement) -> tuple[Profile, Profile]:
+    """Measured and exact profile of a laser."""
+    T_laser_camera = invert(project.scene.T_camera_laser(found.laser))
+    measured = measured_profile(found.points, found.errors, T_laser_camera)
+    return measured, true_profile(frame.curves[found.laser], T_laser_camera, measured)
+
+
+def readings(project: Project, frame: Frame, found: Sequence[Measurement]) -> tuple[Reading, ...]:
+    """Of the measures that are of this frame's step; found: of each laser."""
+    wanted = [gauge for gauge in project.measures if gauge.step in (None, frame.step) and gauge.laser < len(found)]
+    both = {laser: profiles(project, frame, found[laser]) for laser in {gauge.laser for gauge in wanted}}
+    return tuple(read(gauge, frame.step, *both[gauge.laser]) for gauge in wanted)
+
+
+def worst(found: Sequence[Reading]) -> Reading:
+    """Of one measure over the steps: one without a value first, then by verdict, then the farthest from the middle."""
+
+    def badness(one: Reading) -> tuple[bool, bool, bool, float]:
+        gauge = one.gauge
+        middle = (gauge.nominal or 0.0) + 0.5 * ((gauge.lower or 0.0) + (gauge.upper or 0.0))
+        off = 0.0 if gauge.nominal is None or one.reason else abs(one.value - middle)
+        return bool(one.reason), one.verdict == "fail", one.verdict == "undecided", off
+
+    return max(found, key=badness)
+
+
+def measures_record(gauges: Sequence[Gauge], found: Sequence[Reading]) -> list[dict[str, Any]]:
+    """One entry for each measure: its worst reading, and how many of its readings came to which verdict; SI units."""
+    rows = []
+    for gauge in gauges:
+        own = [one for one in found if one.gauge == gauge]
+        shown = worst(own) if own else Reading(gauge, gauge.step or 0, reason="no frame of its step was measured")
+        counts = Counter("none" if one.reason else one.verdict or "no tolerance" for one in own)
+        rows.append({**_row(shown), "readings": len(own), "verdicts": dict(sorted(counts.items()))})
+    return rows
+
+
+def write_measures(path: Path, found: Sequence[Reading]) -> None:
+    """One row for each measure and step, SI units, NaN as an empty cell. InputError: the file cannot be written."""
+    with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(MEASURE_COLUMNS)
+        for one in found:
+            row = _row(one)
+            writer.writerow("" if row[name] is None else row[name] for name in MEASURE_COLUMNS)
+
+
+def _row(one: Reading) -> dict[str, Any]:
+    gauge = one.gauge
+    row: dict[str, Any] = {"name": gauge.name, "kind": gauge.kind, "unit": gauge.unit, "laser": gauge.laser}
+    row["step"] = one.step
+    row |= {name: getattr(one, name) for name in FIGURES}
+    row |= {"points": one.points, "nominal": gauge.nominal, "lower": gauge.lower, "upper": gauge.upper}
+    row |= {"verdict": one.verdict, "reason": one.reason}
+    return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}

@@ -1,0 +1,48 @@
+"""A tolerance is decided only where the uncertainty lets it be; what no gauge can be is refused by its field."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from analysis.gauges.gauge import Gauge
+from tests.analysis.gauges.profiles import gauge
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"),
+    [(10.5, "undecided"), (10.7, "pass"), (11.3, "pass"), (11.4, "undecided"), (11.7, "fail"), (10.3, "fail")],
+)
+def test_a_verdict_needs_all_of_two_sigma_on_one_side(value: float, verdict: str) -> None:
+    """Limits 10.5 and 11.5, sigma 0.08: U is 0.16."""
+    assert gauge("step", nominal=11.0, lower=-0.5, upper=0.5).verdict(value, 0.08) == verdict
+
+
+def test_one_limit_decides_alone_and_without_one_there_is_no_verdict() -> None:
+    assert gauge("step", nominal=1.0, upper=0.1).verdict(-50.0, 0.1) == "pass"
+    assert gauge("step", nominal=1.0).verdict(1.0, 0.1) is None
+    assert gauge("step", nominal=1.0, upper=0.1).verdict(math.nan, 0.1) is None
+
+
+def test_a_sigma_as_wide_as_the_tolerance_never_passes() -> None:
+    assert gauge("step", nominal=1.0, lower=-0.1, upper=0.1).verdict(1.0, 0.06) == "undecided"
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ({"regions": ((0.0, 0.1),)}, "1 of them; allowed for step: 2"),
+        ({"regions": ((0.0, 0.1), (0.3, 0.2))}, r"regions\[1\] goes from 0.3 m to 0.2 m"),
+        ({"lower": -0.1}, "nominal, which is missing"),
+        ({"nominal": 1.0, "lower": 0.2, "upper": 0.1}, "lower is 0.2 and upper 0.1"),
+        ({"nominal": math.nan}, "finite number"),
+        ({"kind": "volume"}, "kind"),
+    ],
+)
+def test_what_is_no_gauge_is_refused(values: dict[str, Any], told: str) -> None:
+    whole: dict[str, Any] = {"kind": "step", "regions": ((0.0, 0.1), (0.2, 0.3))}
+    with pytest.raises(ValidationError, match=told):
+        Gauge(**{**whole, **values})

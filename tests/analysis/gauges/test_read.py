@@ -1,0 +1,93 @@
+"""Dimensions of exact profiles are exact, and those of noisy ones as uncertain as their sigma says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from analysis.gauges.read import read
+from tests.analysis.gauges.profiles import ACROSS, KINDS, gauge, noises, profile, shape
+
+TRIALS = 200
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_exact_profile_gives_the_closed_form(kind: str) -> None:
+    height, exact = shape(kind)
+    reading = read(gauge(kind), 0, profile(height), profile(height))
+
+    assert reading.value == pytest.approx(exact, rel=1e-7)
+    assert reading.error == 0.0 and reading.sigma > 0.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_sigma_covers_and_nothing_is_biased(kind: str) -> None:
+    """Half of the profiles have noise that neighbours share."""
+    height, exact = shape(kind)
+    told = []
+    for length in (1.0, 5.0):
+        for noise in noises(TRIALS // 2, length, seed=7):
+            reading = read(gauge(kind), 0, profile(height, length=length, noise=noise), None)
+            told.append((reading.value - exact) / reading.sigma)
+    low, high = binom.ppf([0.0005, 0.9995], TRIALS, 0.9545)
+    assert low <= np.count_nonzero(np.abs(told) <= 2.0) <= high
+    assert abs(np.mean(told)) < 3.3 / np.sqrt(TRIALS)
+
+
+@pytest.mark.parametrize("kind", ["step", "angle"])
+def test_neighbours_that_err_alike_make_sigma_the_root_of_their_number(kind: str) -> None:
+    height, _ = shape(kind)
+    alone, alike = (read(gauge(kind), 0, profile(height, length=length), None).sigma for length in (1.0, 4.0))
+    # 4 scan lines that err as one make a mean's sigma twice as large; near the ends of a region a little less
+    assert 1.8 < alike / alone < 2.0
+
+
+def test_what_moves_all_points_alike_moves_a_height_only_by_what_tells_them_apart() -> None:
+    """A scale error of 1e-3 in height, and a shift: the step feels the first alone, the bow neither."""
+    height, exact = shape("step")
+    shift, scale = np.zeros((2, len(height), 2))
+    shift[:, 1], scale[:, 1] = 1e-3, 1e-3 * (height + 0.5 - 0.1 * ACROSS)
+    shared = np.stack([shift, scale], axis=2)
+    reading = read(gauge("step"), 0, profile(height, systematic=shared), None)
+    assert reading.sigma_systematic == pytest.approx(1e-3 * exact, rel=1e-6)
+    flat = read(gauge("straightness"), 0, profile(0.0 * ACROSS, systematic=shared[:, :, :1]), None)
+    assert flat.sigma_systematic < 1e-15
+
+
+def test_a_few_wild_points_are_left_out() -> None:
+    height, exact = shape("step")
+    noise = noises(1, 1.0, seed=3)[0]
+    clean = read(gauge("step"), 0, profile(height, noise=noise), None)
+    noise[[40, 45, 150]] += 500.0
+    reading = read(gauge("step"), 0, profile(height, noise=noise), None)
+    assert abs(reading.value - exact) < 4.0 * reading.sigma
+    assert reading.points == clean.points - 3
+
+
+def test_residuals_beyond_the_noise_widen_sigma() -> None:
+    height, _ = shape("step")
+    wavy = height + 1e-4 * np.sin(ACROSS / 7e-4)
+    assert read(gauge("step"), 0, profile(wavy), None).sigma > 4.0 * read(gauge("step"), 0, profile(height), None).sigma
+
+
+@pytest.mark.parametrize(
+    ("kind", "height", "told"),
+    [
+        ("v_depth", 0.1 * ACROSS, "do not cross"),
+        ("width", 0.0 * ACROSS, "do not cross"),
+        ("peak", ACROSS**2, "no peak within its region"),
+    ],
+)
+def test_a_shape_without_the_dimension_says_so(kind: str, height: np.ndarray, told: str) -> None:
+    one = gauge(kind)
+    if kind == "peak":
+        one = one.model_copy(update={"regions": ((-0.02, -0.01), (0.006, 0.012))})
+    reading = read(one, 0, profile(height), profile(height))
+    assert told in reading.reason and np.isnan(reading.value) and reading.verdict is None
+
+
+def test_a_region_without_points_is_told_by_its_name_and_place() -> None:
+    away = gauge("radius").model_copy(update={"regions": ((0.1, 0.2),)})
+    reading = read(away, 0, profile(0.0 * ACROSS), None)
+    assert reading.reason.startswith("too few points in the region 'arc' (100 to 200 mm)")

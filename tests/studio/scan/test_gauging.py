@@ -1,0 +1,103 @@
+"""The project's measures go through a scan into table, record and console, and are measured anew."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+import main
+from analysis.gauges.gauge import Gauge
+from analysis.gauges.read import Reading
+from render.base.errors import InputError
+from studio.project.project import Project
+from studio.scan.gauging import measures_record, worst
+from studio.scan.scan_folder import measured_project, open_folder
+from tests.studio.small_scan import scan, small_project
+
+FLAT = {"kind": "straightness", "regions": [[-0.08, 0.08]]}
+LEVEL = {"kind": "step", "regions": [[-0.08, -0.01], [0.01, 0.08]], "nominal": 0.0, "lower": -0.05, "upper": 0.05}
+
+
+def with_measures(project: Project, *measures: dict[str, Any]) -> Project:
+    return project.replaced({"measures": list(measures)})
+
+
+def call(*arguments: object) -> str:
+    """What a command line prints; it must succeed."""
+    result = CliRunner().invoke(main.cli, [str(argument) for argument in arguments])
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("gauging")
+    file = small_project(folder)
+    project = with_measures(Project.load(file), {"name": "level", **LEVEL}, {"name": "bow", **FLAT, "step": 1})
+    scan(file, folder / "out", project=project)
+    return folder / "out"
+
+
+def test_every_frame_is_read_and_the_plate_is_flat_within_its_sigma(scanned: Path) -> None:
+    with open(scanned / "measures.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["name"], row["step"]) for row in rows] == [("level", "0"), ("level", "1"), ("bow", "1")]
+    for row in rows:
+        assert abs(float(row["truth"])) < 1e-9
+        assert abs(float(row["error"])) < 4.0 * float(row["sigma"]) < 0.02
+    assert [row["verdict"] for row in rows] == ["pass", "pass", ""]
+
+
+def test_the_record_has_one_entry_a_measure(scanned: Path) -> None:
+    rows = open_folder(scanned).manifest["measures"]
+    assert [(row["name"], row["readings"], row["verdicts"]) for row in rows] == [
+        ("level", 2, {"pass": 2}),
+        ("bow", 1, {"no tolerance": 1}),
+    ]
+
+
+def test_other_measures_are_read_off_the_same_frames(scanned: Path, tmp_path: Path) -> None:
+    away = {"name": "away", "kind": "radius", "regions": [[0.5, 0.6]]}
+    project = with_measures(open_folder(scanned).project, {"name": "new", **FLAT}, away)
+    file = scanned.parent / "other.json"
+    file.write_text(project.to_text(), encoding="utf-8")
+    told = json.loads(call("reconstruct", scanned, "--project", file, "--json"))["measures"]
+    assert [row["name"] for row in told] == ["new", "away"]
+    assert told[1]["value"] is None and "too few points" in told[1]["reason"]
+    assert measured_project(open_folder(scanned)).measures == project.measures
+    shown = call("reconstruct", scanned, "--project", file, "--out", tmp_path)
+    assert "Straightness (bow)" in shown and "not measured: away: too few points" in shown
+
+
+def test_the_worst_reading_speaks_for_a_measure() -> None:
+    gauge = Gauge.model_validate({"name": "a", **LEVEL})
+    good = Reading(gauge, 0, value=0.0, sigma_random=1e-5, sigma_systematic=0.0)
+    off = replace(good, step=1, value=0.04)
+    unsure = replace(good, step=2, value=0.05)
+    bad = replace(good, step=3, value=-0.2)
+    none = Reading(gauge, 4, reason="too few points")
+    for found, shown in ((good, off), 1), ((off, unsure), 2), ((unsure, bad, good), 3), ((bad, none), 4):
+        assert worst(found).step == shown
+    assert measures_record((gauge,), ())[0]["reason"] == "no frame of its step was measured"
+
+
+@pytest.mark.parametrize(
+    ("measure", "told"),
+    [
+        ({"laser": 1}, r"measures\[1\].laser is 1; allowed: less than 1"),
+        ({"step": 7}, r"measures\[1\].step is 7; allowed: less than 2"),
+        ({"name": "a"}, r"measures\[1\].name is 'a'"),
+        ({"nominal": "wide"}, r"measures\[1\].nominal"),
+        ({"colour": 1}, r"measures\[1\].*colour"),
+    ],
+)
+def test_a_measure_that_cannot_be_is_refused_by_its_field(measure: dict[str, Any], told: str, tmp_path: Path) -> None:
+    project = Project.load(small_project(tmp_path))
+    with pytest.raises(InputError, match=told):
+        with_measures(project, {"name": "a", **FLAT}, {"name": "b", **FLAT, **measure})
