@@ -20,6 +20,8 @@ from render.base.errors import InputError
 STEPS = 100
 SMALLEST_STEP = 1e-7
 """In standard deviations of the parameters: steps below it change nothing that matters."""
+SETTLED = 1e-3
+"""In standard deviations: a last full step that would move nothing by more is the end."""
 ROUNDING = 1e-9
 """Of chi-square: what a step may add by rounding alone."""
 SINGULAR = 1e-13
@@ -75,19 +77,18 @@ def adjust(seen: Observations, start: Estimate, free: Bool, prior: Prior | None 
 
     free (p,) as of `free_parameters`. InputError: the views do not determine the parameters.
     """
-    estimate, damping, guess, converged = start, 0.0, None, False
+    estimate, damping, guess = start, 0.0, None
     normal, _, _, guess = _normal(seen, estimate, free, prior, guess)
     for _ in range(steps):
         shared, poses, size = _step(normal, free, damping)
+        if size < SMALLEST_STEP and damping == 0.0:
+            break  # whether such a step lessens the cost is decided by rounding
         there = estimate.moved(shared, poses)
         with np.errstate(all="ignore"):
             tried, _, _, tried_guess = _normal(seen, there, free, prior, guess)
         if tried.cost <= normal.cost * (1.0 + 1e-12) + ROUNDING:
             estimate, normal, guess = there, tried, tried_guess
             damping = 0.0 if damping < 1e-8 else damping / 10.0
-            if size < SMALLEST_STEP and damping == 0.0:
-                converged = True
-                break
         else:
             guess = None
             damping = max(10.0 * damping, 1e-6)
@@ -95,6 +96,7 @@ def adjust(seen: Observations, start: Estimate, free: Bool, prior: Prior | None 
                 break
     normal, at_corners, at_lasers, _ = _normal(seen, estimate, free, prior, guess)
     reduced, _, _ = _reduced(normal, 0.0)
+    _, _, remaining = _step(normal, free, 0.0)
     parameters = int(np.count_nonzero(free)) + 6 * seen.count
     return Solution(
         estimate=estimate,
@@ -104,7 +106,7 @@ def adjust(seen: Observations, start: Estimate, free: Bool, prior: Prior | None 
         corner_residual=at_corners.residual.reshape(-1, 2),
         laser_residual=at_lasers.residual,
         freedom=seen.residual_count - parameters,
-        converged=converged,
+        converged=remaining < SETTLED,
     )
 
 

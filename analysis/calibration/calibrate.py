@@ -100,14 +100,27 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
             cure="" if faults else "photograph the board at other tilts and distances",
         ) from None
     estimate, covariance = adjusted.solution.estimate, adjusted.solution.covariance
-    distance = estimate.translation[:, 2]
+    middle = np.append(0.5 * (target.min(axis=0) + target.max(axis=0)), 0.0)
+    distance = (estimate.rotation @ middle + estimate.translation)[:, 2]
     nearest = float(distance.min()) if request.nearest is None else request.nearest
     farthest = float(distance.max()) if request.farthest is None else request.farthest
-    farthest = max(farthest, nearest * 1.01)
+    if request.nearest is not None and request.farthest is not None and farthest <= nearest:
+        raise InputError("the farthest distance is not beyond the nearest", found=f"{nearest:g} and {farthest:g} m")
+    nearest, farthest = (
+        (nearest, max(farthest, nearest * 1.01))
+        if request.farthest is None
+        else (min(nearest, farthest / 1.01), farthest)
+    )
     volumes = [working_volume(estimate, laser, request.size, nearest, farthest) for laser in range(request.lasers)]
     typical = _typical_sigma(adjusted)
     depths = tuple(depth_error(estimate, covariance, one, typical[1]) for one in volumes if len(one.depth))
     usable = [one.volume for one in depths]
+    faults += [
+        f"the camera sees nothing of laser {one.laser} between {nearest:.3g} and {farthest:.3g} m: its depth error is "
+        "not told; ask for other distances"
+        for one in volumes
+        if not len(one.depth)
+    ]
     advice = None
     if usable:
         advice = advise(

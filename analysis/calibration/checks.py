@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from analysis.calibration.adjust import Prior, adjust, without_views
+from analysis.calibration.adjust import Prior, Solution, adjust, without_views
 from analysis.calibration.depth import Volume, depth_jacobian
 from analysis.calibration.estimate import Estimate, free_parameters
 from analysis.calibration.lens import LENGTHS, normalise
@@ -20,6 +20,8 @@ from render.base.errors import InputError
 
 ALARM = 0.05
 """p-value at which a check speaks."""
+LEAST_TOLD = 1e-6
+"""Share of a variance below which rounding decides what the views tell beside a prior."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,8 @@ class Halves:
 
     @property
     def sentence(self) -> str:
+        if self.expected == 0.0:  # no laser, by which alone there is depth
+            return f"two halves of the views {'agree' if self.p >= ALARM else 'differ'} (p = {self.p:.2g})"
         if self.p >= ALARM:
             return (
                 f"two halves of the views agree: {1e6 * self.difference:.0f} um apart in depth, "
@@ -45,7 +49,12 @@ class Halves:
 
 
 def halves(adjusted: Adjusted, volumes: Sequence[Volume], prior: Prior | None = None) -> Halves | None:
-    """Every other view against the rest; None where a half does not determine the parameters, or there is no laser."""
+    """Every other view against the rest; None where a half does not determine the parameters.
+
+    Both halves hold to the same prior, so that its error is not in their difference: with information I of the views
+    and L of the prior each has the covariance C I C, C = (I + L)^-1. Combinations that the prior alone determines are
+    left out. Without a laser, differences in depth are zero.
+    """
     solution, seen = adjusted.solution, adjusted.seen
     parts = []
     for parity in (0, 1):
@@ -56,9 +65,11 @@ def halves(adjusted: Adjusted, volumes: Sequence[Volume], prior: Prior | None = 
             return None
     used = np.nonzero(solution.free)[0]
     off = (parts[0].estimate.shared - parts[1].estimate.shared)[used]
-    covariance = (parts[0].covariance + parts[1].covariance)[np.ix_(used, used)]
-    spread = np.sqrt(np.diag(covariance))
-    chi2 = float(off / spread @ np.linalg.solve(covariance / np.outer(spread, spread), off / spread))
+    covariance = (_by_views(parts[0], prior) + _by_views(parts[1], prior))[np.ix_(used, used)]
+    spread = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(covariance / np.outer(spread, spread))
+    told = values > (LEAST_TOLD if prior is not None else 0.0)
+    chi2 = float(np.sum((vectors.T @ (off / spread))[told] ** 2 / values[told]))
     squared, variance, count = 0.0, 0.0, 0
     for volume in volumes:
         q = normalise(volume.pixel, solution.estimate.intrinsics, solution.estimate.distortion)
@@ -67,7 +78,16 @@ def halves(adjusted: Adjusted, volumes: Sequence[Volume], prior: Prior | None = 
         variance += float(np.einsum("ni,ij,nj->", jacobian, covariance, jacobian))
         count += len(q)
     count = max(count, 1)
-    return Halves(np.sqrt(squared / count), np.sqrt(variance / count), float(stats.chi2.sf(chi2, len(used))))
+    return Halves(
+        np.sqrt(squared / count), np.sqrt(variance / count), float(stats.chi2.sf(chi2, np.count_nonzero(told)))
+    )
+
+
+def _by_views(part: Solution, prior: Prior | None) -> Float:
+    """(p, p) covariance that the views' errors give the estimate, without the prior's own."""
+    if prior is None:
+        return part.covariance
+    return part.covariance - part.covariance @ prior.information @ part.covariance
 
 
 @dataclass(frozen=True)

@@ -30,21 +30,16 @@ def complaints(views: Sequence[View], estimate: Estimate, size: tuple[int, int],
     """
     found = []
     if camera:
-        found += _of_poses(estimate) + _of_coverage(views, size)
+        target = np.concatenate([view.target for view in views])
+        middle = np.append(0.5 * (target.min(axis=0) + target.max(axis=0)), 0.0)
+        found += _of_poses(estimate, estimate.rotation @ middle + estimate.translation) + _of_coverage(views, size)
     for laser in range(len(estimate.planes)):
         found += _of_laser(views, estimate, laser)
     return found
 
 
-def tilts(estimate: Estimate) -> Float:
-    """(views, 2) tilt of each board against the line of sight, as a vector, rad."""
-    normal = estimate.rotation[:, :, 2]
-    normal = normal * np.sign(normal[:, 2:])
-    sight = estimate.translation / np.linalg.norm(estimate.translation, axis=1, keepdims=True)
-    return np.asarray(np.arcsin(np.clip(normal[:, :2] - sight[:, :2], -1.0, 1.0)))
-
-
-def _of_poses(estimate: Estimate) -> list[str]:
+def _of_poses(estimate: Estimate, middle: Float) -> list[str]:
+    """middle (views, 3) m, of the boards: their origins, in a corner, move with the tilt as well."""
     normal = estimate.rotation[:, :, 2]
     normal = normal * np.sign(normal[:, 2:])
     angles = np.arcsin(np.clip(normal[:, :2], -1.0, 1.0))
@@ -66,7 +61,7 @@ def _of_poses(estimate: Estimate) -> list[str]:
             "the board is tilted about one axis only: the principal point across it cannot be told from the tilt; "
             "photograph it tilted about the other axis as well"
         )
-    distance = np.linalg.norm(estimate.translation, axis=1)
+    distance = np.linalg.norm(middle, axis=1)
     if np.ptp(distance) < LEAST_DEPTH * distance.mean():
         found.append(
             f"all boards are at one distance, {distance.mean():.3g} m: what holds there need not hold elsewhere; "

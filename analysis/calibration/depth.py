@@ -57,9 +57,10 @@ def depth_jacobian(estimate: Estimate, volume: Volume, q: Float) -> Float:
     return out
 
 
-def pixel_gain(estimate: Estimate, volume: Volume, q: Float, along: int = 0) -> Float:
+def pixel_gain(estimate: Estimate, volume: Volume, q: Float) -> Float:
     """(n,) m of depth a px of the line's position along the scan line: the random error's part."""
     m = estimate.planes[volume.laser]
+    along = 0 if abs(m[0]) >= abs(m[1]) else 1
     _, by_q, _ = project(q, estimate.intrinsics, estimate.distortion)
     unit = np.zeros((len(q), 2, 1))
     unit[:, along] = 1.0

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from analysis.calibration.board import Board
 from analysis.calibration.corners import noise_of, refine
 from analysis.calibration.observations import View
+from analysis.line.result import Axis
 from render.base.arrays import Bool, Float
 from render.base.errors import InputError
 
@@ -56,15 +57,15 @@ def detect(image: NDArray[Any], board: Board, name: str) -> tuple[View, list[str
     return View(name, refined[good], covariance[good], board.target[number[good]]), notes
 
 
-def on_board(view: View, board: Board, pixel: Float, margin: float) -> Bool:
-    """(m, 2) px -> (m,) on the board between its outermost seen corners, at least `margin` px from any square's edge.
+def on_board(view: View, board: Board, pixel: Float, margin: float, axis: Axis = "rows") -> Bool:
+    """(m, 2) px -> (m,) on the board between its outermost seen corners, `margin` px along the scan line from any edge.
 
     A line that crosses from white to black is pulled to the white side, by far more than its sigma.
     """
     if len(pixel) == 0:
         return np.zeros(0, dtype=bool)
     homography, _ = cv2.findHomography(view.pixel, view.target)
-    beside = pixel + np.array([margin, 0.0])
+    beside = pixel + np.array([margin, 0.0] if axis == "rows" else [0.0, margin])
     place, stepped = (cv2.perspectiveTransform(each.reshape(1, -1, 2), homography)[0] for each in (pixel, beside))
     least, greatest = view.target.min(axis=0), view.target.max(axis=0)
     inside = np.all((place > least) & (place < greatest), axis=1)

@@ -60,10 +60,12 @@ def laser_points(seen: Observations, estimate: Estimate, start: Float | None = N
         level, level_q, level_shared, level_pose = _board_level(seen, estimate, q)
         matrix = np.stack([by_q[everyone, across], level_q], axis=1)
         off = np.stack([pixel[everyone, across] - seen.laser_pixel[everyone, across], level], axis=1)
-        step = np.linalg.solve(matrix, off[:, :, None])[:, :, 0]
+        step = np.clip(np.linalg.solve(matrix, off[:, :, None])[:, :, 0], -0.2, 0.2)
+        q = q - step
+        # the pixel goes along: left behind, it would make the cost depend on where the search began
+        pixel = pixel - np.einsum("nij,nj->ni", by_q, step)
         if np.abs(step).max(initial=0.0) < 1e-13:
             break
-        q = q - np.clip(step, -0.2, 0.2)
     by_both = np.linalg.solve(matrix.transpose(0, 2, 1), by_q[everyone, along][:, :, None])[:, :, 0]
     by_shared = -by_both[:, 1, None] * level_shared
     camera = estimate.camera_count

@@ -11,6 +11,7 @@ from analysis.calibration.estimate import Estimate
 from analysis.calibration.observations import Observations
 from analysis.calibration.residuals import corners, laser_points
 from render.base.arrays import Bool, Float
+from render.base.errors import InputError
 
 ROUNDS = 8
 STRAY = 5.0
@@ -35,7 +36,7 @@ class Adjusted:
 def adjust_robustly(seen: Observations, start: Estimate, free: Bool, prior: Prior | None = None) -> Adjusted:
     """Adjust with Cauchy's weights, leave out what is far off by them, then adjust what remains by least squares.
 
-    InputError: as `adjust`.
+    InputError: as `adjust`, or the steps do not come to an end.
     """
     estimate = start
     for _ in range(ROUNDS):
@@ -51,6 +52,12 @@ def adjust_robustly(seen: Observations, start: Estimate, free: Bool, prior: Prio
     scaled = kept.scaled(corner_scale, laser_scale)
     if max(corner_scale, laser_scale) > 1.0:
         solution = adjust(scaled, solution.estimate, free, prior)
+    if not solution.converged:
+        raise InputError(
+            "the adjustment does not settle: its numbers would be those of a chance moment",
+            where="calibration",
+            cure="ask for fewer distortion terms, or photograph the board at other tilts and distances",
+        )
     return Adjusted(solution, scaled, corner_scale, laser_scale, told)
 
 

@@ -88,12 +88,16 @@ def _laser_line(
         level = place[:, 2] - (1.0 - relative**2) @ estimate.warp
         normal = np.concatenate([2.0 * estimate.warp * relative / half, np.ones((len(q), 1))], axis=1) @ rotation.T
         _, by_q, _ = project(q, estimate.intrinsics, estimate.distortion)
-        by_u = np.linalg.solve(by_q, np.broadcast_to([[1.0], [0.0]], (len(q), 2, 1)))[:, :, 0]
+        fold = np.linalg.det(by_q)
+        by_u = np.column_stack([by_q[:, 1, 1], -by_q[:, 1, 0]]) / np.where(fold > 0.0, fold, np.inf)[:, None]
         facing = np.einsum("ni,ni->n", normal, point)
         level_u = np.einsum("ni,ni->n", normal[:, :2] - m[:2] * facing[:, None], by_u) / (full @ m)
-        change = level / level_u
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = np.nan_to_num(level / level_u)
         u = u - np.clip(change, -400.0, 400.0)
         u = np.clip(u, -size[0], 2.0 * size[0])
         if np.nanmax(np.abs(change), initial=0.0) < 1e-11:
             break
+    # beyond the fold of a lens, and where line and scan line run side by side, nothing was found
+    u = np.where((np.abs(change) < 1e-6) & (fold > 0.0) & (level_u != 0.0), u, np.nan)
     return np.concatenate([np.stack([u, v], axis=1), place[:, :2]], axis=1)

@@ -13,11 +13,18 @@ from analysis.calibration.estimate import unit_plane, unit_plane_jacobian
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
-from studio.project.calibration import CALIBRATION_KIND, CalibratedCamera
+from studio.project.calibration import (
+    CALIBRATION_KIND,
+    CALIBRATION_VERSION,
+    CalibratedCamera,
+    check_covariance,
+    read_calibration_file,
+)
 from studio.project.strict_json import pretty, read_object
 from studio.project.validation_messages import input_error
 
-VERSION = 1
+MOST = 1e24
+"""What a covariance may hold."""
 
 
 def file_data(result: Calibrated, size: tuple[int, int], board: str) -> dict[str, Any]:
@@ -28,9 +35,10 @@ def file_data(result: Calibrated, size: tuple[int, int], board: str) -> dict[str
     camera = {"width": size[0], "height": size[1], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
     covariance = solution.covariance
     planes = [unit_plane(m) for m in estimate.planes]
+    by_laser = {one.volume.laser: one.rms for one in result.depth}
     return {
         "kind": CALIBRATION_KIND,
-        "version": VERSION,
+        "version": CALIBRATION_VERSION,
         "board": board,
         "views": solution.estimate.rotation.shape[0],
         "camera": {**camera, "distortion": estimate.distortion.tolist()},
@@ -46,7 +54,7 @@ def file_data(result: Calibrated, size: tuple[int, int], board: str) -> dict[str
             "whiteness_p": result.whiteness.p,
             "faults": list(result.faults),
             "left_out": list(result.adjusted.left_out),
-            "depth_rms_m": [one.rms for one in result.depth],
+            "depth_rms_m": [by_laser.get(i) for i in range(len(planes))],
         },
     }
 
@@ -72,22 +80,28 @@ def write_calibration(path: Path, data: dict[str, Any]) -> None:
 
 def read_calibration(path: Path) -> tuple[CalibratedCamera, Known, dict[str, Any]]:
     """Camera, what is known of it, and the whole object. InputError: no calibration file, or a damaged one."""
-    data = read_object(path, "calibration file")
-    if data.get("kind") != CALIBRATION_KIND or "camera" not in data:
+    data = read_calibration_file(path, str(path))
+    if "camera" not in data:
         cure = "make one by main.py calibrate"
-        raise InputError("the file is no calibration", where=str(path), allowed=CALIBRATION_KIND, cure=cure)
+        raise InputError("the calibration has no camera", where=str(path), cure=cure)
     try:
         camera = CalibratedCamera.model_validate(data["camera"])
     except ValidationError as error:
         raise input_error(error, CalibratedCamera, data["camera"], str(path)) from None
-    count = 4 + len(camera.distortion)
+    count, where = 4 + len(camera.distortion), f"{path}: camera_covariance"
     try:
-        covariance = np.array(data.get("camera_covariance", np.zeros((count, count))), dtype=np.float64)
-    except (ValueError, TypeError):
+        covariance = np.array(data.get("camera_covariance"), dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
         covariance = np.empty(0)
-    if covariance.shape != (count, count):
-        where = f"{path}: camera_covariance"
-        raise InputError("not a covariance of the camera", where=where, allowed=f"{count} rows of {count} numbers")
+    if covariance.shape != (count, count) or not np.all(np.abs(covariance) <= MOST):
+        allowed = f"{count} rows of {count} numbers to {MOST:g}"
+        raise InputError("not a covariance of the camera", where=where, allowed=allowed)
+    try:
+        check_covariance(covariance, "it")
+    except ValueError as error:
+        raise InputError("not a covariance of the camera", where=where, found=str(error)) from None
+    if not np.all(np.diag(covariance) > 0.0):
+        raise InputError("not a covariance of the camera", where=where, found="a parameter without an error")
     intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
     return camera, Known(intrinsics, np.array(camera.distortion), covariance), data
 

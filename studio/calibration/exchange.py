@@ -17,6 +17,7 @@ from pydantic import ValidationError
 
 from render.base.errors import InputError
 from render.base.files import atomic_write, read_bytes
+from render.camera.camera import MAX_SIDE
 from studio.project.calibration import CalibratedCamera
 from studio.project.validation_messages import input_error
 
@@ -118,58 +119,95 @@ def read_camera(path: Path) -> CalibratedCamera:
 def _from_mrcal(text: str, path: Path) -> dict[str, Any]:
     try:
         model = ast.literal_eval("\n".join(line for line in text.splitlines() if not line.strip().startswith("#")))
-        lens, values, size = model["lensmodel"], [float(v) for v in model["intrinsics"]], model["imagersize"]
-        width, height = (int(side) for side in size)
-    except (ValueError, SyntaxError, KeyError, TypeError, RecursionError, MemoryError):
+        lens, values = model["lensmodel"], [float(v) for v in model["intrinsics"]]
+        size = [float(side) for side in model["imagersize"]]
+    except (ValueError, SyntaxError, KeyError, TypeError, OverflowError, RecursionError, MemoryError):
         raise InputError("a damaged cameramodel", where=str(path), allowed="as mrcal writes it") from None
     if lens not in MRCAL.values():
         raise InputError(
             "a lens model that is not known here", where=str(path), found=lens, allowed=", ".join(MRCAL.values())
         )
-    return _data(width, height, values, path)
+    terms = next(number for number, name in MRCAL.items() if name == lens)
+    _check_count("intrinsics", values, (4 + terms,), path)
+    return _data(size, values, path)
 
 
 def _from_kalibr(text: str, path: Path) -> dict[str, Any]:
-    model = re.search(r"^\s*distortion_model\s*:\s*(\w+)", text, re.MULTILINE)
-    kind = model[1] if model else "none"
-    if kind not in ("radtan", "none"):
-        where, allowed = str(path), "radtan or none"
-        raise InputError("a distortion model that is not known here", where=where, found=kind, allowed=allowed)
+    cameras = re.findall(r"^\s*camera_model\s*:\s*(\S+)", text, re.MULTILINE)
+    if len(cameras) != 1:
+        found, cure = f"{len(cameras)} of them", "keep the one that is meant"
+        raise InputError("not one camera", where=str(path), found=found, allowed="1", cure=cure)
+    if cameras[0] != "pinhole":  # others have other intrinsics, in another order
+        raise InputError("a camera model that is not known here", where=str(path), found=cameras[0], allowed="pinhole")
+    kind = _distortion_model(text, ("radtan", "none"), path)
     intrinsics, size = _numbers(text, "intrinsics", path), _numbers(text, "resolution", path)
-    coefficients = _numbers(text, "distortion_coeffs", path) if kind == "radtan" else []
-    if len(size) != 2:
-        raise InputError("a damaged resolution", where=str(path), allowed="[width, height]")
-    return _data(int(size[0]), int(size[1]), intrinsics + coefficients, path)
+    named = kind == "radtan" or "distortion_coeffs" in text
+    coefficients = _numbers(text, "distortion_coeffs", path) if named else []
+    _check_count("intrinsics", intrinsics, (4,), path)
+    _check_count("distortion_coeffs", coefficients, (4 if kind == "radtan" else 0,), path)
+    return _data(size, intrinsics + coefficients, path)
 
 
 def _from_matrices(text: str, path: Path) -> dict[str, Any]:
     """OpenCV and ROS: matrices as rows, cols and data."""
-    model = re.search(r"^\s*distortion_model\s*:\s*(\w+)", text, re.MULTILINE)
-    if model and model[1] not in ("plumb_bob", "rational_polynomial"):
-        where, allowed = str(path), "plumb_bob or rational_polynomial"
-        raise InputError("a distortion model that is not known here", where=where, found=model[1], allowed=allowed)
     matrix = _matrix_of(text, "camera_matrix", path)
     k = _matrix_of(text, "distortion_coefficients", path)
-    sides = [re.search(rf"^\s*image_{side}\s*:\s*(\d+)", text, re.MULTILINE) for side in ("width", "height")]
+    sides = [re.search(rf"^\s*image_{side}\s*:\s*(\d+)\s*$", text, re.MULTILINE) for side in ("width", "height")]
     if len(matrix) != 9 or sides[0] is None or sides[1] is None:
         allowed = "image_width, image_height, and camera_matrix of nine numbers"
         raise InputError("a damaged camera file", where=str(path), allowed=allowed)
+    if re.search(r"^\s*fisheye_model\s*:\s*[^0\s]", text, re.MULTILINE):
+        cure = "its coefficients mean something else; calibrate without fisheye"
+        raise InputError("a fisheye lens", where=f"{path}: fisheye_model", allowed="0", cure=cure)
+    if re.search(r"^\s*distortion_model\s*:", text, re.MULTILINE):  # ROS, which names its model
+        kind = _distortion_model(text, ("plumb_bob", "rational_polynomial"), path)
+        _check_count("distortion_coefficients", k, (4, 5) if kind == "plumb_bob" else (8,), path)
+    else:
+        _check_count("distortion_coefficients", k, (4, 5, 8, 12, 14), path)
     if matrix[1] != 0.0:
         raise InputError("a camera with skew", where=f"{path}: camera_matrix", found=matrix[1], allowed="0")
+    if matrix[3] != 0.0 or matrix[6:] != [0.0, 0.0, 1.0]:
+        where, allowed = f"{path}: camera_matrix", "[fx, 0, cx, 0, fy, cy, 0, 0, 1]"
+        raise InputError("not a camera matrix, or one by columns", where=where, found=matrix, allowed=allowed)
     k = [] if not any(k) else k
-    return _data(int(sides[0][1]), int(sides[1][1]), [matrix[0], matrix[4], matrix[2], matrix[5], *k], path)
+    return _data([float(side[1]) for side in sides if side], [matrix[0], matrix[4], matrix[2], matrix[5], *k], path)
 
 
-def _data(width: int, height: int, values: list[float], path: Path) -> dict[str, Any]:
-    if len(values) < 4:
-        raise InputError("a camera without its four intrinsics", where=str(path), found=f"{len(values)} numbers")
+def _data(size: list[float], values: list[float], path: Path) -> dict[str, Any]:
+    if len(size) != 2 or not all(1.0 <= side <= MAX_SIDE and side == int(side) for side in size):
+        raise InputError("not an image size", where=str(path), found=size, allowed="width and height, whole pixels")
     fx, fy, cx, cy, *k = values
+    width, height = (int(side) for side in size)
     return {"width": width, "height": height, "fx": fx, "fy": fy, "cx": cx, "cy": cy, "distortion": tuple(k)}
+
+
+def _distortion_model(text: str, known: tuple[str, ...], path: Path) -> str:
+    model = re.search(r"^\s*distortion_model\s*:\s*(\S+)", text, re.MULTILINE)
+    name = model[1].strip("'\"") if model else "none named"
+    if name not in known:
+        where, allowed = str(path), " or ".join(known)
+        raise InputError("a distortion model that is not known here", where=where, found=name, allowed=allowed)
+    return name
+
+
+def _check_count(name: str, values: list[float], allowed: tuple[int, ...], path: Path) -> None:
+    """A lens with other coefficients than its model has is another lens."""
+    if len(values) not in allowed:
+        counts = " or ".join(str(count) for count in allowed)
+        found = f"{len(values)} numbers"
+        raise InputError("not as many numbers as the model has", where=f"{path}: {name}", found=found, allowed=counts)
 
 
 def _matrix_of(text: str, name: str, path: Path) -> list[float]:
     block = re.search(rf"^\s*{name}\s*:(.*?)(?=^\S|\Z)", text, re.MULTILINE | re.DOTALL)
-    return _numbers(block[1], "data", path) if block else []
+    if block is None:
+        raise InputError("numbers are missing", where=f"{path}: {name}", allowed="a matrix with rows, cols and data")
+    values = _numbers(block[1], "data", path)
+    rows, cols = (re.search(rf"^\s*{side}\s*:\s*(\d{{1,6}})\s*$", block[1], re.MULTILINE) for side in ("rows", "cols"))
+    if rows is None or cols is None or int(rows[1]) * int(cols[1]) != len(values):
+        found = f"{len(values)} numbers"
+        raise InputError("not as many numbers as rows and cols say", where=f"{path}: {name}", found=found)
+    return values
 
 
 def _numbers(text: str, name: str, path: Path) -> list[float]:

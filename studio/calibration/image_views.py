@@ -57,7 +57,7 @@ class Found:
 def shots(folder: Path) -> list[Shot]:
     """By name: NAME_off and NAME_on, or NAME_off and NAME_laser0, NAME_laser1; a plain NAME is one image for both.
 
-    InputError: no folder, or none with images.
+    InputError: no folder, none with images, or two files of one name.
     """
     if not folder.is_dir():
         raise InputError("there is no such folder", where=str(folder), cure="give the folder of the photographs")
@@ -69,10 +69,13 @@ def shots(folder: Path) -> list[Shot]:
         role = ROLE.fullmatch(file.stem)
         name = role["name"] if role else file.stem
         shot = found.get(name, Shot(name, None))
-        if role is None or role["role"].lower() == "off":
-            shot = replace(shot, board=file)
-        else:
-            shot = replace(shot, lasers={**shot.lasers, int(role["laser"] or 0): file})
+        board = role is None or role["role"].lower() == "off"
+        laser = 0 if role is None else int(role["laser"] or 0)
+        other = shot.board if board else shot.lasers.get(laser)
+        if other is not None:
+            cure = "give each its own name, or move one away"
+            raise InputError(f"{other.name} and {file.name} are one photograph by name", where=str(folder), cure=cure)
+        shot = replace(shot, board=file) if board else replace(shot, lasers={**shot.lasers, laser: file})
         found[name] = shot
     return list(found.values())
 
@@ -157,7 +160,7 @@ def _with_lines(
             row = np.rint(view.pixel[:, 1 - across])
             index = np.clip(np.searchsorted(pixel[:, 1 - across], row), 0, len(pixel) - 1)
             near |= np.abs(view.pixel[:, across] - pixel[index, across]) < 10.0 + 4.0 * width
-        keep = on_board(view, board, pixel, CLEAR_WIDTHS * width + 2.0)
+        keep = on_board(view, board, pixel, CLEAR_WIDTHS * width + 2.0, settings.axis)
         if np.count_nonzero(keep) < FEWEST_POINTS:
             told.append(f"the line of laser {laser} is not on the board; only its corners are used")
             continue

@@ -17,7 +17,7 @@ def print_board(text: str, *, out: Path | None, paper: str | None, contrast: flo
     path = out or Path(f"{board_text(board).replace(':', '_')}.pdf")
     if path.suffix.lower() != ".pdf":
         raise InputError("the board is a PDF", where="--out", found=path.name, allowed="a name that ends in .pdf")
-    if path.exists() and not path.read_bytes()[:5] == b"%PDF-":
+    if path.exists() and not (path.is_file() and _begins_as_pdf(path)):
         raise InputError("another file is in the way", where=str(path), cure="choose another --out")
     taken = write_board(path, board, paper, contrast)
     if as_json:
@@ -27,3 +27,8 @@ def print_board(text: str, *, out: Path | None, paper: str | None, contrast: flo
     if not quiet:
         print(f"print it on {taken} at 100 %, check the ruler, and glue it to something flat and stiff; then:")
         print(f"  main.py calibrate scanner FOLDER --board {board_text(board)}")
+
+
+def _begins_as_pdf(path: Path) -> bool:
+    with open(path, "rb") as file:
+        return file.read(5) == b"%PDF-"

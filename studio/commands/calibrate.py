@@ -66,6 +66,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     from studio.commands.commands import load_project
 
     options = CalibrateOptions(**given)
+    _check_options(what, options)
     board, truth = parse_board(options.board), None
     known = _known(options) if what == "laser" else None
     with stage_progress(quiet or as_json) as progress:
@@ -92,19 +93,19 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
             raise InputError("not known what to calibrate", where="calibrate", found=what, allowed=allowed)
         _check_size(material, options)
         progress("adjustment", 0.0)
-        result = calibrate(
-            material.views,
-            board.target,
-            Request(
-                material.size,
-                material.lasers,
-                None if options.lens == "auto" else int(options.lens),
-                nearest=options.nearest,
-                farthest=options.farthest,
-                most_tilt=float(np.radians(options.most_tilt)),
-                known=known,
-            ),
+        request = Request(
+            material.size,
+            material.lasers,
+            None if options.lens == "auto" else int(options.lens),
+            nearest=options.nearest,
+            farthest=options.farthest,
+            most_tilt=float(np.radians(options.most_tilt)),
+            known=known,
         )
+        try:
+            result = calibrate(material.views, board.target, request)
+        except InputError as error:
+            raise _with_faults(error, material) from None
         progress("adjustment", 1.0)
     data = file_data(result, material.size, board_text(board))
     write_calibration(out, data)
@@ -125,8 +126,8 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
         _print(result, material, true, options, quiet)
         for file in files:
             print(f"wrote {file}")
-    for error in material.errors:
-        print(f"error: {error}", file=sys.stderr)
+    for fault in material.errors:
+        print(f"error: {fault}", file=sys.stderr)
     return len(material.errors)
 
 
@@ -148,6 +149,32 @@ def _photographed(what: str, folder: Path, options: CalibrateOptions, progress: 
             cure="name pairs NAME_on and NAME_off, or hold the board where the line crosses it",
         )
     return Material(list(found.views), found.size, lasers if with_lasers else 0, found.errors, found.notes)
+
+
+def _with_faults(error: InputError, material: Material) -> InputError:
+    """The same with the files that were left aside: they may be why there is too little."""
+    if not material.errors:
+        return error
+    files = "\n".join(("photographs that were not used:", *material.errors))
+    cure = f"{error.cure}\n{files}" if error.cure else files
+    return InputError(error.what, where=error.where, found=error.found, allowed=error.allowed, cure=cure)
+
+
+def _check_options(what: str, options: CalibrateOptions) -> None:
+    """InputError: options that contradict each other, or that would go unheard."""
+    if options.nearest is not None and options.farthest is not None and options.farthest <= options.nearest:
+        allowed = f"beyond --nearest, {options.nearest:g} m"
+        raise InputError(
+            "not beyond the nearest distance", where="--farthest", found=f"{options.farthest:g} m", allowed=allowed
+        )
+    if what != "laser" and options.camera is not None:
+        cure = "calibrate laser FOLDER --camera FILE holds a camera that is known"
+        raise InputError(
+            "a known camera is for the laser alone", where="--camera", found=f"calibrate {what}", cure=cure
+        )
+    if what == "laser" and options.lens != "auto":
+        cure = "leave --lens out"
+        raise InputError("the known camera has its lens", where="--lens", found=options.lens, cure=cure)
 
 
 def _board(options: CalibrateOptions) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -9,8 +10,10 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from analysis.triangulate import CALIBRATION
+from render.base.errors import InputError
 from render.base.model import Model, quantity
 from render.camera.camera import DISTORTION_LENGTHS, MAX_SIDE, Camera, Coefficient
+from studio.project.strict_json import brief, read_object
 
 Entry = Annotated[float, Field(ge=-1e24, le=1e24)]
 SIZES = tuple(len(CALIBRATION) + terms for terms in DISTORTION_LENGTHS)
@@ -19,7 +22,7 @@ Covariance = Annotated[tuple[Row, ...], Field(min_length=SIZES[0], max_length=SI
 Component = Annotated[float, Field(ge=-1e6, le=1e6)]
 Plane = tuple[Component, Component, Component, Component]
 
-CALIBRATION_KIND = "blazer-calibration"
+CALIBRATION_KIND, CALIBRATION_VERSION = "blazer-calibration", 1
 """What a calibration file says of itself."""
 ROUNDING = 1e-9
 """Of the largest variances: what asymmetry and negative variances of a printed matrix may amount to."""
@@ -87,14 +90,7 @@ class Calibration(Model):
         for i, rows in enumerate(matrices):
             if len(rows) not in SIZES or any(len(row) != len(rows) for row in rows):
                 raise ValueError(f"covariance {i} has {len(rows)} rows; allowed: a square matrix of {SIZES} rows")
-            matrix = np.array(rows)
-            spread = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-            scale = np.outer(spread, spread) + np.finfo(float).tiny
-            if np.any(np.abs(matrix - matrix.T) > ROUNDING * scale):
-                raise ValueError(f"covariance {i} is not symmetric; allowed: a matrix equal to its transpose")
-            related = matrix / np.where(scale > ROUNDING * np.finfo(float).tiny, scale, 1.0)
-            if np.linalg.eigvalsh(np.where(np.abs(matrix) > 0.0, related, 0.0)).min() < -len(rows) * ROUNDING:
-                raise ValueError(f"covariance {i} has negative variances; allowed: a positive semi-definite matrix")
+            check_covariance(np.array(rows), f"covariance {i}")
         return matrices
 
     @model_validator(mode="after")
@@ -129,6 +125,30 @@ class Calibration(Model):
             matrices.append(np.array(rows) * np.outer(by, by))
         covariances = tuple(tuple(tuple(row) for row in matrix.tolist()) for matrix in matrices)
         return self.model_copy(update={"covariances": covariances})
+
+
+def check_covariance(matrix: NDArray[np.float64], name: str) -> None:
+    """(n, n). ValueError: not symmetric, or not positive semi-definite."""
+    spread = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    scale = np.outer(spread, spread) + np.finfo(float).tiny
+    if np.any(np.abs(matrix - matrix.T) > ROUNDING * scale):
+        raise ValueError(f"{name} is not symmetric; allowed: a matrix equal to its transpose")
+    related = matrix / np.where(scale > ROUNDING * np.finfo(float).tiny, scale, 1.0)
+    if np.linalg.eigvalsh(np.where(np.abs(matrix) > 0.0, related, 0.0)).min() < -len(matrix) * ROUNDING:
+        raise ValueError(f"{name} has negative variances; allowed: a positive semi-definite matrix")
+
+
+def read_calibration_file(path: Path, where: str) -> dict[str, Any]:
+    """The JSON object of a calibration file. InputError: none, or of a later version."""
+    data = read_object(path, "calibration file")
+    if data.get("kind") != CALIBRATION_KIND:
+        cure = "make one by main.py calibrate"
+        raise InputError("the file is no calibration", where=where, allowed=CALIBRATION_KIND, cure=cure)
+    version = data.get("version")
+    if version != CALIBRATION_VERSION or isinstance(version, bool):
+        found, allowed = brief(version), str(CALIBRATION_VERSION)
+        raise InputError("a calibration of another version", where=where, found=found, allowed=allowed)
+    return data
 
 
 def from_file_data(data: dict[str, Any]) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from render.scene.shape import MeshFile
 from render.sensor.sensor import Sensor
-from studio.project.calibration import CALIBRATION_KIND, Calibration, from_file_data
+from studio.project.calibration import Calibration, from_file_data, read_calibration_file
 from studio.project.migrations import migrate
 from studio.project.strict_json import parse_object, pretty, read_object
 from studio.project.templates import DESCRIPTIONS, template_folder
@@ -60,7 +60,12 @@ class Project(Model):
         if given not in (0, lasers):
             what = "covariances" if found.covariances else "planes"
             raise ValueError(f"calibration has {given} {what}; allowed: none, or {lasers}, one for each laser")
-        terms = len(found.camera_of(self.scene.camera).distortion)
+        camera = self.scene.camera
+        if found.camera is not None and (found.camera.width, found.camera.height) != (camera.width, camera.height):
+            # photographs cut or scaled have another principal point, and a covariance of other pixels
+            theirs, own = (f"{one.width} x {one.height}" for one in (found.camera, camera))
+            raise ValueError(f"calibration.camera is of {theirs} px; allowed: {own} px, as the scene's camera")
+        terms = len(found.camera_of(camera).distortion)
         for i, rows in enumerate(found.covariances):
             if len(rows) not in (8, 8 + terms):
                 raise ValueError(f"calibration.covariances[{i}] has {len(rows)} rows; allowed: 8 or {8 + terms}")
@@ -188,11 +193,7 @@ class Project(Model):
 def _read_calibration(project: Path, name: str) -> dict[str, Any]:
     """What a project takes over from the calibration file that it names. InputError: it is none."""
     where = f"{project}: calibration"
-    data = read_object(inside(project.parent, name, where), "calibration file")
-    if data.get("kind") != CALIBRATION_KIND:
-        cure = "make one by main.py calibrate"
-        raise InputError("the file is no calibration", where=where, found=name, allowed=CALIBRATION_KIND, cure=cure)
-    return from_file_data(data)
+    return from_file_data(read_calibration_file(inside(project.parent, name, where), f"{where} {name!r}"))
 
 
 def _there(key: str | int, node: Any, place: str) -> Any:

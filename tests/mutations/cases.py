@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
+from tests.mutations.calibration_cases import calibration
 from tests.mutations.image_cases import image
 from tests.mutations.option_cases import option, preferences, recovery
 from tests.mutations.place_cases import place_of_file
@@ -27,17 +28,18 @@ KINDS: dict[str, Callable[[Sources, Path, Random, bool], list[str]]] = {
     "preferences": preferences,
     "recovery": recovery,
     "report": report,
+    "calibration": calibration,
 }
 WEIGHTS = {
-    "project": 24, "mesh": 18, "texture": 7, "image": 13, "frame": 6, "sidecar": 8, "manifest": 6, "place": 5,
-    "option": 9, "preferences": 2, "recovery": 1.5, "report": 0.5,
+    "project": 24, "mesh": 16, "texture": 7, "image": 11, "frame": 6, "sidecar": 8, "manifest": 6, "place": 5,
+    "option": 9, "preferences": 2, "recovery": 1.5, "report": 0.5, "calibration": 4,
 }  # fmt: skip
 """Percent of the cases."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """argv: of the program, run in `folder`; or `preferences`, `recovery`, `import`: functions of the window."""
+    """argv: of the program, run in `folder`; or one of FUNCTIONS in `fork.py`, without a command."""
 
     kind: str
     seed: int

@@ -17,6 +17,7 @@ from typing import Any
 
 import main
 from render.base.errors import InputError
+from studio.calibration.exchange import read_camera
 from studio.project.autosave import find, sweep
 from studio.project.mesh_import import import_mesh
 from studio.runtime.preferences import PreferencesFile
@@ -139,5 +140,14 @@ def _import(*argv: str) -> None:
         sys.exit(2)
 
 
-FUNCTIONS = {"preferences": _preferences, "recovery": _recovery, "import": _import}
+def _camera(*argv: str) -> None:
+    """A camera in the format of others."""
+    try:
+        read_camera(Path(argv[-1]))
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+FUNCTIONS = {"preferences": _preferences, "recovery": _recovery, "import": _import, "camera": _camera}
 """What the window does without a command line."""

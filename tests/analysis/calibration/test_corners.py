@@ -100,3 +100,5 @@ def test_the_line_is_taken_between_the_edges_of_squares() -> None:
     middle = 0.25 * (truth[0] + truth[1] + truth[9] + truth[10])
     edge, off = 0.5 * (truth[0] + truth[9]) + [3.0, 0.0], truth[0] - 30.0
     np.testing.assert_array_equal(on_board(view, CHECKERS, np.array([middle, edge, off]), 5.0), [True, False, False])
+    upper = 0.5 * (truth[0] + truth[1]) + [0.0, 3.0]
+    np.testing.assert_array_equal(on_board(view, CHECKERS, np.array([edge, upper]), 5.0, "columns"), [True, False])

@@ -14,6 +14,8 @@ from analysis.calibration.estimate import unit_plane
 from analysis.line.result import Line
 from main import cli
 from render.base.errors import InputError
+from studio.calibration.calibration_file import read_calibration
+from studio.calibration.image_views import shots
 from studio.project.project import Project
 from studio.scan.stages import triangulate_line
 from tests.studio.calibration.photographed_boards import BOARD, scanner, write_folder
@@ -95,6 +97,9 @@ def test_a_bad_photograph_is_named_and_the_rest_goes_on(tmp_path: Path) -> None:
         (["camera", "nowhere", "--board", BOARD], "no such folder"),
         (["camera", ".", "--board", "chess:3"], "not a board"),
         (["laser", ".", "--board", BOARD], "needs a camera"),
+        (["camera", ".", "--board", BOARD, "--camera", "camera.json"], "laser alone"),
+        (["laser", ".", "--board", BOARD, "--camera", "camera.json", "--lens", "5"], "has its lens"),
+        (["camera", ".", "--board", BOARD, "--nearest", "1", "--farthest", "0.5"], "not beyond"),
         (["everything", ".", "--board", BOARD], "not known what to calibrate"),
     ],
 )
@@ -131,6 +136,47 @@ def test_points_of_a_calibrated_project_are_off_by_as_much_as_they_tell(tmp_path
         found.append((told.depth_z - truth.depth_z) / told.sigma_depth_systematic)
     # all points share a few errors: the mean square is at most as uncertain as one squared normal number
     assert 1e-3 < np.mean(np.square(found)) < 9.0
+
+
+def test_where_nothing_can_be_found_the_bad_photographs_are_named_too(tmp_path: Path) -> None:
+    write_folder(tmp_path, scanner(2), pairs=False)
+    (tmp_path / "broken.png").write_bytes(b"no image")
+    code, told = run("calibrate", "camera", str(tmp_path), "--board", BOARD, "--lens", "4")
+    assert code == 2
+    message = told["error"]["message"]
+    assert "too few views" in message and "broken.png" in message and "not an image" in message
+
+
+@pytest.mark.parametrize("second", ["pose_off.tif", "pose.png", "POSE_off.png"])
+def test_two_files_that_are_one_photograph_by_name_are_not_taken_for_each_other(second: str, tmp_path: Path) -> None:
+    for name in ("pose_off.png", second):
+        (tmp_path / name).write_bytes(b"")
+    if second.startswith("POSE"):
+        assert len(shots(tmp_path)) == 2
+        return
+    with pytest.raises(InputError, match="one photograph by name"):
+        shots(tmp_path)
+
+
+def file_of(covariance: list[list[float]]) -> dict[str, object]:
+    camera = {"width": 640, "height": 512, "fx": 900.0, "fy": 900.0, "cx": 320.0, "cy": 256.0, "distortion": []}
+    return {"kind": "blazer-calibration", "version": 1, "camera": camera, "camera_covariance": covariance}
+
+
+def test_a_known_camera_has_a_whole_covariance(tmp_path: Path) -> None:
+    path, good = tmp_path / "camera.json", np.diag([1.0, 1.0, 0.5, 0.5]).tolist()
+    path.write_text(json.dumps(file_of(good)))
+    assert read_calibration(path)[1].covariance[0, 0] == 1.0
+    wrong: list[object] = [np.diag([1.0, 1.0, 0.5, -0.5]).tolist(), np.zeros((4, 4)).tolist(), np.eye(3).tolist()]
+    wrong += [(np.eye(4) + np.eye(4, k=1)).tolist(), (np.eye(4) + 2.0 * np.eye(4)[::-1]).tolist(), None, "x"]
+    for covariance in wrong:
+        path.write_text(json.dumps(file_of(good) | {"camera_covariance": covariance}))
+        with pytest.raises(InputError, match="not a covariance"):
+            read_calibration(path)
+    for version in (2, "1", None, True):
+        path.write_text(json.dumps(file_of(good) | {"version": version}))
+        with pytest.raises(InputError, match="another version"):
+            read_calibration(path)
 
 
 def test_a_project_names_only_calibration_files(tmp_path: Path) -> None:

@@ -64,6 +64,61 @@ def test_a_lens_that_a_format_does_not_have_is_refused(tmp_path: Path) -> None:
     assert set(TERMS) == set(WRITERS)
 
 
+OPENCV = (
+    "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
+    "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+    "   data: [500., 0., 320., 0., 501., 240., 0., 0., 1.]\n"
+    "distortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 4\n   dt: d\n   data: [-0.1, 0.1, 0., 0.]\n"
+)
+ROS = OPENCV.replace("%YAML:1.0\n---\n", "distortion_model: plumb_bob\n")
+KALIBR = (
+    "cam0:\n  camera_model: pinhole\n  intrinsics: [500.0, 501.0, 320.0, 240.0]\n  distortion_model: radtan\n"
+    "  distortion_coeffs: [-0.1, 0.1, 0.0, 0.0]\n  resolution: [640, 480]\n"
+)
+MRCAL = (
+    "{'lensmodel': 'LENSMODEL_OPENCV4', 'intrinsics': [500.0, 501.0, 320.0, 240.0, -0.1, 0.1, 0.0, 0.0],"
+    " 'imagersize': [640, 480]}"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new"),
+    [
+        (KALIBR, "pinhole", "omni"),  # its intrinsics begin with xi
+        (KALIBR, "[500.0,", "[0.9, 500.0,"),
+        (KALIBR, "radtan", "none"),
+        (KALIBR, "  distortion_model: radtan\n", ""),
+        (KALIBR, "0.1, 0.0, 0.0]", "0.1]"),
+        (KALIBR, "640", "nan"),
+        (KALIBR, "640", "inf"),
+        (KALIBR, "640", "640.5"),
+        (KALIBR, "500.0", "nan"),
+        (KALIBR, "cam0:", "cam0:\n  camera_model: pinhole\ncam1:"),
+        (MRCAL, "OPENCV4", "OPENCV8"),
+        (MRCAL, "LENSMODEL_OPENCV4", "LENSMODEL_PINHOLE"),
+        (MRCAL, "640", "1e999"),
+        (MRCAL, "640", "640.5"),
+        (MRCAL, "500.0", "1" + 400 * "0"),
+        (OPENCV, "distortion_coefficients", "distortion"),
+        (OPENCV, "[-0.1, 0.1, 0., 0.]", "[-0.1, 0.1, 0.]"),
+        (OPENCV, "cols: 4", "cols: 5"),
+        (OPENCV, "320., 0., 501., 240., 0., 0.", "0., 0., 501., 0., 320., 240."),
+        (OPENCV, "---\n", "---\nfisheye_model: 1\n"),
+        (OPENCV, "image_width: 640", "image_width: 640.5"),
+        (ROS, "plumb_bob", "rational_polynomial"),
+        (ROS, "plumb_bob", "equidistant"),
+    ],
+)
+def test_a_camera_of_another_kind_is_not_read_as_ours(text: str, old: str, new: str, tmp_path: Path) -> None:
+    path = tmp_path / "camera"
+    path.write_text(text)
+    assert read_camera(path).fy == 501.0
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=str(path)):
+        read_camera(path)
+
+
 @pytest.mark.parametrize(
     "text",
     [

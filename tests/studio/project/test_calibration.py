@@ -85,6 +85,17 @@ def test_every_laser_has_one_or_none_has() -> None:
         Project.from_data(data)
 
 
+def test_a_camera_of_another_image_size_is_refused() -> None:
+    """Half the size is another covariance, and a cut image has another principal point."""
+    data = Project.load("plane").model_dump(mode="json")
+    names = ("width", "height", "fx", "fy", "cx", "cy")
+    camera = {name: data["scene"]["rig"]["camera"][name] for name in names}
+    assert Project.from_data(data | {"calibration": {"camera": camera}}).calibration.camera is not None
+    for change in ({"width": camera["width"] // 2, "height": camera["height"] // 2}, {"height": camera["height"] - 8}):
+        with pytest.raises(InputError, match="as the scene's camera"):
+            Project.from_data(data | {"calibration": {"camera": camera | change}})
+
+
 def test_a_saved_project_keeps_it_bit_for_bit() -> None:
     project = with_covariance(random_covariance(3))
     assert Project.from_text(project.to_text()) == project
