@@ -9,7 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from render.base.arrays import Float32
+import numpy as np
+
+from render.base.arrays import Float, Float32
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,24 @@ class Importance:
     peaks: tuple[Float32, ...] = ()
     """For each laser (h, w) weight of its own light: of a run of CELL pixels along a row, the sum of weight and error
     is at most 1 where no peak appears or vanishes by it."""
+    allowed: float = 1.0
+    """Deviation of a line that such a sum of 1 stands for, over the line's own sigma: the share of the goal that
+    reflected light has, and ambient light."""
+    direct: float = 1.0
+    """The share that direct light has, likewise over the line's own sigma."""
+
+    def line_deviations(self, laser: int, deviation: Float32) -> Float:
+        """(h, w) standard deviations of independent pixels of a laser's light -> (lines,) those of the lines that it
+        moves, over their own sigma."""
+        weight = self.laser[laser]
+        axis = 1 if self.axis == "rows" else 0
+        lit = np.any(weight != 0.0, axis=axis)
+        variance = np.sum(np.square(weight * deviation, dtype=np.float64), axis=axis)
+        return np.asarray(self.allowed * np.sqrt(variance[lit]))
 
 
+LINES_KNOWN = 0.95
+"""Share of the lines that a goal is met for: a few about bright corners or hidden edges would keep all others waiting.
+What is told of them all is the deviation that so many are below."""
 CELL = 4
 """Pixels; about as many as peaks are looked for with."""

@@ -170,3 +170,18 @@ class GroupQuality:
         allowance = 0.9 if self.group == "ambient" else 1.0
         done = self.group == "direct" or self.work >= allowance * self.most
         return "work" if done else "unfinished"
+
+
+def line_noise(quality: tuple[GroupQuality, ...]) -> dict[str, float]:
+    """By each laser's name what the noise of all light so far adds to the line measured in it, over the line's own
+    sigma: in all but the worst lines, and a little more than that, as the worst of one light are not those of another.
+    Infinite: of some light it is not known, as its goal is that of the image. Empty: nothing was rendered for a line.
+    """
+    if not any(one.of == "line" for one in quality):
+        return {}
+    found = {}
+    for name in dict.fromkeys(one.laser for one in quality if one.laser is not None):
+        seen = [one for one in quality if one.laser in (name, None)]
+        known = all(one.of == "line" and math.isfinite(one.error) for one in seen)
+        found[name] = math.hypot(*(one.error for one in seen)) if known else math.inf
+    return found

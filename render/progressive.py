@@ -20,7 +20,7 @@ from render.base.threads import Cancel
 from render.frame import Axis, Frame, LaserCurve
 from render.laser_direct.light_group import QUICK_ERROR
 from render.light_group import LightGroup, chosen_plan, has_work
-from render.products import PRODUCTS, QUICK, ambient_look, expected_plan
+from render.products import AIMED, PRODUCTS, QUICK, ambient_look, expected_plan
 from render.run import Run, never
 from render.scan_plan import ScanPlan
 from render.scene.scene import Scene
@@ -97,6 +97,9 @@ def frames(
     with clock.stage("exact line", 0):
         frame = replace(frame, curves=_curves(placed, axis, run.threads))
     shown, waiting = frame, [product for product in products if has_work(product, scene, settings)]
+    if goal is not None:
+        last = max(i for i, product in enumerate(waiting) if product.group == "direct")
+        waiting.insert(last + 1, AIMED)
     for i, product in enumerate(waiting):
         with clock.stage(product.stage, product.work(scene, settings)) as report:
             later = sum(other.parts(scene) for other in waiting[i + 1 :])
@@ -121,9 +124,11 @@ def frames(
 
 
 def aimed_later(later: Products, product: LightGroup[Any]) -> bool:
-    """Light is to come whose errors matter more in some places than in others, and no more of this one's group."""
-    groups = [other.group for other in later]
-    return product.group not in groups and ("indirect" in groups or "ambient" in groups)
+    """Light is to come whose errors matter more in some places than in others, and what this one adds is there."""
+    if product == AIMED:
+        return False
+    groups = [other.group for other in later if other != AIMED]
+    return product.group not in groups and (AIMED in later or "indirect" in groups or "ambient" in groups)
 
 
 def _begun(run: Run) -> Run:

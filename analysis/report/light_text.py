@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from render.plan import GroupQuality, Plan, ThinLens, TransportStep
+from render.importance import LINES_KNOWN
+from render.plan import GroupQuality, Plan, ThinLens, TransportStep, line_noise
 
 LIGHT = {
     ("direct", "direct"): "light of each laser that meets one surface, exact across the sheet, sampled across edges "
@@ -44,8 +45,13 @@ def plan_lines(plan: Plan) -> list[str]:
 
 
 def quality_lines(quality: tuple[GroupQuality, ...]) -> list[tuple[str, str]]:
-    """Name and quality of every light group that has begun."""
-    return [(group_name(one), quality_text(one)) for one in quality]
+    """Name and quality of every light group that has begun, and what the errors of all of them do to the line."""
+    lines = [(group_name(one), quality_text(one)) for one in quality]
+    for laser, noise in line_noise(quality).items():
+        told = f"moves {LINES_KNOWN:.0%} of the rows by at most {noise:.2g} sigma"
+        told = told if math.isfinite(noise) else "how far it moves the line is not known"
+        lines.append((f"{laser}, noise of all light", told))
+    return lines
 
 
 def stage_note(stage: str, quality: tuple[GroupQuality, ...]) -> str:
@@ -71,7 +77,8 @@ def quality_text(quality: GroupQuality) -> str:
         parts.append(f"{known}, goal {quality.target:.2g}{' out of reach' if quality.out_of_reach else ''}")
         if quality.image_error is not None and math.isfinite(quality.image_error):
             end = "" if quality.image_target is None else f", which ends it at {quality.image_target:.0%}"
-            parts.append(f"image error {quality.image_error:.0%}{end}")
+            places = 2 if quality.group == "direct" else 0
+            parts.append(f"image error {quality.image_error:.{places}%}{end}")
         if quality.coarse_error is not None:
             parts.append(f"elsewhere interpolated to {quality.coarse_error:.1%}")
     elif not math.isnan(quality.error):

@@ -19,6 +19,7 @@ from render.ambient.transport_plan import (
     plan_of,
 )
 from render.frame import Estimate, Frame
+from render.importance import Importance
 from render.light_group import LightGroup, Shares
 from render.plan import GroupQuality, TransportStep
 from render.run import Run
@@ -87,22 +88,22 @@ class AmbientLight(LightGroup[AmbientPlan]):
             run.leave(self.field, placed.world, made_of, image)
 
         for image in replace(run, part="ambient").until_over(images):
-            yield Estimate(image.radiance, (quality_of(image, settings),))
+            yield Estimate(image.radiance, (quality_of(image, settings, importance),))
 
 
-def quality_of(image: AmbientImage, settings: RenderSettings) -> GroupQuality:
-    """How well the ambient light is known; its error is not, after a single sample."""
+def quality_of(image: AmbientImage, settings: RenderSettings, importance: Importance | None = None) -> GroupQuality:
+    """How well the ambient light is known; its error is not, after a single sample. importance: where errors matter."""
     clamped = settings.clamp is not None
-    goal = None if image.coarse_error is None else settings.goal
+    allowed = None if importance is None or image.coarse_error is None else importance.allowed
     return GroupQuality(
         "ambient",
         None,
-        image.error if goal is None else image.error * goal.depth,
-        settings.ambient_error if goal is None else goal.depth,
+        image.error if allowed is None else image.error * allowed,
+        settings.ambient_error if allowed is None else allowed,
         image.samples,
         "samples a pixel",
         settings.ambient_samples,
-        of="image" if goal is None else "line",
+        of="image" if allowed is None else "line",
         invalid=image.invalid,
         clamped=image.clamped if clamped else None,
         clamped_radiance=image.clamped_radiance if clamped else None,

@@ -23,7 +23,7 @@ from render.ambient.integrator import CONVERGENCE
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
 from render.base.arrays import Float, Int
-from render.importance import Importance
+from render.importance import LINES_KNOWN, Importance
 from render.run import Run
 
 MARGIN = 1.3
@@ -35,8 +35,6 @@ AROUND = 3
 interpolation."""
 REACH = 2
 """Pixels on each side over which variances are averaged."""
-LINES_KNOWN = 0.95
-"""Share of the scan lines that are known at least as well as is told."""
 FAR = 4.0
 """Times the samples that are allowed: with as many foreseen, lines are still known to about twice the goal."""
 PILOT, GROWTH, PASSES = 2, 4.0, 12

@@ -11,7 +11,6 @@ from render.ambient.coarse_image import CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
 from render.ambient.line_samples import (
     FAR,
-    LINES_KNOWN,
     PILOT,
     Band,
     band_of,
@@ -22,7 +21,7 @@ from render.ambient.line_samples import (
 from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
-from render.importance import Importance
+from render.importance import LINES_KNOWN, Importance
 from render.run import Run
 from render.world.placed import PlacedScene
 

@@ -83,6 +83,8 @@ class DirectImage:
     """Number of camera rays."""
     invalid: int
     """Number of contributions that were NaN, infinite or negative, and count as 0."""
+    deviation: Float32
+    """(h, w) estimated standard error of each pixel, W/(m^2 sr)."""
 
 
 def direct_image(
@@ -144,7 +146,10 @@ def direct_image(
             wanted = grade_neighbours(wanted, cells, pixels, camera.width)
         if relative <= target or np.array_equal(wanted, cells):
             invalid = sum(task.invalid) + write_pixels(pixels, task.mean, image)
-            return DirectImage(image.reshape(camera.height, camera.width), relative, count, samples, invalid)
+            deviation = np.zeros_like(image)
+            write_pixels(pixels, task.error, deviation)
+            shape = camera.height, camera.width
+            return DirectImage(image.reshape(shape), relative, count, samples, invalid, deviation.reshape(shape))
         left *= 0.5
 
 

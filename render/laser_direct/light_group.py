@@ -6,18 +6,23 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from render.frame import Estimate, Frame
+from render.importance import LINES_KNOWN, Importance
 from render.laser_direct.integrator import DirectImage, direct_image
 from render.light_group import LightGroup, Shares
 from render.plan import GroupPlan, GroupQuality, TransportStep
 from render.run import Run
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
-from render.world.placed import PlacedScene
+from render.world.placed import PlacedLaser, PlacedScene
 from render.world.world import World
 
 QUICK_ERROR = 0.05
 """Relative error of a first frame, and of the direct light that a pilot's errors are compared with."""
+FINER, ROUNDS, FINEST = 4.0, 4, 1e-5
+"""Most by which a round makes the target finer where the lines ask for it, rounds, and the finest target."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +31,8 @@ class DirectLight(LightGroup[GroupPlan]):
 
     quick: bool = False
     """Render to `QUICK_ERROR` only, for a first frame."""
+    aimed: bool = False
+    """Render until the lines are known well enough, by what the frame says of where errors matter."""
 
     group = "direct"
     field = "laser_direct"
@@ -39,6 +46,8 @@ class DirectLight(LightGroup[GroupPlan]):
 
     def work(self, scene: Scene, settings: RenderSettings) -> float:
         """Estimated rays: four a pixel for a line that covers a twentieth of the image, more for a finer target."""
+        if self.aimed:
+            return 0.0
         pixels, target = scene.camera.width * scene.camera.height, self._target(settings)
         return 0.2 * pixels * len(scene.lasers) * (1.0 + 0.2 * math.log2(max(1.0, QUICK_ERROR / target)))
 
@@ -49,9 +58,14 @@ class DirectLight(LightGroup[GroupPlan]):
         images, count, target = [], len(placed.lasers), self._target(settings)
         for i, laser in enumerate(placed.lasers):
             part = run.between(i / count, (i + 1) / count).shifted(i)
-            images.append(direct_image(*laser, target=target, run=part))
+            if self.aimed and frame.importance is not None:
+                images.append(known_lines(laser, target, frame.importance, i, part))
+            else:
+                images.append(direct_image(*laser, target=target, run=part))
+        importance = frame.importance if self.aimed else None
         quality = [
-            quality_of(laser.name, image, settings) for laser, image in zip(placed.scene.lasers, images, strict=True)
+            quality_of(laser.name, image, settings, importance, i)
+            for i, (laser, image) in enumerate(zip(placed.scene.lasers, images, strict=True))
         ]
         yield Estimate(tuple(image.radiance for image in images), tuple(quality))
 
@@ -59,15 +73,45 @@ class DirectLight(LightGroup[GroupPlan]):
         return QUICK_ERROR if self.quick else settings.laser_error
 
 
-def quality_of(laser: str, image: DirectImage, settings: RenderSettings) -> GroupQuality:
-    """How well one laser's direct light is known; its target is that of the last image, not of a quick one."""
+def known_lines(placed: PlacedLaser, target: float, importance: Importance, laser: int, run: Run) -> DirectImage:
+    """The image whose lines are known as well as direct light's share of the goal asks, to the target at least; or the
+    finest that edges allow. Raises Cancelled."""
+    image = direct_image(*placed, target=target, run=run)
+    for _ in range(ROUNDS):
+        over = line_deviation(image, importance, laser) / importance.direct
+        target = min(target, image.error)
+        if over <= 1.0 or target <= FINEST:
+            break
+        target = max(target / min(1.1 * over, FINER), FINEST)
+        finer = direct_image(*placed, target=target, run=run)
+        divided, image = finer.samples > image.samples, finer
+        if not divided:
+            break
+    return image
+
+
+def line_deviation(image: DirectImage, importance: Importance, laser: int) -> float:
+    """By how much the error of the image moves `LINES_KNOWN` of the lines at most, over their own sigma."""
+    deviations = importance.line_deviations(laser, image.deviation)
+    return float(np.quantile(deviations, LINES_KNOWN)) if len(deviations) else 0.0
+
+
+def quality_of(
+    laser: str, image: DirectImage, settings: RenderSettings, importance: Importance | None = None, index: int = 0
+) -> GroupQuality:
+    """How well one laser's direct light is known; its target is that of the last image, not of a quick one.
+
+    importance: where errors of the light of laser number `index` matter, once the line is the goal.
+    """
     return GroupQuality(
         "direct",
         laser,
-        image.error,
-        settings.laser_error,
+        image.error if importance is None else line_deviation(image, importance, index),
+        settings.laser_error if importance is None else importance.direct,
         image.samples,
         "samples",
+        of="image" if importance is None else "line",
+        image_error=None if importance is None else image.error,
         invalid=image.invalid,
         lit_pixels=image.pixels,
     )

@@ -108,6 +108,11 @@ class Accumulator:
         return math.inf if self.line is None else self.line.error(self.weight)
 
     @property
+    def line_deviation(self) -> float:
+        """The estimate of it, of which `line_error` is an upper bound."""
+        return math.inf if self.line is None else self.line.deviation(self.weight)
+
+    @property
     def next_weight(self) -> float:
         """Weight of each pass of the next wave."""
         return float(self.growth**WAVE_WEIGHT_EXPONENT)

@@ -75,8 +75,8 @@ class IndirectImage:
     """Pixels of passes that the clamp lowered."""
     clamped_radiance: float = 0.0
     """Radiance that the clamp took away, mean over the image."""
-    line_error: float = math.inf
-    """Deviation of the measured line over the allowed one; infinite: not known."""
+    line_deviation: float = math.inf
+    """Estimated deviation of the measured line over the allowed one; infinite: not known."""
     out_of_reach: bool = False
     """The line's goal would have taken far more paths than that of the image, or than are allowed."""
 
@@ -141,7 +141,7 @@ def indirect_images(
     low, high, reach = visible_fan_range(world, laser, T_world_laser)
     shape = (camera.height, camera.width)
     if high <= low:
-        yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0, line_error=0.0)
+        yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0, line_deviation=0.0)
         return
     waves = Waves(BdptPass.of(placed, reach, run.seed, kinds), camera, run)
     time_is_over = run.time_is_over(left)
@@ -155,7 +155,7 @@ def indirect_images(
         counts = so_far.paths, round(so_far.invalid), round(so_far.clamped)
         clamped_radiance = so_far.clamped_radiance / so_far.weight / so_far.total.size
         return IndirectImage(
-            so_far.radiance(shape), so_far.error, *counts, clamped_radiance, so_far.line_error, given_up()
+            so_far.radiance(shape), so_far.error, *counts, clamped_radiance, so_far.line_deviation, given_up()
         )
 
     def given_up() -> bool:

@@ -17,7 +17,7 @@ from render.light_group import LightGroup, Shares
 from render.plan import GroupQuality, TransportStep
 from render.run import Run
 from render.scene.scene import Scene
-from render.scene.settings import DepthGoal, RenderSettings
+from render.scene.settings import RenderSettings
 from render.world.placed import PlacedScene
 from render.world.world import World
 
@@ -79,8 +79,8 @@ class IndirectLight(LightGroup[IndirectPlan]):
                 run=part,
             ):
                 images[i] = image.radiance
-                goal = None if aim is None else settings.goal
-                quality[i:] = [quality_of(laser.laser.name, image, settings, goal, frame.laser_direct[i])]
+                allowed = None if aim is None else aim.importance.allowed
+                quality[i:] = [quality_of(laser.laser.name, image, settings, allowed, frame.laser_direct[i])]
                 yield Estimate(tuple(images), tuple(quality))
 
 
@@ -98,22 +98,25 @@ def _aim(laser: int, images: list[Float32], frame: Frame, run: Run) -> Aim | Non
 
 
 def quality_of(
-    laser: str, image: IndirectImage, settings: RenderSettings, goal: DepthGoal | None, direct: Float32
+    laser: str, image: IndirectImage, settings: RenderSettings, allowed: float | None, direct: Float32
 ) -> GroupQuality:
-    """How well one laser's indirect light is known, and what share of its direct light it is."""
+    """How well one laser's indirect light is known, and what share of its direct light it is.
+
+    allowed: deviation that it may add to a line, over the line's own sigma; None: its goal is the image.
+    """
     clamped = settings.laser_clamp is not None
     known = float(direct.sum(dtype=np.float64))
     return GroupQuality(
         "indirect",
         laser,
-        image.error if goal is None else image.line_error * goal.depth,
-        settings.indirect_error if goal is None else goal.depth,
+        image.error if allowed is None else image.line_deviation * allowed,
+        settings.indirect_error if allowed is None else allowed,
         image.paths,
         "light paths",
         settings.light_paths,
-        of="image" if goal is None else "line",
-        image_error=None if goal is None else image.error,
-        image_target=None if goal is None else settings.indirect_error,
+        of="image" if allowed is None else "line",
+        image_error=None if allowed is None else image.error,
+        image_target=None if allowed is None else settings.indirect_error,
         out_of_reach=image.out_of_reach,
         invalid=image.invalid,
         clamped=image.clamped if clamped else None,

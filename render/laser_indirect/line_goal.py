@@ -15,9 +15,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
+from scipy.special import gammaincinv
 
 from render.base.arrays import Float, Float32
-from render.importance import CELL, Importance
+from render.importance import CELL, LINES_KNOWN, Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 
 Int = NDArray[np.int64]
@@ -27,11 +28,11 @@ Weigh = Callable[[Float32], Importance]
 POOLED = 25
 """Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one. In the
 first wave neighbours, later those that were known alike before: a few bad ones would else speak for all about them."""
-MARGIN = 2.5
-"""On the deviation that a few passes tell: rare bright paths are in few of them, and narrow lines move unevenly."""
-UNMET = 0.03
-"""Share of the lit scan lines that may miss the goal as far as passes tell: those about a bright corner would keep all
-others waiting. MARGIN and this were tuned on the weld seam at a quarter, so that in truth one line in twenty misses."""
+CONFIDENCE = 0.95
+"""That the deviation is as small as the goal asks, before the render ends. A rare bright path is in the sums of many
+lines, so that all of them together may have no more degrees of freedom than one."""
+UNMET = 1.0 - LINES_KNOWN
+"""Share of the lit scan lines that may miss the goal."""
 FAR = 8.0
 """Times the light paths after which the render ends in any case: more of them put the goal out of reach. Guided by it
 the variance falls sooner than the first passes say, as much as tenfold where rows glitter."""
@@ -111,6 +112,8 @@ class LineErrors:
     waves: int = 0
     measured: float = 0.0
     """What the waves add to the variance whose spread was taken, in that of a pass of unit size and weight."""
+    squares: float = 0.0
+    """The sum of the squares of what each wave adds, over the degrees of freedom of its spread."""
     all_waves: float = 0.0
     """The same of all waves; some were projected onto other weights."""
     out_of_reach: bool = False
@@ -163,13 +166,25 @@ class LineErrors:
         self.moved += pooled_alike(moved, self.alone, lit) if self.waves else pooled(moved, lit)
         self.alone = self.alone + moved
         self.waves, self.measured, self.all_waves = self.waves + 1, self.measured + share, self.all_waves + share
+        self.squares += share**2 / (passes - 1)
         if len(self.projection.peaks):
             touched = np.flatnonzero(np.any([buffer.touched for buffer in buffers], axis=0))
             rises = np.stack([self.projection.rises(buffer.image, touched) for buffer in buffers])
             self.risen[touched] += (weight**2 * passes * np.var(rises, axis=0, ddof=1)).astype(np.float32)
 
+    @property
+    def margin(self) -> float:
+        """What the deviation is at most, over that which passes tell, with `CONFIDENCE`: by chi-square with the
+        degrees of freedom of the waves' spreads, weighed as they are (Welch 1947; Satterthwaite 1946)."""
+        freedom = self.measured**2 / self.squares
+        return math.sqrt(0.5 * freedom / float(gammaincinv(0.5 * freedom, 1.0 - CONFIDENCE)))
+
     def error(self, weights: float) -> float:
-        """Deviation over the allowed one of all scan lines but the share UNMET; weights: sum over all passes."""
+        """Deviation that the lines have at most, with `CONFIDENCE`, over the allowed one; as `deviation`."""
+        return self.margin * self.deviation(weights) if self.measured else math.inf
+
+    def deviation(self, weights: float) -> float:
+        """Estimated deviation, over the allowed one, of all lines but the share UNMET; weights: sum over all passes."""
         if not self.measured:
             return math.inf
         scale = self.all_waves / self.measured / weights**2
@@ -177,7 +192,7 @@ class LineErrors:
         if len(self.risen):
             np.maximum.at(rows, self.projection.block_row, self.risen.max(axis=1))
         worst = max(_all_but_unmet(self.moved[self.projection.lit]), _all_but_unmet(rows))
-        return MARGIN * math.sqrt(scale * worst)
+        return math.sqrt(scale * worst)
 
     def judge(self, error: float, image_error: float, paths: int, most: float) -> None:
         """Whether the goal is out of reach, from how far it and that of the image are exceeded after so many light
@@ -208,7 +223,7 @@ class LineErrors:
             "line_moved": self.moved,
             "line_alone": self.alone,
             "line_risen": self.risen,
-            "line_numbers": np.array([self.waves, self.measured, self.all_waves, self.out_of_reach]),
+            "line_numbers": np.array([self.waves, self.measured, self.squares, self.all_waves, self.out_of_reach]),
         }
 
     @classmethod
@@ -217,10 +232,11 @@ class LineErrors:
         weight, peaks, moved = arrays["line_weight"], arrays["line_peaks"], arrays["line_moved"]
         axis: Literal["rows", "columns"] = "rows" if len(moved) == len(weight) else "columns"
         importance = Importance((weight,), weight, axis, (peaks,) if peaks.size else ())
-        waves, measured, all_waves, out_of_reach = arrays["line_numbers"].tolist()
+        waves, measured, squares, all_waves, out_of_reach = arrays["line_numbers"].tolist()
         found = cls.of(importance, 0)
         found.moved, found.alone, found.risen = moved.copy(), arrays["line_alone"].copy(), arrays["line_risen"].copy()
         found.waves, found.measured, found.all_waves = int(waves), measured, all_waves
+        found.squares = squares
         found.out_of_reach = bool(out_of_reach)
         return found
 

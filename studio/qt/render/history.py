@@ -49,7 +49,11 @@ def describe(render: Render) -> str:
     parts = [f"{width} x {height}" + (f", {small}" if small else "")]
     if render.scan is not None:
         parts.insert(0, f"step {render.frame.step + 1} of {render.scan.count}")
-    errors = [one.error for one in render.frame.quality if one.group == "direct"]
+    errors = [
+        one.error if one.image_error is None else one.image_error
+        for one in render.frame.quality
+        if one.group == "direct"
+    ]
     if errors:
         parts.append(f"laser {max(errors):.2%}")
     ambient = render.frame.quality_of("ambient")

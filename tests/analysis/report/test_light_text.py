@@ -9,7 +9,7 @@ from typing import get_args
 import pytest
 
 from analysis.report.light_text import plan_lines, quality_lines, quality_text, sentences, stage_note
-from render.plan import GroupQuality, Plan, Reason, ThinLens, TransportStep
+from render.plan import GroupQuality, Plan, Reason, ThinLens, TransportStep, line_noise
 from render.products import expected_plan
 from render.scene.lights import Environment
 from render.scene.settings import RenderSettings
@@ -114,3 +114,12 @@ def test_light_for_what_is_measured_tells_scan_lines_and_what_is_interpolated():
     told = "noise moves the line by 0.083 sigma, goal 0.1, elsewhere interpolated to 4.1%"
     assert quality_text(measured) == f"{told}, 0.2 of 16 samples"
     assert quality_text(replace(measured, error=math.nan)).startswith("line not known, goal 0.1, elsewhere")
+
+
+def test_what_all_light_does_to_the_line_is_told_by_the_root_of_the_sum_of_squares() -> None:
+    lines = [replace(one, of="line", error=error) for one, error in ((DIRECT, 0.03), (INDIRECT, 0.04), (AMBIENT, 0.12))]
+    assert line_noise(tuple(lines)) == {"red": pytest.approx(0.13)}
+    assert quality_lines(tuple(lines))[-1] == ("red, noise of all light", "moves 95% of the rows by at most 0.13 sigma")
+    # of light whose goal was given up for that of its image nobody knows
+    assert "not known" in quality_lines((*lines[:2], AMBIENT))[-1][1]
+    assert line_noise((DIRECT, INDIRECT, AMBIENT)) == {}

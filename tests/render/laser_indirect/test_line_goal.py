@@ -8,7 +8,7 @@ import pytest
 from render.importance import CELL, Importance
 from render.laser_indirect.connection_buffer import PassBuffer
 from render.laser_indirect.integrator import empty_buffer
-from render.laser_indirect.line_goal import MARGIN, Effect, LineErrors, Projection
+from render.laser_indirect.line_goal import Effect, LineErrors, Projection
 
 HEIGHT, WIDTH = 200, 64
 LINE = slice(28, 36)
@@ -47,7 +47,24 @@ def test_the_error_is_that_of_the_mean_of_all_passes(common: float) -> None:
     mean = np.sqrt(one * 4.0 * (1 + 1 + 4 + 16)) / weights
     # waves of weight 1, 1, 4, 16 give a line 5.3 degrees of freedom; of the 13 at the end of a ranking, the fewest that
     # are taken together, the deviation is known to 8.5 %. The error is that of nearly the worst line: three times that.
-    assert mean < errors.error(weights) / MARGIN < mean * 1.26
+    assert mean < errors.deviation(weights) < mean * 1.26
+
+
+def test_the_bound_on_the_deviation_holds_as_often_as_it_says() -> None:
+    """Of waves whose passes all lines have in common, so that they are no better known together than one."""
+    rng, weight, held, trials = np.random.default_rng(6), np.linspace(-1.0, 1.0, 8), 0, 400
+    buffers = [empty_buffer(HEIGHT * WIDTH) for _ in range(4)]
+    for _ in range(trials):
+        errors, weights = LineErrors.of(importance(), 0), 0.0
+        for size in (1, 1, 2):
+            for buffer in buffers:
+                buffer.image.reshape(HEIGHT, WIDTH)[:, LINE] = rng.standard_normal() * weight / np.sqrt(size)
+            errors.add(buffers, weight=float(size), size=float(size))
+            weights += 4.0 * size
+        true = np.sum(weight**2) * np.sqrt(4.0 * (1 + 1 + 4 / 2)) / weights
+        held += errors.error(weights) > true
+    # Satterthwaite's degrees of freedom are an approximation, good to a percent or two
+    assert abs(held / trials - 0.95) < 3.0 * np.sqrt(0.95 * 0.05 / trials) + 0.02
 
 
 def test_a_few_bad_lines_do_not_speak_for_those_about_them() -> None:
@@ -77,8 +94,8 @@ def test_light_that_few_passes_hold_counts_for_all_lines_that_it_may_meet() -> N
             buffer.touched[:] = True
         errors.add(buffers, 1.0, 1.0)
     # variance of a pass p (1 - p) 100^2 with p = 0.01, of the mean of 12 of them; pooled over 25 lines three times
-    expected = MARGIN * 100.0 * np.sqrt(0.01 * 0.99 / 12.0)
-    assert 0.8 * expected < errors.error(12.0) < 2.5 * expected
+    expected = 100.0 * np.sqrt(0.01 * 0.99 / 12.0)
+    assert 0.8 * expected < errors.deviation(12.0) < 2.5 * expected
 
 
 def test_a_goal_is_out_of_reach_far_beyond_where_the_render_ends() -> None:
@@ -105,7 +122,9 @@ def test_waves_of_before_count_by_those_that_were_measured() -> None:
             later.add(buffers, 1.0, 1.0)
         weights += 4.0
     assert later.all_waves == all_of_them.all_waves == 16.0
-    assert later.error(weights) == pytest.approx(all_of_them.error(weights), rel=0.15)
+    assert later.deviation(weights) == pytest.approx(all_of_them.deviation(weights), rel=0.15)
+    # half of the waves are known to half of the degrees of freedom
+    assert later.margin > all_of_them.margin
 
 
 def test_a_bright_dot_where_a_peak_could_appear_is_an_error() -> None:
@@ -119,7 +138,7 @@ def test_a_bright_dot_where_a_peak_could_appear_is_an_error() -> None:
     errors = LineErrors.of(importance(peaks=0.1), 0)
     errors.add(buffers, 1.0, 1.0)
     # one of four passes has all of it: the deviation of the mean is the mean itself
-    assert errors.error(4.0) == pytest.approx(MARGIN * 0.1 * 80.0 / 4.0, rel=1e-6)
+    assert errors.deviation(4.0) == pytest.approx(0.1 * 80.0 / 4.0, rel=1e-6)
 
 
 def test_what_a_checkpoint_keeps_gives_the_same_error() -> None:

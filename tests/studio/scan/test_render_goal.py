@@ -63,11 +63,17 @@ def test_a_weight_says_how_far_light_moves_a_row_over_the_allowed(world: World) 
     rows = np.flatnonzero(before.flag[:, 0] == 0)[::4]
     assert len(rows) > 20
     columns = np.rint(before.u[rows, 0]).astype(int) + 1
-    light = frame.laser_direct[0].copy()
-    more = 0.01 * light[rows, columns]
-    light[rows, columns] += more
-    after = line_in(wide, replace(frame, laser_direct=(light,)))
-    moved = (after.u - before.u)[rows, 0] / (0.1 * before.sigma_u[rows, 0])
+    more = 0.01 * frame.laser_direct[0][rows, columns]
+    moves = []
+    for sign in (1.0, -1.0):
+        light = frame.laser_direct[0].copy()
+        light[rows, columns] += sign * more
+        after = line_in(wide, replace(frame, laser_direct=(light,)))
+        moves.append(sign * (after.u - before.u)[rows, 0] / (0.1 * before.sigma_u[rows, 0]))
+    # where either sign makes the fit choose between one line and two there is no derivative
+    smooth = np.abs(moves[0] - moves[1]) < 0.5 * np.maximum(np.abs(moves[0]), np.abs(moves[1]))
+    assert smooth.mean() >= 0.95
+    rows, columns, more, moved = rows[smooth], columns[smooth], more[smooth], np.mean(moves, axis=0)[smooth]
     # the closed form is that of a Gaussian on an even background: at the seam some rows are neither
     told = found.laser[0][rows, columns] * more
     alike = np.isclose(told, moved, rtol=0.1, atol=0.02 * np.abs(moved).max())
@@ -89,7 +95,7 @@ def test_the_goal_is_reached_in_nineteen_rows_of_twenty(world: World) -> None:
     for seed in range(SEEDS):
         run = Run(seed=1000 + seed, threads=2)
         *_, last = indirect_images(placed.lasers[0], target=1e-4, most_paths=1 << 22, aim=aim, run=run)
-        assert last.line_error <= 1.0
+        assert last.line_deviation <= 1.0
         images.append(last.radiance)
     lines = [line_in(project, replace(frame, laser_indirect=(image,))) for image in images]
     reference = line_in(project, replace(frame, laser_indirect=(np.mean(images, axis=0, dtype=np.float32),)))
