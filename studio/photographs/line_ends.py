@@ -55,7 +55,7 @@ def ended(line: Line) -> Line:
 def _seen(line: Line, rows: NDArray[np.intp], k: int) -> Floats:
     """Amplitudes (m,) of a line's scan lines; a saturated one's is the least that saturates: the fit's is a guess."""
     amplitude, saturated = line.amplitude[rows, k], line.flag[rows, k] == Flag.SATURATED
-    return np.where(saturated, amplitude[saturated].min(initial=np.inf), amplitude)
+    return np.asarray(np.where(saturated, amplitude[saturated].min(initial=np.inf), amplitude))
 
 
 def _past(rows: NDArray[np.intp], u: Floats, width: Floats, amplitude: Floats) -> NDArray[np.bool_]:
