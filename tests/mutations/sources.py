@@ -18,7 +18,7 @@ from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, template_folder
 from tests.mutations.images import Image
 
-VERSIONS = Path(__file__).resolve().parents[1] / "studio" / "projects"
+VERSIONS = Path(__file__).resolve().parents[1] / "studio" / "project" / "projects"
 WIDTH = 48
 MEASURES = [
     {"name": "step", "kind": "step", "regions": [[-0.2, -0.01], [0.01, 0.2]], "nominal": 0.0, "upper": 0.001},
