@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.study.intervals import LEVEL, mean_interval
+from analysis.study.intervals import student
 from render.base.arrays import Float
 
 Measured = Mapping[float, Float]
@@ -128,7 +128,8 @@ def _bracket(search: Search, measured: Measured) -> tuple[float | None, float | 
 
 def _breaks(search: Search, repeats: Float) -> bool:
     """A run that measures nothing at all breaks any limit."""
-    mean = mean_interval(repeats).mean
+    found = repeats[np.isfinite(repeats)]
+    mean = float(found.mean()) if len(found) else math.nan
     return not (mean <= search.limit if search.above else mean >= search.limit)
 
 
@@ -160,8 +161,6 @@ def _across(search: Search, good: float, bad: float) -> list[float]:
 
 def _crossing(search: Search, measured: Measured, good: float, bad: float) -> tuple[float, float, float]:
     """Place of the limit with its interval, from a parabola through all repeats about the bracket."""
-    from scipy.stats import t
-
     reach = 0.5 * (bad - good) * (1.0 + 1e-9)
     pairs = [
         (search.place(value), one)
@@ -180,7 +179,7 @@ def _crossing(search: Search, measured: Measured, good: float, bad: float) -> tu
     grid = np.linspace(max(0.0, centre - width), min(1.0, centre + width), 4001)
     rows = np.vander((grid - centre) / width, 3, increasing=True)
     curve = rows @ solution
-    half = t.ppf(0.5 + LEVEL / 2.0, freedom) * np.sqrt(variance * np.einsum("ij,jk,ik->i", rows, inverse, rows))
+    half = student(freedom) * np.sqrt(variance * np.einsum("ij,jk,ik->i", rows, inverse, rows))
     middle = float(grid[np.argmin(np.abs(curve))])
     inside = np.flatnonzero(np.abs(curve) <= half)
     if len(inside) == 0:

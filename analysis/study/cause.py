@@ -2,31 +2,61 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
+LOST = 0.02
+"""Of the rows, lost to one symptom more than before."""
+STEEPER = 2.0
+"""Times that the cosine of the angle of incidence has shrunk where a surface is grazed."""
+COARSER = 1.5
+"""Times that the depth of one pixel has grown where camera and laser hardly see from two sides."""
 WIDER = 1.5
-"""A line so many times as wide as before is out of focus, or grazed."""
-DIMMER = 0.5
+"""A line so many times as wide as before is out of focus, or too wide."""
+DIMMER = 2.0
 
 
 def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
     """Names what changed most between two runs' measures.
 
-    Each symptom is the fraction of rows that it takes, more than before; the largest names the cause. Where no row is
-    lost, the line itself says why it is measured worse: it is wider, or dimmer.
+    Each symptom is the fraction of rows that it takes, more than before; the largest names the cause. A surface seen or
+    lit at grazing angles loses its rows to that, whatever their symptom, unless they are hidden. Where no row is lost,
+    depth may be coarse though the line is exact; else the line itself says why it is measured worse: it is wider, which
+    also loses rows or tears the peak, or dimmer. A measure that is not known has not changed.
     """
     symptoms = {
-        "occluded": good["visible_rows"] - bad["visible_rows"],
-        "starved": bad["no_peak_rows"] - good["no_peak_rows"],
-        "saturated": bad["saturated_rows"] - good["saturated_rows"],
-        "wrong peak": bad["wrong_rows"] - good["wrong_rows"] + bad["false_rows"] - good["false_rows"],
-        "not measurable": bad["unmeasured_rows"] - good["unmeasured_rows"],
+        "occluded": _less(good, bad, "visible_rows"),
+        "starved": _less(bad, good, "no_peak_rows"),
+        "saturated": _less(bad, good, "saturated_rows"),
+        "wrong peak": _less(bad, good, "wrong_rows") + _less(bad, good, "false_rows"),
+        "not measurable": _less(bad, good, "unmeasured_rows"),
     }
-    worst = max(symptoms, key=lambda name: symptoms[name] if symptoms[name] == symptoms[name] else -1.0)
-    if symptoms[worst] > 0.02:
+    worst = max(symptoms, key=lambda name: symptoms[name])
+    if symptoms[worst] <= LOST:
+        worst = "less precise"
+    if worst == "occluded":
         return worst
-    if bad["line_width"] > WIDER * good["line_width"]:
-        return "out of focus or grazing"
-    if bad["signal"] < DIMMER * good["signal"]:
+    if math.cos(good.get("incidence", 0.0)) > STEEPER * math.cos(bad.get("incidence", 0.0)):
+        return "grazing"
+    if worst in ("starved", "saturated"):
+        return worst
+    coarser = _times(good, bad, "depth_per_pixel")
+    if worst == "less precise" and coarser > max(COARSER, _times(good, bad, "position_rmse")):
+        return "degenerate"
+    if _times(good, bad, "line_width") > WIDER:
+        return "out of focus or too wide"
+    if worst != "wrong peak" and _times(bad, good, "signal") > DIMMER:
         return "starved"
-    return "less precise"
+    return worst
+
+
+def _less(a: Mapping[str, float], b: Mapping[str, float], name: str) -> float:
+    """a - b."""
+    difference = a.get(name, math.nan) - b.get(name, math.nan)
+    return difference if math.isfinite(difference) else 0.0
+
+
+def _times(before: Mapping[str, float], after: Mapping[str, float], name: str) -> float:
+    """How much it has grown, as a factor."""
+    first, second = before.get(name, math.nan), after.get(name, math.nan)
+    return second / first if first > 0.0 and math.isfinite(second) else 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -29,8 +30,6 @@ def mean_interval(values: Float) -> Interval:
 
     Source: Student (1908), Biometrika 6, 1; exact for normal repeats.
     """
-    from scipy.stats import t
-
     found = np.asarray(values, dtype=np.float64)
     found = found[np.isfinite(found)]
     if len(found) == 0:
@@ -38,5 +37,13 @@ def mean_interval(values: Float) -> Interval:
     mean = float(found.mean())
     if len(found) == 1:
         return Interval(mean, float("nan"), float("nan"), 1)
-    half = float(t.ppf(0.5 + LEVEL / 2.0, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    half = student(len(found) - 1) * float(found.std(ddof=1) / np.sqrt(len(found)))
     return Interval(mean, mean - half, mean + half, len(found))
+
+
+@lru_cache(maxsize=4096)
+def student(freedom: int) -> float:
+    """Half the width of a 95 % interval in standard errors, by degrees of freedom."""
+    from scipy.stats import t
+
+    return float(t.ppf(0.5 + LEVEL / 2.0, freedom))

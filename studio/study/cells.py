@@ -32,17 +32,25 @@ class Cell:
     point: Point
     method: str
     repeat: int
-    project: Project
-    """With the point's values, the method and the repeat's seed."""
+    seed: int
+    varied: Project
+    """With the point's values; shared by its methods and repeats."""
     key: str
     """Names the measurement by what decides it: the same in every study, shard and machine."""
     render_key: str
     """Cells with the same one differ only in sensor, laser power or method."""
 
+    @property
+    def project(self) -> Project:
+        """With the point's values, the method and the repeat's seed."""
+        extraction = self.varied.extraction.model_copy(update={"method": self.method})
+        changed = self.varied.model_copy(update={"extraction": extraction, "seed": self.seed})
+        return changed.in_folder(self.varied.folder)
+
     def part_key(self, study: Study) -> str:
         """Cells with the same one belong to one shard: those of a render, or of a bisection, which needs its own."""
         sweep = study.sweeps[self.sweep]
-        return _digest([sweep.name, self.method]) if sweep.sampling == "bisection" else self.render_key
+        return _hashed(_words([sweep.name, self.method])) if sweep.sampling == "bisection" else self.render_key
 
 
 @dataclass(frozen=True)
@@ -105,11 +113,14 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
         varied = with_fields(base, values, where)
         if state is not None:
             varied = in_state(varied, str(state))
-        for method, repeat in itertools.product(methods_of(study, sweep), range(study.repeats)):
-            extraction = varied.extraction.model_copy(update={"method": method})
-            seed = (varied.seed + repeat) % (MAX_SEED + 1)
-            project = varied.model_copy(update={"extraction": extraction, "seed": seed}).in_folder(base.folder)
-            yield Cell(number, point, method, repeat, project, *_keys(project, study.image_scale))
+        names = _Names(varied.in_folder(base.folder), study.image_scale)
+        seeds = [(varied.seed + repeat) % (MAX_SEED + 1) for repeat in range(study.repeats)]
+        shared = [names.render_key(seed) for seed in seeds] if varied.render.goal is None else None
+        for method, (repeat, seed) in itertools.product(methods_of(study, sweep), enumerate(seeds)):
+            key = names.key(method, seed)
+            yield Cell(
+                number, point, method, repeat, seed, names.project, key, key if shared is None else shared[repeat]
+            )
 
 
 def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Shard = WHOLE) -> list[Cell]:
@@ -166,19 +177,38 @@ def _repeats(
     return np.array([rows[cell.key][limit.measure] for cell in cells], dtype=np.float64)
 
 
-def _keys(project: Project, image_scale: float) -> tuple[str, str]:
-    """Of a cell, and of the render that it shares: with none where light is rendered for what one sensor measures."""
-    data = project.model_dump(mode="json")
-    del data["name"], data["schema_version"]
-    whole = _digest({**data, "image_scale": image_scale})
-    if project.render.goal is not None:
-        return whole, whole
-    sensor, extraction = data.pop("sensor"), data.pop("extraction")
-    del sensor
-    for laser in data["scene"]["rig"]["lasers"]:
-        laser["power"] = laser["power"] > 0.0  # light is scaled; a laser that is off leaves none to scale
-    return whole, _digest({**data, "axis": extraction["axis"], "image_scale": image_scale})
+class _Names:
+    """Keys of a point's cells. What the point decides is put into words once: a study may have a million cells."""
+
+    def __init__(self, project: Project, image_scale: float) -> None:
+        self.project = project
+        data = {**project.model_dump(mode="json"), "image_scale": image_scale}
+        del data["name"], data["schema_version"]
+        self.extraction = data["extraction"]
+        self.whole = {name: _words(value) for name, value in data.items()}
+        lasers = [{**one, "power": one["power"] > 0.0} for one in data["scene"]["rig"]["lasers"]]
+        rig = {**data["scene"]["rig"], "lasers": lasers}  # light is scaled; a laser that is off leaves none to scale
+        self.light = {**self.whole, "scene": _words({**data["scene"], "rig": rig})}
+        self.light["axis"] = _words(self.extraction["axis"])
+        del self.light["sensor"], self.light["extraction"]
+
+    def key(self, method: str, seed: int) -> str:
+        extraction = _words({**self.extraction, "method": method})
+        return _hashed(_object({**self.whole, "extraction": extraction, "seed": _words(seed)}))
+
+    def render_key(self, seed: int) -> str:
+        """Of a render without a goal: with one, light is rendered for what one sensor measures."""
+        return _hashed(_object({**self.light, "seed": _words(seed)}))
 
 
-def _digest(data: Any) -> str:
-    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:32]
+def _words(data: Any) -> str:
+    return json.dumps(data, sort_keys=True)
+
+
+def _object(parts: Mapping[str, str]) -> str:
+    """The words of an object, from those of its fields."""
+    return "{" + ", ".join(f'"{name}": {parts[name]}' for name in sorted(parts)) + "}"
+
+
+def _hashed(words: str) -> str:
+    return hashlib.sha256(words.encode()).hexdigest()[:32]

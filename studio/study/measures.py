@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.error import Errors
-from analysis.line.result import Flag, Line
+from analysis.line.result import Flag, Line, positioned
 from analysis.triangulate import Points
+from render.frame import LaserCurve
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,13 @@ MEASURES: dict[str, Measure] = {
     "visible_rows": Measure("rows on which the line can be seen", "%", 100.0),
     "signal": Measure("peak, median", "e-"),
     "line_width": Measure("line width, median sigma", "px"),
+    "depth_per_pixel": Measure("depth of one pixel, median", "µm/px", 1e6),
+    "incidence": Measure("angle from the surface's normal, to light or camera, median", "°", 180.0 / np.pi),
 }
 
 
-def measures(line: Line, points: Points, errors: Errors) -> dict[str, float]:
-    """One number for each of MEASURES, NaN where there is none."""
+def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> dict[str, float]:
+    """One number for each of MEASURES, NaN where there is none. curve: the exact line of the same laser."""
     rows = len(line.u)
     first = line.flag[:, 0]
     visible = max(errors.truth_rows, 1)
@@ -70,10 +73,12 @@ def measures(line: Line, points: Points, errors: Errors) -> dict[str, float]:
         "autocorrelation": errors.depth_z.autocorrelation,
         "no_peak_rows": float(np.mean(first == Flag.NO_PEAK)),
         "saturated_rows": float(np.mean(first == Flag.SATURATED)),
-        "unmeasured_rows": float(np.mean(first > Flag.NO_PEAK)),
+        "unmeasured_rows": float(np.mean(~positioned(first) & (first != Flag.NO_PEAK))),
         "visible_rows": errors.truth_rows / rows,
         "signal": _median(line.amplitude[found]),
         "line_width": _median(line.width[found]),
+        "depth_per_pixel": _median(np.abs(points.gradient[points.valid, 2])),
+        "incidence": _median(np.maximum(curve.laser_angle, curve.camera_angle)),
     }
 
 

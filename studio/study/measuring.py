@@ -54,7 +54,7 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
             line = extract(image, settings=project.extraction, threads=1)
             extracted = time.process_time()
             points = triangulate(line)
-            found = measures(line, points, compare(points, frame))
+            found = measures(line, points, compare(points, frame), frame.curves[task.laser])
         except InputError as error:
             rows.append((key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
             continue

@@ -66,7 +66,7 @@ def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows:
         said = {"sweep": sweep.name, "key": cell.key, "method": cell.method, "repeat": cell.repeat}
         for name, column in columns.items():
             if name == "seed":
-                column.append(cell.project.seed)
+                column.append(cell.seed)
             else:
                 column.append(said[name] if name in said else values.get(name) if name in fields else row.get(name))
         for name, column in times.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 
@@ -31,23 +32,24 @@ SHAPES: dict[str, Callable[[float, float], float]] = {
 }
 
 
-@pytest.mark.parametrize("noise", [0.02, 0.1])
-@pytest.mark.parametrize("shape", SHAPES)
-def test_the_interval_holds_a_known_boundary_in_95_percent_of_cases(shape: str, noise: float) -> None:
-    random = np.random.default_rng(5)
-    trials, held, cells = 200, 0, 0
-    search = Search(0.0, 1.0, 1.0, tolerance=0.002)
-    for _ in range(trials):
-        boundary = random.uniform(0.15, 0.85)
-        found, measured = searched(
-            search,
-            lambda v: SHAPES[shape](v, boundary) + noise * random.standard_normal(REPEATS),  # noqa: B023
-        )
-        held += found.low <= boundary <= found.high
-        cells += len(measured)
-    # 3.5 standard deviations of a binomial about 95 %
-    assert abs(held / trials - 0.95) < 3.5 * math.sqrt(0.95 * 0.05 / trials)
-    assert cells / trials <= 1.0 / search.tolerance / 5.0
+def test_the_interval_holds_a_known_boundary_in_93_to_97_percent_of_cases() -> None:
+    search, trials = Search(0.0, 1.0, 1.0, tolerance=0.002), 200
+    coverages, cells = [], 0
+    for shape, noise in itertools.product(SHAPES.values(), (0.02, 0.1)):
+        random, held = np.random.default_rng(5), 0
+        for _ in range(trials):
+            boundary = random.uniform(0.15, 0.85)
+            found, measured = searched(
+                search,
+                lambda v: shape(v, boundary) + noise * random.standard_normal(REPEATS),  # noqa: B023
+            )
+            held += found.low <= boundary <= found.high
+            cells += len(measured)
+        coverages.append(held / trials)
+    # 3.5 standard deviations of a binomial about 95 %; 2 % are 3.7 of all 1600 cases
+    assert all(abs(one - 0.95) < 3.5 * math.sqrt(0.95 * 0.05 / trials) for one in coverages)
+    assert 0.93 <= np.mean(coverages) <= 0.97
+    assert cells / trials / len(coverages) <= 1.0 / search.tolerance / 5.0
 
 
 @pytest.mark.parametrize("logarithmic", [False, True])

@@ -20,7 +20,7 @@ GOOD = {
         ({"wrong_rows": 0.2, "false_rows": 0.2, "saturated_rows": 0.3}, "wrong peak"),
         ({"visible_rows": 0.4}, "occluded"),
         ({"unmeasured_rows": 0.5}, "not measurable"),
-        ({"line_width": 4.0}, "out of focus or grazing"),
+        ({"line_width": 4.0}, "out of focus or too wide"),
         ({"signal": 100.0}, "starved"),
         ({}, "less precise"),
     ],
