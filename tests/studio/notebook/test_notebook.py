@@ -45,7 +45,8 @@ class TestTheSevenLines:
         exec(lines.replace("error=0.01", f"error=0.01, image_scale={SCALE}"), told)
         assert 0.0 < told["errors"].depth_z.rmse < 5e-3
         assert told["errors"].completeness > 0.9
-        assert told["frame"].quality[0].error <= told["frame"].quality[0].target == 0.01
+        direct = told["frame"].quality[0]
+        assert direct.image_error <= 0.01 and direct.of == "line" and direct.error <= direct.target
         assert told["line"].u.shape == told["line"].sigma_u.shape == told["line"].flags.shape
         assert "Weld seam" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
@@ -116,7 +117,8 @@ class TestTheSevenLines:
 class TestWhatAFrameKnows:
     def test_the_quality_of_every_light_group_is_data(self, frame: blazer.RenderedFrame) -> None:
         direct, ambient = frame.quality
-        assert (direct.group, direct.laser, direct.target) == ("direct", "laser", frame.project.render.laser_error)
+        assert (direct.group, direct.laser, direct.of) == ("direct", "laser", "line")
+        assert direct.image_error is not None and direct.image_error <= frame.project.render.laser_error
         assert direct.reached == (direct.error <= direct.target) and direct.work > 0
         assert (ambient.group, ambient.laser, ambient.unit) == ("ambient", None, "samples a pixel")
 

@@ -15,6 +15,7 @@ from studio.qt.render.render_panel import RenderPanel
 from studio.runtime.jobs import State
 from studio.scan.compare import compare, resampled
 from studio.scan.redevelop import develop_again, development
+from studio.scan.render_goal import goal_of
 from tests.studio.qt.small_session import small_project, small_render, small_session
 
 
@@ -59,7 +60,8 @@ def test_the_image_refines_until_it_is_the_final_one(qtbot, panel):
     assert seen[0] == (1, False) and seen[-1] == (1, True) and len(seen) >= 5
     project = small_project()
     world, _ = small_render()
-    whole = render_world(world, project.scene, settings=project.render, run=Run(seed=project.seed))
+    run = Run(seed=project.seed, goal=goal_of(project))
+    whole = render_world(world, project.scene, settings=project.render, run=run)
     assert np.array_equal(session.shown.frame.laser_direct[0], whole.laser_direct[0])
     assert "error" in panel.errors.text() and panel.start_button.isVisible()
 
