@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import subprocess
 import sys
@@ -161,8 +162,10 @@ def test_no_test_is_lost_unseen() -> None:
 def test_the_project_in_the_readme_is_a_project() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```json\n(.*?)```", readme, re.DOTALL)
-    assert len(blocks) == 1
-    assert Project.from_text(blocks[0]).scene.frame_count == 5
+    whole, measures = blocks
+    assert Project.from_text(whole).scene.frame_count == 5
+    measured = Project.from_data(json.loads(whole) | json.loads(f"{{{measures}}}"))
+    assert [one.kind for one in measured.measures] == ["step"]
 
 
 def test_every_command_in_the_readme_exists() -> None:
