@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
@@ -23,7 +24,8 @@ def start(
     """Camera, poses and planes from corners and laser points; size (width, height) px.
 
     known: intrinsics (4,) and distortion of a camera that is calibrated already.
-    InputError: too few views; the views do not determine the camera; a laser is on fewer than two boards.
+    InputError: too few views; the views do not determine the camera; a laser is on fewer than two boards, or its
+    lines are too short for a plane.
     """
     if known is None:
         known = _camera(views, size, terms)
@@ -102,10 +104,19 @@ def _plane(views: Sequence[View], estimate: Estimate, laser: int) -> Float:
     for _ in range(100):
         pair = np.isin(number, rng.choice(np.unique(number), 2, replace=False))
         some = points[pair]
+        if len(some) < 3:  # a single point of either line: no plane
+            continue
         middle = some.mean(axis=0)
         normal = np.linalg.svd(some - middle, full_matrices=False)[2][2]
         away = float(np.median(np.abs((points - middle) @ normal)))
         offset = float(normal @ middle)
         if away < best[0] and abs(offset) > 1e-6:
             best = (away, normal / offset)
+    if not math.isfinite(best[0]):
+        raise InputError(
+            f"the lines of laser {laser} on the board are in no plane",
+            found=f"{len(points)} points in {len(np.unique(number))} views",
+            allowed="3 points or more on two of the lines, in a plane that does not pass the camera's centre",
+            cure="hold the board where the laser's line crosses more of it",
+        )
     return best[1]

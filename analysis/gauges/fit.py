@@ -125,7 +125,7 @@ def fit(
     """
     frame = frame_of(profile.position[here])
     frame = frame if axes is None else Frame(frame.centre, axes)
-    for _ in range(ROUNDS):
+    for round_left in reversed(range(ROUNDS)):
         part = profile.taken(here)
         local, direction = frame.local(part.position), part.random @ frame.axes.T
         curve, whitening = curve_of(here), part.whitening()
@@ -139,7 +139,7 @@ def fit(
         e, by_theta, by_point = _misses(curve, local, direction, theta)
         white = _white(whitening, e)
         wrong = np.abs(e) > OUTLIER_SIGMAS * max(1.0, robust_sigma(e))
-        if not wrong.any() or len(e) - np.count_nonzero(wrong) <= len(theta):
+        if round_left == 0 or not wrong.any() or len(e) - np.count_nonzero(wrong) <= len(theta):
             break
         here = here.copy()
         here[np.flatnonzero(here)[wrong]] = False

@@ -8,7 +8,6 @@ sidecar (which holds the image's) and of every input file; each sidecar says wha
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -161,9 +160,9 @@ def open_folder(folder: Path) -> ScanFolder:
 def image_scale_of(found: ScanFolder) -> float:
     """Of the scan's images, to the scanner's. InputError: the manifest holds none."""
     scale = found.manifest.get("image_scale", 1.0)
-    if isinstance(scale, bool) or not isinstance(scale, float | int) or not 0.0 < scale < math.inf:
+    if isinstance(scale, bool) or not isinstance(scale, float | int) or not 0.01 <= scale <= 4.0:
         where = f"{found.folder / MANIFEST}: image_scale"
-        raise InputError("the image scale is none", where=where, found=scale, allowed="a positive number")
+        raise InputError("the image scale is none", where=where, found=scale, allowed="0.01 to 4")
     return float(scale)
 
 

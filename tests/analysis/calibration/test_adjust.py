@@ -14,8 +14,10 @@ from analysis.calibration.estimate import Estimate, free_parameters
 from analysis.calibration.lens import LENGTHS, normalise, project
 from analysis.calibration.observations import Observations, gather
 from analysis.calibration.residuals import corners, laser_points
+from analysis.calibration.start import start
 from analysis.calibration.virtual import noisy
-from tests.analysis.calibration.boards import LENS, truth, views_of
+from render.base.errors import InputError
+from tests.analysis.calibration.boards import LENS, SIZE, truth, views_of
 
 
 @pytest.mark.parametrize("terms", LENGTHS)
@@ -72,6 +74,16 @@ def test_exact_views_give_the_truth(terms: int) -> None:
     assert found.chi2 < 1e-12
 
 
+def test_single_points_of_a_laser_are_no_plane() -> None:
+    there = truth(3, 6)
+    views = [
+        replace(view, stripes=tuple(replace(one, pixel=one.pixel[:1], sigma=one.sigma[:1]) for one in view.stripes))
+        for view in views_of(there)
+    ]
+    with pytest.raises(InputError, match="laser 0 on the board are in no plane; found 6 points in 6 views"):
+        start(views, SIZE, 0, 1, known=(there.intrinsics, there.distortion))
+
+
 def test_parameters_and_covariance_are_those_of_scipy() -> None:
     there = truth(5, 5, terms=4, lasers=2)
     seen = gather(noisy(views_of(there, laser_step=64), np.random.default_rng(6)))
@@ -83,8 +95,8 @@ def test_parameters_and_covariance_are_those_of_scipy() -> None:
         return everything(seen, best.moved(step[: len(free)], step[len(free) :].reshape(-1, 6)))
 
     scale = np.concatenate([np.sqrt(np.diag(found.covariance)), np.full(30, 1e-5)])
-    start = np.random.default_rng(7).normal(size=len(scale)) * scale
-    other = least_squares(moved, start, x_scale=scale, jac="3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    first = np.random.default_rng(7).normal(size=len(scale)) * scale
+    other = least_squares(moved, first, x_scale=scale, jac="3-point", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     theirs = best.shared + other.x[: len(free)]
     np.testing.assert_allclose(best.shared, theirs, rtol=1e-8, atol=1e-8 * scale[: len(free)].max() + 1e-10)
     scaled = other.jac * scale

@@ -91,3 +91,12 @@ def test_a_region_without_points_is_told_by_its_name_and_place() -> None:
     away = gauge("radius").model_copy(update={"regions": ((0.1, 0.2),)})
     reading = read(away, 0, profile(0.0 * ACROSS), None)
     assert reading.reason.startswith("too few points in the region 'arc' (100 to 200 mm)")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_noise_that_is_wild_everywhere_leaves_a_value_or_a_reason(kind: str) -> None:
+    """Each round of leaving points out finds others, to the last round."""
+    height, _ = shape(kind)
+    for noise in np.random.default_rng(5).standard_cauchy((40, len(ACROSS))):
+        reading = read(gauge(kind), 0, profile(height, noise=20.0 * noise), None)
+        assert reading.reason or (np.isfinite(reading.value) and reading.sigma > 0.0)
