@@ -16,6 +16,7 @@ from analysis.report.glossary import GLOSSARY
 from analysis.report.light_text import sentences
 from analysis.report.line_figures import camera_figure, profile_figure, three_panel_figure, zoom_figure
 from analysis.report.model import FrameResult, ReportInput
+from analysis.report.page import page_of
 from analysis.report.style import plain
 from analysis.report.summary import headline, remarks, sample_note
 from analysis.report.tables import (
@@ -54,23 +55,7 @@ def write_report(folder: Path | str, report: ReportInput) -> tuple[Path, Path]:
 
 def render_page(report: ReportInput) -> str:
     """The report as one HTML page."""
-    import jinja2
-    from markupsafe import Markup
-
-    here = Path(__file__).parent
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(here), autoescape=True, undefined=jinja2.StrictUndefined, finalize=_printable
-    )
-    style = (here / "style.css").read_text(encoding="utf-8")
-    return environment.get_template("template.html").render(style=Markup(style), **_content(report))
-
-
-def _printable(value: Any) -> Any:
-    """Names come from files: what the template prints is text only. Markup and pictures are ours."""
-    from markupsafe import Markup
-
-    ours = isinstance(value, Markup) or not isinstance(value, str) or value.startswith("data:image/png;base64,")
-    return value if ours else plain(value)
+    return page_of(Path(__file__).parent / "template.html", _content(report))
 
 
 def _content(report: ReportInput) -> dict[str, Any]:

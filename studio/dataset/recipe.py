@@ -8,14 +8,12 @@ import math
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from render.base.model import Model, quantity
 from studio.project.project import Project
-from studio.project.ready_made import file_of, names_in
-from studio.project.strict_json import read_object
+from studio.project.ready_made import load_model, names_in
 from studio.project.templates import DESCRIPTIONS, template_folder
-from studio.project.validation_messages import input_error
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "recipes"
 MESHES = (".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
@@ -130,16 +128,8 @@ class Recipe(Model):
 
     @classmethod
     def load(cls, path: Path | str) -> tuple[Self, Path]:
-        """A recipe and the folder that its paths start from; path: a file, or the name of a ready-made one.
-
-        InputError: one message for all that is wrong with it.
-        """
-        file = file_of(path, FOLDER, "recipe")
-        data = read_object(file, "recipe")
-        try:
-            return cls.model_validate_json(json.dumps(data), strict=True), file.parent
-        except ValidationError as error:
-            raise input_error(error, cls, data, str(file)) from None
+        """A recipe and the folder that its paths start from: `load_model`, with the ready-made ones of `FOLDER`."""
+        return load_model(cls, path, FOLDER, "recipe")
 
     def digest(self, base: Project) -> str:
         """SHA-256 of what decides the images, beside the program."""

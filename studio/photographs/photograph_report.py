@@ -10,10 +10,10 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 
-import analysis.report
 from analysis.cloud import at_first_step
 from analysis.line.result import Flag
 from analysis.report.colour import ACCENT, MUTED
+from analysis.report.page import page_of
 from analysis.report.style import figure, image_uri, plain, png_uri, short
 from analysis.report.units import NONE, count, micrometres, percent
 from analysis.report.write import write_pdf
@@ -62,15 +62,9 @@ class PhotographReport:
 
 def write_photograph_report(html: Path, pdf: Path, report: PhotographReport) -> list[dict[str, Any]]:
     """Write the page, whole in itself, and the same as PDF; returns the fits for programs."""
-    import jinja2
-    from markupsafe import Markup
-
     singles = [_single(one, report) for one in report.points]
     whole = _whole(report)
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    source = (Path(__file__).parent / "photograph_report.html").read_text(encoding="utf-8")
-    style = (Path(analysis.report.__file__).parent / "style.css").read_text(encoding="utf-8")
-    page = environment.from_string(source).render(style=Markup(style), **_content(report, singles, whole))
+    page = page_of(Path(__file__).parent / "photograph_report.html", _content(report, singles, whole))
     with atomic_write(html) as temporary:
         temporary.write_text(page, encoding="utf-8")
     with atomic_write(pdf) as temporary:

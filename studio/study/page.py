@@ -8,9 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from analysis.report.colour import method_name
+from analysis.report.page import page_of
 from analysis.report.style import png_uri
 from render.base.files import atomic_write
 from studio.project.project import Project
@@ -22,8 +21,6 @@ from studio.study.labels import field_labels
 from studio.study.measures import MEASURES
 from studio.study.store import Row
 from studio.study.study import Study
-
-STYLE = Path(__file__).resolve().parents[2] / "analysis" / "report" / "style.css"
 
 
 def write_page(
@@ -53,17 +50,14 @@ def write_page(
         )
         write_budgets(folder, answer.budgets, number + 1)
         write_bounds(folder, answer, number + 1)
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    page = environment.get_template("page.html").render(
-        study=study,
-        parts=parts,
-        style=STYLE.read_text(encoding="utf-8"),
-        cells=len(rows),
-        repeats=study.repeats,
-        bases=", ".join(sorted(bases)),
-    )
+    content = {
+        "study": study,
+        "parts": parts,
+        "cells": len(rows),
+        "repeats": study.repeats,
+        "bases": ", ".join(sorted(bases)),
+    }
+    page = page_of(Path(__file__).parent / "page.html", content)
     with atomic_write(folder / "study.html") as temporary:
         temporary.write_text(page, encoding="utf-8")
     return folder / "study.html", found

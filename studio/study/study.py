@@ -10,17 +10,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from analysis.line.settings import Method
 from render.base.errors import InputError
 from render.base.files import inside
 from render.base.model import Model, quantity
 from studio.project.project import Project
-from studio.project.ready_made import file_of, names_in
-from studio.project.strict_json import read_object
+from studio.project.ready_made import load_model, names_in
 from studio.project.templates import DESCRIPTIONS, template_folder
-from studio.project.validation_messages import input_error
 from studio.study.effects import STATES
 from studio.study.measures import MEASURES
 
@@ -169,16 +167,8 @@ class Study(Model):
 
     @classmethod
     def load(cls, path: Path | str) -> tuple[Self, Path]:
-        """A study and the folder that its paths start from; path: a file, or the name of a ready-made one.
-
-        InputError: one message for all that is wrong with it.
-        """
-        file = file_of(path, FOLDER, "study")
-        data = read_object(file, "study file")
-        try:
-            return cls.model_validate_json(json.dumps(data), strict=True), file.parent
-        except ValidationError as error:
-            raise input_error(error, cls, data, str(file)) from None
+        """A study and the folder that its paths start from: `load_model`, with the ready-made ones of `FOLDER`."""
+        return load_model(cls, path, FOLDER, "study")
 
     def digest(self, bases: dict[str, Project]) -> str:
         """What decides a cell's numbers beside its key, as SHA-256: the program, the bases, what is fixed."""
