@@ -26,6 +26,7 @@ from render.scan_plan import ScanPlan
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from render.truth.laser_curve import laser_curve
+from render.truth.sheet_bias import with_sheet_bias
 from render.world.embree import RayScene
 from render.world.material_checks import check_materials, scene_warnings
 from render.world.placed import PlacedScene
@@ -163,4 +164,4 @@ def _rays(world: World, cancelled: Cancel) -> RayScene:
 
 
 def _curves(placed: PlacedScene, axis: Axis, threads: int | None) -> tuple[LaserCurve, ...]:
-    return tuple(laser_curve(*laser, axis, threads) for laser in placed.lasers)
+    return tuple(with_sheet_bias(laser_curve(*laser, axis, threads), *laser, threads) for laser in placed.lasers)

@@ -8,7 +8,6 @@ line through their common point is counted once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numba
 import numpy as np
@@ -23,7 +22,6 @@ from render.camera.view import View
 from render.frame import Axis, LaserCurve
 from render.laser.irradiance import irradiance_at
 from render.laser.laser import LineLaser
-from render.truth.sheet_bias import sheet_bias
 from render.truth.visibility import visible
 from render.world.world import World
 
@@ -210,7 +208,7 @@ def laser_curve(
     axis: Axis = "rows",
     threads: int | None = None,
 ) -> LaserCurve:
-    """The part of one laser's line that is lit and visible to the camera. Poses (4, 4)."""
+    """The part of one laser's line that is lit and visible to the camera, without `sheet_bias`. Poses (4, 4)."""
     side = sheet_side(world.vertices, invert(T_world_laser))
     crossing = crossing_triangles(side, world.triangles)
     segments, triangle = cut_triangles(
@@ -222,10 +220,9 @@ def laser_curve(
     def sees(points: Float, facing: Float, towards: Float) -> NDArray[np.bool_]:
         return visible(world.rays, points, facing, towards, threads)
 
-    curve = curve_of_cut(
+    return curve_of_cut(
         segments, normals, world.object_id[triangle], camera, laser, T_world_camera, T_world_laser, axis, sees
     )
-    return replace(curve, sheet_bias=sheet_bias(world, curve, camera, laser, T_world_camera, T_world_laser, threads))
 
 
 def curve_of_cut(  # noqa: PLR0913

@@ -13,6 +13,8 @@ nodes STEP sigma apart, so that edges and shadows across the sheet are included.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,23 +33,23 @@ MAX_SIGMA_PX = 50.0
 """Upper limit of the line's sigma, px, where the sheet grazes the surface."""
 
 
-def sheet_bias(
-    world: World,
+def with_sheet_bias(
     curve: LaserCurve,
+    world: World,
     camera: Camera,
     laser: LineLaser,
     T_world_camera: Float,
     T_world_laser: Float,
     threads: int | None = None,
-) -> Float:
-    """(n,) px along the scan line from each crossing to the centroid of its light. Poses (4, 4).
+) -> LaserCurve:
+    """The curve with the distance, px along the scan line, from each crossing to the centroid of its light.
 
-    0 where nothing is lit. Neighbouring crossings on a scan line are separated halfway between them.
+    Poses (4, 4). 0 where nothing is lit. Neighbouring crossings on a scan line are separated halfway between them.
     """
     nodes = np.arange(-SAMPLED_SIGMAS, SAMPLED_SIGMAS + STEP / 2, STEP)
     count = len(curve.index)
     if count == 0 or len(world.triangles) == 0:
-        return np.zeros(count)
+        return replace(curve, sheet_bias=np.zeros(count))
     sigma = _line_sigma(world, curve, camera, laser, T_world_camera, T_world_laser)
     half = np.minimum(SAMPLED_SIGMAS * sigma, _half_gap(curve))
     offsets = (half / SAMPLED_SIGMAS)[:, None] * nodes
@@ -65,7 +67,8 @@ def sheet_bias(
     )
     light = light.reshape(offsets.shape)
     total = light.sum(axis=1)
-    return np.asarray(np.where(total > 0.0, (light * offsets).sum(axis=1) / np.where(total > 0.0, total, 1.0), 0.0))
+    bias = np.where(total > 0.0, (light * offsets).sum(axis=1) / np.where(total > 0.0, total, 1.0), 0.0)
+    return replace(curve, sheet_bias=bias)
 
 
 def _line_sigma(

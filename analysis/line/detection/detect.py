@@ -169,7 +169,7 @@ def _measure(
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: Array, flags: Mask) -> None:
-    """Scan lines (n, w) in electrons -> seeds (n, k, SEED_COLUMNS) and flags (n, k), strongest first.
+    """Scan lines (n, w) in electrons -> seeds (n, k, SEED_COLUMNS), strongest first, but for PRIOR, and flags (n, k).
 
     floor (n, w) or (n, 1): variance of a pixel without signal, e-^2.
     """
@@ -184,7 +184,7 @@ def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: A
         usable = load_row(signal[y], mask[y], row)
         for k in range(wanted):
             flags[y, k] = Flag.NO_PEAK.value if usable else Flag.NO_PIXELS.value
-            for j in range(SEED_COLUMNS):
+            for j in range(PRIOR):
                 seeds[y, k, j] = np.nan
         if not usable:
             continue
@@ -228,5 +228,4 @@ def detect(signal: Float32, mask: Mask, floor: Float32, limits: Limits, seeds: A
             if slope != 0.0:  # on it the blocks' median is the level beside the line
                 flags[y, taken] = _measure(line, response, mask[y], pixel, beside, dark, limits, seed)
             seed[SLOPE], seed[SLOPE_SIGMA] = slope, slope_sigma
-            seed[PRIOR:] = 0.0
             taken += 1

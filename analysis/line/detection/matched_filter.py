@@ -19,6 +19,8 @@ FILTER_SIGMA = 1.5
 RADIUS = 4
 BLOCK = 32
 """px; the background is sought on blocks of pixels, at least 8 of them."""
+SAMPLES = 4
+"""Of a whole block, at every eighth pixel."""
 TEXTURED_BLOCKS = 24
 """At most twice so many tell how large a texture is."""
 TEXTURE = 1.25
@@ -45,13 +47,16 @@ def response_gain(correlation: Array) -> float:
 def load_row(signal: Float32, mask: Mask, row: Float32) -> int:
     """(w,) -> padded (w + 2 RADIUS,), gaps filled linearly; returns the number of usable pixels."""
     w = signal.shape[0]
-    gaps = 0
+    seen, gaps = np.uint8(0), 0
     for i in range(w):
         row[i + RADIUS] = signal[i]
-        gaps += (mask[i] & MISSING) >> 1
-    if gaps == w:
-        return 0
-    if gaps > 0:
+    for i in range(w):  # 32 at a time, which a count is not
+        seen |= mask[i]
+    if seen & MISSING:
+        for i in range(w):
+            gaps += (mask[i] & MISSING) >> 1
+        if gaps == w:
+            return 0
         last = -1
         for i in range(w):
             if mask[i] & MISSING == 0:
@@ -214,12 +219,17 @@ def noise_margin(
         sigma[b] = scale * root
         margin[b] = rise if rise > step else step
     spread = np.int32(0)
+    samples = (block + 5) // 8
     for b in range(blocks):
         middle, bound = np.float32(level[b]), np.float32(0.6745 * TEXTURE * sigma[b])
         start = np.uint64(min(b * block + 2, w - 1))
-        for i in range((block + 5) // 8):
-            spread += np.int32(abs(response[start + np.uint64(8 * i)] - middle) > bound)
-    count = blocks * ((block + 5) // 8)
+        if samples == SAMPLES:  # most often, and over a length known beforehand
+            for i in range(SAMPLES):
+                spread += np.int32(abs(response[start + np.uint64(8 * i)] - middle) > bound)
+        else:
+            for i in range(samples):
+                spread += np.int32(abs(response[start + np.uint64(8 * i)] - middle) > bound)
+    count = blocks * samples
     if 2 * spread <= count + 3.0 * math.sqrt(count):  # three sigma of a fair coin
         return
     size = np.empty(blocks)
@@ -246,40 +256,62 @@ def _deviation(values: Float32, start: float, slope: float) -> float:
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def local_maxima(response: Float32, level: Array, margin: Array, at: NDArray[np.int32]) -> int:
-    """Pixels where the response is a maximum and exceeds background + margin; returns how many."""
+    """Pixels where the response is a maximum and exceeds background + margin; returns how many.
+
+    From the centre of one block to the next the bound is a straight line, and goes on beyond the outermost.
+    """
     w, blocks = response.shape[0], level.shape[0]
     block = block_size(w)
-    bound = np.empty(blocks, np.float32)
+    half, bound = block // 2, np.empty(blocks, np.float32)
     for b in range(blocks):
         bound[b] = level[b] + margin[b]
-    found = 0
-    for b in range(-1, blocks):
-        # from the centre of one block to the next the bound is a straight line, and goes on beyond the outermost
-        start = 0 if b < 0 else b * block + block // 2
-        stop = w if b == blocks - 1 else (b + 1) * block + block // 2
-        low, high = bound[max(b, 0)], bound[min(b + 1, blocks - 1)]
-        if blocks > 1 and b < 0:
-            low -= np.float32(0.5) * (bound[1] - bound[0])
-            high = low + (bound[1] - bound[0])
-        elif blocks > 1 and b == blocks - 1:
-            high += bound[b] - bound[b - 1]
-        # without a branch, and most often over a length known beforehand: most stretches hold nothing
-        lowest, above, origin = min(low, high), np.int32(0), np.uint64(start)
-        if stop - start == BLOCK:
-            for i in range(BLOCK):
-                above += np.int32(response[origin + np.uint64(i)] > lowest)
-        else:
-            for i in range(stop - start):
-                above += np.int32(response[origin + np.uint64(i)] > lowest)
-        if above == 0:
+    rise = bound[1] - bound[0] if blocks > 1 else np.float32(0.0)
+    before = bound[0] - np.float32(0.5) * rise
+    found = _maxima_above(response, before, before + rise, 0, half, at, 0)
+    b = 0
+    while b < blocks - 1:
+        several = block == BLOCK and b + 4 < blocks
+        if several and not _any_of_four(response, bound, b):
+            b += 4
             continue
-        slope = (high - low) / np.float32(block)
-        for i in range(start, stop):
-            value = response[i]
-            if value > low + slope * (np.float32(i - start) + np.float32(0.5)):
-                before = response[i - 1] if i > 0 else np.float32(-np.inf)
-                after = response[i + 1] if i < w - 1 else np.float32(-np.inf)
-                if value >= before and value > after:
-                    at[found] = i
-                    found += 1
+        for _ in range(4 if several else 1):
+            start = b * block + half
+            found = _maxima_above(response, bound[b], bound[b + 1], start, start + block, at, found)
+            b += 1
+    rise = bound[b] - bound[b - 1] if blocks > 1 else np.float32(0.0)
+    return _maxima_above(response, bound[b], bound[b] + rise, b * block + half, w, at, found)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _any_of_four(response: Float32, bound: Float32, b: int) -> bool:
+    """Whether a pixel from the centre of block b on exceeds the lower end of its bound, in any of four blocks.
+
+    Without a branch, over a length known beforehand and with one sum for all: most stretches hold nothing.
+    """
+    a0, a1 = _low(bound[b], bound[b + 1]), _low(bound[b + 1], bound[b + 2])
+    a2, a3 = _low(bound[b + 2], bound[b + 3]), _low(bound[b + 3], bound[b + 4])
+    above, origin = np.int32(0), np.uint64(b * BLOCK + BLOCK // 2)
+    for i in range(BLOCK):
+        first = origin + np.uint64(i)
+        above += np.int32(response[first] > a0) + np.int32(response[first + np.uint64(BLOCK)] > a1)
+        above += np.int32(response[first + np.uint64(2 * BLOCK)] > a2)
+        above += np.int32(response[first + np.uint64(3 * BLOCK)] > a3)
+    return bool(above > 0)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _maxima_above(
+    response: Float32, low: float, high: float, start: int, stop: int, at: NDArray[np.int32], found: int
+) -> int:
+    """Maxima at pixels start..stop above a bound that goes from low to high in a block -> at; returns the new count."""
+    w = response.shape[0]
+    slope = (high - low) / np.float32(block_size(w))
+    for i in range(start, stop):
+        value = response[i]
+        if value > low + slope * (np.float32(i - start) + np.float32(0.5)):
+            before = response[i - 1] if i > 0 else np.float32(-np.inf)
+            after = response[i + 1] if i < w - 1 else np.float32(-np.inf)
+            if value >= before and value > after:
+                at[found] = i
+                found += 1
     return found

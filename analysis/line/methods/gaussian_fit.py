@@ -119,7 +119,8 @@ def _measure_narrow(
         out[:] = np.nan
         return Flag.NOT_CONVERGED.value
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
-    out[TOLD:] = told.ravel()
+    if out.shape[0] > TOLD:
+        out[TOLD:] = told.ravel()
     chi2 = mass = 0.0
     light, weight = np.empty(n), np.empty(n)
     for i in range(n):
@@ -164,13 +165,15 @@ def _tell_width(width: float, variance: float, out: Array) -> None:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _asymmetry(pixel: Array, n: int, p: Array, held: bool, shape: Array, hessian: Array) -> float:
+def _asymmetry(
+    pixel: Array, n: int, p: Array, held: bool, shape: Array, hessian: Array, factor: Array, projected: Array
+) -> float:
     """Score test for a third Hermite term in the profile: a normal deviate where the line is a Gaussian.
 
     A neighbour leans a line to one side long before chi-square, which looks in every direction, sees it. held: the
-    width is known.
+    width is known. factor (4, 4), projected (4,): scratch.
     """
-    cross, projected = np.zeros(4), np.empty(4)
+    cross = np.zeros(4)
     moment = square = 0.0
     for i in range(n):
         z = (pixel[POSITION, i] - p[1]) / p[2]
@@ -182,7 +185,7 @@ def _asymmetry(pixel: Array, n: int, p: Array, held: bool, shape: Array, hessian
         cross[1] += weight * p[0] * shape[1, i]
         cross[2] += 0.0 if held else weight * p[0] * shape[2, i]
         cross[3] += weight
-    if not solve(hessian, 0.0, cross, np.zeros((4, 4)), projected):
+    if not solve(hessian, 0.0, cross, factor, projected):
         return 0.0
     for j in range(4):
         square -= cross[j] * projected[j]
@@ -267,7 +270,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         return flag
     for i in range(count):
         pixel[VARIANCE, i] += scattered * light[i] * light[i]
-    asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian)
+    asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian, factor, row)
     if max(deviate(chi2, count - 4), abs(asymmetry)) < UNLIKELY:
         return flag
     return measure_misfit(pixels, seed, count, p, options, out)

@@ -32,9 +32,12 @@ def measure_phase(pixels: Pixels, y: int, seed: Array, flag: int, options: Optio
     if n > signal.shape[0]:
         return Flag.AT_BORDER.value
     step = 2.0 * math.pi / n
-    for i in range(half + 1):
-        sines[half + i], cosines[half + i] = math.sin(step * i), math.cos(step * i)
-        sines[half - i], cosines[half - i] = -sines[half + i], cosines[half + i]
+    sine, cosine = math.sin(step), math.cos(step)
+    sines[half], cosines[half] = 0.0, 1.0
+    for i in range(half, 2 * half):  # by the sum of angles, to 1e-14
+        sines[i + 1] = sines[i] * cosine + cosines[i] * sine
+        cosines[i + 1] = cosines[i] * cosine - sines[i] * sine
+        sines[2 * half - i - 1], cosines[2 * half - i - 1] = -sines[i + 1], cosines[i + 1]
     reason, u, real, imaginary, previous = Flag.NOT_CONVERGED.value, np.nan, 0.0, 0.0, -1
     for _ in range(8):
         if load_window(signal, mask, middle - half, middle + half, seed, window) < 0:

@@ -88,6 +88,9 @@ def write_sigma(
     pixels: Pixels, y: int, seed: Array, x: Array, weight: Array, variance: Array, n: int, out: Array
 ) -> float:
     """Sigma of a position that weighs the pixels x (n,) of scan line y themselves; their correlation length -> out."""
+    if pixels.covariances.shape[1] == 0:
+        out[CORRELATION_LENGTH] = pixels.alike
+        return math.sqrt(linear_variance(weight, variance, x, n, pixels.correlation))
     light = np.empty(n)
     for i in range(n):
         light[i] = pixels.signal[y, int(x[i])] - seed[BACKGROUND] - seed[SLOPE] * (x[i] - seed[CENTRE])

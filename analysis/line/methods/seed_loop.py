@@ -29,7 +29,8 @@ Mask = NDArray[np.uint8]
 
 CORRELATION_LENGTH, SHARED, TOLD = 6, 7, 8
 """Columns of out: scan lines; covariance of place and width, px^2, of a narrow line; from TOLD on the logarithm of the
-likelihood of each of PRIOR_WIDTHS at the place that is likeliest, and then that over all places."""
+likelihood of each of PRIOR_WIDTHS at the place that is likeliest, and then that over all places; by methods that fit a
+width alone, and the first NaN where there is nothing to tell."""
 COLUMNS = TOLD + 2 * len(PRIOR_WIDTHS)
 """Of out."""
 ROOM = 11
@@ -95,7 +96,7 @@ def seed_kernel(measure: Callable[..., int]) -> Callable[[Pixels, Array, Mask, O
     def run(pixels: Pixels, seeds: Array, flags: Mask, options: Options, out: Array) -> None:
         for row in range(seeds.shape[0]):
             for k in range(seeds.shape[1]):
-                for j in range(out.shape[2]):
+                for j in range(min(TOLD + 1, out.shape[2])):  # without its first, nothing is told
                     out[row, k, j] = np.nan
                 if flags[row, k] <= Flag.SATURATED.value:
                     y = pixels.first + row

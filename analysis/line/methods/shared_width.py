@@ -42,15 +42,16 @@ LEAST = 1e-30
 
 
 def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] | None:
-    """What scan lines tell of their width (n, 2 m), NaN where there is no narrow line, and their positions and sigmas
-    (n,), px -> the logarithm of the density of each of the m PRIOR_WIDTHS by a line's neighbours, all 0 where a line
+    """What scan lines tell of their width (n, 2 m), the first NaN where nothing, their positions and sigmas (n,), px ->
+    the logarithm of the density of each of the m PRIOR_WIDTHS by a line's neighbours, all 0 where a line
     needs none or does not share theirs; and what makes of the covariance of place and width the error that a line has
     in common with its neighbours, 1/px, 0 where nothing is shared. None: none needs any.
 
     By the delta method: the neighbours' width is uncertain by V, and one line's by V + SPREAD^2, so that a position
     moves by cov(c, s) sqrt(V) / (V + SPREAD^2) for one standard deviation of what all of them are wrong by together.
     """
-    known = np.isfinite(told).all(axis=1) & np.isfinite(u) & np.isfinite(sigma_u)
+    known = np.isfinite(told[:, 0]) & np.isfinite(u) & np.isfinite(sigma_u)
+    known[known] = np.isfinite(told[known]).all(axis=1)
     if known.sum() < FEWEST:
         return None
     best, mass = np.split(np.where(known[:, None], told, 0.0), 2, axis=1)

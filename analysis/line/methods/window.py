@@ -44,10 +44,10 @@ def load_window(signal: Float32, mask: Mask, first: int, last: int, seed: Array,
     w = signal.shape[0]
     if first < 0 or last > w - 1:
         return -1
-    usable = 0
+    usable, base, slope, centre = 0, seed[BACKGROUND], seed[SLOPE], seed[CENTRE]
     for i in range(first, last + 1):
         if mask[i] & MISSING == 0:
-            y[i - first] = signal[i] - ground(seed, i)
+            y[i - first] = signal[i] - (base + slope * (i - centre))  # `ground`, which would be read each time
             usable += 1
         else:
             left, right, t = _neighbours(mask, i)
@@ -93,6 +93,8 @@ def any_saturated(mask: Mask, first: int, last: int) -> bool:
 @njit(nogil=True, cache=True, error_model="numpy")
 def slope_variance(seed: Array, weight: Array, x: Array, n: int) -> float:
     """Variance, by what is unknown of the background's slope, of a position that moves by weight (n,) px/e-."""
+    if seed[SLOPE_SIGMA] == 0.0:
+        return 0.0
     moment = 0.0
     for i in range(n):
         moment += weight[i] * (x[i] - seed[CENTRE])

@@ -16,6 +16,7 @@ from render.mesh.mesh import Mesh
 from render.mesh.primitives import primitive_mesh
 from render.scene.shape import Sphere
 from render.truth.laser_curve import laser_curve
+from render.truth.sheet_bias import with_sheet_bias
 from tests.render.scenes import BASELINE, moved, paper_camera, plane_mesh, scene_of, world_of
 
 STEEPEST = math.radians(70.0)
@@ -43,7 +44,7 @@ def curve_and_biases(mesh, laser, camera):
     scene = scene_of(camera, laser)
     world = world_of(scene, mesh)
     poses = scene.T_world_camera(), scene.T_world_laser(0)
-    curve = laser_curve(world, camera, laser, *poses)
+    curve = with_sheet_bias(laser_curve(world, camera, laser, *poses), world, camera, laser, *poses)
     image = direct_image(world, camera, laser, *poses, target=1e-3).radiance.astype(np.float64)
     reach = int(math.ceil(6.0 * laser.sigma(0.87) * camera.fx / 0.8))
     found = []
@@ -84,7 +85,9 @@ def test_bias_of_a_cylinder_is_that_of_the_second_order():
     triangles = np.concatenate([np.stack([i, j, j + n], axis=1), np.stack([i, j + n, i + n], axis=1)]).astype(np.int32)
     mesh = Mesh(np.concatenate([low, high]), triangles)
     scene = scene_of(camera, beam)
-    curve = laser_curve(world_of(scene, mesh), camera, beam, scene.T_world_camera(), scene.T_world_laser(0))
+    parts = (camera, beam, scene.T_world_camera(), scene.T_world_laser(0))
+    world = world_of(scene, mesh)
+    curve = with_sheet_bias(laser_curve(world, *parts), world, *parts)
     x = curve.point[1, 0]
     z = -math.sqrt(radius**2 - x**2)
     m = invert(beam.T_rig_laser.matrix)[0]
@@ -114,10 +117,10 @@ def test_a_plane_has_the_bias_of_the_perspective_alone_and_it_goes_with_the_squa
 def test_two_lines_on_a_row_share_what_is_between_them_and_darkness_has_no_bias():
     scene = scene_of(paper_camera(0.25), sheet(0.0003).model_copy(update={"power": 0.0}))
     world = world_of(scene, plane_mesh((0, 0, 1), 0.9))
-    curve = laser_curve(world, scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0))
+    parts = (scene.camera, scene.lasers[0], scene.T_world_camera(), scene.T_world_laser(0))
+    curve = with_sheet_bias(laser_curve(world, *parts), world, *parts)
     assert len(curve.index) > 100
     np.testing.assert_array_equal(curve.sheet_bias, 0.0)
-    empty = laser_curve(
-        world, scene.camera, scene.lasers[0], scene.T_world_camera(), Pose(translation=(9.0, 0.0, 0.0)).matrix
-    )
+    aside = (*parts[:3], Pose(translation=(9.0, 0.0, 0.0)).matrix)
+    empty = with_sheet_bias(laser_curve(world, *aside), world, *aside)
     assert empty.sheet_bias.shape == (0,)
