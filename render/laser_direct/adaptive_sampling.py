@@ -89,20 +89,19 @@ def _level_at(bin_: int, threshold: int, level: int, most: int) -> int:
 
 
 @numba.njit(nogil=True, cache=True, forceinline=True)
-def neighbours_in_row(pixels: Int, start: Long, i: int, row: int, width: int) -> tuple[int, int, int]:
+def neighbours_in_row(pixels: Int, start: Long, i: int, row: int, width: int) -> tuple[int, int]:
     """Of pixel i of ascending flat indices, its neighbours in the row before (0), its own (1) or the row after (2).
 
-    The index of the leftmost place, and the range of `pixels` there. start (3,): where the range of each row began at
-    the pixel before; as pixels ascend these only ascend, and are moved on.
+    The index of the leftmost place, and where `pixels` reach it; the neighbours are those up to two places on. start
+    (3,): where the neighbours of each row began at the pixel before; as pixels ascend these only ascend, and are moved
+    on.
     """
     low = pixels[i] + (row - 1) * width - 1
     first = start[row]
     while first < len(pixels) and pixels[first] < low:
         first += 1
-    start[row] = stop = first
-    while stop < len(pixels) and pixels[stop] <= low + 2:
-        stop += 1
-    return low, first, stop
+    start[row] = first
+    return low, first
 
 
 @numba.njit(nogil=True, cache=True)
@@ -120,8 +119,10 @@ def grade_neighbours(wanted: Int, cells: Int, pixels: Int, width: int) -> Int:
         if wanted[i] <= cells[i]:
             continue
         for row in range(3):
-            _, first, stop = neighbours_in_row(pixels, start, i, row, width)
-            for j in range(first, stop):
+            low, first = neighbours_in_row(pixels, start, i, row, width)
+            for j in range(first, len(pixels)):
+                if pixels[j] > low + 2:
+                    break
                 out[j] = max(out[j], wanted[i] // 2)
     return out
 
@@ -143,9 +144,11 @@ def raise_neighbour_errors(
         if neighbour_error[i] <= 0.0 and mean[i] <= 0.0:
             continue
         for row in range(3):
-            low, first, stop = neighbours_in_row(pixels, start, i, row, width)
-            for j in range(first, stop):
-                if cells[j] > 1:
+            low, first = neighbours_in_row(pixels, start, i, row, width)
+            for j in range(first, n):
+                if pixels[j] > low + 2:
+                    break
+                if cells[j] > 1 and neighbour_error[i] > error[j]:  # cells only lower it
                     error[j] = max(error[j], neighbour_error[i] * float(cells[j]) ** (-0.5 * order))
                 if mean[j] == 0.0 and mean[i] > 0.0 and (row == 1 or pixels[j] == low + 1):
                     if cells[j] > 1:

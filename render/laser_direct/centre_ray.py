@@ -63,9 +63,13 @@ def estimate_errors(
             # in the sheet's middle the slope vanishes, and the curvature decides
             slope = max(slope, 0.25 * share)
         for row in range(3):
-            low, first, end = neighbours_in_row(pixels, walk, i, row, width)
-            for j in range(first, end):
+            low, first = neighbours_in_row(pixels, walk, i, row, width)
+            for j in range(first, len(pixels)):
+                if pixels[j] > low + 2:
+                    break
                 other = planes[j, 3]
+                if peak <= 0.0 and other <= 0.0:
+                    continue
                 predicted = planes[j, 0] + planes[j, 1] * (low + 1 - pixels[j]) + planes[j, 2] * (1 - row)
                 if peak > 0.0 and other > 0.0:
                     worst = max(worst, peak * slope * min(abs(predicted - q), 1.0) + share * abs(other - peak))
@@ -73,7 +77,7 @@ def estimate_errors(
                         along_u += 0.5 * (other - peak) * (pixels[j] - low - 1)
                     elif pixels[j] == low + 1:
                         along_v += 0.5 * (other - peak) * (row - 1)
-                elif peak > 0.0 or other > 0.0:
+                else:
                     # a dark neighbour outside the sheet is no edge where the same surface continues there
                     beyond = min(peak, other) == BEYOND
                     worst = max(worst, max(middle[i], middle[j]) * (min(abs(predicted - q), 1.0) if beyond else 1.0))

@@ -83,8 +83,16 @@ class DirectImage:
     """Number of camera rays."""
     invalid: int
     """Number of contributions that were NaN, infinite or negative, and count as 0."""
-    deviation: Float32
-    """(h, w) estimated standard error of each pixel, W/(m^2 sr)."""
+    reached: Int
+    """(n,) ascending flat indices of the pixels that the sheet may reach; all others are known to be dark."""
+    standard_error: Float
+    """(n,) estimated, of those, W/(m^2 sr)."""
+
+    def deviation(self) -> Float32:
+        """(h, w) estimated standard error of each pixel, W/(m^2 sr)."""
+        image = np.zeros(self.radiance.size, np.float32)
+        write_pixels(self.reached, self.standard_error, image)
+        return image.reshape(self.radiance.shape)
 
 
 def direct_image(
@@ -106,14 +114,17 @@ def direct_image(
     n = len(pixels)
     cells, wanted = np.zeros(n, np.int32), np.full(n, 2 if aperture else 1, np.int32)
     centre_rays = 0 if aperture else n
+    surface = world.surface_at((laser.wavelength_nm,) * 3)
+    weights = np.array(reflectance_weights(laser.wavelength_nm))
+    sheet = Sheet(invert(T_world_laser), T_world_laser[:3, 3].copy(), laser.packed(), weights)
     task = _Task(
         world,
-        world.surface_at((laser.wavelength_nm,) * 3),
+        surface,
         camera,
-        laser,
         T_world_camera,
-        T_world_laser,
         run.seed,
+        has_gloss(surface),
+        sheet,
         pixels,
         np.zeros(n),
         np.zeros(n),
@@ -146,10 +157,8 @@ def direct_image(
             wanted = grade_neighbours(wanted, cells, pixels, camera.width)
         if relative <= target or np.array_equal(wanted, cells):
             invalid = sum(task.invalid) + write_pixels(pixels, task.mean, image)
-            deviation = np.zeros_like(image)
-            write_pixels(pixels, task.error, deviation)
-            shape = camera.height, camera.width
-            return DirectImage(image.reshape(shape), relative, count, samples, invalid, deviation.reshape(shape))
+            radiance = image.reshape(camera.height, camera.width)
+            return DirectImage(radiance, relative, count, samples, invalid, pixels, task.error)
         left *= 0.5
 
 
@@ -188,10 +197,10 @@ class _Task:
     world: World
     surface: Surface
     camera: Camera
-    laser: LineLaser
     T_world_camera: Float
-    T_world_laser: Float
     seed: int
+    glossy: bool
+    sheet: Sheet
     pixels: Int
     mean: Float
     error: Float
@@ -235,18 +244,12 @@ class _Task:
         origins, towards = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
         far, sample = np.empty(count, np.float32), np.empty(count, np.int32)
         if aperture:
-            shade = shade_glossy_lens if has_gloss(surface) else shade_diffuse_lens
+            shade = shade_glossy_lens if self.glossy else shade_diffuse_lens
         else:
-            shade = shade_glossy if has_gloss(surface) else shade_diffuse
-        sheet = Sheet(
-            invert(self.T_world_laser),
-            self.T_world_laser[:3, 3].copy(),
-            self.laser.packed(),
-            np.array(reflectance_weights(self.laser.wavelength_nm)),
-        )
+            shade = shade_glossy if self.glossy else shade_diffuse
         buffers = ShadowRays(rays.centre, rays.surface_offset, origins, towards, far, sample)
         cell_rays = CellRays(triangle, normalised, offsets, lens, cells)
-        shadows, invalid = shade(surface, view, cell_rays, sheet, buffers, values, planes)
+        shadows, invalid = shade(surface, view, cell_rays, self.sheet, buffers, values, planes)
         self.invalid.append(invalid)
         blocked = rays.occluded(origins[:shadows], towards[:shadows], far[:shadows], coherent=True)
         mean, error, jump = (np.empty(len(pixels)) for _ in range(3))

@@ -92,7 +92,7 @@ def known_lines(placed: PlacedLaser, target: float, importance: Importance, lase
 
 def line_deviation(image: DirectImage, importance: Importance, laser: int) -> float:
     """By how much the error of the image moves `LINES_KNOWN` of the lines at most, over their own sigma."""
-    deviations = importance.line_deviations(laser, image.deviation)
+    deviations = importance.line_deviations(laser, image.deviation())
     return float(np.quantile(deviations, LINES_KNOWN)) if len(deviations) else 0.0
 
 

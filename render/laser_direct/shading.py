@@ -205,6 +205,7 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
         triangle, normalised, offsets, lens, cells = rays
         centre, surface_offset, origins, directions, far, sample = shadows
         tilt, distorted = tilt_matrix(view.distortion[12], view.distortion[13]), bool(np.any(view.distortion))
+        straight = ray_slopes(view, tilt, False, 0.0, 0.0)
         emitter, _ = sheet_sigma(0.0, beam)
         laser_centre = vector(sheet.centre)
         origin = m[0, 3], m[1, 3], m[2, 3]
@@ -252,7 +253,7 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
             sigma, slope = sheet_sigma(laser[2], beam)
             hit = SheetHit(normal, d, s, cosine, laser[0] / sigma, sigma, slope)
             q = hit.q
-            xu, xv, yu, yv = ray_slopes(view, tilt, distorted, x, y)
+            xu, xv, yu, yv = ray_slopes(view, tilt, True, x, y) if distorted else straight
             if aperture:
                 a, b = lens[r, 0], lens[r, 1]
                 xu, xv, yu, yv = lens_ray_slopes(view, (xu, xv, yu, yv), a, b)

@@ -19,7 +19,9 @@ LINES, WIDTH = 40, 8
 def image_of(target: float, samples: int = 100) -> DirectImage:
     """Of radiance 1, known in each pixel to the target."""
     ones = np.ones((LINES, WIDTH), np.float32)
-    return DirectImage(ones, target, ones.size, samples, 0, np.float32(target) * ones)
+    return DirectImage(
+        ones, target, ones.size, samples, 0, np.arange(ones.size, dtype=np.int32), np.full(ones.size, target)
+    )
 
 
 @pytest.mark.parametrize("axis", ["rows", "columns"])
@@ -29,7 +31,7 @@ def test_a_line_is_off_by_the_root_of_the_sum_of_squares_of_its_pixels(axis: Any
     image = image_of(0.01)
     if axis == "columns":
         weight, image = np.ascontiguousarray(weight.T), image_of(0.01)
-        image = DirectImage(image.radiance.T, 0.01, 1, 1, 0, image.deviation.T)
+        image = DirectImage(image.radiance.T, 0.01, 1, 1, 0, image.reached, image.standard_error)
     found = Importance((weight,), weight, axis, allowed=0.05, direct=0.03)
     assert line_deviation(image, found, 0) == pytest.approx(0.05 * np.sqrt(50.0) * 0.01)
 
