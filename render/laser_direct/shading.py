@@ -153,6 +153,23 @@ def middle_offset(du: float, dv: float, cell: int, cells: int) -> tuple[float, f
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def meet_sheet(
+    T_laser_world: Float, beam: Float, normal: Vector, height: float, origin: Vector, d: Vector
+) -> tuple[float, Vector, Vector, SheetHit]:
+    """Where a ray from `height` m above a facet meets its plane: the fan's density there, 0 where no light goes, the
+    point, the same in laser coordinates, and the hit.
+    """
+    cosine = dot(normal, d)
+    s = -height / cosine if cosine != 0.0 else 0.0
+    point = origin[0] + s * d[0], origin[1] + s * d[1], origin[2] + s * d[2]
+    laser = transformed(T_laser_world, point)
+    lit = cosine != 0.0 and laser[2] > 1e-9
+    density = fan_density(laser[1] / laser[2], beam) if lit else 0.0
+    sigma, slope = sheet_sigma(laser[2], beam)
+    return density, point, laser, SheetHit(normal, d, s, cosine, laser[0] / sigma, sigma, slope)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def irradiance_without_gaussian(
     T_laser_world: Float, beam: Float, laser: Vector, density: float, normal: Vector, hit: SheetHit
 ) -> float:
@@ -186,13 +203,7 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
 
     @numba.njit(nogil=True, cache=True, error_model="numpy")
     def shade(  # noqa: PLR0915
-        surface: Surface,
-        view: View,
-        rays: CellRays,
-        sheet: Sheet,
-        shadows: ShadowRays,
-        values: Float,
-        planes: Float,
+        surface: Surface, view: View, rays: CellRays, sheet: Sheet, shadows: ShadowRays, values: Float, planes: Float
     ) -> tuple[int, int]:
         """Unoccluded radiance of each ray's cell and predicted for its whole pixel -> values (n, 2); their shadow rays.
 
@@ -237,22 +248,11 @@ def _shade_kernel(glossy: bool, aperture: bool) -> Any:  # noqa: PLR0915
             if not height_camera * height_laser > 0.0:
                 continue
             side = 1.0 if height_camera > 0.0 else -1.0
-            # the ray meets the facet's plane at o + s d
             d = lens_direction(view, x, y, lens[r, 0], lens[r, 1]) if aperture else rotated(m, (x, y, 1.0))
-            cosine = dot(normal, d)
-            if cosine == 0.0:
-                continue
-            s = -height_camera / cosine
-            point = origin[0] + s * d[0], origin[1] + s * d[1], origin[2] + s * d[2]
-            laser = transformed(w, point)
-            if laser[2] <= 1e-9:
-                continue
-            h = fan_density(laser[1] / laser[2], beam)
+            h, point, laser, hit = meet_sheet(w, beam, normal, height_camera, origin, d)
             if h == 0.0:
                 continue
-            sigma, slope = sheet_sigma(laser[2], beam)
-            hit = SheetHit(normal, d, s, cosine, laser[0] / sigma, sigma, slope)
-            q = hit.q
+            q, s = hit.q, hit.s
             xu, xv, yu, yv = ray_slopes(view, tilt, True, x, y) if distorted else straight
             if aperture:
                 a, b = lens[r, 0], lens[r, 1]
