@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -13,9 +14,11 @@ from analysis.study.cause import cause
 from analysis.study.intervals import Interval, mean_interval
 from analysis.study.pareto import Front, bootstrapped_front
 from studio.project.project import Project
+from studio.scan.stages import scaled
 from studio.study.bounds import Bound, bounds
 from studio.study.cells import Point, measured_along, methods_of, search_of
 from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
+from studio.study.ray_units import RAY_SPEED, Throughput, throughput
 from studio.study.store import Row
 from studio.study.study import Study, Sweep, with_fields
 from studio.study.tables import grouped, rays_of, seconds_of, values_of
@@ -69,6 +72,8 @@ class Answer:
     """Of effects, by method."""
     bounds: tuple[Bound, ...] = ()
     """Of a chart of speed: what no method can beat."""
+    throughput: Throughput | None = None
+    """Of a chart of speed; None: of rows that were measured before it was."""
 
 
 def answers(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Answer]:
@@ -94,7 +99,19 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
         _broken(study, number, bases, rows, groups),
         _budgets(sweep, study, bases, groups),
         bounds(study, sweep, bases, list(dict.fromkeys(spot.point for spot in spots))),
+        _throughput(study, sweep, bases, groups),
     )
+
+
+def _throughput(study: Study, sweep: Sweep, bases: Mapping[str, Project], groups: Groups) -> Throughput | None:
+    if sweep.chart != "speed":
+        return None
+    base, least = bases[sweep.base or study.base], math.inf
+    for point in dict.fromkeys(point for point, _ in groups):
+        values = dict(zip((one.field for one in sweep.vary), point, strict=True))
+        camera = scaled(with_fields(base, {**study.set, **sweep.set, **values}, sweep.name), study.image_scale).scene
+        least = min(least, camera.rig.camera.width * camera.rig.camera.height)
+    return throughput([row.get(RAY_SPEED, math.nan) for rows in groups.values() for row in rows], least)
 
 
 def _median(values: np.ndarray) -> float:

@@ -14,6 +14,7 @@ from studio.study.answers import Answer, Spot
 from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
 from studio.study.measures import MEASURES, Measure
+from studio.study.ray_units import MILLION, Throughput
 from studio.study.study import Parameter, Value
 
 MARKERS = "osD^vP*X<>"
@@ -163,19 +164,37 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         _bound(axes, bound, len(answer.bounds) > 1, measure)
     what = "frame" if answer.sweep.time == "frame" else "line's extraction"
     axes.set(xscale="log", yscale="log", xlabel=f"processor time of a {what} (s)", ylabel=_axis_label(measure))
+    if answer.throughput is not None:
+        _rays(axes, answer.throughput, answer.sweep.time == "frame")
     _roomy(axes)
     if not named and len(methods) > 1:
         axes.legend()
 
 
 def _bound(axes: Any, bound: Bound, several: bool, measure: Measure) -> None:
-    """A line of what no method can beat, named at its left end."""
+    """A line of what no method can beat, named at its right end, away from the limit of time."""
     height = bound.all * measure.scale
     words = "Cramér-Rao bound" if bound.speckle is None else "Cramér-Rao bound and speckle"
     at = f", {', '.join(map(shown, bound.point))}" if several else ""
     axes.axhline(height, color=MUTED, lw=0.9, ls=(0, (1, 2)))
     across = axes.get_yaxis_transform()
-    axes.annotate(words + at, (0.01, height), (0, 3), across, "offset points", fontsize=6.0, color=MUTED)
+    style: dict[str, Any] = {"fontsize": 6.0, "color": MUTED, "ha": "right"}
+    axes.annotate(words + at, (0.99, height), (0, 3), across, "offset points", **style)
+
+
+def _rays(axes: Any, throughput: Throughput, whole_frame: bool) -> None:
+    """Time in the machine's own rays along the top, and the least that the rays of a frame take."""
+    speed = throughput.rays_per_second / MILLION
+    top = axes.secondary_xaxis("top", functions=(lambda seconds: seconds * speed, lambda rays: rays / speed))
+    top.set_xlabel("million rays of this machine")
+    top.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    top.xaxis.set_major_formatter(_tick)
+    top.xaxis.set_minor_formatter(NullFormatter())
+    if whole_frame:
+        axes.axvline(throughput.frame_seconds, color=MUTED, lw=0.9, ls=(0, (4, 2, 1, 2)))
+        up = axes.get_xaxis_transform()
+        style: dict[str, Any] = {"fontsize": 6.0, "color": MUTED, "rotation": 90, "va": "top"}
+        axes.annotate("one ray a pixel", (throughput.frame_seconds, 0.98), (3, 0), up, "offset points", **style)
 
 
 def _note(axes: Any, text: str, place: tuple[float, float], colour: str, size: float, off: tuple[int, int]) -> None:

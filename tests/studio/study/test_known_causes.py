@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,6 +101,13 @@ def named(kind: str, random: np.random.Generator) -> tuple[str, str]:
     change, good, bad, (measure, limit, above), logarithmic = SEARCHES[kind]
     look = Look(random.uniform(1500.0, 6000.0), random.uniform(1.2, 2.5), random.uniform(1.0, 6.0))
     search = Search(good, bad, limit * random.uniform(0.9, 1.1), above, logarithmic, 0.03)
+    return searched(look, change, search, measure, random)
+
+
+def searched(
+    look: Look, change: Callable[[Look, float], Look], search: Search, measure: str, random: np.random.Generator
+) -> tuple[str, str]:
+    """How the search ends, and the cause that is named."""
     rows: dict[float, list[dict[str, float]]] = {}
     known: dict[float, np.ndarray] = {}
     while values := next_values(search, known):
@@ -111,7 +119,7 @@ def named(kind: str, random: np.random.Generator) -> tuple[str, str]:
         return found.ending, ""
     good_row, bad_row = (
         {name: mean_interval(np.array([row[name] for row in rows[value]])).mean for name in rows[value][0]}
-        for value in (good, found.first_bad)
+        for value in (search.good, found.first_bad)
     )
     return found.ending, cause(good_row, bad_row)
 
