@@ -26,6 +26,7 @@ from analysis.line.shared_noise import with_shared_noise
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
+from render.camera.camera import Camera
 from studio.photographs.completion import FILLED, completed, offered, without_detours
 from studio.photographs.evidence import chains_of, shrink
 from studio.photographs.laser_light import Light, banded, laser_light, without
@@ -284,12 +285,18 @@ def naming(path: Path) -> Iterator[None]:
 
 def check_camera(image: NDArray[Any], volume: WorkingVolume | None) -> None:
     """InputError: the image is not of the size of the camera whose geometry is asked for."""
-    if volume is None or image.shape[:2] == (volume.camera.height, volume.camera.width):
+    if volume is not None:
+        check_size(image, volume.camera)
+
+
+def check_size(image: NDArray[Any], camera: Camera) -> None:
+    """InputError: the image is not of the camera's size."""
+    if image.shape[:2] == (camera.height, camera.width):
         return
     raise InputError(
         "the image is not of the camera's size",
         found=f"{image.shape[1]} x {image.shape[0]} px",
-        allowed=f"{volume.camera.width} x {volume.camera.height} px",
+        allowed=f"{camera.width} x {camera.height} px",
     )
 
 
