@@ -11,15 +11,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.line.result import Line
+from analysis.line.result import Flag, Line
 from render.base.arrays import Float
 
 BIN = 0.25
 """px of the profile's bins."""
 CORE = 3.5
 """Widths of the line within which a scan line is compared with the mean profile."""
+SAMPLES = 8
+"""Pixels of a profile's bin below which it says nothing."""
 LEVELS, FEWEST = 24, 30
-"""Bins of light for the noise, and pixels below which a bin says nothing."""
+"""Bins of light for the noise, and pixels below which one says nothing."""
 DARK = 3.0
 """DN above the lowest number from which a mean is not cut off by it."""
 LEAST_FREE = 0.1
@@ -65,7 +67,7 @@ class Transfer:
 def stretch_of(image: NDArray[np.generic], line: Line, half: int, saturation: float) -> Stretch:
     """Image (h, w) DN and its line -> the scan lines whose window of 2 half + 1 px is whole and nowhere saturated."""
     upright = np.asarray(image if line.axis == "rows" else image.T, np.float64)
-    rows = np.flatnonzero(line.flag[:, 0] == 0)
+    rows = np.flatnonzero(np.isin(line.flag[:, 0], (Flag.OK, Flag.MISFIT, Flag.SPECKLED)))
     middle = np.rint(line.u[rows, 0]).astype(np.intp)
     whole = (middle >= half) & (middle + half < upright.shape[1])
     rows, middle = rows[whole], middle[whole]
@@ -89,7 +91,7 @@ def mean_profile(stretch: Stretch, rows: NDArray[np.intp], width: float) -> Prof
         mean = np.bincount(place, flat) / count
         spread = np.sqrt(np.maximum(np.bincount(place, flat**2) / count - mean**2, 0.0) / (count - 1))
         middle = np.bincount(place, distance.ravel()) / count
-    good = count >= FEWEST
+    good = count >= SAMPLES
     good[good] &= spread[good] > 0.0
     return Profile(middle[good], mean[good], spread[good])
 
@@ -127,7 +129,7 @@ def transfer_of(stretch: Stretch, shape: Float, slope: Float, width: float, lowe
             return None
         line = np.polynomial.polynomial.polyfit(level[known], squares[known], 1)
         weight = 1.0 / np.maximum(line[0] + line[1] * mean, 0.05 * float(np.mean(squares[known])))
-    light = np.linalg.solve(r, seen[..., None])[:, :1, 0] * shape[:, near]
+    light = (np.linalg.pinv(r) @ seen[..., None])[:, :1, 0] * shape[:, near]
     light = 0.5 * (light[after] + light[after + 1])
     edges = np.unique(np.quantile(level[known], np.linspace(0.0, 1.0, LEVELS + 1)))
     place = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, len(edges) - 2)

@@ -32,6 +32,10 @@ from studio.project.project import Project
 
 STRETCHES, ROWS = 8, 64
 """Stretches of line by the sheet's width, and scan lines below which there are fewer."""
+WIDEST = 1e4
+"""Of the variance of the project's sheet, the most that is believed."""
+SHORTEST = 16
+"""Bins of a profile below which no width is fitted."""
 HALF, WIDER = 40, 8.0
 """px of a window to either side of the line, at least, and widths of the line."""
 TOLD = 0.1
@@ -109,7 +113,8 @@ def look(
     full = float(2**project.sensor.bits - 1)
     tops = [float(image.max()) for image in images]
     saturated = max(tops) if sum(int((image == max(tops)).sum()) for image in images) >= ROWS // 2 else None
-    width = float(np.nanmedian(np.concatenate([line.width[line.valid] for line in lines])))
+    widths = np.concatenate([line.width[line.valid] for line in lines])
+    width = float(np.median(widths[np.isfinite(widths)])) if np.isfinite(widths).any() else 1.0
     half = int(np.ceil(max(HALF, WIDER * width)))
     limit = saturated if saturated is not None else full
     stretches, sheets, known, facing = [], [], [], False
@@ -121,6 +126,8 @@ def look(
         facing |= normal is None
         sheet, blur = _expected(project, laser, line, one.row, normal)
         good = np.isfinite(sheet) & np.isfinite(blur)
+        if not good.any():
+            continue
         stretches.append(Stretch(one.values[good], one.distance[good], one.sigma_u[good], one.row[good]))
         sheets.append(sheet[good])
         known.append(blur[good])
@@ -221,6 +228,12 @@ def _profiles(seen: Seen) -> tuple[list[Profile], Float, Float]:
     sheet, known = np.concatenate(seen.sheet), np.concatenate(seen.known)
     parts = np.array_split(np.argsort(sheet, kind="stable"), max(1, min(STRETCHES, len(sheet) // ROWS)))
     profiles = [mean_profile(whole, part, seen.width) for part in parts]
+    if any(len(one.value) < SHORTEST or not one.value.max() > 0.0 for one in profiles):
+        raise InputError(
+            "the line's profile cannot be told",
+            found=f"{len(values)} scan lines",
+            cure="add photographs, or expose longer",
+        )
     added = np.nan_to_num(whole.sigma_u) ** 2 + known + BIN**2 / 12.0
     return profiles, np.array([np.mean(sheet[k] ** 2) for k in parts]), np.array([np.mean(added[k]) for k in parts])
 
@@ -286,6 +299,12 @@ def _fit_profiles(
             where="sensor.blur_sigma",
             found=f"{blur:.3g} px of blur",
             cure="lower it in the project",
+        )
+    if p[0] > WIDEST or sigma[0] > p[0]:
+        raise InputError(
+            "the width of the line cannot be told by the project's sheet",
+            found=f"{np.sqrt(p[0]):.3g} times as wide as the project's",
+            cure="see that the photographs are of this project's scanner, from where it stands",
         )
     scale = Told(float(np.sqrt(p[0])), float(0.5 * sigma[0] / np.sqrt(p[0])))
     why = "" if apart else "the sheet is about as wide everywhere: the two cannot be told apart"

@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from render.base.errors import InputError
 from render.frame import LaserCurve
-from render.laser.laser import Divergence, LineLaser
+from render.laser.laser import Divergence, LineLaser, Waist
 from render.scene.scene import Scene
 from render.sensor.sensor import Sensor
 from render.truth.laser_curve import laser_curve
@@ -57,9 +58,17 @@ def twin_of(project: Project, root: Path, laser: int, paths: Sequence[Path], thr
     with naming(paths[0]):
         seen = look(project, laser, [one.image for one in measured], [one.line for one in measured], curves)
         twin = fitted(project, seen)
-    made = _with_twin(project, laser, twin)
-    made, power = _with_power(made, root, laser, twin, threads)
+    try:
+        made, power = _with_power(_with_twin(project, laser, twin), root, laser, twin, threads)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        cure = "see that the photographs are of this project's scanner"
+        raise InputError(f"the fit is beyond what a project may hold: {first['msg']}", where=where, cure=cure) from None
     warnings = []
+    sheet = project.scene.lasers[laser].sheet
+    if isinstance(sheet, Waist) and twin.scale.value**2 * sheet.m_squared < 1.0:
+        warnings.append("the sheet is narrower than a beam of this wavelength stays: M^2 is 1, and it widens faster")
     if seen.facing:
         warnings.append(
             "the line is not where the project's surface has it, so the surface is taken to face the laser: on a "
@@ -123,7 +132,7 @@ def wider(laser: LineLaser, scale: float) -> LineLaser:
     if isinstance(sheet, Divergence):
         angle = 2.0 * math.atan(scale * math.tan(sheet.full_angle / 2.0))
         return laser.model_copy(update={"sheet": Divergence(full_angle=angle)})
-    # the Rayleigh length stays, pi w^2 / (M^2 lambda)
+    # the Rayleigh length stays, pi w^2 / (M^2 lambda), down to that of a perfect beam
     values = {"radius": scale * sheet.radius, "m_squared": max(scale**2 * sheet.m_squared, 1.0)}
     return laser.model_copy(update={"sheet": type(sheet).model_validate({**sheet.model_dump(), **values})})
 

@@ -111,6 +111,7 @@ def test_the_twin_is_refused_in_words(shots: tuple[Path, list[Path], Project], t
     cases = {
         "small": image[:100], "bits": (image // 16).astype(np.uint8), "colour": np.stack([image, image // 2, image], 2),
     }  # fmt: skip
+    cases["noise"] = (100 + 5 * np.random.default_rng(1).standard_normal(image.shape)).astype(np.uint16)
     for name, pixels in cases.items():
         cv2.imwrite(str(tmp_path / f"{name}.png"), pixels)
     out = tmp_path / "out.json"
