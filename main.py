@@ -18,12 +18,10 @@ try:
     from studio.runtime.command_options import (
         COLOUR,
         FARTHEST,
-        GEOMETRY,
-        METHOD,
         NEAREST,
-        SELECT,
         THREADS,
         common,
+        extracting,
         measuring,
         photographed,
         real_views,
@@ -157,26 +155,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 
 @cli.command()
 @click.argument("images", nargs=-1, required=True, type=click.Path(path_type=Path))
-@METHOD
-@click.option("--laser", "colour", type=COLOUR, help="Its colour  [default: auto].")
-@photographed
-@click.option("--peaks", type=int, help="Peaks kept on each scan line  [default: as many as lines stand out].")
-@SELECT
-@click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5. One table.")
-@click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table.")
-@click.option("--ridges", is_flag=True, help="Lines of any direction, as points with their normal (Steger in 2-D).")
-@click.option(
-    "--spacetime", is_flag=True, help="The images are a sweep over a scene at rest: when it passes each pixel."
-)
-@click.option("--project", type=click.Path(path_type=Path), help="Project with camera and laser, for --geometry.")
-@click.option(
-    "--laser-number", type=click.IntRange(0), default=0, show_default=True, help="Which laser of the project."
-)
-@GEOMETRY
-@NEAREST
-@FARTHEST
-@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside each image].")
-@THREADS
+@extracting
 @common
 def extract(images: tuple[Path, ...], **options: Any) -> None:
     """The laser line in image files of a real scanner (PNG, TIFF, EXR, JPEG, BMP), as a table for each."""
@@ -266,6 +245,25 @@ def advise(project: Path | None, **options: Any) -> None:
     from studio.commands.advise import advise_project
 
     advise_project(project, **options)
+
+
+@cli.command()
+@click.argument("project", type=click.Path(path_type=Path))
+@click.argument("photographs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--laser", type=click.IntRange(0), default=0, show_default=True, help="Which laser made the line.")
+@click.option("--out", type=click.Path(path_type=Path), help="Project to write  [default: PROJECT_twin.json].")
+@THREADS
+@common
+def twin(project: Path, photographs: tuple[Path, ...], **options: Any) -> None:
+    """Fit a project to raw mono photographs of its scanner: sheet, blur, halo, noise, laser power; a new project.
+
+    The photographs are the steps of the project's motion, or all of its first step. What they do not tell is
+    kept.
+    """
+    _require_system()
+    from studio.commands.twin import twin_project
+
+    twin_project(project, photographs, **options)
 
 
 @cli.command()

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.line.result import Flag, Line
 from analysis.line.selection.continuity import select_chain
+from studio.photographs.line_ends import NEXT, alike
 
 FEWEST = 32
 """Scan lines with both positions by which the second is judged."""
@@ -25,8 +26,36 @@ AGREED = 0.25
 """Share of a chain of centres that is beside fits, from which all of it is the line."""
 BEND = 1.0
 """Widths from one scan line to the next at which a chain of centres ends."""
-FILLED = (Flag.REJECTED, Flag.NOT_CONVERGED, Flag.TOO_WIDE, Flag.OUT_OF_WINDOW, Flag.TOO_FEW_PIXELS, Flag.UNSURE)
+FILLED = (
+    Flag.REJECTED,
+    Flag.NOT_CONVERGED,
+    Flag.TOO_WIDE,
+    Flag.OUT_OF_WINDOW,
+    Flag.TOO_FEW_PIXELS,
+    Flag.UNSURE,
+    Flag.PAST_END,
+)
 """Reasons that say nothing against there being a line."""
+
+
+def offered(candidates: Line, centres: Line) -> Line:
+    """Candidates (n, k) by a fit, and the centres (n, 1) of the strongest -> the centres where the strongest has none.
+
+    A chain chosen of these does not leave the line for something faint beside it where a fit of the line fails.
+    """
+    lost = np.flatnonzero(np.isin(candidates.flag[:, 0], FILLED) & centres.valid[:, 0])
+    values: dict[str, Any] = {}
+    for name in ("u", "sigma_u", "width", "amplitude", "background", "flag"):
+        values[name] = getattr(candidates, name).copy()
+        values[name][lost, 0] = getattr(centres, name)[lost, 0]
+    return replace(candidates, **values)
+
+
+def without_detours(line: Line, chosen: Line) -> Line:
+    """The line (n, 1) of fits without what is not `chosen` when the centres are offered as well."""
+    detour = (chosen.u != line.u) & line.valid
+    flag = np.where(detour, np.uint8(Flag.REJECTED), line.flag).astype(np.uint8)
+    return replace(line, u=np.where(detour, np.nan, line.u), flag=flag)
 
 
 def completed(line: Line, centres: Line) -> Line:
@@ -83,6 +112,21 @@ def _on_chain(line: Line, centres: Line, width: float) -> NDArray[np.intp]:
     found = [np.zeros(0, np.intp)]
     far = (np.diff(rows) > GAP) | (np.abs(np.diff(u)) > BEND * width * np.diff(rows))
     for piece in np.split(np.arange(len(rows)), np.flatnonzero(far) + 1):
-        if near[piece].sum() >= max(FEWEST, AGREED * len(piece)):
-            found.append(rows[piece][np.isin(line.flag[rows[piece], 0], FILLED)])
+        here = rows[piece]
+        if near[piece].sum() < max(FEWEST, AGREED * len(piece)):
+            here = _like_fits(line, chain, here)
+            here = here if len(here) >= FEWEST else here[:0]
+        found.append(here[np.isin(line.flag[here, 0], FILLED)])
     return np.concatenate(found)
+
+
+def _like_fits(line: Line, chain: Line, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Of these scan lines of a chain of centres those as bright and as wide as the nearest fits of the line."""
+    fitted = np.flatnonzero(line.valid[:, 0])
+    middle = np.searchsorted(fitted, rows)
+    like = []
+    for row, at in zip(rows, middle, strict=True):
+        nearest = fitted[max(0, at - NEXT // 2) : at + NEXT // 2]
+        width, amplitude = float(chain.width[row, 0]), float(chain.amplitude[row, 0])
+        like.append(alike(width, amplitude, line.width[nearest, 0], line.amplitude[nearest, 0]))
+    return rows[np.array(like, np.bool_)]

@@ -71,7 +71,7 @@ def _past(rows: NDArray[np.intp], u: Floats, width: Floats, amplitude: Floats) -
                 past[inward[: _first(width[inward], amplitude[inward])]] = True
         elif len(piece) <= NEXT and len(long):
             nearest = long[np.argsort(np.abs(long - piece.mean()), kind="stable")[:NEXT]]
-            past[piece] = not _alike(
+            past[piece] = not alike(
                 float(np.median(width[piece])), float(np.median(amplitude[piece])), width[nearest], amplitude[nearest]
             )
     return past
@@ -82,10 +82,11 @@ def _first(width: Floats, amplitude: Floats) -> int:
     there = []
     for k in range(NEXT + SURE):
         inside = slice(k + 1, k + 1 + NEXT)
-        there.append(_alike(width[k], amplitude[k], width[inside], amplitude[inside]))
+        there.append(alike(width[k], amplitude[k], width[inside], amplitude[inside]))
     return next((k for k in range(NEXT) if all(there[k : k + SURE])), 0)
 
 
-def _alike(width: float, amplitude: float, widths: Floats, amplitudes: Floats) -> bool:
+def alike(width: float, amplitude: float, widths: Floats, amplitudes: Floats) -> bool:
+    """Whether a width and an amplitude are those of a line whose scan lines (m,) have others."""
     usual = float(np.median(widths))
     return amplitude >= HALF * float(np.median(amplitudes)) and usual / WIDER <= width <= WIDER * usual

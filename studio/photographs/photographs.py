@@ -26,7 +26,8 @@ from analysis.line.shared_noise import with_shared_noise
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
-from studio.photographs.completion import FILLED, completed
+from render.camera.camera import Camera
+from studio.photographs.completion import FILLED, completed, offered, without_detours
 from studio.photographs.evidence import chains_of, shrink
 from studio.photographs.laser_light import Light, banded, laser_light, without
 from studio.photographs.line_ends import ended
@@ -83,12 +84,16 @@ def extract_photograph(
         plain = noise.model_copy(update={"alike": False})
         line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
         line = placed(unsure_dropped(line), whole.shape, look.region.corner)
-        line = line if alone else selected(line, settings, volume)
         fits = settings.select == "continuous" and settings.peaks == 1 and settings.method in FITS
-        if fits and np.isin(line.flag, FILLED).any():
+        if fits and np.isin(line.flag[:, 0], FILLED).any():
             plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
             centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
-            line = completed(line, placed(centres, whole.shape, look.region.corner))
+            centres = placed(centres, whole.shape, look.region.corner)
+            chosen = selected(offered(line, centres), settings, volume)
+            fitted = without_detours(selected(line, settings, volume), chosen)
+            line = completed(ended(fitted), centres)  # noise past an end is no base for centres
+        elif not alone:
+            line = selected(line, settings, volume)
         if settings.select == "continuous":
             line = ended(line)
         line = with_shared_noise(line) if shared else line
@@ -280,12 +285,18 @@ def naming(path: Path) -> Iterator[None]:
 
 def check_camera(image: NDArray[Any], volume: WorkingVolume | None) -> None:
     """InputError: the image is not of the size of the camera whose geometry is asked for."""
-    if volume is None or image.shape[:2] == (volume.camera.height, volume.camera.width):
+    if volume is not None:
+        check_size(image, volume.camera)
+
+
+def check_size(image: NDArray[Any], camera: Camera) -> None:
+    """InputError: the image is not of the camera's size."""
+    if image.shape[:2] == (camera.height, camera.width):
         return
     raise InputError(
         "the image is not of the camera's size",
         found=f"{image.shape[1]} x {image.shape[0]} px",
-        allowed=f"{volume.camera.width} x {volume.camera.height} px",
+        allowed=f"{camera.width} x {camera.height} px",
     )
 
 

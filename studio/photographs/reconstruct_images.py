@@ -16,7 +16,7 @@ from render.base.errors import InputError
 from studio.photographs.image_files import load_photograph
 from studio.photographs.photograph_report import PhotographReport, write_photograph_report
 from studio.photographs.photograph_set import Wishes, look_at
-from studio.photographs.photographs import Measured, extract_photograph, extract_series
+from studio.photographs.photographs import Measured, check_size, extract_photograph, extract_series, naming
 from studio.project.project import Project
 from studio.scan.line_extraction import working_volume
 from studio.scan.own_files import check_replaceable
@@ -52,7 +52,8 @@ def reconstruct_images(
     check_replaceable(files, paths)
     volume = working_volume(project, laser)
     for path in paths:
-        _check_size(path, project)
+        with naming(path):
+            check_size(load_photograph(path), project.scene.camera)
     with clock.stage("line extraction"):
         settings = project.extraction
         if wishes is None:
@@ -89,18 +90,6 @@ def reconstruct_images(
         "flags": {Flag(int(flag)).name: int(count) for flag, count in zip(flags, counts, strict=True)},
         "seconds": clock.seconds,
     }
-
-
-def _check_size(path: Path, project: Project) -> None:
-    """InputError: the file is no image, or not of the camera's size."""
-    camera, image = project.scene.camera, load_photograph(path)
-    if image.shape[:2] != (camera.height, camera.width):
-        raise InputError(
-            "the image is not of the camera's size",
-            where=str(path),
-            found=f"{image.shape[1]} x {image.shape[0]} px",
-            allowed=f"{camera.width} x {camera.height} px",
-        )
 
 
 def _along_time(measured: Sequence[Measured], project: Project, laser: int, threads: int | None) -> list[Line]:

@@ -192,7 +192,7 @@ def _width(project: Project, frame: Frame, i: int, seen: Float) -> float | None:
     T_camera_laser = scene.T_camera_laser(i)
     pair = (curve.position, curve.index) if curve.axis == "rows" else (curve.index, curve.position)
     pixels = np.stack(pair, axis=1).astype(np.float64)
-    normal = _facets(curve, T_camera_laser[:3, 3])
+    normal = facets(curve, T_camera_laser[:3, 3])
     known = line_width_px(
         scene.camera, scene.lasers[i], T_camera_laser, normal, curve.point, pixels, curve.axis == "rows"
     )
@@ -200,7 +200,7 @@ def _width(project: Project, frame: Frame, i: int, seen: Float) -> float | None:
     return float(np.median(known)) if len(known) else width
 
 
-def _facets(curve: LaserCurve, origin: Float) -> Float:
+def facets(curve: LaserCurve, origin: Float) -> Float:
     """(n, 3) unit normals, camera frame, by their angles to camera (at 0) and laser.
 
     Two normals have them, mirrored in the plane of both directions; the one perpendicular to the line is taken.

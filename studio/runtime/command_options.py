@@ -115,6 +115,38 @@ def photographed(command: Callable[..., Any]) -> Callable[..., Any]:
 COLOUR = click.Choice(["auto", "mono", "red", "green", "blue"])
 
 
+def extracting(command: Callable[..., Any]) -> Callable[..., Any]:
+    """How lines are found in photographs without a project."""
+    for option in (
+        THREADS,
+        click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside each image]."),
+        FARTHEST,
+        NEAREST,
+        GEOMETRY,
+        click.option(
+            "--laser-number", type=click.IntRange(0), default=0, show_default=True, help="Which laser of the project."
+        ),
+        click.option(
+            "--project", type=click.Path(path_type=Path), help="Project with camera and laser, for --geometry."
+        ),
+        click.option(
+            "--spacetime", is_flag=True, help="The images are a sweep over a scene at rest: when it passes each pixel."
+        ),
+        click.option(
+            "--ridges", is_flag=True, help="Lines of any direction, as points with their normal (2-D Steger)."
+        ),
+        click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table."),
+        click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene: 8,2,0.5. One table."),
+        SELECT,
+        click.option("--peaks", type=int, help="Peaks kept on each scan line  [default: as many as lines stand out]."),
+        photographed,
+        click.option("--laser", "colour", type=COLOUR, help="Its colour  [default: auto]."),
+        METHOD,
+    ):
+        command = option(command)
+    return command
+
+
 def repeating(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of the commands that run a project many times."""
     for option in (

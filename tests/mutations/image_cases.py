@@ -1,4 +1,4 @@
-"""Photographs of every kind, broken or not, for `extract` and `reconstruct`."""
+"""Photographs of every kind, broken or not, for `extract`, `reconstruct` and `twin`."""
 
 from __future__ import annotations
 
@@ -35,12 +35,16 @@ def image(sources: Sources, place: Path, rng: Random, harm: bool) -> list[str]:
     (place / name).write_bytes(content)
     common = [*json_or_not(rng), "--out", "out"]
     use = (
-        rng.choice(("extract",) * 6 + ("reconstruct", "reconstruct", "hdr", "off", "sweep", "ridges", "geometry"))
+        rng.choice(
+            ("extract",) * 6 + ("reconstruct", "reconstruct", "hdr", "off", "sweep", "ridges", "geometry", "twin")
+        )
         if harm
         else "extract"
     )
     if use == "reconstruct":
         return ["reconstruct", name, "--project", "project.json", *common]
+    if use == "twin":
+        return ["twin", "project.json", name, "whole.png", *common[:-1], "twin.json"]
     order = rng.sample([name, "whole.png"], 2)
     if use == "hdr":
         return ["extract", *order, "--hdr", rng.choice(("8,2", "2,8", "1,1")), *common]

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.line.result import Flag, Line
-from studio.photographs.completion import GAP, completed
+from analysis.line.selection.continuity import select_chain
+from studio.photographs.completion import GAP, completed, offered, without_detours
 
 COUNT, WIDTH, SCATTER = 400, 2.0, 0.3
 
@@ -62,9 +63,29 @@ def test_a_smooth_chain_of_centres_carries_the_line_on_where_no_fit_does() -> No
     lost = np.arange(250, COUNT)
     found = completed(without(fits, lost, Flag.NOT_CONVERGED), centres)
     assert found.valid[lost].all() and np.abs(found.u[lost, 0] - truth[lost]).max() < 5.0 * SCATTER
-    # as long as enough of it is beside fits
-    few = completed(without(fits, np.arange(60, COUNT), Flag.NOT_CONVERGED), centres)
-    assert few.valid.sum() == 60
+    # as long as enough of it is beside fits, or all of it as bright as they are
+    few = without(fits, np.arange(60, COUNT), Flag.NOT_CONVERGED)
+    dim = centres.amplitude.copy()
+    dim[60:] = 0.3
+    assert completed(few, replace(centres, amplitude=dim)).valid.sum() == 60
+    assert completed(few, centres).valid.mean() > 0.99  # the chain leaves out what scatters most
+
+
+def test_the_line_is_not_left_for_a_ghost_where_its_own_fit_fails() -> None:
+    fits, centres, truth = lines()
+    ghost = replace(fits, u=np.full((COUNT, 1), 300.0), amplitude=np.full((COUNT, 1), 0.05))
+    lost = np.arange(150, 190)
+    ghost = without(ghost, np.setdiff1d(np.arange(COUNT), lost), Flag.NO_PEAK)
+    pairs = {
+        name: np.concatenate([getattr(without(fits, lost, Flag.NOT_CONVERGED), name), getattr(ghost, name)], axis=1)
+        for name in ("u", "sigma_u", "width", "amplitude", "background", "chi2", "length_apart", "flag")
+    }
+    candidates = replace(fits, **pairs)
+    alone = select_chain(candidates)
+    assert np.all(alone.u[lost] == 300.0)
+    kept = without_detours(alone, select_chain(offered(candidates, centres)))
+    found = completed(kept, centres)
+    assert found.valid.all() and np.abs(found.u[:, 0] - truth).max() < 5.0 * SCATTER
 
 
 def test_scan_lines_without_a_peak_stay_without_one() -> None:
