@@ -11,12 +11,13 @@ from html import escape
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent, QColor, QKeySequence, QPixmap, QResizeEvent, QShortcut
+from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
     QHBoxLayout,
     QLabel,
+    QScrollArea,
     QSizePolicy,
     QSplitter,
     QStackedLayout,
@@ -30,6 +31,7 @@ from analysis.report.colour import TRUTH, method_colour, method_name
 from analysis.report.units import digits
 from render.base.arrays import Float
 from studio.qt.core import theme
+from studio.qt.core.icons import dot
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.results.measures_table import MeasuresTable
@@ -58,6 +60,8 @@ STEPS, NOTICE = 2, 3
 """Tabs of the plots."""
 PART, REGION = 1, 2
 """Tabs of the figures."""
+LEAST = 90
+"""px of height of the figures: what has no room scrolls."""
 TALL = 480
 """px of height from which there is room below the measures."""
 
@@ -312,7 +316,7 @@ class ResultsPanel(QWidget):
             switch.setCheckable(True)
             switch.setChecked(method not in self.hidden)
             switch.setText(method_name(method))
-            switch.setIcon(_dot(method_colour(method)))
+            switch.setIcon(dot(method_colour(method)))
             switch.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
             switch.setToolTip("Show or hide this method")
             switch.toggled.connect(partial(self._switch, method))
@@ -360,8 +364,12 @@ class ResultsPanel(QWidget):
         self.figures = QTabWidget()
         self.figures.setDocumentMode(True)
         self.figures.addTab(measures, "Errors")
-        self.figures.addTab(self.part, "Measures of the part")
+        scrolled = QScrollArea(widgetResizable=True)
+        scrolled.setFrameShape(QFrame.Shape.NoFrame)
+        scrolled.setWidget(self.part)
+        self.figures.addTab(scrolled, "Measures of the part")
         self.figures.addTab(self.region, "Region")
+        self.figures.setMinimumHeight(LEAST)
         parts: list[tuple[QWidget, int]] = [(self.rows, 5), (tabs, 4), (self.figures, 3)]
         for i, (part, stretch) in enumerate(parts):
             across.addWidget(part)
@@ -384,17 +392,3 @@ class ResultsPanel(QWidget):
         self.stack = QStackedLayout(self)
         self.stack.addWidget(nothing)
         self.stack.addWidget(content)
-
-
-def _dot(colour: str) -> QPixmap:
-    from PySide6.QtGui import QPainter
-
-    made = QPixmap(12, 12)
-    made.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(made)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(colour))
-    painter.drawEllipse(1, 1, 10, 10)
-    painter.end()
-    return made
