@@ -23,6 +23,8 @@ FINEST = 1e-9
 """m a level at least."""
 CHUNK = 1 << 18
 """Cells at a time."""
+Means = tuple[NDArray[np.intp], Float]
+"""(n,) cells as means of three points each: (n, 3) points, (n, 3) weights, NaN where there is no surface."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         found, allowed = f"{columns} x {rows} cells of {pitch:g} m", f"at most {MOST_CELLS} cells"
         raise InputError("the height map would be too large", found=found, allowed=allowed, cure="give a larger pitch")
     heights, sigma, covariance = (np.full(rows * columns, np.nan) for _ in range(3))
-    grid = _Grid(mesh, is_surface, cloud, pitch, columns, float(extent[1]))
+    grid = _Grid(cloud, pitch, columns, float(extent[1]), mesh, is_surface)
     for start in range(0, rows * columns, CHUNK):
         cells = np.arange(start, min(start + CHUNK, rows * columns))
         here, beside = grid.weights(cells), grid.weights(cells + 1)
@@ -116,28 +118,19 @@ def decoded(numbers: NDArray[np.uint16], scale: float, offset: float) -> Float:
 
 
 @dataclass(frozen=True)
-class _Weights:
-    """(n,) cells as means of three points each."""
-
-    vertex: NDArray[np.intp]
-    """(n, 3) points."""
-    weight: Float
-    """(n, 3), NaN where there is no surface."""
-
-
-@dataclass(frozen=True)
 class _Grid:
     """Cells row by row over a triangulation whose origin is its lowest x and y."""
 
-    mesh: Delaunay
-    is_surface: NDArray[np.bool_]
     cloud: Cloud
     pitch: float
     columns: int
     top: float
     """y of the first row."""
+    mesh: Delaunay
+    is_surface: NDArray[np.bool_]
+    """(t,) triangles that bridge no gap."""
 
-    def weights(self, cells: NDArray[np.intp]) -> _Weights:
+    def weights(self, cells: NDArray[np.intp]) -> Means:
         row, column = np.divmod(cells, self.columns)
         place = np.column_stack([column * self.pitch, self.top - row * self.pitch])
         # a hair of tolerance, so that the cells on the hull are of its triangles
@@ -146,19 +139,20 @@ class _Grid:
         two = np.einsum("nij,nj->ni", transform[:, :2], place - transform[:, 2])
         weight = np.column_stack([two, 1.0 - two.sum(axis=1)])
         weight[(found < 0) | ~self.is_surface[found]] = np.nan
-        return _Weights(self.mesh.simplices[found], weight)
+        return self.mesh.simplices[found], weight
 
-    def heights(self, of: _Weights) -> Float:
-        return np.asarray((of.weight * self.cloud["z"][of.vertex]).sum(axis=1))
+    def heights(self, of: Means) -> Float:
+        vertex, weight = of
+        return np.asarray((weight * self.cloud["z"][vertex]).sum(axis=1))
 
-    def covariance(self, one: _Weights, other: _Weights) -> Float:
+    def covariance(self, one: Means, other: Means) -> Float:
         """(n,) of the random errors of n pairs of cells."""
-        total = np.zeros(len(one.vertex))
+        total = np.zeros(len(one[0]))
         sigma = self.cloud["sigma_random"]
         for i in range(3):
             for j in range(3):
-                a, b = one.vertex[:, i], other.vertex[:, j]
-                total += one.weight[:, i] * other.weight[:, j] * sigma[a] * sigma[b] * self._correlation(a, b)
+                a, b = one[0][:, i], other[0][:, j]
+                total += one[1][:, i] * other[1][:, j] * sigma[a] * sigma[b] * self._correlation(a, b)
         return total
 
     def _correlation(self, a: NDArray[np.intp], b: NDArray[np.intp]) -> Float:

@@ -42,7 +42,7 @@ class PartDrawing(QObject):
         self.plot = plot
         self.spans: list[plots.Span] = []
         self._items: list[Any] = []
-        self._kind: Kind | None = None
+        self._made_for: tuple[Kind | None, str] = None, ""
 
     def show_readings(self, readings: list[Reading], profile: Profile | None, chosen: Gauge | None) -> None:
         """Curves and dimension of each; the chosen one thicker, with its value."""
@@ -64,19 +64,17 @@ class PartDrawing(QObject):
 
     def show_regions(self, kind: Kind | None, regions: Sequence[tuple[float, float]] = ()) -> None:
         """Of one measure, as many as there are yet; their edges can be moved once all are there. None: of none."""
-        if kind != self._kind:
+        colour = theme.colours().accent
+        if (kind, colour) != self._made_for:
             for span in self.spans:
                 self.plot.removeItem(span)
             names = () if kind is None else REGIONS[kind]
             # one below the other, so that the names of narrow regions do not cover each other
-            self.spans = [
-                plots.Span(self.plot, theme.colours().accent, name, NAME_AT + NAME_APART * i)
-                for i, name in enumerate(names)
-            ]
+            self.spans = [plots.Span(self.plot, colour, name, NAME_AT + NAME_APART * i) for i, name in enumerate(names)]
             for span in self.spans:
                 span.edges_moving.connect(partial(self._tell, self.moving))
                 span.edges_moved.connect(partial(self._tell, self.moved))
-            self._kind = kind
+            self._made_for = kind, colour
         for span in self.spans:
             span.setMovable(len(regions) == len(self.spans))
         for span, (low, high) in zip(self.spans, regions, strict=False):

@@ -53,6 +53,9 @@ def drag(qtbot: QtBot, plots: PointedPlots, low: float, high: float, k: int = 0)
     box, view = plots.plots[k].vb, plots.viewport()
     height = 0.5 * sum(box.viewRange()[1])
     ends = [plots.mapFromScene(box.mapViewToScene(QPointF(x, height))) for x in (low, high)]
+    qtbot.mouseMove(view, ends[0] - QPoint(9, 0))  # what is under the mouse is known by where it moved
+    qtbot.mouseMove(view, ends[0])
+    qtbot.wait(20)  # the scene hears of few moves in a short time
     qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=ends[0])
     for share in (0.3, 0.7, 1.0):
         qtbot.mouseMove(view, QPoint(*(round(a + share * (b - a)) for a, b in zip(*map(_pair, ends), strict=True))))
