@@ -194,6 +194,22 @@ def compare(a: Path, b: Path, **options: Any) -> None:
 
 
 @cli.command()
+@click.argument("source", type=click.Path(path_type=Path))
+@click.option("--pitch", type=FiniteRange(1e-3, 1e3), help="Of the cells, mm  [default: a cell for each point].")
+@click.option("--out", type=click.Path(path_type=Path), help="PNG or TIFF  [default: heightmap.png beside the points].")
+@common
+def heightmap(source: Path, **options: Any) -> None:
+    """The points of a scan as heights on a uniform grid: a 16-bit picture, with its scale in a JSON file beside it.
+
+    SOURCE is a results folder, or a PLY of points.
+    """
+    _require_system()
+    from studio.commands.height_map import make_height_map
+
+    make_height_map(source, **options)
+
+
+@cli.command()
 @PROJECT
 @common
 def inspect(project: Path | None, **options: Any) -> None:

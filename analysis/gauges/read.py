@@ -78,15 +78,22 @@ def _true_value(gauge: Gauge, truth: Profile | None) -> float:
     return NAN if isinstance(found, str) else found[0]
 
 
-def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | str:
-    """Value, its derivative by the points' positions (m, 2), and the curves that it is of; or why there is none."""
+def parts_of(gauge: Gauge, profile: Profile) -> list[Mask] | str:
+    """The (m,) points within each region, or why they are too few."""
     parts = [profile.within(*region) for region in gauge.regions]
     for name, part, region in zip(REGIONS[gauge.kind], parts, gauge.regions, strict=True):
         least = PARAMETERS.get(gauge.kind, 2) + SPARE
         if (there := np.count_nonzero(part)) < least:
             where = f"{region[0] * 1e3:.6g} to {region[1] * 1e3:.6g} mm"
             return f"too few points in the region {name!r} ({where}): {there}; at least {least} are needed"
-    fits, function = _curves(gauge, profile, parts)
+    return parts
+
+
+def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | str:
+    """Value, its derivative by the points' positions (m, 2), and the curves that it is of; or why there is none."""
+    if isinstance(parts := parts_of(gauge, profile), str):
+        return parts
+    fits, function = curves_of(gauge, profile, parts)
     theta = [one.theta for one in fits]
     value = function(theta)
     if not math.isfinite(value):
@@ -116,7 +123,7 @@ NOTHING = {
 Function = Callable[[Sequence[Float]], float]
 
 
-def _curves(gauge: Gauge, profile: Profile, parts: list[Mask]) -> tuple[list[Fit], Function]:
+def curves_of(gauge: Gauge, profile: Profile, parts: list[Mask]) -> tuple[list[Fit], Function]:
     """The curves that a value is of, and the value of their parameters."""
     match gauge.kind:
         case "step":
@@ -136,7 +143,7 @@ def _curves(gauge: Gauge, profile: Profile, parts: list[Mask]) -> tuple[list[Fit
             return fits, lambda theta: _height_of_peak(fits, theta, gauge.regions[1])
         case _:
             fits = [_polynomial(profile, part, 1) for part in parts]
-            return fits, lambda theta: _of_lines(gauge, [_line(*pair) for pair in zip(fits, theta, strict=True)])
+            return fits, lambda theta: _of_lines(gauge, [line_of(*pair) for pair in zip(fits, theta, strict=True)])
 
 
 def _polynomial(profile: Profile, part: Mask, degree: int, axes: Float | None = None) -> Fit:
@@ -147,7 +154,7 @@ def _zeros(count: int) -> Float:
     return np.zeros(count)
 
 
-def _line(one: Fit, theta: Float) -> tuple[Float, Float]:
+def line_of(one: Fit, theta: Float) -> tuple[Float, Float]:
     """A point of the line and its direction, to the right or up."""
     along = np.array([1.0, theta[1]]) @ one.frame.axes
     return one.frame.out(np.array([0.0, theta[0]])), along / np.linalg.norm(along)
@@ -164,13 +171,13 @@ def _of_lines(gauge: Gauge, lines: list[tuple[Float, Float]]) -> float:
         return float(np.linalg.norm(ends[1] - ends[0]))
     r, w = lines[2]
     if gauge.kind == "width":
-        return float(np.linalg.norm(_crossing(p, u, r, w) - _crossing(p, u, q, v)))
-    return -_cross(u, _crossing(q, v, r, w) - p)
+        return float(np.linalg.norm(crossing(p, u, r, w) - crossing(p, u, q, v)))
+    return -_cross(u, crossing(q, v, r, w) - p)
 
 
 def _height_of_peak(fits: list[Fit], theta: Sequence[Float], region: tuple[float, float]) -> float:
     """Where the parabola runs along the reference line, over that line; NaN: not within the region."""
-    point, along = _line(fits[0], theta[0])
+    point, along = line_of(fits[0], theta[0])
     frame, (a, b, q) = fits[1].frame, theta[1]
     right, up = frame.axes @ along
     t = _over(_over(up, right) - b, 2.0 * q)
@@ -178,7 +185,7 @@ def _height_of_peak(fits: list[Fit], theta: Sequence[Float], region: tuple[float
     return _cross(along, top - point) if region[0] <= top[0] <= region[1] else NAN
 
 
-def _crossing(p: Float, u: Float, q: Float, v: Float) -> Float:
+def crossing(p: Float, u: Float, q: Float, v: Float) -> Float:
     """Where the lines through p along u and through q along v cross; NaN: they are parallel."""
     sine = _cross(u, v)
     return p + u * (_cross(q - p, v) / sine if abs(sine) > FLATTEST else NAN)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,19 @@ def readings(project: Project, frame: Frame, found: Sequence[Measurement]) -> tu
     wanted = [gauge for gauge in project.measures if gauge.step in (None, frame.step) and gauge.laser < len(found)]
     both = {laser: profiles(project, frame, found[laser]) for laser in {gauge.laser for gauge in wanted}}
     return tuple(read(gauge, frame.step, *both[gauge.laser]) for gauge in wanted)
+
+
+def read_each(gauges: Sequence[Gauge], step: int, of: Mapping[int, tuple[Profile, Profile]]) -> tuple[Reading, ...]:
+    """One for each measure, those of another step or laser without a value; of: `profiles` by laser."""
+    found = []
+    for gauge in gauges:
+        if gauge.step not in (None, step):
+            found.append(Reading(gauge, step, reason=f"it is of step {gauge.step} alone"))
+        elif gauge.laser not in of:
+            found.append(Reading(gauge, step, reason=f"laser {gauge.laser} was not rendered"))
+        else:
+            found.append(read(gauge, step, *of[gauge.laser]))
+    return tuple(found)
 
 
 def worst(found: Sequence[Reading]) -> Reading:

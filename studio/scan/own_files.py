@@ -15,7 +15,7 @@ HEAD = 64 * 1024
 """Bytes at the beginning of a file that tell what it is."""
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 EXR_LAYERS = re.compile(rb"laser\.[^\0]*\.direct\.Y\0|object_id\.Y\0|ambient\.B\0.{16}ambient\.G\0|sigma_time\0", re.S)
-JSON_FORMAT = re.compile(rb'\{\s*"format": "blazer-(frame|scan)"')
+JSON_FORMAT = re.compile(rb'\{\s*"format": "blazer-(frame|scan|heightmap)"')
 OF_A_POSITION = ("rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "correlation_length", "flag")
 
 
@@ -95,6 +95,8 @@ def is_own(path: Path) -> bool:
     A PNG belongs to the frame or table beside it, a PDF to the HTML.
     """
     suffix = path.suffix.lower()
+    if suffix in (".tif", ".tiff"):
+        return is_own(path.with_suffix(".json"))
     if suffix == ".png":
         return any(is_own(path.with_suffix(other)) for other in (".exr", ".json", ".csv"))
     if suffix == ".pdf":

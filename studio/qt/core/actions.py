@@ -54,6 +54,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("export_png", "File/Export", "&Image as PNG…", "", "", "As the sensor sees it"),
     Command("export_ply", "File/Export", "&Points as PLY…", "", "", "With error and scan line as attributes"),
     Command("export_csv", "File/Export", "Points as &CSV…", "", "", "A table for a spreadsheet"),
+    Command("export_heightmap", "File/Export", "&Height map of the scan…", "", "", "16 bit, with its scale beside it"),
     "File/Export/-",
     Command("screenshot", "File/Export", "&Screenshot of the window…", "Ctrl+Shift+P", "picture"),
     "File/-",

@@ -79,3 +79,8 @@ def icon_button(name: str, tip: str, handler: Callable[[], None]) -> QToolButton
     button.setToolTip(tip)
     button.clicked.connect(handler)
     return button
+
+
+def dot(colour: str) -> QIcon:
+    """A filled circle of a colour that means something."""
+    return drawn(f"<circle cx='12' cy='12' r='9' fill='{colour}' stroke='none'/>")

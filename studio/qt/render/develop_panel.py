@@ -50,6 +50,7 @@ class DevelopPanel(QWidget):
         self.session = session
         self.runner = JobRunner(self)
         self.develop_seconds = 0.0
+        self._followed = session.project
         self._told_of: Render | None = None
         """The render that brightness and measures are of."""
         self._to_measure: tuple[Render, Frame, Development, list[Image], tuple[Method, ...]] | None = None
@@ -178,8 +179,10 @@ class DevelopPanel(QWidget):
         self.refresh()
 
     def _project_changed(self) -> None:
-        self._follow_project()
-        self.refresh()
+        before, self._followed = self._followed, self.session.project
+        if before.model_copy(update={"measures": self._followed.measures}) != self._followed:
+            self._follow_project()
+            self.refresh()  # measures of the part are read off what was measured
 
     def _follow_project(self) -> None:
         project = self.session.project

@@ -15,10 +15,12 @@ from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import show_trouble, suggested
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Session
+from studio.qt.core.session import Render, Session
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress
 from studio.runtime.preferences import PreferencesFile
+from studio.scan.height_map import export_height_map
+from studio.scan.own_files import check_replaceable
 from studio.scan.redevelop import Development, develop_again, development, measure_again
 from studio.scan.remarks import scale_notes
 
@@ -32,6 +34,7 @@ KINDS = {
     "export_png": ("PNG image (*.png)", ".png", "image"),
     "export_ply": ("PLY points (*.ply)", ".ply", "points"),
     "export_csv": ("CSV table (*.csv)", ".csv", "points"),
+    "export_heightmap": ("Height map, 16 bit (*.png)", ".png", "height map"),
 }
 """Command -> filter of the file dialog, suffix, what it is."""
 LANE = "export"
@@ -59,10 +62,7 @@ class ExportActions(QObject):
         """Offer what can be had."""
         render = self.session.shown
         for key, (_, _, what) in KINDS.items():
-            there = render is not None and (
-                what == "frame" or bool(render.images if what == "image" else render.measurements)
-            )
-            self.actions[key].setEnabled(there)
+            self.actions[key].setEnabled(render is not None and _is_there(what, render))
 
     def ask(self, key: str) -> None:
         """Ask for a file, then write it."""
@@ -104,12 +104,15 @@ class ExportActions(QObject):
             "frame": export.export_frame,
             "image": export.export_image,
             "points": export.export_points,
+            "height map": partial(export_height_map, render.scan),
         }
         writer = writers[kind]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
             progress(path.name, 0.0)  # how far it is, nobody knows
-            what = shown if current or kind == "frame" else _measured(shown, how, noise, cancelled)
+            what = shown if current or kind in ("frame", "height map") else _measured(shown, how, noise, cancelled)
+            if kind == "height map":  # nobody was asked about the file beside the picture
+                check_replaceable([path.with_suffix(".json")])
             return export.export_unless(cancelled, writer, path, what)
 
         notes = scale_notes(render.scanner_scale)
@@ -143,6 +146,13 @@ class ExportActions(QObject):
     def _tell(self, written: list[Path], notes: tuple[str, ...]) -> None:
         names = ", ".join(str(path) for path in written)
         self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes]))
+
+
+def _is_there(what: str, render: Render) -> bool:
+    """What is exported of a render can be had."""
+    if what == "height map":
+        return render.scan is not None and render.scan.measured
+    return what == "frame" or bool(render.images if what == "image" else render.measurements)
 
 
 def _measured(shown: Exported, how: Development, noise: bool, cancelled: Cancel) -> Exported:

@@ -37,8 +37,8 @@ def shown(value: float) -> str:
     return "-" if math.isnan(value) else f"{value:.0f}" if value == round(value) else digits(value)
 
 
-class MeasuresTable(QTableWidget):
-    """Read only; rows can be selected and copied."""
+class ReadOnlyTable(QTableWidget):
+    """Rows can be selected and copied."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -48,22 +48,42 @@ class MeasuresTable(QTableWidget):
         self.setAlternatingRowColors(True)
         self.verticalHeader().setDefaultSectionSize(ROW_PX)
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+
+    def show_methods(self, methods: list[str], count: int) -> None:
+        """A column for each of them, and so many rows."""
+        self.setColumnCount(len(methods))
+        self.setRowCount(count)
+        self.setHorizontalHeaderLabels([method_name(method).replace(" ", "\n", 1) for method in methods])
+
+    def show_cell(self, row: int, column: int, text: str) -> QTableWidgetItem:
+        item = QTableWidgetItem(text)
+        item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setItem(row, column, item)
+        return item
+
+    def end_with_rows(self) -> None:
+        """No higher than its rows."""
+        rows = ROW_PX * self.rowCount()
+        self.setMaximumHeight(self.horizontalHeader().sizeHint().height() + rows + 2 * self.frameWidth())
+
+
+class MeasuresTable(ReadOnlyTable):
+    """What the errors of each method come to."""
+
+    def __init__(self) -> None:
+        super().__init__()
         self.setMinimumWidth(360)
 
     def show_measures(self, methods: list[str], rows: list[tuple[str, str, list[float]]]) -> None:
         """rows: name, unit, and a value for each method, NaN where there is none."""
-        self.setColumnCount(len(methods))
-        self.setRowCount(len(rows))
-        self.setHorizontalHeaderLabels([method_name(method).replace(" ", "\n", 1) for method in methods])
+        self.show_methods(methods, len(rows))
         for row, (name, unit, values) in enumerate(rows):
             heading = QTableWidgetItem(f"{name} / {unit}" if unit else name)
             heading.setToolTip(f"<p>{EXPLAINED[name]}</p>")
             self.setVerticalHeaderItem(row, heading)
             for column, value in enumerate(values):
-                item = QTableWidgetItem(shown(value))
-                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                item = self.show_cell(row, column, shown(value))
                 item.setToolTip(f"<p>{EXPLAINED[name]}</p>")
                 if name == COVERED and value < HONEST:
                     item.setForeground(QColor(theme.colours().warning))
-                self.setItem(row, column, item)
-        self.setMaximumHeight(self.horizontalHeader().sizeHint().height() + ROW_PX * len(rows) + 2 * self.frameWidth())
+        self.end_with_rows()

@@ -5,11 +5,72 @@ from __future__ import annotations
 from typing import Any
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QPointF, Signal
+from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtGui import QColor
 
 from studio.qt.core import theme
 
 pg.setConfigOptions(antialias=False)
+
+
+class RangeBox(pg.ViewBox):  # type: ignore[misc]
+    """A drag chooses a range of x; with Shift or the middle button it moves the view."""
+
+    ranged = Signal(float, float, bool)
+    """From, to, and whether the drag is over."""
+
+    def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
+        plain = (
+            event.button() == Qt.MouseButton.LeftButton and not event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+        )
+        if axis is not None or not plain:
+            super().mouseDragEvent(event, axis)
+            return
+        event.accept()
+        ends = [self.mapToView(place).x() for place in (event.buttonDownPos(), event.pos())]
+        self.ranged.emit(min(ends), max(ends), event.isFinish())
+
+
+class Span(pg.LinearRegionItem):  # type: ignore[misc]
+    """A range of x whose edges can be moved: `edges_moved` tells where to, `edges_moving` meanwhile.
+
+    Neither tells what `place` sets.
+    """
+
+    edges_moving = Signal(float, float)
+    edges_moved = Signal(float, float)
+
+    def __init__(self, plot: pg.PlotItem, colour: str, name: str = "", height: float = 0.0) -> None:
+        """name: written beside its left edge, at a height from 0 to 1 along the axis."""
+        super().__init__((0.0, 1.0))
+        if name:
+            pg.InfLineLabel(self.lines[0], name, position=height, anchors=[(0.0, 0.5), (0.0, 0.5)], color=colour)
+        self.sigRegionChanged.connect(lambda: self.edges_moving.emit(*self.ends))
+        self.sigRegionChangeFinished.connect(lambda: self.edges_moved.emit(*self.ends))
+        self.paint_in(colour)
+        self.hide()
+        plot.addItem(self, ignoreBounds=True)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        low, high = sorted(self.getRegion())
+        return low, high
+
+    def place(self, low: float, high: float) -> None:
+        self.blockSignals(True)
+        self.setRegion((low, high))
+        self.blockSignals(False)
+        self.show()
+
+    def paint_in(self, colour: str) -> None:
+        fill, hovered = QColor(colour), QColor(colour)
+        fill.setAlpha(38)
+        hovered.setAlpha(64)
+        self.setBrush(fill)
+        self.setHoverBrush(hovered)
+        for line in self.lines:
+            line.setPen(pg.mkPen(colour, width=1.2))
+            line.setHoverPen(pg.mkPen(colour, width=3))
 
 
 class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
@@ -17,6 +78,8 @@ class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
     hovered = Signal(object)
     chosen = Signal(int)
+    ranged = Signal(float, float)
+    """A range of x was dragged, or its edges were."""
 
     def __init__(self, *shown: pg.PlotItem) -> None:
         """shown: from top to bottom."""
@@ -26,12 +89,34 @@ class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             self.addItem(plot, row=row, col=0)
             plot.getAxis("left").setWidth(62)
         self.ci.layout.setContentsMargins(2, 4, 8, 2)
+        self.spans = [Span(plot, theme.colours().muted) for plot in shown]
+        for plot, span in zip(shown, self.spans, strict=True):
+            plot.vb.ranged.connect(self._range)
+            span.edges_moving.connect(self.show_range)
+            span.edges_moved.connect(self.ranged)
         self.scene().sigMouseMoved.connect(self._move)
         self.scene().sigMouseClicked.connect(self._click)
 
     def scan_line_at(self, position: QPointF) -> int | None:
         """Of the sample at a place of the widget, None where none is near."""
         raise NotImplementedError
+
+    def show_range(self, low: float, high: float) -> None:
+        for span in self.spans:
+            span.place(low, high)
+
+    def hide_range(self) -> None:
+        for span in self.spans:
+            span.hide()
+
+    def paint_range(self) -> None:
+        for span in self.spans:
+            span.paint_in(theme.colours().muted)
+
+    def _range(self, low: float, high: float, over: bool) -> None:
+        self.show_range(low, high)
+        if over:
+            self.ranged.emit(low, high)
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
@@ -51,9 +136,9 @@ class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
             self.chosen.emit(scan_line)
 
 
-def new_plot(bottom: str = "", left: str = "", left_unit: str = "") -> pg.PlotItem:
+def new_plot(bottom: str = "", left: str = "", left_unit: str = "", box: pg.ViewBox | None = None) -> pg.PlotItem:
     """An empty plot; the unit is part of the label, so that no prefix is put before it."""
-    plot = pg.PlotItem()
+    plot = pg.PlotItem(viewBox=box)
     plot.setLabel("left", f"{left} / {left_unit}" if left_unit else left)
     if bottom:
         plot.setLabel("bottom", bottom)

@@ -11,7 +11,7 @@ from html import escape
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent, QColor, QPixmap, QResizeEvent
+from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -31,15 +31,20 @@ from analysis.report.colour import TRUTH, method_colour, method_name
 from analysis.report.units import digits
 from render.base.arrays import Float
 from studio.qt.core import theme
+from studio.qt.core.icons import dot
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.results.measures_table import MeasuresTable
+from studio.qt.results.part_tab import PartTab
+from studio.qt.results.region_tab import RegionTab
+from studio.qt.results.remarks_list import Remarks
 from studio.qt.results.results_histogram import ErrorHistogram
 from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.results_rows import RowPlots
 from studio.qt.results.results_steps import StepsPlot
 from studio.qt.results.scan_bar import ScanBar
 from studio.scan.redevelop import is_developed_otherwise
+from studio.scan.region import Region
 from studio.scan.remarks import frame_remarks, scale_head, scale_notes
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, error_values, measured_series, table, true_series
 from studio.scan.scan_results import COLUMNS, ScanResults
@@ -52,7 +57,11 @@ NOTHING = (
 BY_STEP_ONLY = "The scan's files hold this error in sum only; choose This step"
 AS_SCANNED = "All steps are as they were scanned; what was changed since in exposure or extraction is in This step."
 STEPS, NOTICE = 2, 3
-"""Tabs."""
+"""Tabs of the plots."""
+PART, REGION = 1, 2
+"""Tabs of the figures."""
+LEAST = 90
+"""px of height of the figures: what has no room scrolls."""
 TALL = 480
 """px of height from which there is room below the measures."""
 
@@ -80,13 +89,18 @@ class ResultsPanel(QWidget):
         self.reading.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.rows, self.profile, self.histogram, self.by_step = RowPlots(), ProfilePlot(), ErrorHistogram(), StepsPlot()
         self.table = MeasuresTable()
+        self.part = PartTab(session, self.profile)
+        self.region = RegionTab(session, self.rows, self.profile)
         self.scan_bar = ScanBar(session)
         self.scan_steps = scan_steps(session)
         self.head = QFrame()
         self.head_text = QLabel()
         self.head_text.setMinimumWidth(1)  # a narrow panel may cut it off: it is among the remarks as well
-        self.notices = _Remarks(), _Remarks()
+        self.notices = Remarks(), Remarks()
         """What a reader should notice: below the measures, and in a tab where there is no room below them."""
+        self.give_up = QShortcut(QKeySequence(Qt.Key.Key_Escape), self, self.part.cancel)
+        self.give_up.setContext(Qt.ShortcutContext.WindowShortcut)
+        self.give_up.setEnabled(False)
         self._lay_out()
         self.laser.currentIndexChanged.connect(self.refresh)
         self.error.currentIndexChanged.connect(self.refresh)
@@ -94,6 +108,10 @@ class ResultsPanel(QWidget):
         for plot in (self.rows, self.profile):
             plot.hovered.connect(self._hover)
             plot.chosen.connect(self._pin)
+        self.rows.ranged.connect(lambda low, high: self._choose(Region("scan lines", low, high)))
+        self.profile.ranged.connect(lambda low, high: self._choose(Region("fan", 1e-3 * low, 1e-3 * high)))
+        self.region.changed.connect(self._show_region)
+        self.part.placing_changed.connect(self._follow_placing)
         self.by_step.chosen.connect(session.look_at_step)
         self.scan_bar.scope_changed.connect(self.refresh)
         self.scan_steps.told.connect(self._tell_head)
@@ -140,19 +158,37 @@ class ResultsPanel(QWidget):
         errors = {method: error_values(one.errors, view) for method, one in shown.items()}
         self.rows.show_series(curve.axis, truth, {method: (series[method], errors[method]) for method in shown}, view)
         self.profile.show_series(truth, series)
+        self.part.follow(laser)
+        self.region.show_measurements(shown, view)
         if render.scan is not None and self.scan_bar.all_steps:
             self._show_all_steps(render.scan, laser)
             remarks = render.scan.remarks()
             if is_developed_otherwise(render.project, self.session.project, render.image_scale):
                 remarks.insert(0, AS_SCANNED)
         else:
-            self.histogram.show_errors(errors, view)
+            self._show_histogram()
             self.table.show_measures(list(shown), table(list(shown.values()), view))
             remarks = frame_remarks(render.project, render.frame, render.measurements) if render.measurements else []
         self._show_by_step(render.scan, laser)
         self._tell_remarks(list(dict.fromkeys([*scale_notes(render.scanner_scale), *remarks])))
         self._tell_head()
         self._mark()
+
+    def _show_region(self) -> None:
+        """Another region was chosen, or none."""
+        self.region.show_measurements(self.shown(), self.view)
+        if not self.scan_bar.all_steps:
+            self._show_histogram()
+            self._mark()
+
+    def _show_histogram(self) -> None:
+        """Of the shown frame, or of a region of it."""
+        render, region, view = self.session.shown, self.region.region, self.view
+        errors = {method: error_values(one.errors, view) for method, one in self.shown().items()}
+        if render is not None and region is not None:
+            within = {method: region.of(one, render.project.scene) for method, one in self.shown().items()}
+            errors = {method: error[within[method]] for method, error in errors.items()}
+        self.histogram.show_errors(errors, view, "" if region is None else f"Of {region.title}")
 
     def _show_all_steps(self, scan: ScanResults, laser: int) -> None:
         """Measures and histogram of a whole scan; its points are of the first method alone."""
@@ -205,6 +241,7 @@ class ResultsPanel(QWidget):
         self.laser.setVisible(len(names) > 1)
         if self.scan_bar.scan is None or render is None or render.scan is not self.scan_bar.scan:
             self.pinned = None  # from step to step of a scan a row stays the same
+            self.region.choose(None)
         self.scan_bar.follow()
         self.refresh()
 
@@ -240,6 +277,25 @@ class ResultsPanel(QWidget):
         self.pinned = None if scan_line == self.pinned else scan_line
         self.session.hover(scan_line)
 
+    def _follow_placing(self) -> None:
+        self.give_up.setEnabled(self.part.placing is not None)
+        self.figures.setCurrentIndex(PART)
+
+    def _choose(self, region: Region) -> None:
+        """A range was dragged: of the measure that is being added, else to be told of."""
+        if self.part.placing is None:
+            self.region.choose(region)
+            self.figures.setCurrentIndex(REGION)
+            return
+        self.region.choose(None)
+        render = self.session.shown
+        found = next(iter(self.shown().values()), None)
+        across = None if render is None or found is None else region.across(found, render.project.scene)
+        if across is None:
+            self.session.message.emit("warning", f"No points within {region.title}: drag where the profile is")
+        else:
+            self.part.place(*across)
+
     def _make_switches(self) -> None:
         """One button for each method of the render, in its colour."""
         render = self.session.shown
@@ -260,7 +316,7 @@ class ResultsPanel(QWidget):
             switch.setCheckable(True)
             switch.setChecked(method not in self.hidden)
             switch.setText(method_name(method))
-            switch.setIcon(_dot(method_colour(method)))
+            switch.setIcon(dot(method_colour(method)))
             switch.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
             switch.setToolTip("Show or hide this method")
             switch.toggled.connect(partial(self._switch, method))
@@ -305,7 +361,16 @@ class ResultsPanel(QWidget):
         column.addWidget(self.table, 2)
         column.addWidget(self.notices[0], 1)
         column.addStretch(0)
-        parts: list[tuple[QWidget, int]] = [(self.rows, 5), (tabs, 4), (measures, 3)]
+        self.figures = QTabWidget()
+        self.figures.setDocumentMode(True)
+        self.figures.addTab(measures, "Errors")
+        scrolled = QScrollArea(widgetResizable=True)
+        scrolled.setFrameShape(QFrame.Shape.NoFrame)
+        scrolled.setWidget(self.part)
+        self.figures.addTab(scrolled, "Measures of the part")
+        self.figures.addTab(self.region, "Region")
+        self.figures.setMinimumHeight(LEAST)
+        parts: list[tuple[QWidget, int]] = [(self.rows, 5), (tabs, 4), (self.figures, 3)]
         for i, (part, stretch) in enumerate(parts):
             across.addWidget(part)
             across.setStretchFactor(i, stretch)
@@ -327,34 +392,3 @@ class ResultsPanel(QWidget):
         self.stack = QStackedLayout(self)
         self.stack.addWidget(nothing)
         self.stack.addWidget(content)
-
-
-class _Remarks(QScrollArea):
-    """Sentences, one below the other."""
-
-    def __init__(self) -> None:
-        super().__init__(widgetResizable=True)
-        self.setFrameShape(QFrame.Shape.NoFrame)
-        self.text = QLabel(wordWrap=True, textFormat=Qt.TextFormat.RichText)
-        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.text.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.text.setContentsMargins(8, 8, 8, 8)
-        self.setWidget(self.text)
-
-    def show_texts(self, texts: list[str]) -> None:
-        listed = "".join(f"<p style='margin: 0 0 6px 0'>{escape(text)}</p>" for text in texts)
-        self.text.setText(f"<p style='margin: 0 0 6px 0'><b>Worth noticing</b></p>{listed}" if texts else "")
-
-
-def _dot(colour: str) -> QPixmap:
-    from PySide6.QtGui import QPainter
-
-    made = QPixmap(12, 12)
-    made.fill(Qt.GlobalColor.transparent)
-    painter = QPainter(made)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.setPen(Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(colour))
-    painter.drawEllipse(1, 1, 10, 10)
-    painter.end()
-    return made

@@ -21,7 +21,7 @@ class ProfilePlot(plots.PointedPlots):
     """Distance from the laser over the place along its fan, both mm. Nearer is up."""
 
     def __init__(self) -> None:
-        self.plot = plots.new_plot("Along the fan / mm", "Distance from the laser", "mm")
+        self.plot = plots.new_plot("Along the fan / mm", "Distance from the laser", "mm", plots.RangeBox())
         super().__init__(self.plot)
         self.plot.invertY(True)
         self.truth = plots.curve(TRUTH)
@@ -66,6 +66,7 @@ class ProfilePlot(plots.PointedPlots):
         self.setBackground(c.base)
         plots.paint(self.plot)
         self.ring.setPen(pg.mkPen(c.text, width=1.5))
+        self.paint_range()
 
     def scan_line_at(self, position: QPointF) -> int | None:
         """Of the nearest sample."""

@@ -22,9 +22,9 @@ class RowPlots(plots.PointedPlots):
     """Stacked plots with one scan-line axis."""
 
     def __init__(self) -> None:
-        self.position = plots.new_plot("", "Position", "px")
-        self.depth = plots.new_plot("", "Depth", "mm")
-        self.error = plots.new_plot("Row", "Error", "µm")
+        self.position = plots.new_plot("", "Position", "px", plots.RangeBox())
+        self.depth = plots.new_plot("", "Depth", "mm", plots.RangeBox())
+        self.error = plots.new_plot("Row", "Error", "µm", plots.RangeBox())
         super().__init__(self.position, self.depth, self.error)
         for plot in (self.position, self.depth):
             plot.setXLink(self.error)
@@ -91,6 +91,7 @@ class RowPlots(plots.PointedPlots):
         for ring in self.rings:
             ring.setPen(pg.mkPen(c.text, width=1.5))
         self.zero.setPen(pg.mkPen(c.muted, width=1))
+        self.paint_range()
 
     def _add(self, plot: pg.PlotItem, item: Any) -> Any:
         plot.addItem(item)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QScrollArea, QSizePolicy, QToolBar, QToolButton, QWidget
 
@@ -92,13 +92,13 @@ class MainWindow(QMainWindow):
         if self.workspace:
             self._send_back()
             self._remember_arrangement()
-        wanted = workspace(key)
+        wanted, size = workspace(key), self.size()
         self.workspace = wanted.key
         # before the panels come: all together they may need more room than the window has, and it would grow
         self.panels["viewport"].setVisible(wanted.viewport)
         if not self._restore_panels():
             self.rearrange()
-            QTimer.singleShot(0, self, self._fit_panels)
+        QTimer.singleShot(0, self, partial(self._fit_panels, size))
         self.commands[SWITCH[wanted.key]].setChecked(True)
         self.cloud.pin(wanted.key == "measure")
         self.preferences.change(workspace=wanted.key)
@@ -348,19 +348,19 @@ class MainWindow(QMainWindow):
     def _restore_panels(self) -> bool:
         return restore(self, self.preferences.values.arrangements.get(self.workspace, ""))
 
-    def _fit_panels(self) -> None:
-        """Once more, in the size that the window has come to."""
+    def _fit_panels(self, size: QSize | None = None) -> None:
+        """Once more, in the size that the window has come to; size: which it had, and is not to outgrow."""
+        if size is not None and not (self.isMaximized() or self.isFullScreen()):
+            self.resize(self.size().boundedTo(size))  # the last workspace's columns may have made it grow
         if not self._restore_panels():
             share_out(self, self.docks, workspace(self.workspace))
 
     def _send_back(self) -> None:
-        for key in self._called:
-            self.docks[key].hide()
-        self._called.clear()
+        while self._called:
+            self.docks[self._called.pop()].hide()
 
     def _remember_arrangement(self) -> None:
-        kept = {**self.preferences.values.arrangements, self.workspace: remembered(self)}
-        self.preferences.change(arrangements=kept)
+        self.preferences.change(arrangements={**self.preferences.values.arrangements, self.workspace: remembered(self)})
 
     def _tell_document(self) -> None:
         """Title, undo and redo follow the document."""

@@ -16,7 +16,7 @@ from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import Reading
 from render.base.errors import InputError
 from studio.project.project import Project
-from studio.scan.gauging import measures_record, worst
+from studio.scan.gauging import measures_record, read_each, worst
 from studio.scan.scan_folder import measured_project, open_folder
 from tests.studio.small_scan import scan, small_project
 
@@ -101,3 +101,10 @@ def test_a_measure_that_cannot_be_is_refused_by_its_field(measure: dict[str, Any
     project = Project.load(small_project(tmp_path))
     with pytest.raises(InputError, match=told):
         with_measures(project, {"name": "a", **FLAT}, {"name": "b", **FLAT, **measure})
+
+
+def test_a_window_is_told_why_a_measure_is_not_of_its_frame() -> None:
+    other_step, other_laser = (Gauge.model_validate(FLAT | more) for more in ({"step": 2}, {"laser": 1}))
+    found = read_each((other_step, other_laser), 0, {})
+    assert [one.reason for one in found] == ["it is of step 2 alone", "laser 1 was not rendered"]
+    assert not any(one.verdict for one in found)

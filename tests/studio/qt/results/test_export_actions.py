@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
+import numpy as np
 import pytest
 from PySide6.QtWidgets import QMainWindow
 from pytestqt.qtbot import QtBot
 
+from analysis.cloud import write_ply
+from render.base.errors import InputError
 from studio.qt.core.actions import Actions
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.export_actions import ExportActions
 from studio.runtime.preferences import PreferencesFile
+from studio.scan.height_map import export_height_map
+from studio.scan.scan_results import ScanResults
 from tests.studio.qt.small_session import small_session
 
 
@@ -28,14 +36,15 @@ def measured(qtbot: QtBot) -> tuple[Session, DevelopPanel]:
     return session, panel
 
 
-def export(session: Session, path: Path, qtbot: QtBot) -> bytes:
+def export(session: Session, path: Path, qtbot: QtBot, key: str = "export_csv") -> bytes:
     window = QMainWindow()
     qtbot.addWidget(window)
     runner = JobRunner(window)
     preferences = PreferencesFile(path.parent / "preferences.json")
     actions = ExportActions(window, session, runner, preferences, Actions(window))
+    assert actions.actions[key].isEnabled()
     with qtbot.waitSignal(runner.finished, timeout=60_000):
-        actions.write("export_csv", path)
+        actions.write(key, path)
     runner.close()
     return path.read_bytes()
 
@@ -61,3 +70,22 @@ def test_light_that_was_refined_since_it_was_measured_is_measured_anew(
     panel.close()
     render.frame = replace(render.frame, laser_direct=[0.3 * light for light in render.frame.laser_direct])
     assert export(session, tmp_path / "after.csv", qtbot) != before
+
+
+def test_the_height_map_of_a_scan_is_of_all_its_points(
+    measured: tuple[Session, DevelopPanel], qtbot: QtBot, tmp_path: Path
+) -> None:
+    session, panel = measured
+    panel.close()
+    render = session.shown
+    assert render is not None
+    with pytest.raises(InputError, match="single frame"):
+        export_height_map(render.scan, tmp_path / "alone.png")
+    x, y = (one.ravel() for one in np.meshgrid(np.arange(5.0), np.arange(4.0)))
+    write_ply(tmp_path / "points.ply", {"x": x, "y": y, "z": 0.1 * x})
+    folder = SimpleNamespace(folder=tmp_path)
+    session.shown = replace(
+        render, scan=cast(ScanResults, SimpleNamespace(measured=True, found=folder, image_scale=1.0))
+    )
+    assert export(session, tmp_path / "map.png", qtbot, "export_heightmap").startswith(b"\x89PNG")
+    assert json.loads((tmp_path / "map.json").read_text())["points"] == 20

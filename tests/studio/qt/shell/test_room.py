@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, QToolButton, QWidget
 
@@ -100,6 +100,26 @@ def test_no_text_of_any_panel_is_cut_off(window: MainWindow, screen: tuple[int, 
         window.rearrange()
     window.resize(before)
     assert not found, "\n".join(f"{where}: {text}" for where, texts in found.items() for text in texts)
+
+
+def test_no_workspace_makes_the_window_larger_than_a_small_screen_at_1_5(window: MainWindow) -> None:
+    """1366 x 768, drawn half as large again; also from one workspace to the next, whose columns are others."""
+    before, size = window.size(), QSize(911, 512 - BAR)
+    world, frame = small_render()
+    window.session.add_render(Render(1, small_project(), world, frame))
+    grown = []
+    window.resize(size)
+    for key in ("setup", "render", "measure", "study", "setup", "measure", "render", "setup"):
+        window.switch_to(key)
+        for item in ITEMS if key == "setup" else ():
+            window.session.select(item)
+            QApplication.processEvents()
+        for _ in range(3):
+            QApplication.processEvents()
+        if window.size() != size:
+            grown.append(f"{key}: {window.width()} x {window.height()}, least {window.minimumSizeHint().width()}")
+    window.resize(before)
+    assert not grown
 
 
 def test_the_cheat_sheet_fits_on_a_small_screen(window: MainWindow) -> None:

@@ -1,0 +1,185 @@
+"""A cloud as heights on a uniform grid, and what that makes of the points' sigma."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, QhullError
+
+from analysis.cloud import Cloud
+from render.base.arrays import Float
+from render.base.errors import InputError
+
+MOST_POINTS = 5_000_000
+MOST_CELLS = 50_000_000
+BRIDGED = 3.0
+"""Longest edge of a triangle that is surface, over the usual one: beyond it there was nothing to see."""
+LEVELS = 65535
+"""Of 16 bits, less 0, which says that there is no height."""
+FINEST = 1e-9
+"""m a level at least."""
+CHUNK = 1 << 18
+"""Cells at a time."""
+Means = tuple[NDArray[np.intp], Float]
+"""(n,) cells as means of three points each: (n, 3) points, (n, 3) weights, NaN where there is no surface."""
+
+
+@dataclass(frozen=True)
+class HeightMap:
+    """Heights along z over x (columns) and y (rows, downward); m."""
+
+    heights: Float
+    """(rows, columns), NaN where there is no surface."""
+    x: float
+    y: float
+    """Of the centre of the first cell."""
+    pitch: float
+    points: int
+    sigma_points: float
+    """Median random sigma of the points, NaN if they have none."""
+    sigma_cells: float
+    """Median random sigma of a cell, as that of its points."""
+    correlation: float
+    """Median correlation of a cell's random error with that of its right neighbour."""
+
+
+def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
+    """Heights by linear interpolation between a cloud's points, in the triangles of Delaunay.
+
+    pitch: m, None for as many cells as there are points. A height is a mean of three points, w^T z, so that its
+    variance is w^T C w, C with the correlation of neighbouring scan lines; neighbours that share points err alike.
+    InputError: too few points, all on one line, or too many cells.
+    """
+    cloud = _usable(points)
+    xy = np.column_stack([cloud["x"], cloud["y"]])
+    origin = xy.min(axis=0)
+    try:
+        mesh = Delaunay(xy - origin)
+    except QhullError:
+        raise InputError("the points lie on one line, which has no area", cure="scan several steps") from None
+    corners = mesh.points[mesh.simplices]
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    is_surface = edges <= BRIDGED * float(np.median(edges))
+    first, second = (corners[:, i] - corners[:, 0] for i in (1, 2))
+    area = 0.5 * float(np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])[is_surface].sum())
+    if pitch is None:
+        pitch = float(f"{max(math.sqrt(area / len(xy)), 1e-9):.3g}")
+    extent = mesh.points.max(axis=0)
+    columns, rows = (int(min(length / pitch, 1e9)) + 1 for length in extent)
+    if columns * rows > MOST_CELLS:
+        found, allowed = f"{columns} x {rows} cells of {pitch:g} m", f"at most {MOST_CELLS} cells"
+        raise InputError("the height map would be too large", found=found, allowed=allowed, cure="give a larger pitch")
+    heights, sigma, covariance = (np.full(rows * columns, np.nan) for _ in range(3))
+    grid = _Grid(cloud, pitch, columns, float(extent[1]), mesh, is_surface)
+    for start in range(0, rows * columns, CHUNK):
+        cells = np.arange(start, min(start + CHUNK, rows * columns))
+        here, beside = grid.weights(cells), grid.weights(cells + 1)
+        heights[cells] = grid.heights(here)
+        sigma[cells] = np.sqrt(grid.covariance(here, here))
+        known = (cells + 1) % columns != 0
+        covariance[cells] = np.where(known, grid.covariance(here, beside), np.nan)
+    together = covariance[:-1] / (sigma[:-1] * sigma[1:])
+    return HeightMap(
+        heights.reshape(rows, columns),
+        float(origin[0]),
+        float(origin[1] + extent[1]),
+        pitch,
+        len(xy),
+        _median(cloud["sigma_random"]),
+        _median(sigma),
+        _median(together),
+    )
+
+
+def encoded(heights: Float) -> tuple[NDArray[np.uint16], float, float]:
+    """16-bit numbers, scale and offset: a height is offset + scale times its number, and 0 says that there is none.
+
+    The scale has three digits. InputError: there is no height at all.
+    """
+    known = np.isfinite(heights)
+    if not known.any():
+        raise InputError("the height map has no cell with a height", cure="give a larger pitch")
+    low, high = float(heights[known].min()), float(heights[known].max())
+    least = max((high - low) / (LEVELS - 1), FINEST)
+    unit = 10.0 ** (math.floor(math.log10(least)) - 2)
+    scale = float(f"{math.ceil(least / unit * (1.0 - 1e-12)) * unit:.3g}")
+    offset = low - scale
+    numbers = np.zeros(heights.shape, dtype=np.uint16)
+    numbers[known] = np.clip(np.round((heights[known] - offset) / scale), 1, LEVELS).astype(np.uint16)
+    return numbers, scale, offset
+
+
+def decoded(numbers: NDArray[np.uint16], scale: float, offset: float) -> Float:
+    """The heights of `encoded` numbers, m, NaN where there is none."""
+    return np.where(numbers > 0, offset + scale * numbers.astype(np.float64), np.nan)
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Cells row by row over a triangulation whose origin is its lowest x and y."""
+
+    cloud: Cloud
+    pitch: float
+    columns: int
+    top: float
+    """y of the first row."""
+    mesh: Delaunay
+    is_surface: NDArray[np.bool_]
+    """(t,) triangles that bridge no gap."""
+
+    def weights(self, cells: NDArray[np.intp]) -> Means:
+        row, column = np.divmod(cells, self.columns)
+        place = np.column_stack([column * self.pitch, self.top - row * self.pitch])
+        # a hair of tolerance, so that the cells on the hull are of its triangles
+        found = self.mesh.find_simplex(place, tol=1e-9)
+        transform = self.mesh.transform[found]
+        two = np.einsum("nij,nj->ni", transform[:, :2], place - transform[:, 2])
+        weight = np.column_stack([two, 1.0 - two.sum(axis=1)])
+        weight[(found < 0) | ~self.is_surface[found]] = np.nan
+        return self.mesh.simplices[found], weight
+
+    def heights(self, of: Means) -> Float:
+        vertex, weight = of
+        return np.asarray((weight * self.cloud["z"][vertex]).sum(axis=1))
+
+    def covariance(self, one: Means, other: Means) -> Float:
+        """(n,) of the random errors of n pairs of cells."""
+        total = np.zeros(len(one[0]))
+        sigma = self.cloud["sigma_random"]
+        for i in range(3):
+            for j in range(3):
+                a, b = one[0][:, i], other[0][:, j]
+                total += one[1][:, i] * other[1][:, j] * sigma[a] * sigma[b] * self._correlation(a, b)
+        return total
+
+    def _correlation(self, a: NDArray[np.intp], b: NDArray[np.intp]) -> Float:
+        """Of points: 1 with itself, r^k over k scan lines of one laser and step, L = (1 + r) / (1 - r)."""
+        length = np.nan_to_num(self.cloud["correlation_length"], nan=1.0)
+        r = np.clip((length - 1.0) / (length + 1.0), 0.0, 1.0)
+        alike = (self.cloud["laser"][a] == self.cloud["laser"][b]) & (self.cloud["step"][a] == self.cloud["step"][b])
+        apart = np.abs(self.cloud["row"][a] - self.cloud["row"][b])
+        # of two peaks on one scan line each has its own noise
+        shared = np.where(alike & (apart > 0), np.sqrt(r[a] * r[b]) ** np.maximum(apart, 1), 0.0)
+        return np.where(a == b, 1.0, shared)
+
+
+def _usable(points: Cloud) -> Cloud:
+    """The points with coordinates, and all the columns that are needed. InputError: there are too few or too many."""
+    missing = [name for name in "xyz" if name not in points]
+    if missing:
+        raise InputError("the points have no coordinates", found=f"no {', '.join(missing)}", allowed="x, y and z")
+    here = np.isfinite(np.column_stack([points[name] for name in "xyz"])).all(axis=1)
+    count = int(here.sum())
+    if not 3 <= count <= MOST_POINTS:
+        raise InputError("so many points make no height map", found=count, allowed=f"3 to {MOST_POINTS}")
+    absent = {"sigma_random": np.nan, "correlation_length": 1.0, "laser": 0, "step": 0, "row": 0}
+    defaults = {name: np.full(count, value) for name, value in absent.items()}
+    return defaults | {name: column[here] for name, column in points.items()}
+
+
+def _median(values: Float) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else math.nan

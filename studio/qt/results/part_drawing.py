@@ -1,0 +1,105 @@
+"""The part's measures in the profile: fitted curves, dimension, and the regions of the one that is chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QObject, Qt, Signal
+
+from analysis.gauges.gauge import REGIONS, Gauge, Kind
+from analysis.gauges.outline import outline
+from analysis.gauges.profile import Profile
+from analysis.gauges.read import Reading
+from analysis.report.gauge_table import value_text
+from render.base.arrays import Float
+from studio.qt.core import theme
+from studio.qt.results import plots
+
+NAME_AT, NAME_APART = 0.95, -0.08
+"""Of the plot's height, from its top: names stand at the bottom, values beside their dimensions."""
+TO_PLOT = np.array([1e3, -1e3])
+"""From across and height, m, to the plot's mm along the fan and mm from the laser."""
+
+
+def verdict_colour(reading: Reading) -> str:
+    """Of this theme: by the verdict, where there is one."""
+    c = theme.colours()
+    return {"pass": c.good, "fail": c.error, "undecided": c.warning}.get(reading.verdict or "", c.accent)
+
+
+class PartDrawing(QObject):
+    """Over a profile's plot. `moving` and `moved` tell the regions of the chosen measure, m, as edges are dragged."""
+
+    moving = Signal(object)
+    moved = Signal(object)
+
+    def __init__(self, plot: pg.PlotItem, parent: QObject) -> None:
+        super().__init__(parent)
+        self.plot = plot
+        self.spans: list[plots.Span] = []
+        self._items: list[Any] = []
+        self._made_for: tuple[Kind | None, str] = None, ""
+
+    def show_readings(self, readings: list[Reading], profile: Profile | None, chosen: Gauge | None) -> None:
+        """Curves and dimension of each; the chosen one thicker, with its value."""
+        for item in self._items:
+            self.plot.removeItem(item)
+        self._items = []
+        for one in readings:
+            if profile is None or one.reason:
+                continue
+            curves, dimension = outline(one.gauge, profile)
+            is_chosen, colour = one.gauge == chosen, verdict_colour(one)
+            for curve in curves:
+                self._line(curve, pg.mkPen(colour, width=3.0 if is_chosen else 1.6))
+            if len(dimension):
+                self._line(dimension, pg.mkPen(colour, width=1.6, style=Qt.PenStyle.DashLine))
+            if is_chosen:
+                at = dimension.mean(axis=0) if len(dimension) else curves[0][-1]
+                self._text(f"{one.gauge.name}: {value_text(one.value, one.sigma, one.gauge.unit)}", at, colour)
+
+    def show_regions(self, kind: Kind | None, regions: Sequence[tuple[float, float]] = ()) -> None:
+        """Of one measure, as many as there are yet; their edges can be moved once all are there. None: of none."""
+        colour = theme.colours().accent
+        if (kind, colour) != self._made_for:
+            for span in self.spans:
+                self.plot.removeItem(span)
+            names = () if kind is None else REGIONS[kind]
+            # one below the other, so that the names of narrow regions do not cover each other
+            self.spans = [plots.Span(self.plot, colour, name, NAME_AT + NAME_APART * i) for i, name in enumerate(names)]
+            for span in self.spans:
+                span.edges_moving.connect(partial(self._tell, self.moving))
+                span.edges_moved.connect(partial(self._tell, self.moved))
+            self._made_for = kind, colour
+        for span in self.spans:
+            span.setMovable(len(regions) == len(self.spans))
+        for span, (low, high) in zip(self.spans, regions, strict=False):
+            span.place(1e3 * low, 1e3 * high)
+        for span in self.spans[len(regions) :]:
+            span.hide()
+
+    def _tell(self, signal: Any, low: float, high: float) -> None:
+        # rounded to what a mouse can mean, so that the project file stays legible
+        signal.emit(tuple(tuple(round(1e-3 * end, 8) for end in span.ends) for span in self.spans))
+
+    def _line(self, places: Float, pen: Any) -> None:
+        across, distance = (places * TO_PLOT).T
+        item = pg.PlotCurveItem(across, distance, pen=pen)
+        item.setZValue(25)
+        self.plot.addItem(item, ignoreBounds=True)
+        self._items.append(item)
+
+    def _text(self, text: str, at: Float, colour: str) -> None:
+        ground = pg.mkColor(theme.colours().base)
+        ground.setAlpha(215)
+        low, high = self.plot.vb.viewRange()[0]
+        leaves_room = at[0] * TO_PLOT[0] < 0.5 * (low + high)
+        item = pg.TextItem(text, color=colour, anchor=(-0.06, 0.5) if leaves_room else (1.06, 0.5), fill=ground)
+        item.setPos(*(at * TO_PLOT))
+        item.setZValue(40)
+        self.plot.addItem(item, ignoreBounds=True)
+        self._items.append(item)

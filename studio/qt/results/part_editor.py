@@ -1,0 +1,119 @@
+"""Name and tolerance of the chosen measure of the part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from PySide6.QtWidgets import QGridLayout, QLabel, QSizePolicy, QWidget
+
+from analysis.gauges.gauge import Gauge
+from render.base.errors import InputError
+from studio.editing.forms import describe_item
+from studio.editing.units import Unit
+from studio.project.document import FieldPath
+from studio.qt.core.session import Session
+from studio.qt.forms.fields import TextField, reason
+from studio.qt.forms.number_field import NumberField
+
+FIELDS = ("name", "nominal", "lower", "upper")
+
+
+class PartEditor(QWidget):
+    """Of the measure at `path`; typed or dragged, each change one step of undo."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__()
+        self.session = session
+        self.path: FieldPath = ()
+        self.fields: dict[str, TextField] = {}
+        self.problem = QLabel(wordWrap=True)
+        self.problem.setObjectName("error")
+        self.problem.hide()
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setHorizontalSpacing(4)
+        self._grid.setVerticalSpacing(2)
+        self._grid.addWidget(self.problem, 2, 0, 1, len(FIELDS))
+        for column, share in enumerate((4, 3, 3, 3)):
+            self._grid.setColumnStretch(column, share)
+        self._made_for: tuple[FieldPath, str] = (), ""
+        self._dragged = False
+
+    def show_gauge(self, index: int, gauge: Gauge | None) -> None:
+        """None: there is none to edit."""
+        self.setVisible(gauge is not None)
+        if gauge is None:
+            return
+        self.path = ("measures", index)
+        if self._made_for != (self.path, gauge.unit):
+            self._made_for = self.path, gauge.unit
+            self._make(gauge)
+        for name, field in self.fields.items():
+            field.show_value(getattr(gauge, name))
+
+    def _make(self, gauge: Gauge) -> None:
+        for i in range(self._grid.count() - 1, -1, -1):
+            item = self._grid.itemAt(i)
+            widget = None if item is None else item.widget()
+            if widget is not None and widget is not self.problem:
+                self._grid.removeWidget(widget)
+                widget.hide()
+                widget.deleteLater()
+        self._tell("")
+        specs = {spec.name: spec for spec in describe_item(self.session.project, self.path).fields}
+        self.fields = {}
+        for column, name in enumerate(FIELDS):
+            spec = specs[name]
+            if name == "name":
+                field: TextField = TextField(spec)
+            else:
+                field = NumberField(replace(spec, unit=Unit.of(gauge.unit)))
+                field.drag_began.connect(self.session.begin_drag)
+                field.dragged.connect(partial(self._drag, name))
+                field.drag_ended.connect(self._end_drag)
+            label = QLabel(spec.label)
+            label.setObjectName("muted")
+            label.setBuddy(field)
+            field.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+            field.setToolTip(spec.help)
+            field.setAccessibleName(spec.label)
+            field.entered.connect(partial(self._enter, name))
+            field.refused.connect(self._tell)
+            self._grid.addWidget(label, 0, column)
+            self._grid.addWidget(field, 1, column)
+            self.fields[name] = field
+
+    def _enter(self, name: str, value: Any) -> None:
+        field = self.fields[name]
+        try:
+            self._set(name, value)
+        except InputError as error:
+            if not field.hasFocus():
+                self.session.message.emit("warning", f"{reason(error)} The value is as it was")
+            field.reject()
+            self._tell(reason(error))
+            return
+        self._tell("")
+
+    def _drag(self, name: str, value: Any) -> None:
+        try:
+            self._set(name, value, merge=f"drag {self.path} {name}")
+            self._dragged = True
+        except InputError as error:
+            self._tell(reason(error))
+
+    def _end_drag(self, keep: bool) -> None:
+        self.session.end_drag()
+        if self._dragged and not keep:
+            self.session.document.undo()
+        self._dragged = False
+        self._tell("")
+
+    def _set(self, name: str, value: Any, merge: str = "") -> None:
+        self.session.document.set((*self.path, name), value, f"change {name} of a measure", merge)
+
+    def _tell(self, why: str) -> None:
+        self.problem.setText(why)
+        self.problem.setVisible(bool(why))

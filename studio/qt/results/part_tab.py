@@ -1,0 +1,276 @@
+"""Measures of the part: those of the project, read off the shown frame; added by dragging, edited, judged."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QMenu,
+    QPushButton,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
+from analysis.gauges.profile import Profile
+from analysis.gauges.read import Reading
+from analysis.report.gauge_table import MARKS, small_text, value_text
+from analysis.report.units import NONE
+from studio.qt.core.session import Session
+from studio.qt.core.widgets import text_button
+from studio.qt.results.measures_table import ReadOnlyTable
+from studio.qt.results.part_drawing import PartDrawing, verdict_colour
+from studio.qt.results.part_editor import PartEditor
+from studio.qt.results.results_profile import ProfilePlot
+from studio.scan.gauging import profiles, read_each
+from studio.scan.remarks import best
+
+HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
+NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
+
+
+class PartTab(QWidget):
+    """Follows the shown render and the project's `measures`; draws them in the profile's plot."""
+
+    placing_changed = Signal()
+    """`placing` is another kind, or none."""
+
+    def __init__(self, session: Session, profile: ProfilePlot) -> None:
+        super().__init__()
+        self.session = session
+        self.laser = 0
+        """Whose profile is shown."""
+        self.placing: Kind | None = None
+        """The kind that is being added, region by region."""
+        self.chosen = -1
+        """Of the project's measures."""
+        self.readings: tuple[Reading, ...] = ()
+        self._profiles: dict[int, tuple[Profile, Profile]] = {}
+        self._placed: list[tuple[float, float]] = []
+        self._read: tuple[Gauge, ...] = ()
+        self.drawing = PartDrawing(profile.plot, self)
+        self.table = ReadOnlyTable()
+        self.editor = PartEditor(session)
+        self.add: QPushButton = text_button("Add", "Read another dimension off the profile")
+        self.remove = text_button("Delete", "The chosen measure")
+        self.told = QLabel(wordWrap=True)
+        self.told.setObjectName("muted")
+        self._lay_out()
+        self.remove.clicked.connect(self.delete)
+        self.table.itemSelectionChanged.connect(self._select)
+        self.drawing.moving.connect(self._moving)
+        self.drawing.moved.connect(self._moved)
+        session.project_changed.connect(self._project_changed)
+        session.document_replaced.connect(self.cancel)
+
+    def follow(self, laser: int) -> None:
+        """Another frame, measurement or laser is shown."""
+        render, self.laser = self.session.shown, laser
+        self._profiles = {}
+        if render is not None and render.measurements:
+            found = best(render.measurements, render.developed_by(self.session.project))
+            used = {laser, *(gauge.laser for gauge in self.session.project.measures)}
+            self._profiles = {
+                i: profiles(render.project, render.frame, one) for i, one in enumerate(found) if i in used
+            }
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read and show all measures anew."""
+        render = self.session.shown
+        self._read = self.session.project.measures
+        self.chosen = min(self.chosen, len(self._read) - 1)
+        step = 0 if render is None else render.frame.step
+        self.readings = read_each(self._read, step, self._profiles) if self._profiles else ()
+        self._show()
+        self._show_regions()
+
+    def start(self, kind: Kind) -> None:
+        """The next drags are the regions of a new measure."""
+        self.placing, self._placed = kind, []
+        self._show_regions()
+        self._tell()
+        self.placing_changed.emit()
+
+    def cancel(self) -> None:
+        """No measure is added after all."""
+        if self.placing is not None:
+            self._end_placing()
+            self.refresh()
+
+    def place(self, low: float, high: float) -> None:
+        """The next region of the measure that is being added, m across the fan."""
+        kind = self.placing
+        if kind is None or not high > low:
+            return
+        self._placed.append((round(low, 8), round(high, 8)))
+        if len(self._placed) < len(REGIONS[kind]):
+            self._show_regions()
+            self._tell()
+            return
+        now = self.session.project.measures
+        gauge = Gauge(name=_free_name(kind, now), kind=kind, laser=self.laser, regions=tuple(self._placed))
+        self._end_placing()
+        self.chosen = len(now)
+        if not self.session.set(("measures",), (*now, gauge), f"add {TITLES[kind].lower()}"):
+            self.chosen = len(now) - 1
+            self.refresh()
+
+    def delete(self) -> None:
+        now = self.session.project.measures
+        if 0 <= self.chosen < len(now):
+            kept = (*now[: self.chosen], *now[self.chosen + 1 :])
+            self.session.set(("measures",), kept, f"delete {now[self.chosen].name}")
+
+    def _show_regions(self) -> None:
+        """Of the measure that is being added, else of the chosen one."""
+        own = self._own()
+        if self.placing is not None:
+            self.drawing.show_regions(self.placing, self._placed)
+        elif own is not None and self._profiles:
+            self.drawing.show_regions(own.kind, own.regions)
+        else:
+            self.drawing.show_regions(None)
+
+    def _end_placing(self) -> None:
+        self.placing, self._placed = None, []
+        self.placing_changed.emit()
+
+    def _own(self) -> Gauge | None:
+        """The chosen measure, where it is of the profile that is shown."""
+        if not 0 <= self.chosen < len(self._read):
+            return None
+        gauge = self._read[self.chosen]
+        return gauge if gauge.laser == self.laser else None
+
+    def _project_changed(self) -> None:
+        if self.session.project.measures is not self._read:
+            if {gauge.laser for gauge in self.session.project.measures} <= self._profiles.keys():
+                self.refresh()
+            else:
+                self.follow(self.laser)
+
+    def _select(self) -> None:
+        row = self.table.currentRow()
+        if row != self.chosen and self.table.selectedItems():
+            self.chosen = row
+            self.cancel()
+            self.refresh()
+
+    def _moving(self, regions: object) -> None:
+        """While an edge is dragged its measure is read, the project keeps what it has."""
+        self._with_regions(regions)
+        self._show()
+
+    def _moved(self, regions: object) -> None:
+        if self._with_regions(regions):
+            self.session.set(("measures", self.chosen, "regions"), regions, "move a region")
+        else:
+            self.refresh()
+
+    def _with_regions(self, regions: object) -> bool:
+        gauge = self._own()
+        if gauge is None or not isinstance(regions, tuple) or any(not high > low for low, high in regions):
+            return False
+        moved = read_each([gauge.model_copy(update={"regions": regions})], self._step(), self._profiles)
+        self.readings = (*self.readings[: self.chosen], *moved, *self.readings[self.chosen + 1 :])
+        return True
+
+    def _step(self) -> int:
+        return 0 if self.session.shown is None else self.session.shown.frame.step
+
+    def _show(self) -> None:
+        """Table, editor and drawing of `readings`."""
+        with QSignalBlocker(self.table):
+            self.table.setRowCount(len(self._read))
+            for row, gauge in enumerate(self._read):
+                self._show_row(row, gauge, self.readings[row] if self.readings else None)
+            if self.chosen >= 0:
+                self.table.selectRow(self.chosen)
+        self.table.setVisible(bool(self._read))
+        self.table.end_with_rows()
+        index = self.chosen
+        self.editor.show_gauge(index, self._read[index] if 0 <= index < len(self._read) else None)
+        self.remove.setEnabled(index >= 0)
+        self.add.setEnabled(bool(self._profiles) and len(self._read) < MOST_GAUGES)
+        of_laser = [one for one in self.readings if one.gauge.laser == self.laser]
+        own = self.readings[index].gauge if self.readings and index >= 0 else None
+        profile = self._profiles[self.laser][0] if self.laser in self._profiles else None
+        self.drawing.show_readings(of_laser, profile, own)
+        self._tell()
+
+    def _show_row(self, row: int, gauge: Gauge, reading: Reading | None) -> None:
+        texts, tip = [gauge.name, NONE, NONE, NONE, NONE], f"<p>{TITLES[gauge.kind]}</p>"
+        if reading is not None:
+            verdict = "not measured" if reading.reason else MARKS.get(reading.verdict or "", NONE)
+            figures = [small_text(value, gauge.unit) for value in (reading.sigma, reading.error)]
+            texts[1:] = [value_text(reading.value, reading.sigma, gauge.unit), *figures, verdict]
+            truth = value_text(reading.truth, reading.sigma, gauge.unit)
+            ratio = f" ({reading.error_in_sigmas:+.2f} sigma)" if math.isfinite(reading.error_in_sigmas) else ""
+            tip += (
+                f"<p>{reading.reason}</p>"
+                if reading.reason
+                else f"<p>truth {truth}; {reading.points} points{ratio}</p>"
+            )
+        for column, text in enumerate(texts):
+            item = self.table.show_cell(row, column, text)
+            item.setToolTip(tip)
+            if column == 0:
+                item.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+            if column == len(texts) - 1 and reading is not None and reading.verdict:
+                item.setForeground(QColor(verdict_colour(reading)))
+
+    def _tell(self) -> None:
+        """What to do next, or why the chosen measure has no value."""
+        text = "" if self._read else NONE_YET
+        if self.placing is not None:
+            names = REGIONS[self.placing]
+            count = f" ({len(self._placed) + 1} of {len(names)})" if len(names) > 1 else ""
+            text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
+        elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].reason:
+            text = self.readings[self.chosen].reason.capitalize()
+        self.told.setText(text)
+        self.told.setVisible(bool(text))
+
+    def _lay_out(self) -> None:
+        menu = QMenu(self.add)
+        for kind, title in TITLES.items():
+            menu.addAction(title).triggered.connect(partial(self._start_asked, kind))
+        self.add.setMenu(menu)
+        self.table.setColumnCount(len(HEADINGS))
+        self.table.setHorizontalHeaderLabels(list(HEADINGS))
+        self.table.verticalHeader().hide()
+        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        header = self.table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        head = self.table.horizontalHeaderItem(0) or QTableWidgetItem()
+        head.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.add)
+        buttons.addWidget(self.remove)
+        buttons.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(4, 6, 4, 0)
+        column.addLayout(buttons)
+        column.addWidget(self.told)
+        column.addWidget(self.table, 1)
+        column.addWidget(self.editor)
+        column.addStretch(0)
+
+    def _start_asked(self, kind: Kind, _checked: bool = False) -> None:
+        self.start(kind)
+
+
+def _free_name(kind: Kind, taken: tuple[Gauge, ...]) -> str:
+    names = {gauge.name for gauge in taken}
+    return next(name for i in range(1, MOST_GAUGES + 2) if (name := f"{TITLES[kind]} {i}") not in names)

@@ -1,0 +1,110 @@
+"""A range dragged in the row charts or the profile: what its errors come to, and its points as a table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QPushButton, QTableWidgetItem, QVBoxLayout, QWidget
+
+from render.base.errors import InputError
+from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.session import Session
+from studio.qt.core.widgets import text_button
+from studio.qt.results.measures_table import ReadOnlyTable
+from studio.qt.results.plots import PointedPlots
+from studio.runtime.error_messages import trouble
+from studio.scan.region import Region, export_region, region_table
+from studio.scan.result_series import ErrorView
+from studio.scan.stages import Measurement
+
+HINT = (
+    "Drag across the row charts or the profile: the errors of what lies within are told here. "
+    "The edges can be moved; Shift or the middle button shifts the view."
+)
+EXPLAINED = (
+    "Value ± one sigma of chance: neighbouring scan lines that err alike count as one, by the predicted length of "
+    "correlation or by the errors' own, whichever is longer."
+)
+
+
+class RegionTab(QWidget):
+    """Of the region that was chosen last; `changed` when it is another one or none."""
+
+    changed = Signal()
+
+    def __init__(self, session: Session, rows: PointedPlots, profile: PointedPlots) -> None:
+        super().__init__()
+        self.session, self.rows, self.profile = session, rows, profile
+        self.region: Region | None = None
+        self._shown: dict[str, Measurement] = {}
+        self.title = QLabel(wordWrap=True)
+        self.table = ReadOnlyTable()
+        self.table.setToolTip(f"<p>{EXPLAINED}</p>")
+        self.export: QPushButton = text_button("Export as CSV…", "The region's points, by the first method shown")
+        self.clear = text_button("Clear", "No region")
+        buttons = QHBoxLayout()
+        for button in (self.export, self.clear):
+            buttons.addWidget(button)
+        buttons.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(4, 6, 4, 0)
+        column.addWidget(self.title)
+        column.addWidget(self.table)
+        column.addLayout(buttons)
+        column.addStretch(1)
+        self.export.clicked.connect(self._ask)
+        self.clear.clicked.connect(lambda: self.choose(None))
+        self._tell()
+
+    def choose(self, region: Region | None) -> None:
+        """Mark it where it was dragged, and tell of it."""
+        self.region = region
+        if region is None or region.along != "scan lines":
+            self.rows.hide_range()
+        if region is None or region.along != "fan":
+            self.profile.hide_range()
+        self._tell()
+        self.changed.emit()
+
+    def show_measurements(self, shown: dict[str, Measurement], view: ErrorView) -> None:
+        """By method, of one laser of the shown render."""
+        self._shown = shown
+        render, region = self.session.shown, self.region
+        if render is None or region is None:
+            return
+        rows = region_table(region, list(shown.values()), render.project.scene, view)
+        self.table.show_methods(list(shown), len(rows))
+        for i, (name, texts) in enumerate(rows):
+            self.table.setVerticalHeaderItem(i, QTableWidgetItem(name))
+            for k, text in enumerate(texts):
+                self.table.show_cell(i, k, text)
+        self.table.end_with_rows()
+
+    def write(self, path: Path) -> None:
+        """InputError: there is nothing to write, or the file cannot be written."""
+        render = self.session.shown
+        if render is None or self.region is None or not self._shown:
+            raise InputError("no region is chosen", cure="drag across the profile first")
+        first = next(iter(self._shown.values()))
+        count = export_region(path, self.region, first, render.project.scene, self.session.document.root)
+        self.session.message.emit("info", f"Wrote {path}: {count} points, {self.region.title}")
+
+    def _ask(self) -> None:
+        start = f"{self.session.project.name.replace('/', '-')} region.csv"
+        chosen, _ = QFileDialog.getSaveFileName(self.window(), "Export", start, "CSV table (*.csv)")
+        if not chosen:
+            return
+        path = Path(chosen)
+        try:
+            self.write(path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv"))
+        except InputError as error:
+            show_trouble(self.window(), trouble(error, "export the region"))
+
+    def _tell(self) -> None:
+        there = self.region is not None
+        self.title.setText(HINT if self.region is None else f"<b>{self.region.title.capitalize()}</b>")
+        self.title.setObjectName("" if there else "muted")
+        self.title.style().polish(self.title)
+        for widget in (self.table, self.export, self.clear):
+            widget.setVisible(there)

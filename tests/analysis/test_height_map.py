@@ -1,0 +1,98 @@
+"""Heights on a grid: exact on planes, with the sigma that repeated clouds show, and nothing over a gap."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from analysis.cloud import Cloud
+from analysis.height_map import HeightMap, decoded, encoded, height_map
+from render.base.errors import InputError
+
+ROWS, STEPS, SIGMA = 40, 12, 2e-5
+
+
+def scan(length: float = 1.0) -> Cloud:
+    """Scan lines 0.3 mm apart, slanted in y, and steps of 1 mm."""
+    row, step = (one.ravel() for one in np.meshgrid(np.arange(ROWS), np.arange(STEPS)))
+    x, y = 3e-4 * row, 1e-3 * step + 1e-5 * row
+    z = 0.1 + 0.2 * x - 0.3 * y
+    return {
+        "x": x, "y": y, "z": z, "sigma_random": np.full(len(x), SIGMA),
+        "correlation_length": np.full(len(x), length), "row": row.astype(np.int32),
+        "laser": np.zeros(len(x), dtype=np.int32), "step": step.astype(np.int32),
+    }  # fmt: skip
+
+
+def places(made: HeightMap) -> tuple[np.ndarray, np.ndarray]:
+    rows, columns = made.heights.shape
+    x = made.x + made.pitch * np.arange(columns)
+    y = made.y - made.pitch * np.arange(rows)
+    return np.meshgrid(x, y)
+
+
+def test_a_plane_stays_a_plane_and_has_a_cell_for_each_point() -> None:
+    made = height_map(scan())
+    x, y = places(made)
+    known = np.isfinite(made.heights)
+    assert known.sum() == pytest.approx(ROWS * STEPS, rel=0.1)
+    assert np.abs(made.heights - (0.1 + 0.2 * x - 0.3 * y))[known].max() < 1e-12
+
+
+@pytest.mark.parametrize("length", [1.0, 4.0])
+def test_sigma_and_correlation_of_cells_are_those_of_repeated_clouds(length: float) -> None:
+    cloud, trials = scan(length=length), 40
+    r = (length - 1.0) / (length + 1.0)
+    rng = np.random.default_rng(3)
+    drawn = []
+    for _ in range(trials):
+        noise = rng.standard_normal((STEPS, ROWS))
+        for k in range(1, ROWS):
+            noise[:, k] = r * noise[:, k - 1] + np.sqrt(1.0 - r**2) * noise[:, k]
+        noisy = cloud | {"z": cloud["z"] + SIGMA * noise.ravel()}
+        drawn.append(height_map(noisy, 4e-4).heights)
+    made, errors = height_map(cloud, 4e-4), np.array(drawn)
+    errors = errors - made.heights
+    spread = np.sqrt((errors**2).mean(axis=0))
+    # the median over eight hundred cells that hang together: as sharp as fifty of them at least
+    slack = chi2.ppf([1e-4, 1.0 - 1e-4], 50 * trials) / (50 * trials)
+    ratio = np.nanmedian(spread) ** 2 / made.sigma_cells**2
+    assert slack[0] < ratio < slack[1]
+    beside = (errors[:, :, :-1] * errors[:, :, 1:]).mean(axis=0) / (spread[:, :-1] * spread[:, 1:])
+    assert np.nanmedian(beside) == pytest.approx(made.correlation, abs=0.05)
+    assert made.sigma_points == SIGMA and made.sigma_cells < SIGMA
+
+
+def test_nothing_is_made_up_over_a_gap() -> None:
+    cloud = scan()
+    kept = (cloud["step"] < 4) | (cloud["step"] > 9)
+    made = height_map({name: column[kept] for name, column in cloud.items()}, 4e-4)
+    _, y = places(made)
+    inside = (y > 4.2e-3) & (y < 8.8e-3)
+    assert np.isnan(made.heights[inside]).all() and np.isfinite(made.heights[y < 2.5e-3]).mean() > 0.9
+
+
+def test_numbers_give_heights_within_half_a_level_and_the_same_numbers_again() -> None:
+    rng = np.random.default_rng(5)
+    heights = rng.normal(0.85, 0.01, (40, 30))
+    heights[3:5, 7:20] = np.nan
+    numbers, scale, offset = encoded(heights)
+    again = decoded(numbers, scale, offset)
+    assert np.array_equal(np.isnan(again), np.isnan(heights)) and numbers.max() > 65000
+    assert np.nanmax(np.abs(again - heights)) <= 0.5 * scale * (1.0 + 1e-6)
+    assert np.array_equal(encoded(again)[0] > 0, numbers > 0) and np.array_equal(
+        np.round((again[numbers > 0] - offset) / scale), numbers[numbers > 0]
+    )
+    flat, scale, offset = encoded(np.full((2, 2), 0.5))
+    assert np.allclose(decoded(flat, scale, offset), 0.5, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("kept", "pitch", "words"),
+    [(slice(0, ROWS), None, "one line"), (slice(0, 2), None, "so many points"), (slice(None), 1e-6, "too large")],
+)
+def test_what_makes_no_height_map_is_refused(kept: slice, pitch: float | None, words: str) -> None:
+    cloud = {name: column[kept] for name, column in scan().items()}
+    with pytest.raises(InputError, match=words):
+        height_map(cloud, pitch)

@@ -1,0 +1,168 @@
+"""Measures of the part in the window: dragged in the profile, judged, undone; and the figures of a region."""
+
+from __future__ import annotations
+
+import csv
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from pytestqt.qtbot import QtBot
+
+from analysis.gauges.gauge import Gauge
+from studio.qt.core.session import Session
+from studio.qt.results.plots import PointedPlots
+from studio.qt.results.results_panel import PART, REGION, ResultsPanel
+from studio.scan.gauging import readings
+from studio.scan.redevelop import develop_again, development, measure_again
+from studio.scan.stages import Measurement
+from tests.studio.qt.small_session import small_project, small_render, small_session
+
+SIDES = ((-0.25, -0.15), (0.15, 0.25))
+"""m, of the ground beside the sphere."""
+
+
+@lru_cache(maxsize=1)
+def measured() -> dict[str, list[Measurement]]:
+    """Of the small sphere."""
+    project, (world, frame) = small_project(), small_render()
+    how = development(project, project)
+    images = develop_again(frame, how)
+    return measure_again(frame, world, how, images, ("likelihood",), cancelled=lambda: False)
+
+
+@pytest.fixture
+def panel(qtbot: QtBot) -> ResultsPanel:
+    """The small sphere, measured, on the screen."""
+    session = small_session(rendered=True)
+    assert session.shown is not None
+    session.shown.measurements = measured()
+    made = ResultsPanel(session)
+    qtbot.addWidget(made)
+    made.resize(1366, 420)
+    made.show()
+    qtbot.waitExposed(made)
+    qtbot.waitUntil(lambda: made.profile.plot.vb.width() > 100)
+    return made
+
+
+def drag(qtbot: QtBot, plots: PointedPlots, low: float, high: float, k: int = 0) -> None:
+    """With the left button, from one place of a plot's x axis to another."""
+    box, view = plots.plots[k].vb, plots.viewport()
+    height = 0.5 * sum(box.viewRange()[1])
+    ends = [plots.mapFromScene(box.mapViewToScene(QPointF(x, height))) for x in (low, high)]
+    qtbot.mouseMove(view, ends[0] - QPoint(9, 0))  # what is under the mouse is known by where it moved
+    qtbot.mouseMove(view, ends[0])
+    qtbot.wait(20)  # the scene hears of few moves in a short time
+    qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=ends[0])
+    for share in (0.3, 0.7, 1.0):
+        qtbot.mouseMove(view, QPoint(*(round(a + share * (b - a)) for a, b in zip(*map(_pair, ends), strict=True))))
+    qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=ends[1])
+
+
+def _pair(point: QPoint) -> tuple[int, int]:
+    return point.x(), point.y()
+
+
+def texts(panel: ResultsPanel, row: int) -> list[str]:
+    table = panel.part.table
+    return [table.item(row, column).text() for column in range(table.columnCount())]
+
+
+def with_a_step(session: Session, **tolerance: float) -> Gauge:
+    gauge = Gauge(name="level", kind="step", regions=SIDES, **tolerance)
+    session.set(("measures",), (gauge,))
+    return gauge
+
+
+def test_drags_in_the_profile_make_a_measure_and_undo_removes_it(panel: ResultsPanel, qtbot: QtBot) -> None:
+    session = panel.session
+    panel.part.start("step")
+    for low, high in SIDES:
+        drag(qtbot, panel.profile, 1e3 * low, 1e3 * high)
+    (made,) = session.project.measures
+    a_pixel = 1e-3 * panel.profile.plot.vb.viewPixelSize()[0]
+    assert np.abs(np.array(made.regions) - SIDES).max() < 2.0 * a_pixel
+    assert panel.figures.currentIndex() == PART and panel.part.placing is None
+    # the number of the table is the one that a scan writes
+    render = session.shown
+    assert render is not None
+    project = render.project.model_copy(update={"measures": session.project.measures})
+    (expected,) = readings(project, render.frame, render.measurements["likelihood"])
+    assert panel.part.readings[0].value == expected.value and "mm" in texts(panel, 0)[1]
+    assert len(panel.part.drawing.spans) == 2
+    session.document.undo()
+    assert session.project.measures == () and panel.part.table.rowCount() == 0 and not panel.part.drawing.spans
+    session.document.redo()
+    assert session.project.measures == (made,) and panel.part.table.rowCount() == 1
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "verdict"),
+    [
+        ({"nominal": 0.0, "lower": -0.01, "upper": 0.01}, "pass"),
+        ({"nominal": 0.1, "lower": -0.01, "upper": 0.01}, "fail"),
+        ({"nominal": 0.0, "lower": -1e-9, "upper": 1e-9}, "undecided"),
+    ],
+)
+def test_the_verdict_is_told_in_a_word(panel: ResultsPanel, tolerance: dict[str, float], verdict: str) -> None:
+    with_a_step(panel.session, **tolerance)
+    assert texts(panel, 0)[-1].endswith(verdict)
+
+
+def test_a_moved_edge_is_one_step_of_undo_and_reads_the_measure_anew(panel: ResultsPanel) -> None:
+    session, part = panel.session, panel.part
+    gauge = with_a_step(session)
+    part.table.selectRow(0)
+    before = part.readings[0].points
+    span = part.drawing.spans[1]
+    span.lines[1].setValue(200.0)
+    assert session.project.measures == (gauge,) and part.readings[0].points < before, "only looked at while it moves"
+    span.lineMoveFinished()
+    assert session.project.measures[0].regions[1] == (0.15, 0.2)
+    session.document.undo()
+    assert session.project.measures == (gauge,) and part.readings[0].points == before
+
+
+def test_a_tolerance_without_its_nominal_is_refused_beside_the_field(panel: ResultsPanel, qtbot: QtBot) -> None:
+    gauge = with_a_step(panel.session)
+    panel.figures.setCurrentIndex(PART)
+    panel.part.table.selectRow(0)
+    editor = panel.part.editor
+    for name, text in (("lower", "-0.1"), ("nominal", "0"), ("lower", "-0.1"), ("name", "ground")):
+        field = editor.fields[name]
+        field.setFocus()
+        field.selectAll()
+        qtbot.keyClicks(field, text)
+        refused = name == "lower" and panel.session.project.measures[0].nominal is None
+        qtbot.keyClick(field, Qt.Key.Key_Return)
+        assert editor.problem.isVisible() == refused
+        if refused:
+            assert "nominal" in editor.problem.text() and panel.session.project.measures == (gauge,)
+            qtbot.keyClick(field, Qt.Key.Key_Escape)
+    changed = panel.session.project.measures[0]
+    assert (changed.name, changed.nominal, changed.lower) == ("ground", 0.0, pytest.approx(-1e-4))
+
+
+def test_a_drag_over_rows_tells_of_their_errors_and_writes_their_points(
+    panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    drag(qtbot, panel.rows, 40.0, 90.0, 2)
+    region = panel.region.region
+    assert region is not None and panel.figures.currentIndex() == REGION
+    assert region.low == pytest.approx(40.0, abs=2.0) and region.high == pytest.approx(90.0, abs=2.0)
+    found = panel.shown()["likelihood"]
+    here = (found.points.index >= region.low) & (found.points.index <= region.high) & found.points.valid
+    error = 1e6 * found.errors.depth[here & np.isfinite(found.errors.depth)]
+    shown = [panel.region.table.item(row, 0).text() for row in range(panel.region.table.rowCount())]
+    assert shown[0] == str(here.sum())
+    mean, sigma = (float(part) for part in shown[1].split(" ± "))
+    assert mean == pytest.approx(error.mean(), abs=sigma) and sigma >= 0.9 * error.std() / np.sqrt(len(error)) - 0.01
+    panel.region.write(tmp_path / "region.csv")
+    with open(tmp_path / "region.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["row"]) for row in rows] == found.points.index[here].tolist()
+    panel.region.clear.click()
+    assert not panel.rows.spans[0].isVisible()
