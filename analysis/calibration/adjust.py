@@ -191,17 +191,26 @@ def _covariance(matrix: Float, free: Bool, names: tuple[str, ...]) -> Float:
     scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     values, vectors = np.linalg.eigh(inner * np.outer(scale, scale))
     if lost or values[0] < SINGULAR:
-        weak = lost or [names[used[i]] for i in np.argsort(-np.abs(vectors[:, 0]))[:3]]
+        weak = ", ".join(lost) if lost else weakest_mixture(matrix, free, names)
         raise InputError(
             "the views do not determine all parameters",
             where="calibration",
-            found=f"nothing is known of a mixture of {', '.join(weak)}",
+            found=f"nothing is known of a mixture of {weak}",
             cure="photograph the board at other tilts and distances, or ask for fewer distortion terms",
         )
     inverse = (vectors / values) @ vectors.T
     out = np.zeros_like(matrix)
     out[np.ix_(used, used)] = inverse * np.outer(scale, scale)
     return out
+
+
+def weakest_mixture(information: Float, free: Bool, names: tuple[str, ...]) -> str:
+    """Of information (p, p): the three free parameters that weigh most in the combination known least."""
+    used = np.nonzero(free)[0]
+    inner = information[np.ix_(used, used)]
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(inner), np.finfo(float).tiny))
+    _, vectors = np.linalg.eigh(inner * np.outer(scale, scale))
+    return ", ".join(names[used[i]] for i in np.argsort(-np.abs(vectors[:, 0]))[:3])
 
 
 def rescaled(solution: Solution, seen: Observations) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.calibration.adjust import Prior, Solution, adjust, rescaled, without, without_views
+from analysis.calibration.adjust import Prior, Solution, adjust, rescaled, weakest_mixture, without, without_views
 from analysis.calibration.estimate import Estimate
 from analysis.calibration.observations import Observations
 from analysis.calibration.residuals import corners, laser_points
@@ -56,6 +56,7 @@ def adjust_robustly(seen: Observations, start: Estimate, free: Bool, prior: Prio
         raise InputError(
             "the adjustment does not settle: its numbers would be those of a chance moment",
             where="calibration",
+            found=f"least is known of a mixture of {weakest_mixture(solution.information, free, estimate.names)}",
             cure="ask for fewer distortion terms, or photograph the board at other tilts and distances",
         )
     return Adjusted(solution, scaled, corner_scale, laser_scale, told)

@@ -14,6 +14,7 @@ from analysis.calibration.estimate import Estimate, free_parameters
 from analysis.calibration.lens import LENGTHS, normalise, project
 from analysis.calibration.observations import Observations, gather
 from analysis.calibration.residuals import corners, laser_points
+from analysis.calibration.robust import adjust_robustly
 from analysis.calibration.start import start
 from analysis.calibration.virtual import noisy
 from render.base.errors import InputError
@@ -125,3 +126,18 @@ def test_errors_are_as_large_as_told_and_regions_cover() -> None:
     ratio = np.sqrt(np.mean(np.square(errors), axis=0))
     assert 0.95 <= ratio.mean() <= 1.05
     assert abs(np.mean(chi2) - 1.0) < 3.0 * np.sqrt(2.0 / found.freedom / 200)
+
+
+def test_a_rational_lens_settles_where_its_terms_part_and_is_told_by_name_where_they_do_not() -> None:
+    narrow = truth(12, 12, terms=14)
+    wide = np.array([1500.0, 1500.0, 1223.5, 1023.5])
+    near = replace(narrow, intrinsics=wide, translation=narrow.translation * [2.0, 1.5, 0.5])
+    rng = np.random.default_rng(12)
+    free = free_parameters(near, warp=False)
+    found = adjust(gather(noisy(views_of(near, laser_step=96), rng)), near, free)
+    assert found.converged
+    error = (found.estimate.shared - near.shared)[free] / np.sqrt(np.diag(found.covariance)[free])
+    assert np.abs(error).max() < 5.0
+    # within 20 deg of the axis numerator and denominator of the radial term cancel
+    with pytest.raises(InputError, match=r"mixture of k\d, k\d, k\d"):
+        adjust_robustly(gather(noisy(views_of(narrow, laser_step=96), rng)), narrow, free)
