@@ -16,6 +16,7 @@ try:
 
     from studio.runtime.command_line import BAD_INPUT, Commands, FiniteRange
     from studio.runtime.command_options import (
+        CHOOSER,
         COLOUR,
         FARTHEST,
         GEOMETRY,
@@ -162,6 +163,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 @photographed
 @click.option("--peaks", type=int, help="Peaks kept on each scan line  [default: as many as lines stand out].")
 @SELECT
+@CHOOSER
 @click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5. One table.")
 @click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table.")
 @click.option("--ridges", is_flag=True, help="Lines of any direction, as points with their normal (Steger in 2-D).")
@@ -288,6 +290,23 @@ def dataset(recipe: Path | None, **options: Any) -> None:
     from studio.commands.dataset import dataset_command
 
     dataset_command(recipe, **options)
+
+
+@cli.command()
+@click.argument("recipes", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--count", type=click.IntRange(5, 1_000_000), default=40, show_default=True, help="Scenes of each recipe."
+)
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Where training starts.")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Weights (.onnx); the card goes beside.")
+@click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor].")
+@common
+def chooser(recipes: tuple[Path, ...], **options: Any) -> None:
+    """Train the network of --select learned on scenes of recipes, or of ready-made ones by their names."""
+    _require_system()
+    from studio.commands.chooser import chooser_command
+
+    chooser_command(recipes, **options)
 
 
 @cli.command()

@@ -55,8 +55,15 @@ def working(command: Callable[..., Any]) -> Callable[..., Any]:
 METHOD = click.option("--method", help="How the line is found; auto picks, an unknown name lists all.")
 SELECT = click.option(
     "--select",
-    type=click.Choice(["strongest", "first", "last", "continuous"]),
-    help="Which peak of a scan line; continuous: the one on the smoothest chain of peaks.",
+    type=click.Choice(["strongest", "first", "last", "continuous", "learned"]),
+    help="Which peak of a scan line; continuous: the one on the smoothest chain of peaks; learned: the one that a "
+    "trained network takes for the line.",
+)
+CHOOSER = click.option(
+    "--chooser",
+    type=click.Path(path_type=Path),
+    callback=lambda context, option, file: None if file is None else str(file.absolute()),
+    help="Weights (.onnx) of --select learned, as `chooser` trains them  [default: the program's].",
 )
 GEOMETRY = click.option(
     "--geometry/--no-geometry", default=None, help="Only peaks that the laser can have made, in the working volume."
@@ -78,6 +85,7 @@ def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
         FARTHEST,
         NEAREST,
         GEOMETRY,
+        CHOOSER,
         SELECT,
         METHOD,
     ):
