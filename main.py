@@ -16,20 +16,18 @@ try:
 
     from studio.runtime.command_line import BAD_INPUT, Commands, FiniteRange
     from studio.runtime.command_options import (
-        CHOOSER,
         COLOUR,
-        FARTHEST,
-        GEOMETRY,
         METHOD,
-        NEAREST,
-        SELECT,
         THREADS,
         common,
+        labelling,
         measuring,
         photographed,
         real_views,
         repeating,
+        selecting,
         sharing,
+        training,
         virtual_views,
         working,
     )
@@ -162,8 +160,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 @click.option("--laser", "colour", type=COLOUR, help="Its colour  [default: auto].")
 @photographed
 @click.option("--peaks", type=int, help="Peaks kept on each scan line  [default: as many as lines stand out].")
-@SELECT
-@CHOOSER
+@selecting
 @click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene, so long: 8,2,0.5. One table.")
 @click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table.")
 @click.option("--ridges", is_flag=True, help="Lines of any direction, as points with their normal (Steger in 2-D).")
@@ -174,9 +171,6 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 @click.option(
     "--laser-number", type=click.IntRange(0), default=0, show_default=True, help="Which laser of the project."
 )
-@GEOMETRY
-@NEAREST
-@FARTHEST
 @click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside each image].")
 @THREADS
 @common
@@ -272,14 +266,7 @@ def advise(project: Path | None, **options: Any) -> None:
 
 @cli.command()
 @click.argument("recipe", required=False, type=click.Path(path_type=Path))
-@click.option("--count", type=click.IntRange(1, 10_000_000), default=100, show_default=True, help="Scenes.")
-@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/dataset-<name>].")
-@click.option("--format", "formats", multiple=True, help="Labels for others' readers too; an unknown name lists all.")
-@click.option("--preview", is_flag=True, help="Only a contact sheet of the first 64 scenes, small.")
-@click.option(
-    "--from", "sources", multiple=True, type=click.Path(path_type=Path), help="Folder of another shard: take over."
-)
-@sharing
+@labelling
 @common
 def dataset(recipe: Path | None, **options: Any) -> None:
     """Labelled images of a recipe, or of a ready-made one by its name; without a recipe, list them.
@@ -294,12 +281,7 @@ def dataset(recipe: Path | None, **options: Any) -> None:
 
 @cli.command()
 @click.argument("recipes", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    "--count", type=click.IntRange(5, 1_000_000), default=40, show_default=True, help="Scenes of each recipe."
-)
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Where training starts.")
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="Weights (.onnx); the card goes beside.")
-@click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor].")
+@training
 @common
 def chooser(recipes: tuple[Path, ...], **options: Any) -> None:
     """Train the network of --select learned on scenes of recipes, or of ready-made ones by their names."""
@@ -315,8 +297,6 @@ def chooser(recipes: tuple[Path, ...], **options: Any) -> None:
 @click.option("--board", default="checkerboard:13x9:25mm", show_default=True, help="Kind, counts and side; see board.")
 @click.option("--out", type=click.Path(path_type=Path), help="Calibration file  [default: FOLDER/calibration.json].")
 @real_views
-@NEAREST
-@FARTHEST
 @click.option("--most-tilt", type=FiniteRange(5.0, 70.0), default=45.0, show_default=True, help="Of boards, degrees.")
 @click.option("--target-um", type=FiniteRange(0.01, 1e6), help="Depth error that is enough, um.")
 @virtual_views

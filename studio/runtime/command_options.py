@@ -72,6 +72,13 @@ NEAREST = click.option("--nearest", type=FiniteRange(0.0, 1e4), help="Nearest de
 FARTHEST = click.option("--farthest", type=FiniteRange(1e-6, 1e4), help="Farthest depth of the working volume, m.")
 
 
+def selecting(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Which of a scan line's candidates is the line."""
+    for option in (FARTHEST, NEAREST, GEOMETRY, CHOOSER, SELECT):
+        command = option(command)
+    return command
+
+
 def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
     """Settings of the line extraction in place of the project's."""
     for option in (
@@ -82,11 +89,7 @@ def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
             help="Each exposure is so many times shorter than the one before.",
         ),
         click.option("--exposures", type=int, help="Exposures taken of each frame and fused."),
-        FARTHEST,
-        NEAREST,
-        GEOMETRY,
-        CHOOSER,
-        SELECT,
+        selecting,
         METHOD,
     ):
         command = option(command)
@@ -147,6 +150,45 @@ def sharing(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def labelling(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of labelled images of a recipe."""
+    for option in (
+        sharing,
+        click.option(
+            "--from",
+            "sources",
+            multiple=True,
+            type=click.Path(path_type=Path),
+            help="Folder of another shard: take over.",
+        ),
+        click.option("--preview", is_flag=True, help="Only a contact sheet of the first 64 scenes, small."),
+        click.option(
+            "--format", "formats", multiple=True, help="Labels for others' readers too; an unknown name lists all."
+        ),
+        click.option(
+            "--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/dataset-<name>]."
+        ),
+        click.option("--count", type=click.IntRange(1, 10_000_000), default=100, show_default=True, help="Scenes."),
+    ):
+        command = option(command)
+    return command
+
+
+def training(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of training a chooser."""
+    scenes = click.IntRange(5, 1_000_000)
+    for option in (
+        click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor]."),
+        click.option(
+            "--out", required=True, type=click.Path(path_type=Path), help="Weights (.onnx); the card goes beside."
+        ),
+        click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Of training."),
+        click.option("--count", type=scenes, default=40, show_default=True, help="Scenes of each recipe."),
+    ):
+        command = option(command)
+    return command
+
+
 def virtual_views(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of a calibration in silico."""
     sigma = FiniteRange(1e-4, 10.0)
@@ -163,6 +205,8 @@ def virtual_views(command: Callable[..., Any]) -> Callable[..., Any]:
 def real_views(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of a calibration from photographs."""
     for option in (
+        FARTHEST,
+        NEAREST,
         click.option(
             "--channel",
             type=click.Choice(["auto", "mono", "red", "green", "blue"]),
