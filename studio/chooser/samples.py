@@ -19,7 +19,7 @@ from analysis.line.result import Line
 from analysis.line.selection.learned import LINE, OTHER, REFLECTION
 from render.base.threads import Cancel
 from render.frame import Frame
-from studio.dataset.images import rendered
+from studio.dataset.images import Task, rendered
 from studio.dataset.recipe import Recipe
 from studio.dataset.scenes import drawn_scene, place
 from studio.preview.preview import Preview
@@ -32,18 +32,6 @@ ON_LINE = 2.0
 """px from a crossing within which a candidate is the line; beyond it, it is a wrong row."""
 NONE = -1
 """No candidate."""
-
-
-@dataclass(frozen=True)
-class Task:
-    """One scene, as text, so that any process can take it."""
-
-    recipe: str
-    base: str
-    root: str
-    """Folder of the recipe."""
-    base_folder: str
-    scene: int
 
 
 @dataclass(frozen=True)
@@ -60,7 +48,10 @@ class Sample:
 
 
 def samples_of(task: Task, cancelled: Cancel) -> list[Sample]:
-    """The photographs of one scene, a laser each. InputError: as `drawn_scene`. Cancelled: so asked."""
+    """The photographs of one scene, a laser each; nothing is written.
+
+    InputError: as `drawn_scene`. Cancelled: so asked.
+    """
     recipe = Recipe.model_validate_json(task.recipe)
     base = Project.from_text(task.base).in_folder(Path(task.base_folder))
     scene = drawn_scene(recipe, base, Path(task.root), task.scene, Preview(1))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,30 +20,23 @@ from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.base.threads import Cancel
 from studio.chooser.network import fitted, onnx_of
-from studio.chooser.samples import NONE, Sample, Task, samples_of
+from studio.chooser.samples import NONE, Sample, samples_of
+from studio.dataset.images import Task
 from studio.dataset.recipe import Recipe, base_of
 from studio.runtime.workers import EVERY_PROCESSOR, Engine, team
 from studio.study.measuring import warm_up
 
 SURE = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.97, 0.98, 0.99)
 WRONG = 0.0005
-"""Share of wrong rows that the held-out scenes may have; the least probability is the smallest that keeps to it.
+"""Share of wrong rows that the held-out scenes may have; half of what is wanted of others, as they are few.
 
-Half of what is wanted of others, as they are few."""
+The least probability is the smallest that keeps to it."""
 SHRINKAGE = 0.2
 """Of the frames' covariance towards its diagonal (Ledoit and Wolf, 2004), as there are few frames."""
 MARGIN = 1.1
 """Times the farthest held-out frame, as that is not the farthest there can be."""
 
 Progress = Callable[[int, int], None]
-
-
-@dataclass(frozen=True)
-class Trained:
-    """Weights as ONNX and their card."""
-
-    weights: bytes
-    card: Card
 
 
 def gathered(
@@ -60,7 +52,7 @@ def gathered(
     for recipe, root in recipes:
         base = base_of(recipe, root)
         tasks += [
-            Task(recipe.model_dump_json(), base.to_text(), str(root.resolve()), str(base.folder.resolve()), k)
+            Task(recipe.model_dump_json(), base.to_text(), str(root.resolve()), str(base.folder.resolve()), "", k)
             for k in range(scenes)
         ]
     base = base_of(*recipes[0])
@@ -73,7 +65,7 @@ def gathered(
     return [sample for task in tasks for sample in made[task]]
 
 
-def trained(samples: Sequence[Sample], seed: int, told: dict[str, Any]) -> Trained:
+def trained(samples: Sequence[Sample], seed: int, told: dict[str, Any]) -> Chooser:
     """A network fitted to the samples of the training split. told: of its data, for the card.
 
     InputError: a split has no frames with candidates, or a class is missing.
@@ -111,7 +103,7 @@ def trained(samples: Sequence[Sample], seed: int, told: dict[str, Any]) -> Train
         chooser = _with(chooser, sure=sure)
         if shares(chooser, parts["validation"])["wrong"] <= WRONG:
             break
-    return Trained(weights, _with(chooser, scores=scores(chooser, parts["test"])).card)
+    return _with(chooser, scores=scores(chooser, parts["test"]))
 
 
 def _with(chooser: Chooser, **changes: Any) -> Chooser:
@@ -168,7 +160,7 @@ def auc(low: Float, high: Float) -> float:
     return float((ranks.sum() - len(high) * (len(high) + 1) / 2) / (len(low) * len(high)))
 
 
-def write(path: Path, found: Trained) -> None:
+def write(path: Path, found: Chooser) -> None:
     """Weights (.onnx), and the card beside them (.json). InputError: they cannot be written."""
     with atomic_write(path) as temporary:
         temporary.write_bytes(found.weights)
