@@ -17,17 +17,17 @@ try:
     from studio.runtime.command_line import BAD_INPUT, Commands, FiniteRange
     from studio.runtime.command_options import (
         COLOUR,
-        FARTHEST,
-        NEAREST,
         THREADS,
+        calibrating,
         common,
         extracting,
+        labelling,
         measuring,
         photographed,
-        real_views,
+        printing,
         repeating,
         sharing,
-        virtual_views,
+        training,
         working,
     )
     from studio.runtime.system import message, missing_needs, why_not_in_this_folder
@@ -199,10 +199,7 @@ def compare(a: Path, b: Path, **options: Any) -> None:
 @click.option("--out", type=click.Path(path_type=Path), help="PNG or TIFF  [default: heightmap.png beside the points].")
 @common
 def heightmap(source: Path, **options: Any) -> None:
-    """The points of a scan as heights on a uniform grid: a 16-bit picture, with its scale in a JSON file beside it.
-
-    SOURCE is a results folder, or a PLY of points.
-    """
+    """Points of a results folder, or a PLY, as heights on a uniform grid: a 16-bit picture, and its scale as JSON."""
     _require_system()
     from studio.commands.height_map import make_height_map
 
@@ -273,8 +270,7 @@ def advise(project: Path | None, **options: Any) -> None:
 def twin(project: Path, photographs: tuple[Path, ...], **options: Any) -> None:
     """Fit a project to raw mono photographs of its scanner: sheet, blur, halo, noise, laser power; a new project.
 
-    The photographs are the steps of the project's motion, or all of its first step. What they do not tell is
-    kept.
+    The photographs are the steps of the project's motion, or all of its first step. What they do not tell is kept.
     """
     _require_system()
     from studio.commands.twin import twin_project
@@ -284,14 +280,7 @@ def twin(project: Path, photographs: tuple[Path, ...], **options: Any) -> None:
 
 @cli.command()
 @click.argument("recipe", required=False, type=click.Path(path_type=Path))
-@click.option("--count", type=click.IntRange(1, 10_000_000), default=100, show_default=True, help="Scenes.")
-@click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/dataset-<name>].")
-@click.option("--format", "formats", multiple=True, help="Labels for others' readers too; an unknown name lists all.")
-@click.option("--preview", is_flag=True, help="Only a contact sheet of the first 64 scenes, small.")
-@click.option(
-    "--from", "sources", multiple=True, type=click.Path(path_type=Path), help="Folder of another shard: take over."
-)
-@sharing
+@labelling
 @common
 def dataset(recipe: Path | None, **options: Any) -> None:
     """Labelled images of a recipe, or of a ready-made one by its name; without a recipe, list them.
@@ -305,19 +294,21 @@ def dataset(recipe: Path | None, **options: Any) -> None:
 
 
 @cli.command()
+@click.argument("recipes", nargs=-1, required=True, type=click.Path(path_type=Path))
+@training
+@common
+def chooser(recipes: tuple[Path, ...], **options: Any) -> None:
+    """Train the network of --select learned on scenes of recipes, or of ready-made ones by their names."""
+    _require_system()
+    from studio.commands.chooser import chooser_command
+
+    chooser_command(recipes, **options)
+
+
+@cli.command()
 @click.argument("what", metavar="WHAT")
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
-@click.option("--board", default="checkerboard:13x9:25mm", show_default=True, help="Kind, counts and side; see board.")
-@click.option("--out", type=click.Path(path_type=Path), help="Calibration file  [default: FOLDER/calibration.json].")
-@real_views
-@NEAREST
-@FARTHEST
-@click.option("--most-tilt", type=FiniteRange(5.0, 70.0), default=45.0, show_default=True, help="Of boards, degrees.")
-@click.option("--target-um", type=FiniteRange(0.01, 1e6), help="Depth error that is enough, um.")
-@virtual_views
-@click.option(
-    "--export", type=click.Choice(["opencv", "ros", "kalibr", "mrcal"]), multiple=True, help="The camera for others."
-)
+@calibrating
 @common
 def calibrate(what: str, folder: Path | None, **options: Any) -> None:
     """Calibrate a camera, its lasers, or both: camera|laser|scanner FOLDER of photographs, or a PROJECT in silico.
@@ -333,12 +324,7 @@ def calibrate(what: str, folder: Path | None, **options: Any) -> None:
 
 @cli.command()
 @click.argument("board", default="checkerboard:13x9:25mm")
-@click.option(
-    "--paper", type=click.Choice(["A4", "A3", "A2", "A1", "A0"]), help="Size  [default: the least that holds]."
-)
-@click.option(
-    "--contrast", type=FiniteRange(0.1, 1.0), default=1.0, help="1: black on white; 0.6 shows the line better."
-)
+@printing
 @click.option("--out", type=click.Path(path_type=Path), help="PDF file  [default: named by the board].")
 @common
 def board(board: str, **options: Any) -> None:

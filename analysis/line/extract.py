@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from analysis.line.measure import measure
 from analysis.line.result import Line
 from analysis.line.selection.continuity import pick, select_chain
 from analysis.line.selection.geometry import WorkingVolume, consistent
+from analysis.line.selection.learned import READY_MADE, choose_learned, load_chooser
 from analysis.line.settings import ExtractionSettings, Select
 from analysis.line.shared_noise import with_shared_noise
 from render.base.errors import InputError
@@ -64,15 +66,22 @@ def extract(
     # fused exposures hold so many electrons that no lens draws a line which is a Gaussian to their noise
     line = replace(measure(lines, wanted, threads, judge=variance is None), note=note)
     check_finite("line", positions=line.u[line.valid])
-    line = line if alone else select(line, chosen.select, volume)
+    line = line if alone else select(line, chosen.select, volume, chosen.chooser)
     return with_shared_noise(line) if noise.alike else line
 
 
-def select(candidates: Line, how: Select, volume: WorkingVolume | None = None) -> Line:
-    """Peaks (n, k) -> Line (n, 1): one peak of each scan line, of those that the working volume allows, or none."""
+def select(candidates: Line, how: Select, volume: WorkingVolume | None = None, chooser: str | None = None) -> Line:
+    """Peaks (n, k) -> Line (n, 1): one peak of each scan line, of those that the working volume allows, or none.
+
+    chooser: weights of the learned selection, in place of the program's own. InputError: they are not a chooser's.
+    """
     usable = candidates.valid if volume is None else candidates.valid & consistent(candidates, volume)
     if how == "continuous":
         return select_chain(candidates, usable)
+    if how == "learned":
+        choice = choose_learned(candidates, usable, load_chooser(READY_MADE if chooser is None else Path(chooser)))
+        note = "; ".join(filter(None, (candidates.note, choice.refused)))
+        return replace(pick(candidates, choice.rank), note=note)
     if how == "strongest":
         order = np.broadcast_to(np.arange(usable.shape[1], dtype=np.float64), usable.shape)
     else:

@@ -35,7 +35,7 @@ Channel = Literal["auto", "mono", "red", "green", "blue"]
 Pattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 
 
-Select = Literal["strongest", "first", "last", "continuous"]
+Select = Literal["strongest", "first", "last", "continuous", "learned"]
 
 
 class ExtractionSettings(Model):
@@ -50,7 +50,15 @@ class ExtractionSettings(Model):
         "strongest",
         label="Selection",
         help="Strongest: all peaks, strongest first. Others give one peak of each scan line's candidates: the first, "
-        "the last, or the one on the smoothest chain of peaks, which may also be none.",
+        "the last, the one on the smoothest chain of peaks, or the one that a trained network takes for the line; the "
+        "last two may also be none.",
+    )
+    chooser: str | None = quantity(
+        None,
+        label="Chooser",
+        help="Weights (.onnx) of the learned selection, with their card beside them; empty: the program's own.",
+        min_length=1,
+        max_length=1000,
     )
     channel: Channel = quantity(
         "auto", label="Laser channel", help="On colour images the mean of the other two channels is subtracted."

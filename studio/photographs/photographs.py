@@ -178,7 +178,7 @@ def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
 def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolume | None) -> Line:
     """Peaks (n, k) -> (n, 1) by the selection, or, of the continuous one, (n, peaks): a chain each."""
     if settings.select != "continuous" or settings.peaks == 1:
-        return select(candidates, settings.select, volume)
+        return select(candidates, settings.select, volume, settings.chooser)
     left, chains = candidates, []
     for _ in range(settings.peaks):
         chain = select(left, "continuous", volume)

@@ -55,14 +55,28 @@ def working(command: Callable[..., Any]) -> Callable[..., Any]:
 METHOD = click.option("--method", help="How the line is found; auto picks, an unknown name lists all.")
 SELECT = click.option(
     "--select",
-    type=click.Choice(["strongest", "first", "last", "continuous"]),
-    help="Which peak of a scan line; continuous: the one on the smoothest chain of peaks.",
+    type=click.Choice(["strongest", "first", "last", "continuous", "learned"]),
+    help="Which peak of a scan line; continuous: the one on the smoothest chain of peaks; learned: the one that a "
+    "trained network takes for the line.",
+)
+CHOOSER = click.option(
+    "--chooser",
+    type=click.Path(path_type=Path),
+    callback=lambda context, option, file: None if file is None else str(file.absolute()),
+    help="Weights (.onnx) of --select learned, as `chooser` trains them  [default: the program's].",
 )
 GEOMETRY = click.option(
     "--geometry/--no-geometry", default=None, help="Only peaks that the laser can have made, in the working volume."
 )
 NEAREST = click.option("--nearest", type=FiniteRange(0.0, 1e4), help="Nearest depth of the working volume, m.")
 FARTHEST = click.option("--farthest", type=FiniteRange(1e-6, 1e4), help="Farthest depth of the working volume, m.")
+
+
+def selecting(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Which of a scan line's candidates is the line."""
+    for option in (FARTHEST, NEAREST, GEOMETRY, CHOOSER, SELECT):
+        command = option(command)
+    return command
 
 
 def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -75,10 +89,7 @@ def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
             help="Each exposure is so many times shorter than the one before.",
         ),
         click.option("--exposures", type=int, help="Exposures taken of each frame and fused."),
-        FARTHEST,
-        NEAREST,
-        GEOMETRY,
-        SELECT,
+        selecting,
         METHOD,
     ):
         command = option(command)
@@ -120,9 +131,6 @@ def extracting(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in (
         THREADS,
         click.option("--out", type=click.Path(path_type=Path), help="Output folder  [default: beside each image]."),
-        FARTHEST,
-        NEAREST,
-        GEOMETRY,
         click.option(
             "--laser-number", type=click.IntRange(0), default=0, show_default=True, help="Which laser of the project."
         ),
@@ -137,7 +145,7 @@ def extracting(command: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table."),
         click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene: 8,2,0.5. One table."),
-        SELECT,
+        selecting,
         click.option("--peaks", type=int, help="Peaks kept on each scan line  [default: as many as lines stand out]."),
         photographed,
         click.option("--laser", "colour", type=COLOUR, help="Its colour  [default: auto]."),
@@ -171,6 +179,45 @@ def sharing(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+def labelling(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of labelled images of a recipe."""
+    for option in (
+        sharing,
+        click.option(
+            "--from",
+            "sources",
+            multiple=True,
+            type=click.Path(path_type=Path),
+            help="Folder of another shard: take over.",
+        ),
+        click.option("--preview", is_flag=True, help="Only a contact sheet of the first 64 scenes, small."),
+        click.option(
+            "--format", "formats", multiple=True, help="Labels for others' readers too; an unknown name lists all."
+        ),
+        click.option(
+            "--out", type=click.Path(path_type=Path), help="Output folder  [default: scan-output/dataset-<name>]."
+        ),
+        click.option("--count", type=click.IntRange(1, 10_000_000), default=100, show_default=True, help="Scenes."),
+    ):
+        command = option(command)
+    return command
+
+
+def training(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of training a chooser."""
+    scenes = click.IntRange(5, 1_000_000)
+    for option in (
+        click.option("--workers", type=click.IntRange(1, 1024), help="Processes  [default: one a processor]."),
+        click.option(
+            "--out", required=True, type=click.Path(path_type=Path), help="Weights (.onnx); the card goes beside."
+        ),
+        click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Of training."),
+        click.option("--count", type=scenes, default=40, show_default=True, help="Scenes of each recipe."),
+    ):
+        command = option(command)
+    return command
+
+
 def virtual_views(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of a calibration in silico."""
     sigma = FiniteRange(1e-4, 10.0)
@@ -187,6 +234,8 @@ def virtual_views(command: Callable[..., Any]) -> Callable[..., Any]:
 def real_views(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of a calibration from photographs."""
     for option in (
+        FARTHEST,
+        NEAREST,
         click.option(
             "--channel",
             type=click.Choice(["auto", "mono", "red", "green", "blue"]),
@@ -204,6 +253,46 @@ def real_views(command: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option(
             "--camera", type=click.Path(path_type=Path), help="Calibration file of the camera, for laser alone."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def calibrating(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of a calibration, from photographs or in silico."""
+    for option in (
+        click.option(
+            "--export",
+            type=click.Choice(["opencv", "ros", "kalibr", "mrcal"]),
+            multiple=True,
+            help="The camera for others.",
+        ),
+        virtual_views,
+        click.option("--target-um", type=FiniteRange(0.01, 1e6), help="Depth error that is enough, um."),
+        click.option(
+            "--most-tilt", type=FiniteRange(5.0, 70.0), default=45.0, show_default=True, help="Of boards, degrees."
+        ),
+        real_views,
+        click.option(
+            "--out", type=click.Path(path_type=Path), help="Calibration file  [default: FOLDER/calibration.json]."
+        ),
+        click.option(
+            "--board", default="checkerboard:13x9:25mm", show_default=True, help="Kind, counts and side; see board."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def printing(command: Callable[..., Any]) -> Callable[..., Any]:
+    """How a board is printed."""
+    for option in (
+        click.option(
+            "--contrast", type=FiniteRange(0.1, 1.0), default=1.0, help="1: black on white; 0.6 shows the line better."
+        ),
+        click.option(
+            "--paper", type=click.Choice(["A4", "A3", "A2", "A1", "A0"]), help="Size  [default: the least that holds]."
         ),
     ):
         command = option(command)

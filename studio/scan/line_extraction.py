@@ -59,6 +59,8 @@ def extract_line(
     noise = None if image.processed else noise_model(image, project, laser)
     if method == "likelihood" != settings.method:
         settings = settings.model_copy(update={"smoothing": 0.0})  # it needs independent pixels
+    if settings.chooser is not None:
+        settings = settings.model_copy(update={"chooser": str(project.folder / settings.chooser)})
     if image.pattern is not None and settings.pattern is None:
         settings = settings.model_copy(update={"pattern": image.pattern})
     pixels: NDArray[Any] = image.pixels
@@ -80,7 +82,11 @@ def note_of(line: Line, settings: ExtractionSettings, times: list[float]) -> str
     if len(times) > 1:
         notes.append(f"{len(times)} exposures fused, " + ", ".join(f"{1e3 * time:.3g}" for time in times) + " ms")
     if line.candidates is not None:
-        notes.append({"continuous": "the smoothest chain of peaks"}.get(settings.select, f"the {settings.select} peak"))
+        told = {
+            "continuous": "the smoothest chain of peaks",
+            "learned": "what the chooser takes for the line",
+        }
+        notes.append(told.get(settings.select, f"the {settings.select} peak"))
         if settings.geometry:
             near, far = settings.nearest or 0.0, settings.farthest
             end = "" if far is None else f" to {far * 1e3:g} mm"

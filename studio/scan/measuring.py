@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.cloud import SpooledCloud, cloud, write_csv, write_ply
+from analysis.line.selection.learned import UNLIKE
 from analysis.line.settings import Method
 from analysis.report.model import FrameResult
 from analysis.report.record import ScanRecord
@@ -18,6 +19,7 @@ from render.world.world import World
 from studio.project.date_and_time import now
 from studio.project.project import Project
 from studio.scan.gauging import write_measures
+from studio.scan.remarks import result_remarks
 from studio.scan.results import compared_methods, measure_frame, report_input
 from studio.scan.spacetime_window import Passing, Sweep, Taken
 from studio.scan.stages import Clock
@@ -92,6 +94,10 @@ class Measuring:
                     where = f" in {times} of {frames} frames" if times < frames else ""
                     notes.append(f"Line of {laser.name}{where}: {note}.")
         return notes[:MOST_NOTES]
+
+    def remarks(self) -> list[str]:
+        """What the results say beyond themselves, and images that the chooser did not judge."""
+        return [*result_remarks(self.record), *(note for note in self.notes() if UNLIKE in note)]
 
     def write_points(self, out: Path) -> list[Path]:
         """points.ply and points.csv of all frames and lasers, by the project's method, at the first step's pose.

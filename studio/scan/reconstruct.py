@@ -18,7 +18,6 @@ from studio.scan.cautions import Cautions, is_aimed, light_note
 from studio.scan.gauging import measures_record
 from studio.scan.measuring import Measuring
 from studio.scan.redevelop import Development, development
-from studio.scan.remarks import result_remarks
 from studio.scan.run_record import ended_by_clock, run_text
 from studio.scan.stages import Clock, develop_step, step_world
 from studio.scan.summary import summarise
@@ -89,7 +88,7 @@ def _measured(
             notes = [*cautions.notes(figures), *(light_note(found.project, how.powered) if aimed else ())]
             measured["measures"] = measures_record(project.measures, measuring.record.readings)
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
-            measured["remarks"] = result_remarks(measuring.record)
+            measured["remarks"] = measuring.remarks()
             if any(getattr(requested, name) != getattr(found.project, name) for name in MEASURED_WITH):
                 measured["measured_with"] = requested.model_dump(mode="json", include=set(MEASURED_WITH))
             if report:

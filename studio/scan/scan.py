@@ -24,7 +24,6 @@ from studio.scan.gauging import measures_record
 from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
 from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
-from studio.scan.remarks import result_remarks
 from studio.scan.render_goal import goal_of
 from studio.scan.resume import frame_of_step
 from studio.scan.run_record import ended_by_clock, run_text
@@ -122,7 +121,7 @@ def run_scan(
             result["profiles_per_second"] = profile_rate(measuring.record, clock.seconds)
             result["results"] = summarise(measuring.record)
             result["measures"] = measures_record(project.measures, measuring.record.readings)
-            result["remarks"] = result_remarks(measuring.record)
+            result["remarks"] = measuring.remarks()
         result["notes"] = cautions.notes(result.get("results", ()))
 
         def finish(reports: list[Path]) -> dict[str, Any]:

@@ -51,9 +51,9 @@ def option(sources: Sources, place: Path, rng: Random, harm: bool) -> list[str]:
         "inspect": ["project.json"], "run": ["project.json", *QUICK], "render": ["project.json", "--out", "out"],
         "reconstruct": ["scan", "--out", "out"], "extract": ["image.png", "--out", "out"], "new": ["plane", "made"],
         "report": ["absent"], "twin": ["project.json", "image.png", "--out", "twin.json"],
-        "heightmap": ["scan", "--out", "map.png"],
+        "heightmap": ["scan", "--out", "map.png"], "chooser": ["project.json", "--out", "out.onnx"],
     }  # fmt: skip
-    command = rng.choices(tuple(plain), (2, 6, 2, 6, 8, 3, 1, 3, 3))[0] if harm else "extract"
+    command = rng.choices(tuple(plain), (2, 6, 2, 6, 8, 3, 1, 3, 3, 1))[0] if harm else "extract"
     argv = [command, *plain[command]]
     if command == "reconstruct" and rng.random() < 0.4:
         argv[1:2] = ["image.png", "--project", "project.json"]

@@ -76,6 +76,7 @@ def test_wrong_rows_on_metal_are_a_third_by_the_maximum_and_at_most_two_percent_
         "continuity": {"select": "continuous"},
         "geometry": {"geometry": True, **volume},
         "both": {"select": "continuous", "geometry": True, **volume},
+        "learned": {"select": "learned"},
     }
     found = {}
     for name, changes in ways.items():
@@ -86,3 +87,6 @@ def test_wrong_rows_on_metal_are_a_third_by_the_maximum_and_at_most_two_percent_
     assert 0.2 < found["row maximum"][0] < 0.45
     assert found["both"][0] <= 0.02
     assert found["both"][1] >= found["row maximum"][1] - 0.01
+    # of its own scenes it has seen none, and it knows nothing of the rig
+    assert found["learned"][0] <= 0.001
+    assert found["learned"][1] >= found["both"][1] - 0.02

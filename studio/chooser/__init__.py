@@ -1,0 +1,1 @@
+"""Trains the network that chooses the line among a row's peaks, on scenes of a recipe."""
