@@ -18,7 +18,7 @@ from studio.photographs.photograph_report import PhotographReport, write_photogr
 from studio.photographs.photograph_set import Wishes, look_at
 from studio.photographs.photographs import Measured, check_size, extract_photograph, extract_series, naming
 from studio.project.project import Project
-from studio.scan.line_extraction import working_volume
+from studio.scan.line_extraction import extraction_of, working_volume
 from studio.scan.own_files import check_replaceable
 from studio.scan.spacetime_window import surface_motion
 from studio.scan.stages import Clock, triangulate_line
@@ -55,7 +55,7 @@ def reconstruct_images(
         with naming(path):
             check_size(load_photograph(path), project.scene.camera)
     with clock.stage("line extraction"):
-        settings = project.extraction
+        settings = extraction_of(project)
         if wishes is None:
             wishes = Wishes(settings.axis, None if settings.channel == "auto" else settings.channel)
         look = look_at(paths, settings, wishes)

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from studio.project.allowed_files import of_command_line
 from studio.runtime.command_line import FiniteRange
 
 
@@ -62,7 +63,7 @@ SELECT = click.option(
 CHOOSER = click.option(
     "--chooser",
     type=click.Path(path_type=Path),
-    callback=lambda context, option, file: None if file is None else str(file.absolute()),
+    callback=lambda context, option, file: None if file is None else of_command_line(file),
     help="Weights (.onnx) of --select learned, as `chooser` trains them  [default: the program's].",
 )
 GEOMETRY = click.option(

@@ -16,6 +16,7 @@ from analysis.line.series.hdr import fuse
 from analysis.line.settings import ExtractionSettings, Method
 from render.sensor.develop import Image
 from studio.preview.scintillation import scintillation
+from studio.project.allowed_files import allowed_file
 from studio.project.project import Project
 
 
@@ -47,6 +48,15 @@ def working_volume(project: Project, laser: int, settings: ExtractionSettings | 
     )
 
 
+def extraction_of(project: Project) -> ExtractionSettings:
+    """The project's settings, with the file of a chooser. InputError: it lies outside the project's folder."""
+    settings = project.extraction
+    if settings.chooser is None:
+        return settings
+    file = allowed_file(project.folder, settings.chooser, "extraction.chooser")
+    return settings.model_copy(update={"chooser": str(file)})
+
+
 def extract_line(
     project: Project, image: Image, laser: int, threads: int | None = None, method: Method | None = None
 ) -> Line:
@@ -54,13 +64,11 @@ def extract_line(
 
     InputError: as `extract` and `fuse`.
     """
-    settings = project.extraction
+    settings = extraction_of(project)
     # what a camera has processed is a photograph like a stranger's, which tells its noise itself
     noise = None if image.processed else noise_model(image, project, laser)
     if method == "likelihood" != settings.method:
         settings = settings.model_copy(update={"smoothing": 0.0})  # it needs independent pixels
-    if settings.chooser is not None:
-        settings = settings.model_copy(update={"chooser": str(project.folder / settings.chooser)})
     if image.pattern is not None and settings.pattern is None:
         settings = settings.model_copy(update={"pattern": image.pattern})
     pixels: NDArray[Any] = image.pixels

@@ -11,9 +11,10 @@ from analysis.line.result import Flag
 from render.base.errors import InputError
 from render.scene.motion import LinearStage
 from render.world.world import build_world
+from studio.project.allowed_files import of_command_line
 from studio.project.project import Project
 from studio.project.templates import template_folder
-from studio.scan.line_extraction import extract_line, working_volume
+from studio.scan.line_extraction import extract_line, extraction_of, working_volume
 from studio.scan.options import ScanOptions
 from studio.scan.results import compared_methods, measure_frame
 from studio.scan.scan import run_scan
@@ -32,6 +33,17 @@ def rendered():
     project = scaled(Project.load(ROOT / "project.json"), 0.5)
     world = build_world(project.scene, ROOT, 0)
     return project, world, render_step(project, world, 0, CLOCK)
+
+
+@pytest.mark.parametrize("chooser", ["../mine.onnx", "/etc/mine.onnx"])
+def test_a_project_names_no_chooser_outside_its_folder_but_the_command_line_may(chooser, tmp_path):
+    project = with_extraction(Project.load(ROOT / "project.json"), chooser=chooser)
+    with pytest.raises(InputError, match=r"extraction\.chooser"):
+        extraction_of(project)
+    inside = extraction_of(with_extraction(project, chooser="mine.onnx")).chooser
+    assert inside is not None and Path(inside) == (ROOT / "mine.onnx").resolve()
+    named = of_command_line(tmp_path / "mine.onnx")
+    assert extraction_of(with_extraction(project, chooser=named)).chooser == named
 
 
 def bright(project: Project, times: float) -> Project:
