@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from studio.project.allowed_files import of_command_line
 from studio.runtime.command_line import FiniteRange
 
 
@@ -60,10 +59,19 @@ SELECT = click.option(
     help="Which peak of a scan line; continuous: the one on the smoothest chain of peaks; learned: the one that a "
     "trained network takes for the line.",
 )
+
+
+def _named_here(file: Path) -> str:
+    """A file that the command line names may lie outside the project's folder; imported only where one is named."""
+    from studio.project.allowed_files import of_command_line
+
+    return of_command_line(file)
+
+
 CHOOSER = click.option(
     "--chooser",
     type=click.Path(path_type=Path),
-    callback=lambda context, option, file: None if file is None else of_command_line(file),
+    callback=lambda context, option, file: None if file is None else _named_here(file),
     help="Weights (.onnx) of --select learned, as `chooser` trains them  [default: the program's].",
 )
 GEOMETRY = click.option(
