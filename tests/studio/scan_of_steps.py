@@ -18,7 +18,7 @@ SCALE = 0.5
 def small_project(steps: int = 3) -> Project:
     """The step block in 244 x 204 px on a stage."""
     project = scaled(Project.load(template_folder("step_block") / "project.json"), 0.1)
-    settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05})
+    settings = project.render.model_copy(update={"ambient_samples": 1, "laser_error": 0.05, "goal": None})
     motion = LinearStage(step=(0.0, 0.002, 0.0), steps=steps)
     return replaced(project.model_copy(update={"render": settings}), ("scene", "motion"), motion)
 

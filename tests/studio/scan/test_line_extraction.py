@@ -91,7 +91,8 @@ def test_a_scan_along_time_takes_the_edges_out_of_the_line(tmp_path: Path):
     # a shift along x by a third of the line's width a frame
     motion = LinearStage(moves="rig", step=(0.00035, 0.0, 0.0), steps=26)
     scene = project.scene.model_copy(update={"motion": motion, "lights": ()})
-    render = project.render.model_copy(update={"transport": "direct", "truth_images": False, "laser_error": 0.01})
+    update = {"transport": "direct", "truth_images": False, "laser_error": 0.01, "goal": None}
+    render = project.render.model_copy(update=update)
     project = with_extraction(project.model_copy(update={"scene": scene, "render": render}), spacetime=True)
     done = run_scan(project, template_folder("scan"), out=tmp_path, options=ScanOptions(report=False))
     assert any("measured along time" in note for note in done.manifest["extraction"])
