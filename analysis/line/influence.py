@@ -20,13 +20,15 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from analysis.line.detection.channel import Lines, scan_lines
+from analysis.line.detection.detect import PRIOR_WIDTHS
 from analysis.line.detection.noise import NoiseModel
-from analysis.line.measure import METHODS, measure
-from analysis.line.result import Flag, Line
+from analysis.line.measure import METHODS, measure, measure_with_neighbours
+from analysis.line.result import NEIGHBOURS, Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float, Float32
 
 Int = NDArray[np.int64]
+Flags = NDArray[np.uint8]
 
 REACH, EDGE = 4.0, 1.5
 """Sigmas and pixels on either side of a line that its fit looks at (`methods.gaussian_fit`)."""
@@ -34,6 +36,8 @@ WIDEST = 64
 """px; farther from a line no pixel is tried."""
 STEP = 0.01
 """Of the line's amplitude: the differences' step."""
+AT_ONCE = 1024
+"""Scan lines that are held with one pixel changed: 20 MB of 2448 px."""
 TRIED = 64
 """Scan lines on which differences are taken; others take their nearest one's, at their own place and brightness."""
 
@@ -104,36 +108,71 @@ def difference_influence(
 ) -> tuple[Int, Float]:
     """As `likelihood_influence`, of any method, by central differences of its position."""
     u, width = line.u[rows, peak], line.width[rows, peak]
-    reach = int(np.ceil(min(float(np.nanmax(REACH * width + EDGE)) + 1.0, WIDEST)))
-    first = np.rint(u).astype(np.int64) - reach
-    alone = _alone(lines, settings)
-    kept = rows if alone else np.arange(lines.count)
-    own = np.arange(len(rows)) if alone else rows
-    base = replace(lines, image=np.ascontiguousarray(lines.image[kept], np.float64))
+    reach = REACH * width + EDGE + 1.0
+    reach = np.ceil(np.minimum(np.where(np.isnan(reach), np.nanmax(reach), reach), WIDEST)).astype(np.int64)
+    widest = int(reach.max())
+    first = np.rint(u).astype(np.int64) - widest
     wanted = settings.model_copy(update={"peaks": max(settings.peaks, peak + 1, 5)})
     step = np.maximum(STEP * line.amplitude[rows, peak], 1e-3) * lines.noise.gain
-    weight = np.zeros((len(rows), 2 * reach + 1))
-    for j in range(2 * reach + 1):
-        pixel = first + j
-        inside = (pixel >= 0) & (pixel < lines.image.shape[1])
-        place = own[inside], pixel[inside]
-        if lines.noise.saturation is not None:
-            inside[inside] = base.image[place] + step[inside] < lines.noise.saturation
-            place = own[inside], pixel[inside]
-        moved, steady = [], np.ones(int(inside.sum()), np.bool_)
-        for sign in (1.0, -1.0):
-            image = base.image.copy()
-            image[place] += sign * step[inside]
-            found = measure(replace(base, image=image), wanted, threads, judge=True)
-            there = np.where(found.valid, found.u, np.inf)[own[inside]]
-            nearest = np.argmin(np.abs(there - u[inside][:, None]), axis=1)
-            moved.append(there[np.arange(len(there)), nearest])
-            # what takes the peak for another thing does so by chance, and moves it by no small step
-            steady &= found.flag[own[inside], nearest] == line.flag[rows[inside], peak]
-        with np.errstate(invalid="ignore"):
-            change = (moved[0] - moved[1]) / (2.0 * step[inside] / lines.noise.gain)
-        weight[inside, j] = np.where(steady & np.isfinite(change), change, 0.0)
+    moves = _moves_of_each if _alone(lines, settings) else _moves_of_all
+    weight = np.zeros((len(rows), 2 * widest + 1))
+    i, j = np.nonzero(np.abs(np.arange(2 * widest + 1) - widest) <= reach[:, None])
+    pixel = first[i] + j
+    inside = (pixel >= 0) & (pixel < lines.image.shape[1])
+    i, j, pixel = i[inside], j[inside], pixel[inside]
+    if lines.noise.saturation is not None:
+        below = lines.image[rows[i], pixel] + step[i] < lines.noise.saturation
+        i, j, pixel = i[below], j[below], pixel[below]
+    # each pixel brighter, then each darker
+    both = np.tile(i, 2)
+    turn = np.concatenate((j, j + 2 * widest + 1))
+    steps = np.concatenate((step[i], -step[i]))
+    there, flags = moves(lines, wanted, rows[both], np.tile(pixel, 2), steps, turn, threads)
+    nearest = np.argmin(np.abs(there - u[both][:, None]), axis=1)[:, None]
+    found = np.take_along_axis(there, nearest, axis=1)[:, 0]
+    # what takes the peak for another thing does so by chance, and moves it by no small step
+    steady = np.take_along_axis(flags, nearest, axis=1)[:, 0] == line.flag[rows[both], peak]
+    up, down = np.split(np.where(steady & np.isfinite(found), found, np.nan), 2)
+    weight[i, j] = np.nan_to_num((up - down) / (2.0 * step[i] / lines.noise.gain))
     return first, weight
+
+
+def _moves_of_each(
+    lines: Lines, settings: ExtractionSettings, rows: Int, pixel: Int, step: Float, turn: Int, threads: int | None
+) -> tuple[Float, Flags]:
+    """Peaks (n, k) px, infinite where none is, and their flags, of scan lines each of which has one pixel changed.
+
+    The neighbours that a narrow line shares its width with stay as they are: they are told nothing by its own pixels.
+    """
+    tried = np.unique(rows)
+    near = np.unique(np.clip(tried[:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1), 0, lines.count - 1))
+    _, priors = measure_with_neighbours(replace(lines, image=lines.image[near]), settings, threads, judge=True)
+    place = np.searchsorted(near, rows)
+    peaks, flags = [], []
+    for start in range(0, len(rows), AT_ONCE):
+        some = slice(start, start + AT_ONCE)
+        image = np.ascontiguousarray(lines.image[rows[some]], np.float64)
+        image[np.arange(len(image)), pixel[some]] += step[some]
+        # all zero: no line needs any
+        told = np.zeros((len(image), settings.peaks, len(PRIOR_WIDTHS))) if priors is None else priors[place[some]]
+        found, _ = measure_with_neighbours(replace(lines, image=image), settings, threads, judge=True, priors=told)
+        peaks.append(np.where(found.valid, found.u, np.inf))
+        flags.append(found.flag)
+    return np.concatenate(peaks), np.concatenate(flags)
+
+
+def _moves_of_all(
+    lines: Lines, settings: ExtractionSettings, rows: Int, pixel: Int, step: Float, turn: Int, threads: int | None
+) -> tuple[Float, Flags]:
+    """As `_moves_of_each`, of methods that look at neighbours too: the pixels of one `turn` change at once."""
+    peaks, flags = np.empty((len(rows), settings.peaks)), np.empty((len(rows), settings.peaks), np.uint8)
+    for now in np.unique(turn):
+        some = np.flatnonzero(turn == now)
+        image = lines.image.astype(np.float64)
+        image[rows[some], pixel[some]] += step[some]
+        found = measure(replace(lines, image=image), settings, threads, judge=True)
+        peaks[some], flags[some] = np.where(found.valid, found.u, np.inf)[rows[some]], found.flag[rows[some]]
+    return peaks, flags
 
 
 def _alone(lines: Lines, settings: ExtractionSettings) -> bool:

@@ -85,6 +85,20 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
 
     judge: what is no single Gaussian line is measured as two, or flagged; not for who asks how well a line fits.
     """
+    return measure_with_neighbours(lines, settings, threads, judge)[0]
+
+
+def measure_with_neighbours(
+    lines: Lines,
+    settings: ExtractionSettings,
+    threads: int | None,
+    judge: bool = False,
+    priors: NDArray[np.float64] | None = None,
+) -> tuple[Line, NDArray[np.float64] | None]:
+    """As `measure`, and what neighbours tell of each peak's width (n, peaks, widths), None where no peak needs any.
+
+    priors: that, as found before, so that a line whose own pixels change keeps the neighbours that it had.
+    """
     estimator = METHODS[settings.method]
     run, halo = seed_kernel(estimator.measure), estimator.halo
     correlation = smoothing_correlation(settings.smoothing)
@@ -110,9 +124,8 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
     light = smoothed_covariances(lines.noise, settings.smoothing)
     scattering = light, lines.noise.table, lines.noise.fineness, 1.0 / correlation[0] ** 0.5
 
-    def work(start: int, stop: int, priors: NDArray[np.float64] | None = None) -> None:
-        again = None if priors is None else priors[start:stop].any(axis=(1, 2))
-        if again is not None and not again.any():
+    def work(start: int, stop: int, priors: NDArray[np.float64] | None, again: NDArray[np.bool_] | None) -> None:
+        if again is not None and not again[start:stop].any():
             return
         first, last = max(0, start - halo), min(lines.count, stop + halo)
         signal, mask, floor = lines.read(first, last)
@@ -131,19 +144,20 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
             run(pixels, seeds, found, options, out[start:stop])
             flags[start:stop] = found
             return
-        measured = np.empty_like(out[start:stop])
+        measured, chosen = np.empty_like(out[start:stop]), again[start:stop]
         run(pixels, seeds, found, options, measured)
-        out[start:stop][again], flags[start:stop][again] = measured[again], found[again]
+        out[start:stop][chosen], flags[start:stop][chosen] = measured[chosen], found[chosen]
 
-    map_chunks(work, lines.count, TALL_CHUNK if halo else CHUNK, threads)
+    map_chunks(lambda start, stop: work(start, stop, priors, None), lines.count, TALL_CHUNK if halo else CHUNK, threads)
     together = np.zeros((lines.count, settings.peaks))
-    if tells_width:
+    if tells_width and priors is None:
         shared = [width_priors(out[:, k, TOLD:], out[:, k, 0], out[:, k, 1]) for k in range(settings.peaks)]
         if any(one is not None for one in shared):
             none = np.zeros((lines.count, len(PRIOR_WIDTHS)))
             priors = np.stack([none if one is None else one[0] for one in shared], axis=1)
             together = np.stack([none[:, 0] if one is None else one[1] for one in shared], axis=1)
-            map_chunks(lambda start, stop: work(start, stop, priors), lines.count, CHUNK, threads)
+            again: NDArray[np.bool_] = np.any(priors, axis=(1, 2))
+            map_chunks(lambda start, stop: work(start, stop, priors, again), lines.count, CHUNK, threads)
     # a position that says less than a guess along the whole scan line is none
     lost = out[..., 1] > lines.image.shape[1] / np.sqrt(12.0)
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
@@ -152,4 +166,4 @@ def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, jud
     )
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
     common = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
-    return replace(line, length_apart=length, shared_u=common if common.any() else None)
+    return replace(line, length_apart=length, shared_u=common if common.any() else None), priors
