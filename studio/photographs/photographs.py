@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -28,8 +29,7 @@ from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.camera.camera import Camera
 from studio.photographs.completion import FILLED, completed, offered, without_detours
-from studio.photographs.evidence import chains_of, shrink
-from studio.photographs.laser_light import Light, banded, laser_light, without
+from studio.photographs.laser_light import Light, about, bands, full_scale, laser_light, without
 from studio.photographs.line_ends import ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
@@ -53,9 +53,21 @@ class Measured:
     line: Line
     image: NDArray[Any]
     """(h, w) or (h, w, 3), upright."""
-    light: NDArray[Any] | None = None
-    """(h, w) that was measured, NaN outside the region; None: nothing was."""
+    part: NDArray[Any] | None = None
+    """(h', w') that was measured; None: nothing was."""
+    corner: tuple[int, int] = (0, 0)
+    """(x, y) of its first pixel."""
     noise: NoiseModel | None = None
+
+    @property
+    def light(self) -> NDArray[Any] | None:
+        """(h, w) that was measured, NaN beside it; None: nothing was."""
+        if self.part is None or self.part.shape == self.image.shape[:2]:
+            return self.part
+        (x, y), (height, width) = self.corner, self.part.shape
+        around = np.full(self.image.shape[:2], np.nan, np.float32)
+        around[y : y + height, x : x + width] = self.part
+        return around
 
 
 def extract_photograph(
@@ -73,7 +85,7 @@ def extract_photograph(
         whole = check_image(taken.pixels)
         check_camera(whole, volume)
         check_light(look.region.part(whole))
-        light = measured_light(whole, off, look, taken.lossy)
+        light, corner = measured_light(path, whole, off, look, taken.lossy)
         if light is None:
             return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
         noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy)
@@ -83,12 +95,12 @@ def extract_photograph(
         shared = noise.alike or whole.ndim == 3 or taken.lossy
         plain = noise.model_copy(update={"alike": False})
         line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
-        line = placed(unsure_dropped(line), whole.shape, look.region.corner)
+        line = placed(unsure_dropped(line), whole.shape, corner)
         fits = settings.select == "continuous" and settings.peaks == 1 and settings.method in FITS
         if fits and np.isin(line.flag[:, 0], FILLED).any():
             plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
             centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
-            centres = placed(centres, whole.shape, look.region.corner)
+            centres = placed(centres, whole.shape, corner)
             chosen = selected(offered(line, centres), settings, volume)
             fitted = without_detours(selected(line, settings, volume), chosen)
             line = completed(ended(fitted), centres)  # noise past an end is no base for centres
@@ -98,18 +110,32 @@ def extract_photograph(
             line = ended(line)
         line = with_shared_noise(line) if shared else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
-        around = light.image
-        if around.shape != whole.shape[:2]:
-            x, y = look.region.corner
-            around = np.full(whole.shape[:2], np.nan, np.float32)
-            around[y : y + light.image.shape[0], x : x + light.image.shape[1]] = light.image
-    return Measured(replace(line, note=note_of(line, settings, [])), whole, around, noise)
+    return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
 
-def measured_light(whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lossy: bool) -> Light | None:
-    """What is measured of an image, in its region, and where that is; None: nothing is left."""
+def measured_light(
+    path: Path, whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lossy: bool
+) -> tuple[Light | None, tuple[int, int]]:
+    """What is measured of an image, in its region and about its lines, and (x, y) of its first pixel; None: nothing is
+    left.
+    """
     image, closed = look.region.part(whole), look.region.closed
+    x, y = corner = look.region.corner
     off = None if off is None else look.region.part(off)
+    full, within = full_scale(image, lossy), None
+    if look.banded:
+        found = look.lines(path, image, off)
+        near = about(found, look.settings.axis, image.shape)
+        chains = [replace(chain, u=chain.u - near.start) for chain in found]
+        part, corner = ((slice(None), near), (x + near.start, y))
+        if look.settings.axis == "columns":
+            part, corner = (near, slice(None)), (x, y + near.start)
+        image, closed = image[part], None if closed is None else closed[part]
+        off = None if off is None else off[part]
+        within = bands(chains, look.settings.axis, image.shape)
+        if not len(within.rows):
+            return None, corner
+        image, off = within.of(image), None if off is None else within.of(off)
     if look.settings.pattern is not None:
         light = Light(image, None) if off is None else Light(*subtract_off(image, off))
     else:
@@ -117,15 +143,12 @@ def measured_light(whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lo
             allowed = "auto or mono on a mono image"
             raise InputError("the image has no such channel", where="channel", found=look.named, allowed=allowed)
         colour = "mono" if look.evidence is None else look.evidence.colour
-        light = laser_light(image, off, look.channel, colour, lossy)
-    if look.banded:
-        assert look.evidence is not None
-        shrunk = shrink(image, off, closed)
-        chains = chains_of(shrunk, look.evidence.combination, look.evidence.axis, look.settings.peaks)
-        light = banded(light, chains, look.evidence.axis)
+        light = laser_light(image, off, look.channel, colour, full)
+    if within is not None:
+        light = within.on_level_ground(light)
     if closed is not None:
         light = without(light, closed)
-    return light if light.open is None or light.open.any() else None
+    return (light if light.open is None or light.open.any() else None), corner
 
 
 def no_line(shape: tuple[int, ...], settings: ExtractionSettings, note: str) -> Line:
@@ -160,9 +183,9 @@ def _changed(line: Line, change: Callable[[Float], Float], flag: NDArray[np.uint
 def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
     """The line of a part of an image, in the whole image; scan lines beyond the part have no pixels."""
     count = shape[0] if line.axis == "rows" else shape[1]
-    if len(line.u) == count and corner == (0, 0):
-        return line
     along, first = corner if line.axis == "rows" else corner[::-1]
+    if len(line.u) == count:
+        return line if along == 0 else replace(line, u=line.u + along)
 
     def whole(values: Float) -> Float:
         out = np.full((count, values.shape[1]), np.nan)
@@ -323,12 +346,11 @@ def write_line(path: Path, line: Line) -> None:
     along, across = (line.u, line.v) if line.axis == "rows" else (line.v, line.u)
     length = np.ones_like(line.u) if line.correlation_length is None else line.correlation_length
     numbers = (along, across, line.sigma_u, line.width, line.amplitude, line.background, line.chi2, length)
-    for i in range(line.u.shape[0]):
-        for k in range(line.u.shape[1]):
-            flag = Flag(int(line.flag[i, k]))
-            there = line.valid[i, k]
-            cells = [f"{values[i, k]:.9g}" if there and np.isfinite(values[i, k]) else "" for values in numbers]
-            writer.writerow([i, k, *cells, flag.name])
+    told = np.stack([np.where(line.valid, values, np.nan) for values in numbers], axis=-1).tolist()
+    names = {flag.value: flag.name for flag in Flag}
+    for i, (row, flags) in enumerate(zip(told, line.flag.tolist(), strict=True)):
+        for k, (cells, flag) in enumerate(zip(row, flags, strict=True)):
+            writer.writerow([i, k, *(f"{cell:.9g}" if math.isfinite(cell) else "" for cell in cells), names[flag]])
     with atomic_write(path) as temporary:
         temporary.write_text(text.getvalue(), encoding="utf-8")
 
