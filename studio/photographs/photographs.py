@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.line.detection.channel import check_image
 from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise, residual_ratio
-from analysis.line.extract import CANDIDATES, extract, select
+from analysis.line.extract import extract, select
 from analysis.line.result import Flag, Line
 from analysis.line.selection.geometry import WorkingVolume
 from analysis.line.series.hdr import Fused, fuse
@@ -28,6 +28,7 @@ from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.camera.camera import Camera
+from studio.photographs.candidates import peaks_to_choose_from
 from studio.photographs.completion import FILLED, completed, offered, without_detours
 from studio.photographs.laser_light import Light, about, bands, full_scale, laser_light, without
 from studio.photographs.line_ends import ended
@@ -90,11 +91,13 @@ def extract_photograph(
             return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
         noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy)
         alone = settings.select == "strongest" and volume is None
-        wanted = settings if alone else settings.model_copy(update={"peaks": max(settings.peaks, CANDIDATES)})
         # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
         shared = noise.alike or whole.ndim == 3 or taken.lossy
         plain = noise.model_copy(update={"alike": False})
-        line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
+        if alone:
+            line = extract(light.image, settings=settings, noise=plain, threads=threads)
+        else:
+            line = peaks_to_choose_from(light.image, settings, plain, threads, every=volume is not None)
         line = placed(unsure_dropped(line), whole.shape, corner)
         fits = settings.select == "continuous" and settings.peaks == 1 and settings.method in FITS
         if fits and np.isin(line.flag[:, 0], FILLED).any():
