@@ -56,13 +56,14 @@ def _unsettled(line: Line) -> NDArray[np.bool_]:
     """
     chain = select_chain(line)
     rows = np.flatnonzero(chain.valid[:, 0])
-    off = (line.flag[:, 0] != Flag.NO_PEAK) & (line.flag[:, 0] != Flag.NO_PIXELS) & ~chain.valid[:, 0]
+    off: NDArray[np.bool_] = ~chain.valid[:, 0] & ~np.isin(line.flag[:, 0], (Flag.NO_PEAK, Flag.NO_PIXELS))
     if not len(rows):
         return off
     apart, steps, width = np.diff(rows), np.abs(np.diff(chain.u[rows, 0])), float(np.median(line.width[rows, 0]))
     if (apart > GAP).any() or (steps > JUMP * max(width, 1.0) * apart).any():
         return np.ones(len(off), np.bool_)
-    return np.asarray(binary_dilation(off, iterations=NEIGHBOURS)) if width < NARROW else off
+    near: NDArray[np.bool_] = binary_dilation(off, iterations=NEIGHBOURS) if width < NARROW else off
+    return near
 
 
 def _with(line: Line, rows: NDArray[np.bool_], more: Line) -> Line:

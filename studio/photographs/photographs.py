@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.line.detection.channel import check_image
 from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise, residual_ratio
-from analysis.line.extract import extract, select
+from analysis.line.extract import extract
 from analysis.line.result import Flag, Line
 from analysis.line.selection.geometry import WorkingVolume
 from analysis.line.series.hdr import Fused, fuse
@@ -29,9 +29,11 @@ from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.camera.camera import Camera
 from studio.photographs.candidates import peaks_to_choose_from
-from studio.photographs.completion import FILLED, completed, offered, without_detours
+from studio.photographs.choice import carried_on, selected
+from studio.photographs.completion import FILLED
 from studio.photographs.laser_light import Light, about, bands, full_scale, laser_light, without
-from studio.photographs.line_ends import ended
+from studio.photographs.line_arrays import changed
+from studio.photographs.line_ends import HALF, TONED, ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
 from studio.scan.line_extraction import note_of
@@ -92,6 +94,7 @@ def extract_photograph(
         noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy)
         alone = settings.select == "strongest" and volume is None
         # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
+        half = TONED if taken.lossy else HALF
         shared = noise.alike or whole.ndim == 3 or taken.lossy
         plain = noise.model_copy(update={"alike": False})
         if alone:
@@ -99,18 +102,15 @@ def extract_photograph(
         else:
             line = peaks_to_choose_from(light.image, settings, plain, threads, every=volume is not None)
         line = placed(unsure_dropped(line), whole.shape, corner)
-        fits = settings.select == "continuous" and settings.peaks == 1 and settings.method in FITS
-        if fits and np.isin(line.flag[:, 0], FILLED).any():
+        fits = settings.select == "continuous" and settings.method in FITS
+        if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
             plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
             centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
-            centres = placed(centres, whole.shape, corner)
-            chosen = selected(offered(line, centres), settings, volume)
-            fitted = without_detours(selected(line, settings, volume), chosen)
-            line = completed(ended(fitted), centres)  # noise past an end is no base for centres
+            line = carried_on(line, placed(centres, whole.shape, corner), settings, volume, half)
         elif not alone:
             line = selected(line, settings, volume)
         if settings.select == "continuous":
-            line = ended(line)
+            line = ended(line, half)
         line = with_shared_noise(line) if shared else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
@@ -171,16 +171,7 @@ def unsure_dropped(line: Line) -> Line:
     def kept(values: Float) -> Float:
         return np.where(unsure, np.nan, values)
 
-    return _changed(line, kept, np.where(unsure, np.uint8(Flag.UNSURE), line.flag).astype(np.uint8))
-
-
-def _changed(line: Line, change: Callable[[Float], Float], flag: NDArray[np.uint8]) -> Line:
-    """The line with all its numbers (n, k) changed alike."""
-    names = ("u", "sigma_u", "width", "amplitude", "background", "chi2")
-    numbers: dict[str, Any] = {name: change(getattr(line, name)) for name in names}
-    for name in ("length_apart", "shared_u"):
-        numbers[name] = None if getattr(line, name) is None else change(getattr(line, name))
-    return replace(line, **numbers, flag=flag)
+    return changed(line, kept, np.where(unsure, np.uint8(Flag.UNSURE), line.flag).astype(np.uint8))
 
 
 def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
@@ -197,37 +188,8 @@ def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
 
     flag = np.full((count, line.flag.shape[1]), np.uint8(Flag.NO_PIXELS))
     flag[first : first + len(line.flag)] = line.flag
-    found = _changed(line, whole, flag)
+    found = changed(line, whole, flag)
     return replace(found, u=found.u + along)
-
-
-def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolume | None) -> Line:
-    """Peaks (n, k) -> (n, 1) by the selection, or, of the continuous one, (n, peaks): a chain each."""
-    if settings.select != "continuous" or settings.peaks == 1:
-        return select(candidates, settings.select, volume, settings.chooser)
-    left, chains = candidates, []
-    for _ in range(settings.peaks):
-        chain = select(left, "continuous", volume)
-        chains.append(chain)
-        used = chain.valid & (left.u == chain.u)
-        left = replace(left, u=np.where(used, np.nan, left.u), flag=np.where(used, np.uint8(Flag.REJECTED), left.flag))
-
-    def side_by_side(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(chain, name) for chain in chains], axis=1)
-
-    return replace(
-        candidates,
-        u=side_by_side("u"),
-        sigma_u=side_by_side("sigma_u"),
-        width=side_by_side("width"),
-        amplitude=side_by_side("amplitude"),
-        background=side_by_side("background"),
-        chi2=side_by_side("chi2"),
-        length_apart=None if candidates.length_apart is None else side_by_side("length_apart"),
-        shared_u=None if candidates.shared_u is None else side_by_side("shared_u"),
-        flag=side_by_side("flag"),
-        candidates=candidates,
-    )
 
 
 def extract_series(
