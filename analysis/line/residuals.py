@@ -163,43 +163,46 @@ class _Rows:
         lags = [(0, d) for d in range(ACROSS)] + [(k, 0) for k in range(1, ALONG)]
         seen = self.light / self.expected
         z = self.residual * seen
-        by_light = seen[..., None] * self.left * self.light[..., None, :]
+        carried, weighed = self.left * self.light[..., None, :], seen[..., None] * self.left
+        flat, width = _flat(weighed), z.shape[2] + ACROSS
+        by_light, by_still = (_flat(weighed * one[..., None, :]) for one in (self.light, self.still))
         squares, weights = self.left**2, self.light / self.expected**2
         moments = np.empty((self.runs, 1 + len(lags)))
         design = np.zeros((self.runs, 1 + len(lags), 1 + len(lags)))
         known = np.einsum("rpij,rpj->rpi", squares, self.still)
         moments[:, 0] = np.sum(weights * (self.residual**2 - known), axis=(1, 2))
-        design[:, 0, 0] = np.einsum("rpi,rpij,rpj->r", weights, squares, self.light)
+        design[:, 0, 0] = np.einsum("rpi,rpi->r", weights, np.einsum("rpij,rpj->rpi", squares, self.light))
         for b, (_, d) in enumerate(lags[:ACROSS]):
-            pair = self._pairs(self.left * self.light[..., None, :], d)
+            pair = self._pairs(carried, d)
             design[:, 0, 1 + b] = np.einsum("rpi,rpi->r", weights, pair)
         for a, (k, d) in enumerate(lags):
             n = z.shape[2] - d
             upper, lower = slice(0, RUN - k), slice(k, RUN)
             moments[:, 1 + a] = np.sum(z[:, upper, :n] * z[:, lower, d:], axis=(1, 2))
-            first, second = by_light[:, upper, :n], by_light[:, lower, d:]
+            shift = d * width
             if k == 0:
-                ours, theirs = (seen[..., None] * self.left)[:, :, :n], (seen[..., None] * self.left)[:, :, d:]
-                product = ours * theirs
-                moments[:, 1 + a] -= np.einsum("rpij,rpj->r", product, self.still)
-                design[:, 1 + a, 0] = np.einsum("rpij,rpj->r", product, self.light)
+                moments[:, 1 + a] -= _shifted(flat, by_still, shift)
+                design[:, 1 + a, 0] = _shifted(flat, by_light, shift)
                 for b, (_, apart) in enumerate(lags[:ACROSS]):
-                    design[:, 1 + a, 1 + b] = _shared(first, second, apart)
+                    both = (shift + apart, abs(shift - apart)) if apart > 0 else (shift,)
+                    design[:, 1 + a, 1 + b] = sum(_shifted(by_light, by_light, one) for one in both)
             else:
-                design[:, 1 + a, 1 + a] = _shared(first, second, 0)
+                design[:, 1 + a, 1 + a] = _shifted(by_light[:, :-k], by_light[:, k:], shift)
         return moments, design
 
     @staticmethod
     def _pairs(left: Float, apart: int) -> Float:
         """Sum over pixels j, j' that far apart of left[i, j] left[i, j']."""
         n = left.shape[-1] - apart
-        return np.asarray((1.0 if apart == 0 else 2.0) * np.sum(left[..., :n] * left[..., apart:], axis=-1))
+        pairs = np.einsum("...j,...j->...", left[..., :n], left[..., apart:])
+        return np.asarray((1.0 if apart == 0 else 2.0) * pairs)
 
 
-def _shared(first: Float, second: Float, apart: int) -> Float:
-    """(runs,) sum over pixels that far apart, on either side, of first[i, j] second[i, j']."""
-    n = first.shape[-1] - apart
-    total = np.sum(first[..., :n] * second[..., apart:], axis=(1, 2, 3))
-    if apart > 0:
-        total += np.sum(first[..., apart:] * second[..., :n], axis=(1, 2, 3))
-    return np.asarray(total)
+def _flat(values: Float) -> Float:
+    """(runs, RUN, n, n) -> (runs, RUN, m) with zeros, so that one shift of all pairs the same pixels everywhere."""
+    return np.pad(values, ((0, 0), (0, 0), (0, ACROSS), (0, ACROSS))).reshape(*values.shape[:2], -1)
+
+
+def _shifted(first: Float, second: Float, shift: int) -> Float:
+    """(runs, n, m) and (runs, n, m) -> (runs,) sums of products of values that are so far apart."""
+    return np.asarray(np.vecdot(first[..., : first.shape[-1] - shift], second[..., shift:]).sum(axis=1))

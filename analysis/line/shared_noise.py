@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from analysis.line.result import Line
@@ -145,24 +145,29 @@ def _run(u: Float, sigma: Float, width: Float) -> _Run | None:
     there = np.isfinite(u) & np.isfinite(sigma) & (sigma > 0.0)
     if there.sum() < FILLED * len(u):
         return None
-    rest = _residual_maker(np.flatnonzero(there), len(u)) @ u[there]
+    rest = _residual_maker(np.flatnonzero(there).tobytes(), len(u)) @ u[there]
     scale = 1.4826 * np.median(np.abs(rest))
     there[there] = np.abs(rest) <= STRAY * scale
     if there.sum() < FILLED * len(u) or scale > JUMP * np.median(width[there]):
         return None
-    at = np.flatnonzero(there)
-    left = _residual_maker(at, len(u))
-    scaled = left @ u[there] / sigma[there]
-    apart = np.abs(at[:, None] - at[None, :])
-    lags = [(apart == k).astype(np.float64) for k in range(len(u) // LAGS)]
-    spread = [left @ lag @ left for lag in lags]
-    flat = np.stack([lag.ravel() for lag in lags])
-    moments = np.array([scaled @ lag @ scaled for lag in lags])
-    design = flat @ np.stack([one.ravel() for one in spread]).T
-    return _Run(moments, design, scaled**2, sigma[there] ** -2)
+    at = np.flatnonzero(there).tobytes()
+    scaled = _residual_maker(at, len(u)) @ u[there] / sigma[there]
+    lags, design = _lags(at, len(u))
+    return _Run(lags @ np.outer(scaled, scaled).ravel(), design, scaled**2, sigma[there] ** -2)
 
 
-def _residual_maker(at: NDArray[np.intp], length: int) -> Float:
-    """(n, n) that takes the cubic out of positions on the scan lines `at` (n,) of a run."""
-    powers = np.vander(at / length - 0.5, DEGREE + 1)
-    return np.asarray(np.eye(len(at)) - powers @ np.linalg.pinv(powers))
+@lru_cache(maxsize=8)
+def _lags(at: bytes, length: int) -> tuple[Float, Float]:
+    """(lags, n n) pairs of the scan lines of a run that are so far apart, and (lags, lags) as `_Run.design` says."""
+    left, places = _residual_maker(at, length), np.frombuffer(at, np.intp)
+    apart = np.abs(places[:, None] - places[None, :])
+    lags = np.stack([apart == k for k in range(length // LAGS)]).astype(np.float64)
+    flat = lags.reshape(len(lags), -1)
+    return flat, flat @ (left @ lags @ left).reshape(len(lags), -1).T
+
+
+@lru_cache(maxsize=8)
+def _residual_maker(at: bytes, length: int) -> Float:
+    """(n, n) that takes the cubic out of positions on the scan lines `at`, bytes of (n,), of a run; most are alike."""
+    powers = np.vander(np.frombuffer(at, np.intp) / length - 0.5, DEGREE + 1)
+    return np.asarray(np.eye(len(powers)) - powers @ np.linalg.pinv(powers))

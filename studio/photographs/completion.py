@@ -39,20 +39,21 @@ FILLED = (
 
 
 def offered(candidates: Line, centres: Line) -> Line:
-    """Candidates (n, k) by a fit, and the centres (n, 1) of the strongest -> the centres where the strongest has none.
+    """Candidates (n, k) by a fit, and the centres (n, m) of the strongest -> the centres where these have none.
 
     A chain chosen of these does not leave the line for something faint beside it where a fit of the line fails.
     """
-    lost = np.flatnonzero(np.isin(candidates.flag[:, 0], FILLED) & centres.valid[:, 0])
+    count = centres.u.shape[1]
+    lost = np.isin(candidates.flag[:, :count], FILLED) & centres.valid
     values: dict[str, Any] = {}
     for name in ("u", "sigma_u", "width", "amplitude", "background", "flag"):
         values[name] = getattr(candidates, name).copy()
-        values[name][lost, 0] = getattr(centres, name)[lost, 0]
+        values[name][:, :count][lost] = getattr(centres, name)[lost]
     return replace(candidates, **values)
 
 
 def without_detours(line: Line, chosen: Line) -> Line:
-    """The line (n, 1) of fits without what is not `chosen` when the centres are offered as well."""
+    """The lines (n, k) of fits without what is not `chosen` when the centres are offered as well."""
     detour = (chosen.u != line.u) & line.valid
     flag = np.where(detour, np.uint8(Flag.REJECTED), line.flag).astype(np.uint8)
     return replace(line, u=np.where(detour, np.nan, line.u), flag=flag)
@@ -79,6 +80,8 @@ def completed(line: Line, centres: Line) -> Line:
     expected = np.interp(rows, fitted, line.u[fitted, 0])
     near = np.abs(centres.u[rows, 0] - expected) <= np.maximum(width, np.abs(line.u[last, 0] - line.u[first, 0]))
     rows = np.union1d(rows[near & (last - first <= GAP)], _on_chain(line, centres, width))
+    past = line.flag[rows, 0] == Flag.PAST_END  # blur has a centre as well
+    rows = np.union1d(rows[~past], _like_fits(line, centres, rows[past]))
     own = np.nan_to_num(centres.sigma_u[rows, 0])
 
     def with_values(values: NDArray[np.float64], found: Any) -> NDArray[np.float64]:
@@ -128,5 +131,5 @@ def _like_fits(line: Line, chain: Line, rows: NDArray[np.intp]) -> NDArray[np.in
     for row, at in zip(rows, middle, strict=True):
         nearest = fitted[max(0, at - NEXT // 2) : at + NEXT // 2]
         width, amplitude = float(chain.width[row, 0]), float(chain.amplitude[row, 0])
-        like.append(alike(width, amplitude, line.width[nearest, 0], line.amplitude[nearest, 0]))
+        like.append(alike(width, amplitude, line.width[nearest, 0], float(np.median(line.amplitude[nearest, 0]))))
     return rows[np.array(like, np.bool_)]

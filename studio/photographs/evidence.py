@@ -124,14 +124,19 @@ class Evidence:
     combination: Combination
     scores: dict[Axis, dict[str, float]]
     """Mean over the photographs, by axis and combination that were allowed."""
-    second: float
-    """Score of a second line in the chosen combination."""
+    chains: tuple[tuple[Chain, Chain], ...]
+    """Of each photograph in the chosen combination: the line, and what would be a second one."""
     colour: Colour
     """Of the laser: the combination's, or that of most of its light where another channel shows it more clearly."""
 
     @property
     def score(self) -> float:
         return self.scores[self.axis][self.combination.name]
+
+    @property
+    def second(self) -> float:
+        """Score of a second line in the chosen combination."""
+        return float(np.mean([chain.score for _, chain in self.chains]))
 
     @property
     def lines(self) -> int:
@@ -202,19 +207,19 @@ def find_evidence(
     best_axis = axis if axis is not None else max(AXES, key=lambda way: max(scores[way].values()))
     highest = max(scores[best_axis].values())
     best = next(c for c in allowed if scores[best_axis][c.name] >= (1.0 - TIE) * highest)
-    seen = best.colour if mono or colour is not None else _colour_of(shrunk, best, best_axis)
-    second = float(np.mean([chains_of(one, best, best_axis, 2)[1].score for one in shrunk]))
-    return Evidence(best_axis, best, scores, second, seen)
+    both = [chains_of(one, best, best_axis, 2) for one in shrunk]
+    lines = [pair[0] for pair in both]
+    seen = best.colour if mono or colour is not None else _colour_of(shrunk, lines, best, best_axis)
+    return Evidence(best_axis, best, scores, tuple((pair[0], pair[1]) for pair in both), seen)
 
 
-def _colour_of(shrunk: Sequence[Shrunk], combination: Combination, axis: Axis) -> Colour:
-    """The channel with most light along the chains, above that beside them; clipped pixels do not say."""
+def _colour_of(shrunk: Sequence[Shrunk], lines: Sequence[Chain], combination: Combination, axis: Axis) -> Colour:
+    """The channel with most light along the lines, above that beside them; clipped pixels do not say."""
     light = np.zeros(3)
-    for one in shrunk:
+    for one, chain in zip(shrunk, lines, strict=True):
         image, saturated, factor = one.image, one.saturated, one.factor
         if image.ndim == 2:
             continue
-        chain = chain_of(one, combination, axis)
         there = np.flatnonzero(np.isfinite(chain.u))
         turned, full = (image, saturated) if axis == "rows" else (image.swapaxes(0, 1), saturated.T)
         x = np.arange(turned.shape[1])
@@ -257,7 +262,8 @@ def shrink(image: NDArray[Any], off: NDArray[Any] | None, closed: NDArray[np.boo
 
 def brightest(image: NDArray[Any]) -> NDArray[Any]:
     """(h, w, 3) -> (h, w), the largest of the channels; a maximum along an axis of three is many times slower."""
-    return np.asarray(np.maximum(np.maximum(image[..., 0], image[..., 1]), image[..., 2]))
+    red, green, blue = cv2.split(image)
+    return np.asarray(cv2.max(cv2.max(red, green), blue))
 
 
 def chain_of(shrunk: Shrunk, combination: Combination, axis: Axis) -> Chain:

@@ -20,6 +20,8 @@ MAX_PIXELS = 2**27
 KINDS = "PNG, TIFF, JPEG, BMP or EXR"
 ORIENTATION = 0x0112
 """EXIF tag."""
+PNG_DEPTH = 24
+"""The byte of a PNG that tells the bits of a channel."""
 TURNS = {
     2: "mirrored left to right",
     3: "turned by 180 degrees",
@@ -34,6 +36,8 @@ TURNS = {
 
 LEAST_SIDE, MOST_SIDE = 16, 1024
 """px of the piece of an image by which its colour is judged."""
+ROWS_APART = 4
+"""Of the rows of that piece that are looked at."""
 COARSE = 0.7
 """Ratio of colour's change to brightness's, which is 1.4 for independent channels."""
 
@@ -65,17 +69,20 @@ def read_photograph(path: Path) -> Photograph:
         return Photograph(_exr_image(data, str(path)), "", lossy=False)
     import cv2
 
-    orientation, lossy = _checked(data, str(path))
+    orientation, lossy, image = _checked(data, str(path))
+    known = image is not None
     try:
-        image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED) if data else None
+        if image is None and data:
+            image = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         image = None
     if image is None:
         allowed = f"a whole {KINDS}"
         raise InputError("the file is not an image, or is damaged", where=str(path), allowed=allowed)
     if image.ndim == 3 and image.shape[2] >= 3:
-        grey = np.array_equal(image[..., 0], image[..., 1]) and np.array_equal(image[..., 1], image[..., 2])
-        image = np.ascontiguousarray(image[..., 0] if grey else image[:, :, 2::-1])
+        red, green, blue = cv2.split(image)[:3] if known else cv2.split(image)[2::-1]
+        grey = np.array_equal(red, green) and np.array_equal(green, blue)
+        image = red if grey else cv2.merge((red, green, blue))
     elif image.ndim == 3:
         image = np.ascontiguousarray(image[..., 0])
     lossy = image.ndim == 3 and (lossy or has_coarse_colour(image))
@@ -91,7 +98,7 @@ def has_coarse_colour(image: NDArray[Any]) -> bool:
     if image.dtype != np.uint8 or min(image.shape[:2]) < LEAST_SIDE:
         return False
     part = image[tuple(slice(max((n - MOST_SIDE) // 2, 0), (n + MOST_SIDE) // 2) for n in image.shape[:2])]
-    part = part.astype(np.int16)
+    part = part[::ROWS_APART].astype(np.int16)
 
     def bends(values: NDArray[np.int16]) -> float:
         return float(np.mean(np.abs(values[:, 2:] - 2 * values[:, 1:-1] + values[:, :-2])))
@@ -110,8 +117,9 @@ def upright(image: NDArray[Any], orientation: int) -> NDArray[Any]:
     return np.ascontiguousarray(image)
 
 
-def _checked(data: bytes, where: str) -> tuple[int, bool]:
-    """EXIF orientation, and whether it is a JPEG; what Pillow does not know is OpenCV's to judge.
+def _checked(data: bytes, where: str) -> tuple[int, bool, NDArray[Any] | None]:
+    """EXIF orientation, whether it is a JPEG, and, of a PNG of 8 bits, R, G, B or mono; what Pillow does not know is
+    OpenCV's to judge.
 
     InputError: more pixels than MAX_PIXELS, or several pages.
     """
@@ -119,6 +127,7 @@ def _checked(data: bytes, where: str) -> tuple[int, bool]:
 
     ImageFile.LOAD_TRUNCATED_IMAGES = False  # WeasyPrint sets it for the whole program
 
+    pixels = None
     try:
         with Image.open(io.BytesIO(data)) as image:
             # the further pages of an MPO are previews of the first, as phones keep them
@@ -126,8 +135,10 @@ def _checked(data: bytes, where: str) -> tuple[int, bool]:
             orientation, lossy = int(image.getexif().get(ORIENTATION, 1)), image.format in ("JPEG", "MPO")
             if image.format == "PNG" and size[0] * size[1] <= MAX_PIXELS:
                 image.load()  # what is damaged is refused here, where libpng would print words of its own
+                if data[PNG_DEPTH] == 8 and image.mode in ("L", "RGB", "RGBA"):
+                    pixels = np.array(image)
     except UnidentifiedImageError:
-        return 1, False
+        return 1, False, None
     except Image.DecompressionBombError:
         size, pages = (MAX_PIXELS, 2), 1
     except Exception as error:  # Pillow raises many kinds on damaged data, in words of its own
@@ -138,7 +149,7 @@ def _checked(data: bytes, where: str) -> tuple[int, bool]:
     if pages > 1:
         cure = "save each page as an image of its own"
         raise InputError("the image has several pages", where=where, found=pages, allowed="one", cure=cure)
-    return orientation, lossy
+    return orientation, lossy, pixels
 
 
 def _exr_image(data: bytes, where: str) -> NDArray[Any]:

@@ -34,6 +34,8 @@ ROOM, SPARE = 8.0, 24.0
 """Half width of the band about the line: so many sigmas of its ridge, and px."""
 BRIDGE = 12
 """Scan lines of the shrunk image that the band goes on where its chain has none: as far as a chain may skip."""
+LEVEL = 128
+"""px of level ground on either side of the bands, at least: what a background and its noise are told by."""
 TIE = 0.1
 """Relative difference of scatter below which the first of two channels is taken."""
 MOST_FOUND = 0.9
@@ -55,24 +57,25 @@ class Light:
         return self.image if self.open is None else np.where(self.open, self.image, np.float32(np.nan))
 
 
+def full_scale(image: NDArray[Any], lossy: bool) -> float | None:
+    """DN from which on an image is clipped; None: it is not."""
+    full = image_saturation(image)
+    return LOSSY_FULL if full is not None and lossy and image.dtype == np.uint8 else full
+
+
 def laser_light(
-    image: NDArray[Any], off: NDArray[Any] | None, channel: Channel, colour: Colour, lossy: bool = False
+    image: NDArray[Any], off: NDArray[Any] | None, channel: Channel, colour: Colour, full: float | None
 ) -> Light:
     """Image (h, w) or (h, w, 3), less its laser-off image -> what `channel` measures. InputError: as `subtract_off`.
 
-    "mono" is the sum of all channels, "difference" twice the laser's less the others; they and the luminance are
-    clipped where a channel that carries them is.
+    full: DN from which on the image is clipped. "mono" is the sum of all channels, "difference" twice the laser's less
+    the others; they and the luminance are clipped where a channel that carries them is.
     """
     if image.ndim == 2:
-        return _less(image, off, image_saturation(image))
-    full = image_saturation(image)
-    if full is not None and lossy and image.dtype == np.uint8:
-        full = LOSSY_FULL
+        return _less(image, off, full)
     if channel in COLOURS:
         k = COLOURS.index(channel)
-        return _less(
-            np.ascontiguousarray(image[..., k]), None if off is None else np.ascontiguousarray(off[..., k]), full
-        )
+        return _less(cv2.extractChannel(image, k), None if off is None else cv2.extractChannel(off, k), full)
     clipped = image[..., 0]
     if channel == "difference":
         assert colour != "mono"
@@ -129,7 +132,7 @@ def scatter_of(
     pieces = _pieces(image, off, chain, axis)
     if pieces is None:
         return np.inf, 0
-    light = laser_light(*pieces, channel, colour, lossy)
+    light = laser_light(*pieces, channel, colour, full_scale(pieces[0], lossy))
     steps = np.abs(np.diff(light.image.astype(np.float32), axis=1))
     dark = 1.05 * float(np.median(steps)) + 0.3  # half a DN of rounding in each of two neighbours
     gain = max(float(np.nanmax(light.image)), 1.0) / 1e4
@@ -186,28 +189,56 @@ def band(chain: Chain, count: int, width: int) -> tuple[NDArray[np.intp], NDArra
     return low, np.maximum(low, high)
 
 
-def banded(light: Light, chains: Sequence[Chain], axis: Axis) -> Light:
-    """The light within the bands of the chains, on level ground: what is beside them is no line's and hides none."""
-    upright = light.image if axis == "rows" else light.image.T
-    level = np.array(upright, np.float32)
-    inside = np.zeros(upright.shape, np.bool_)
-    x = np.arange(upright.shape[1])
-    for chain in chains:
-        low, high = band(chain, *upright.shape)
-        inside |= (x >= low[:, None]) & (x < high[:, None])
-    rows = np.flatnonzero(inside.any(axis=1))
-    widest = int(inside.sum(axis=1).max()) if len(rows) else 0
-    if widest:
-        # each row's pixels of the band side by side, those of narrower bands taken more than once
-        counts = inside[rows].sum(axis=1)
-        starts = np.cumsum(counts) - counts
-        order = np.nonzero(inside)[1][starts[:, None] + np.arange(widest) % counts[:, None]]
-        ground = np.median(np.take_along_axis(level[rows], order, axis=1), axis=1)
-        level[rows] = np.where(inside[rows], level[rows], np.rint(ground)[:, None])
-    level[~inside.any(axis=1)] = float(np.median(level[rows])) if widest else 0.0
-    turned = (level, inside) if axis == "rows" else (level.T, inside.T)
-    full = image_saturation(light.image) if light.saturation is None else light.saturation
-    return Light(turned[0], full, turned[1])
+def about(chains: Sequence[Chain], axis: Axis, shape: tuple[int, ...]) -> slice:
+    """Pixels of each scan line of an image (h, w, ...) that hold the bands of the chains, and as much level ground."""
+    count, width = shape[:2] if axis == "rows" else shape[1::-1]
+    low, high = np.stack([band(chain, count, width) for chain in chains], axis=1)
+    there = high > low
+    if not there.any():
+        return slice(0, width)
+    margin = max(int((high - low).max()), LEVEL)
+    return slice(max(int(low[there].min()) - margin, 0), min(int(high[there].max()) + margin, width))
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Where the lines of an image may be: so many pixels of each of its scan lines, of any of its bands."""
+
+    rows: NDArray[np.intp]
+    """(m, 1) scan lines that have some."""
+    places: NDArray[np.intp]
+    """(m, n) pixels side by side, those of narrower bands taken more than once."""
+    shape: tuple[int, int]
+    """Scan lines and pixels of each."""
+    axis: Axis
+
+    def of(self, image: NDArray[Any]) -> NDArray[Any]:
+        """Image (h, w, ...) -> (m, n, ...)."""
+        return np.ascontiguousarray((image if self.axis == "rows" else image.swapaxes(0, 1))[self.rows, self.places])
+
+    def on_level_ground(self, light: Light) -> Light:
+        """The light (m, n) of the bands in an image (h, w): what is beside them is no line's and hides none."""
+        level, inside = np.empty(self.shape, np.float32), np.zeros(self.shape, np.bool_)
+        ground = np.rint(np.median(light.image, axis=1))
+        level[:] = np.median(ground) if len(ground) else 0.0
+        level[self.rows[:, 0]] = ground[:, None]
+        level[self.rows, self.places], inside[self.rows, self.places] = light.image, True
+        full = image_saturation(light.image) if light.saturation is None and light.image.size else light.saturation
+        return Light(level, full, inside) if self.axis == "rows" else Light(level.T, full, inside.T)
+
+
+def bands(chains: Sequence[Chain], axis: Axis, shape: tuple[int, ...]) -> Bands:
+    """Of an image (h, w, ...)."""
+    count, width = shape[:2] if axis == "rows" else shape[1::-1]
+    low, high = np.stack([band(chain, count, width) for chain in chains], axis=1)
+    ends = np.cumsum(high - low, axis=0)
+    rows = np.flatnonzero(ends[-1] > 0)
+    number = np.arange(int(ends[-1].max())) % np.maximum(ends[-1][rows], 1)[:, None]
+    places = np.zeros(number.shape, np.intp)
+    for first, before, end in zip(low, ends - (high - low), ends, strict=True):
+        own = (number >= before[rows, None]) & (number < end[rows, None])
+        places = np.where(own, first[rows, None] + number - before[rows, None], places)
+    return Bands(rows[:, None], places, (count, width), axis)
 
 
 def without(light: Light, closed: NDArray[np.bool_]) -> Light:

@@ -1,21 +1,28 @@
 """Where a line ends: light past it is blur, sharpening and the blocks of a JPEG, not the laser on a surface.
 
 A sharp end blurred by anything symmetric has half of its light exactly at the end. So a scan line at an end belongs to
-the line if it has at least half of the light of those next to it, and a width like theirs.
+the line if it surely has half of the light of those next to it, a width like theirs, and lies where they go on to. A
+camera that makes pictures for the eye shows half of the light at more than half of the number.
 """
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.result import Flag, Line
+from studio.photographs.line_arrays import changed
 
 NEXT = 16
 """Scan lines that an end is compared with, and as many as blur may lengthen a line by."""
-HALF = 0.5
+HALF, TONED = 0.5, 0.735
+"""Of the number, at which half of the light is shown: as it is, and by the tone curve of sRGB (IEC 61966-2-1)."""
+SURELY = 2.0
+"""Standard deviations of the light along the line by which it is to be above half, but no more than midway to all."""
+LOW = 0.25
+"""Quantile of light that is in part told by the wings of saturated peaks, which tend to say too much."""
+ASIDE, STRAY = 0.5, 4.0
+"""Widths from where the line goes on to, beyond which it is not the line; so many times its scatter if that is more."""
 WIDER = 3.0
 """Ratio of widths that is no longer one line's."""
 SURE = 3
@@ -26,67 +33,89 @@ JUMP = 3.0
 Floats = NDArray[np.float64]
 
 
-def ended(line: Line) -> Line:
-    """The line (n, k) without what lies past its ends (flag PAST_END)."""
+def ended(line: Line, half: float = HALF) -> Line:
+    """The line (n, k) without what lies past its ends (flag PAST_END).
+
+    half: of the number, at which half of the light is shown.
+    """
     past = np.zeros(line.u.shape, np.bool_)
     for k in range(line.u.shape[1]):
         rows = np.flatnonzero(line.valid[:, k])
-        past[rows, k] = _past(rows, line.u[rows, k], line.width[rows, k], _seen(line, rows, k))
+        past[rows, k] = _past(_Found(rows, line, k), half)
     if not past.any():
         return line
 
     def kept(values: Floats) -> Floats:
         return np.where(past, np.nan, values)
 
-    return replace(
-        line,
-        u=kept(line.u),
-        sigma_u=kept(line.sigma_u),
-        width=kept(line.width),
-        amplitude=kept(line.amplitude),
-        background=kept(line.background),
-        chi2=kept(line.chi2),
-        length_apart=None if line.length_apart is None else kept(line.length_apart),
-        shared_u=None if line.shared_u is None else kept(line.shared_u),
-        flag=np.where(past, np.uint8(Flag.PAST_END), line.flag).astype(np.uint8),
-    )
+    return changed(line, kept, np.where(past, np.uint8(Flag.PAST_END), line.flag).astype(np.uint8))
 
 
-def _seen(line: Line, rows: NDArray[np.intp], k: int) -> Floats:
-    """Amplitudes (m,) of a line's scan lines; a saturated one's is the least that saturates: the fit's is a guess."""
-    amplitude, saturated = line.amplitude[rows, k], line.flag[rows, k] == Flag.SATURATED
-    return np.asarray(np.where(saturated, amplitude[saturated].min(initial=np.inf), amplitude))
+class _Found:
+    """Scan lines (m,) of a line and what is known of them, each (m,)."""
+
+    def __init__(self, rows: NDArray[np.intp], line: Line, k: int) -> None:
+        self.rows, self.u, self.width, self.amplitude = (
+            rows,
+            line.u[rows, k],
+            line.width[rows, k],
+            line.amplitude[rows, k],
+        )
+        self.saturated = line.flag[rows, k] == Flag.SATURATED
+
+    def usual(self, some: NDArray[np.intp]) -> float:
+        """Amplitude of some of them."""
+        return float(np.quantile(self.amplitude[some], LOW if self.saturated[some].any() else 0.5))
 
 
-def _past(rows: NDArray[np.intp], u: Floats, width: Floats, amplitude: Floats) -> NDArray[np.bool_]:
+def _past(found: _Found, half: float) -> NDArray[np.bool_]:
     """Which of a line's scan lines (m,) are past an end of one of its pieces, or on a short piece unlike the next."""
+    rows, width = found.rows, found.width
     past = np.zeros(len(rows), np.bool_)
     narrower = np.minimum(width[1:], width[:-1])
-    splits = np.flatnonzero((np.diff(rows) > NEXT) | (np.abs(np.diff(u)) > JUMP * np.maximum(narrower, 1.0))) + 1
+    splits = np.flatnonzero((np.diff(rows) > NEXT) | (np.abs(np.diff(found.u)) > JUMP * np.maximum(narrower, 1.0))) + 1
     pieces = [piece for piece in np.split(np.arange(len(rows)), splits) if len(piece)]
     long = np.concatenate([piece for piece in pieces if len(piece) > 2 * NEXT] or [np.zeros(0, np.intp)])
     for piece in pieces:
         if len(piece) > 2 * NEXT:
             for inward in (piece, piece[::-1]):
-                past[inward[: _first(width[inward], amplitude[inward])]] = True
+                past[inward[: _first(found, inward, half)]] = True
         elif len(piece) <= NEXT and len(long):
             nearest = long[np.argsort(np.abs(long - piece.mean()), kind="stable")[:NEXT]]
-            past[piece] = not alike(
-                float(np.median(width[piece])), float(np.median(amplitude[piece])), width[nearest], amplitude[nearest]
-            )
+            seen = float(np.median(width[piece])), float(np.median(found.amplitude[piece]))
+            past[piece] = not alike(*seen, width[nearest], found.usual(nearest))
     return past
 
 
-def _first(width: Floats, amplitude: Floats) -> int:
+def _first(found: _Found, inward: NDArray[np.intp], half: float) -> int:
     """From the end of a piece inward: how many scan lines are past it; 0 where it fades for longer than blur does."""
-    there = []
+    there, on, surely = [], [], []
     for k in range(NEXT + SURE):
-        inside = slice(k + 1, k + 1 + NEXT)
-        there.append(alike(width[k], amplitude[k], width[inside], amplitude[inside]))
-    return next((k for k in range(NEXT) if all(there[k : k + SURE])), 0)
+        at, inside = inward[k], inward[k + 1 : k + 1 + NEXT]
+        usual = found.usual(inside)
+        bends = np.abs(np.diff(found.amplitude[inside], 2))
+        scatter = 1.4826 * float(np.median(bends)) / 6.0**0.5 / max(usual, 1e-300)
+        asked = min(half * (1.0 + SURELY * scatter), 0.5 * (1.0 + half))
+        there.append(alike(found.width[at], found.amplitude[at], found.width[inside], usual))
+        on.append(there[-1] and _goes_on(found, at, inside))
+        surely.append(on[-1] and found.amplitude[at] >= asked * usual)
+    begins = [k for k in range(NEXT) if all(there[k : k + SURE])]
+    likely = [k for k in range(NEXT) if on[k]] if begins else []
+    return next((k for k in begins if surely[k]), likely[0] if likely else 0)
 
 
-def alike(width: float, amplitude: float, widths: Floats, amplitudes: Floats) -> bool:
-    """Whether a width and an amplitude are those of a line whose scan lines (m,) have others."""
-    usual = float(np.median(widths))
-    return amplitude >= HALF * float(np.median(amplitudes)) and usual / WIDER <= width <= WIDER * usual
+def _goes_on(found: _Found, at: np.intp, inside: NDArray[np.intp]) -> bool:
+    """Whether a scan line lies on a straight line through those that follow it."""
+    inside = inside[: NEXT // 2]
+    apart = (found.rows[inside] - found.rows[at]).astype(np.float64)
+    slope = float(np.median(np.diff(found.u[inside]) / np.diff(apart)))
+    expected = found.u[inside] - slope * apart
+    scatter = 1.4826 * float(np.median(np.abs(expected - np.median(expected))))
+    allowed = max(ASIDE * float(np.median(found.width[inside])), STRAY * scatter)
+    return abs(float(found.u[at]) - float(np.median(expected))) <= allowed
+
+
+def alike(width: float, amplitude: float, widths: Floats, usual: float) -> bool:
+    """Whether a width and an amplitude are those of a line whose scan lines (m,) have others, and a usual amplitude."""
+    typical = float(np.median(widths))
+    return amplitude >= HALF * usual and typical / WIDER <= width <= WIDER * typical

@@ -20,10 +20,11 @@ from studio.photographs.evidence import (
     COLOURS,
     ENOUGH,
     FAINT,
+    Chain,
     Colour,
     Evidence,
     Shrunk,
-    chain_of,
+    chains_of,
     find_evidence,
     shrink,
 )
@@ -34,8 +35,8 @@ from studio.photographs.region import Region
 
 TRIED = 3
 """Photographs on which channels are compared."""
-KEPT = 2**25
-"""Pixels of photographs that are kept in memory from looking to measuring."""
+KEPT = 2**28
+"""Bytes of photographs that are kept in memory from looking to measuring."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,8 @@ class Look:
     named: str | None = None
     """The colour that was asked for, which every photograph must have."""
     kept: dict[Path, Photograph] = field(default_factory=dict)
+    chains: dict[Path, tuple[Chain, ...]] = field(default_factory=dict)
+    """Of the photographs that were looked at."""
 
     @property
     def banded(self) -> bool:
@@ -92,6 +95,25 @@ class Look:
         off = self.offs.get(path)
         return taken, None if off is None else alike(taken.pixels, _recent(off))
 
+    def lines(self, path: Path, image: NDArray[Any], off: NDArray[Any] | None) -> Sequence[Chain]:
+        """The chains of ridges that are the lines of a photograph, as its region shows it."""
+        assert self.evidence is not None
+        known = self.chains.get(path, ())
+        if len(known) >= self.settings.peaks:
+            return known[: self.settings.peaks]
+        shrunk = shrink(image, off, self.region.closed)
+        return chains_of(shrunk, self.evidence.combination, self.evidence.axis, self.settings.peaks)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A photograph of the set in its region, less what a Bayer pattern takes apart, and the same to be looked at."""
+
+    image: NDArray[Any]
+    off: NDArray[Any] | None
+    lossy: bool
+    shrunk: Shrunk
+
 
 _recent = lru_cache(maxsize=2)(load_photograph)
 """One laser-off image serves many photographs."""
@@ -114,7 +136,7 @@ def look_at(paths: Sequence[Path], settings: ExtractionSettings, wishes: Wishes)
     partners, how = pair_offs(paths, wishes.off)
     offs = dict(zip(paths, partners, strict=True))
     look = Look(settings, None, wishes.channel or "mono", wishes.region, offs, [], [], _named(wishes))
-    seen: list[tuple[Photograph, NDArray[Any] | None, Shrunk]] = []
+    seen: dict[Path, Seen] = {}
     kept: dict[Path, Photograph] = {}
     turned: list[str] = []
     spread = np.unique(np.linspace(0, len(paths) - 1, min(ENOUGH, len(paths))).astype(int))
@@ -126,11 +148,11 @@ def look_at(paths: Sequence[Path], settings: ExtractionSettings, wishes: Wishes)
             if not image.size:  # a raw image of less than two pixels a side
                 continue
             closed = None if settings.pattern is not None else wishes.region.closed
-            seen.append((Photograph(image, "", taken.lossy), dark, shrink(image, dark, closed)))
+            seen[path] = Seen(image, dark, taken.lossy, shrink(image, dark, closed))
         except InputError:
             continue
         turned += [taken.turned] if taken.turned else []
-        if sum(one.pixels.size for one in kept.values()) + taken.pixels.size < KEPT:
+        if sum(one.pixels.nbytes for one in kept.values()) + taken.pixels.nbytes < KEPT:
             kept[path] = taken
     told = wishes.region.told() + ([("laser off", how)] if how else [])
     if turned:
@@ -138,7 +160,7 @@ def look_at(paths: Sequence[Path], settings: ExtractionSettings, wishes: Wishes)
     settings = settings.model_copy(update={"axis": wishes.axis or settings.axis})
     if not seen:
         return replace(look, settings=settings, told=told)
-    evidence = find_evidence([shrunk for _, _, shrunk in seen], wishes.axis, wishes.colour)
+    evidence = find_evidence([one.shrunk for one in seen.values()], wishes.axis, wishes.colour)
     told = evidence.told() + told
     settings = settings.model_copy(update={"axis": evidence.axis, "channel": "auto"})
     if wishes.count_lines:
@@ -147,10 +169,10 @@ def look_at(paths: Sequence[Path], settings: ExtractionSettings, wishes: Wishes)
     if settings.pattern is not None:
         found = evidence.colour if evidence.colour != "mono" else "auto"
         return replace(look, settings=settings.model_copy(update={"channel": found}))
-    channel, why = _measuring(seen, evidence, wishes.channel)
-    if any(image.pixels.ndim == 3 for image, _, _ in seen):
+    channel, why = _measuring(list(seen.values()), evidence, wishes.channel)
+    if any(one.image.ndim == 3 for one in seen.values()):
         told.append(("measured in", f"{channel} ({why})"))
-    return replace(look, evidence=evidence, channel=channel)
+    return replace(look, evidence=evidence, channel=channel, chains=dict(zip(seen, evidence.chains, strict=True)))
 
 
 def _named(wishes: Wishes) -> str | None:
@@ -174,26 +196,21 @@ def mosaic(image: NDArray[Any], settings: ExtractionSettings) -> NDArray[Any]:
     return colours
 
 
-def _measuring(
-    seen: Sequence[tuple[Photograph, NDArray[Any] | None, Shrunk]], evidence: Evidence, wished: Channel | None
-) -> tuple[Channel, str]:
+def _measuring(seen: Sequence[Seen], evidence: Evidence, wished: Channel | None) -> tuple[Channel, str]:
     """The channel that scatters least about a smooth line, of those that see nearly all of it; and the reason."""
-    coloured = [one for one in seen if one[0].pixels.ndim == 3]
+    pairs = zip(seen, (line for line, _ in evidence.chains), strict=True)
+    coloured = [(one, line) for one, line in pairs if one.image.ndim == 3]
     if wished is not None or not coloured:
         return wished or "mono", "given"
-    lossy = any(image.lossy for image, _, _ in coloured)
+    lossy = any(one.lossy for one, _ in coloured)
     names = channels_to_try(evidence.colour, evidence.combination.difference, lossy)
     if evidence.score < FAINT / 10.0:
         return names[0], "by default"
     scatters: dict[Channel, list[float]] = {name: [] for name in names}
     counts = dict.fromkeys(names, 0)
-    order = np.argsort([-chain_of(one[2], evidence.combination, evidence.axis).score for one in coloured])
-    for image, off, shrunk in (coloured[k] for k in order[:TRIED]):
-        chain = chain_of(shrunk, evidence.combination, evidence.axis)
+    for one, line in sorted(coloured, key=lambda pair: -pair[1].score)[:TRIED]:
         for name in names:
-            scatter, found = scatter_of(
-                image.pixels, off, chain, name, evidence.colour, evidence.axis, lossy=image.lossy
-            )
+            scatter, found = scatter_of(one.image, one.off, line, name, evidence.colour, evidence.axis, one.lossy)
             scatters[name].append(scatter)
             counts[name] += found
     typical = {name: float(np.median(scatters[name])) for name in names}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.line.detection.channel import check_image
 from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise, residual_ratio
-from analysis.line.extract import CANDIDATES, extract, select
+from analysis.line.extract import extract
 from analysis.line.result import Flag, Line
 from analysis.line.selection.geometry import WorkingVolume
 from analysis.line.series.hdr import Fused, fuse
@@ -27,10 +28,12 @@ from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.camera.camera import Camera
-from studio.photographs.completion import FILLED, completed, offered, without_detours
-from studio.photographs.evidence import chains_of, shrink
-from studio.photographs.laser_light import Light, banded, laser_light, without
-from studio.photographs.line_ends import ended
+from studio.photographs.candidates import peaks_to_choose_from
+from studio.photographs.choice import carried_on, selected
+from studio.photographs.completion import FILLED
+from studio.photographs.laser_light import Light, about, bands, full_scale, laser_light, without
+from studio.photographs.line_arrays import changed
+from studio.photographs.line_ends import HALF, TONED, ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
 from studio.scan.line_extraction import note_of
@@ -53,9 +56,21 @@ class Measured:
     line: Line
     image: NDArray[Any]
     """(h, w) or (h, w, 3), upright."""
-    light: NDArray[Any] | None = None
-    """(h, w) that was measured, NaN outside the region; None: nothing was."""
+    part: NDArray[Any] | None = None
+    """(h', w') that was measured; None: nothing was."""
+    corner: tuple[int, int] = (0, 0)
+    """(x, y) of its first pixel."""
     noise: NoiseModel | None = None
+
+    @property
+    def light(self) -> NDArray[Any] | None:
+        """(h, w) that was measured, NaN beside it; None: nothing was."""
+        if self.part is None or self.part.shape == self.image.shape[:2]:
+            return self.part
+        (x, y), (height, width) = self.corner, self.part.shape
+        around = np.full(self.image.shape[:2], np.nan, np.float32)
+        around[y : y + height, x : x + width] = self.part
+        return around
 
 
 def extract_photograph(
@@ -73,43 +88,57 @@ def extract_photograph(
         whole = check_image(taken.pixels)
         check_camera(whole, volume)
         check_light(look.region.part(whole))
-        light = measured_light(whole, off, look, taken.lossy)
+        light, corner = measured_light(path, whole, off, look, taken.lossy)
         if light is None:
             return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
         noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy)
         alone = settings.select == "strongest" and volume is None
-        wanted = settings if alone else settings.model_copy(update={"peaks": max(settings.peaks, CANDIDATES)})
         # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
+        half = TONED if taken.lossy else HALF
         shared = noise.alike or whole.ndim == 3 or taken.lossy
         plain = noise.model_copy(update={"alike": False})
-        line = extract(light.image, settings=wanted, select="strongest", noise=plain, threads=threads)
-        line = placed(unsure_dropped(line), whole.shape, look.region.corner)
-        fits = settings.select == "continuous" and settings.peaks == 1 and settings.method in FITS
-        if fits and np.isin(line.flag[:, 0], FILLED).any():
+        if alone:
+            line = extract(light.image, settings=settings, noise=plain, threads=threads)
+        else:
+            line = peaks_to_choose_from(light.image, settings, plain, threads, every=volume is not None)
+        line = placed(unsure_dropped(line), whole.shape, corner)
+        fits = settings.select == "continuous" and settings.method in FITS
+        if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
             plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
             centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
-            centres = placed(centres, whole.shape, look.region.corner)
-            chosen = selected(offered(line, centres), settings, volume)
-            fitted = without_detours(selected(line, settings, volume), chosen)
-            line = completed(ended(fitted), centres)  # noise past an end is no base for centres
+            line = carried_on(line, placed(centres, whole.shape, corner), settings, volume, half)
         elif not alone:
             line = selected(line, settings, volume)
         if settings.select == "continuous":
-            line = ended(line)
+            line = ended(line, half)
         line = with_shared_noise(line) if shared else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
-        around = light.image
-        if around.shape != whole.shape[:2]:
-            x, y = look.region.corner
-            around = np.full(whole.shape[:2], np.nan, np.float32)
-            around[y : y + light.image.shape[0], x : x + light.image.shape[1]] = light.image
-    return Measured(replace(line, note=note_of(line, settings, [])), whole, around, noise)
+    return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
 
-def measured_light(whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lossy: bool) -> Light | None:
-    """What is measured of an image, in its region, and where that is; None: nothing is left."""
+def measured_light(
+    path: Path, whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lossy: bool
+) -> tuple[Light | None, tuple[int, int]]:
+    """What is measured of an image, in its region and about its lines, and (x, y) of its first pixel; None: nothing is
+    left.
+    """
     image, closed = look.region.part(whole), look.region.closed
+    x, y = corner = look.region.corner
     off = None if off is None else look.region.part(off)
+    full, within = full_scale(image, lossy), None
+    if look.banded:
+        found = look.lines(path, image, off)
+        near = about(found, look.settings.axis, image.shape)
+        chains = [replace(chain, u=chain.u - near.start) for chain in found]
+        part, corner = ((slice(None), near), (x + near.start, y))
+        if look.settings.axis == "columns":
+            part, corner = (near, slice(None)), (x, y + near.start)
+        image, closed = image[part], None if closed is None else closed[part]
+        off = None if off is None else off[part]
+        within = bands(chains, look.settings.axis, image.shape)
+        if not len(within.rows):
+            return None, corner
+        image, off = within.of(image), None if off is None else within.of(off)
     if look.settings.pattern is not None:
         light = Light(image, None) if off is None else Light(*subtract_off(image, off))
     else:
@@ -117,15 +146,12 @@ def measured_light(whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lo
             allowed = "auto or mono on a mono image"
             raise InputError("the image has no such channel", where="channel", found=look.named, allowed=allowed)
         colour = "mono" if look.evidence is None else look.evidence.colour
-        light = laser_light(image, off, look.channel, colour, lossy)
-    if look.banded:
-        assert look.evidence is not None
-        shrunk = shrink(image, off, closed)
-        chains = chains_of(shrunk, look.evidence.combination, look.evidence.axis, look.settings.peaks)
-        light = banded(light, chains, look.evidence.axis)
+        light = laser_light(image, off, look.channel, colour, full)
+    if within is not None:
+        light = within.on_level_ground(light)
     if closed is not None:
         light = without(light, closed)
-    return light if light.open is None or light.open.any() else None
+    return (light if light.open is None or light.open.any() else None), corner
 
 
 def no_line(shape: tuple[int, ...], settings: ExtractionSettings, note: str) -> Line:
@@ -145,24 +171,15 @@ def unsure_dropped(line: Line) -> Line:
     def kept(values: Float) -> Float:
         return np.where(unsure, np.nan, values)
 
-    return _changed(line, kept, np.where(unsure, np.uint8(Flag.UNSURE), line.flag).astype(np.uint8))
-
-
-def _changed(line: Line, change: Callable[[Float], Float], flag: NDArray[np.uint8]) -> Line:
-    """The line with all its numbers (n, k) changed alike."""
-    names = ("u", "sigma_u", "width", "amplitude", "background", "chi2")
-    numbers: dict[str, Any] = {name: change(getattr(line, name)) for name in names}
-    for name in ("length_apart", "shared_u"):
-        numbers[name] = None if getattr(line, name) is None else change(getattr(line, name))
-    return replace(line, **numbers, flag=flag)
+    return changed(line, kept, np.where(unsure, np.uint8(Flag.UNSURE), line.flag).astype(np.uint8))
 
 
 def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
     """The line of a part of an image, in the whole image; scan lines beyond the part have no pixels."""
     count = shape[0] if line.axis == "rows" else shape[1]
-    if len(line.u) == count and corner == (0, 0):
-        return line
     along, first = corner if line.axis == "rows" else corner[::-1]
+    if len(line.u) == count:
+        return line if along == 0 else replace(line, u=line.u + along)
 
     def whole(values: Float) -> Float:
         out = np.full((count, values.shape[1]), np.nan)
@@ -171,37 +188,8 @@ def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:
 
     flag = np.full((count, line.flag.shape[1]), np.uint8(Flag.NO_PIXELS))
     flag[first : first + len(line.flag)] = line.flag
-    found = _changed(line, whole, flag)
+    found = changed(line, whole, flag)
     return replace(found, u=found.u + along)
-
-
-def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolume | None) -> Line:
-    """Peaks (n, k) -> (n, 1) by the selection, or, of the continuous one, (n, peaks): a chain each."""
-    if settings.select != "continuous" or settings.peaks == 1:
-        return select(candidates, settings.select, volume, settings.chooser)
-    left, chains = candidates, []
-    for _ in range(settings.peaks):
-        chain = select(left, "continuous", volume)
-        chains.append(chain)
-        used = chain.valid & (left.u == chain.u)
-        left = replace(left, u=np.where(used, np.nan, left.u), flag=np.where(used, np.uint8(Flag.REJECTED), left.flag))
-
-    def side_by_side(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(chain, name) for chain in chains], axis=1)
-
-    return replace(
-        candidates,
-        u=side_by_side("u"),
-        sigma_u=side_by_side("sigma_u"),
-        width=side_by_side("width"),
-        amplitude=side_by_side("amplitude"),
-        background=side_by_side("background"),
-        chi2=side_by_side("chi2"),
-        length_apart=None if candidates.length_apart is None else side_by_side("length_apart"),
-        shared_u=None if candidates.shared_u is None else side_by_side("shared_u"),
-        flag=side_by_side("flag"),
-        candidates=candidates,
-    )
 
 
 def extract_series(
@@ -323,12 +311,11 @@ def write_line(path: Path, line: Line) -> None:
     along, across = (line.u, line.v) if line.axis == "rows" else (line.v, line.u)
     length = np.ones_like(line.u) if line.correlation_length is None else line.correlation_length
     numbers = (along, across, line.sigma_u, line.width, line.amplitude, line.background, line.chi2, length)
-    for i in range(line.u.shape[0]):
-        for k in range(line.u.shape[1]):
-            flag = Flag(int(line.flag[i, k]))
-            there = line.valid[i, k]
-            cells = [f"{values[i, k]:.9g}" if there and np.isfinite(values[i, k]) else "" for values in numbers]
-            writer.writerow([i, k, *cells, flag.name])
+    told = np.stack([np.where(line.valid, values, np.nan) for values in numbers], axis=-1).tolist()
+    names = {flag.value: flag.name for flag in Flag}
+    for i, (row, flags) in enumerate(zip(told, line.flag.tolist(), strict=True)):
+        for k, (cells, flag) in enumerate(zip(row, flags, strict=True)):
+            writer.writerow([i, k, *(f"{cell:.9g}" if math.isfinite(cell) else "" for cell in cells), names[flag]])
     with atomic_write(path) as temporary:
         temporary.write_text(text.getvalue(), encoding="utf-8")
 

@@ -99,7 +99,8 @@ def image_saturation(image: NDArray[Any]) -> float | None:
     if np.issubdtype(image.dtype, np.integer) and int(highest) in FULL_SCALES:
         return highest
     at_top = np.count_nonzero(image == highest)
-    if at_top < PILE or not (below := image[image < highest]).size:
+    lowest = image.min()
+    if at_top < PILE or lowest == image.max():
         return None
-    next_lower = np.count_nonzero(below == below.max())
+    next_lower = np.count_nonzero(image == np.where(image < highest, image, lowest).max())
     return highest if at_top > STEEP * next_lower else None

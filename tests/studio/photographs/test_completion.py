@@ -8,6 +8,8 @@ import numpy as np
 
 from analysis.line.result import Flag, Line
 from analysis.line.selection.continuity import select_chain
+from analysis.line.settings import ExtractionSettings
+from studio.photographs.choice import carried_on
 from studio.photographs.completion import GAP, completed, offered, without_detours
 
 COUNT, WIDTH, SCATTER = 400, 2.0, 0.3
@@ -99,3 +101,23 @@ def test_centres_that_err_by_more_than_the_line_is_wide_complete_nothing() -> No
     wild = replace(centres, u=centres.u + 20.0 * np.random.default_rng(2).standard_normal((COUNT, 1)))
     line = without(fits, np.arange(100, 105), Flag.NOT_CONVERGED)
     assert completed(line, wild) is line
+
+
+def test_each_of_two_lines_is_carried_on_by_its_own_centres() -> None:
+    fits, centres, truth = lines()
+    settings = ExtractionSettings(select="continuous", peaks=2)
+    lost = np.arange(3, COUNT - 3, 5)
+
+    def two(line: Line, other: Line) -> Line:
+        far = replace(other, u=other.u + 80.0)
+        # which of them is the stronger changes from scan line to scan line
+        swap = (np.arange(COUNT) % 3 == 0)[:, None]
+        names = ("u", "sigma_u", "width", "amplitude", "background", "chi2", "flag", "length_apart")
+        pairs = {name: np.concatenate([getattr(line, name), getattr(far, name)], axis=1) for name in names}
+        return replace(line, **{name: np.where(swap, values[:, ::-1], values) for name, values in pairs.items()})
+
+    candidates = two(without(fits, lost, Flag.NOT_CONVERGED), without(fits, lost + 1, Flag.NOT_CONVERGED))
+    found = carried_on(candidates, two(centres, centres), settings, None, 0.5)
+    assert found.u.shape == (COUNT, 2) and found.valid.mean() > 0.99
+    order = np.sort(found.u, axis=1) - np.stack([truth, truth + 80.0], axis=1)
+    assert np.nanmax(np.abs(order)) < 6.0 * SCATTER

@@ -206,3 +206,19 @@ def test_the_overlay_shows_points_on_the_line_and_marks_what_has_none(tmp_path: 
     assert len(rows) > 200 and abs(np.median(columns) - scale * 170.5) < scale and rows.max() < scale * 201
     assert drawn[scale * 250, scale * 400 + 5].tolist() == [70, 70, 70]  # no line there
     assert answer(tmp_path / "a.png", "--overlay")["images"][0]["overlay"] == told["overlay"]  # its own file
+
+
+def test_a_wider_view_of_the_same_wall_leaves_the_line_as_it_is(tmp_path: Path) -> None:
+    scene, left = Scene(room=40.0), 300
+    rng = np.random.default_rng(5)
+    wide = np.clip(np.round(46.0 + 2.0 * rng.normal(size=(HEIGHT, 1440, 3))), 0, 255).astype(np.uint8)
+    wide[:, 700:1100] = photograph(scene, seed=9)
+    write(tmp_path / "wide.png", wide)
+    write(tmp_path / "near.png", wide[:, left:])
+    found = []
+    for name in ("wide", "near"):
+        answer(tmp_path / f"{name}.png")
+        found.append(positions(tmp_path / f"{name}_line.csv"))
+    assert np.isfinite(found[0][0]).mean() >= 0.98
+    np.testing.assert_allclose(found[0][0] - left, found[1][0], atol=1e-6)
+    np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-6)

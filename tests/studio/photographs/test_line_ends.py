@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from analysis.line.result import Flag, Line
-from studio.photographs.line_ends import ended
+from studio.photographs.line_ends import TONED, ended
 
 COUNT, FIRST, LAST = 200, 40, 159
 
@@ -70,3 +70,34 @@ def test_a_short_piece_far_off_is_the_line_only_if_it_is_as_bright() -> None:
         amplitude[150:], u[150:] = 0.0, 90.0
         amplitude[155:165] = light
         assert bool(ended(line_of(amplitude, u)).valid[155:165].all()) is stays
+
+
+def test_a_tone_curve_shows_half_of_the_light_at_more_than_half_of_the_number() -> None:
+    sharp = np.zeros(COUNT)
+    sharp[FIRST : LAST + 1] = 1.0
+    shown = 200.0 * np.maximum(gaussian_filter1d(sharp, 1.5), 1e-6) ** (1.0 / 2.2)
+    line = line_of(shown)
+    assert np.flatnonzero(ended(line, TONED).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
+    assert ended(line).valid.sum() > LAST - FIRST + 1
+
+
+def test_a_scan_line_at_an_end_is_the_line_only_where_the_line_goes_on_to() -> None:
+    rng = np.random.default_rng(6)
+    rows, light = np.arange(COUNT), np.zeros(COUNT)
+    light[FIRST : LAST + 1] = 200.0
+    bent = 50.0 + 0.3 * rows + 0.05 * rng.standard_normal(COUNT)
+    assert ended(line_of(light, bent)).valid.sum() == LAST - FIRST + 1
+    bent[[FIRST, LAST]] += np.array([2.0, -2.0])
+    assert np.flatnonzero(ended(line_of(light, bent)).valid[:, 0]).tolist() == list(range(FIRST + 1, LAST))
+
+
+def test_wild_amplitudes_of_saturated_scan_lines_neither_end_a_line_nor_lengthen_it() -> None:
+    rng = np.random.default_rng(7)
+    light = np.zeros(COUNT)
+    light[FIRST : LAST + 1] = 1000.0 * rng.uniform(1.0, 3.0, LAST - FIRST + 1)
+    light[FIRST + 5 : LAST - 5 : 4] *= 100.0
+    light[[FIRST - 1, LAST + 1]] = 300.0
+    line = line_of(light)
+    line.flag[FIRST : LAST + 1] = Flag.SATURATED
+    kept = np.flatnonzero(ended(line).valid[:, 0])
+    assert FIRST <= kept[0] <= FIRST + 2 and LAST - 2 <= kept[-1] <= LAST
