@@ -113,22 +113,23 @@ def circle_start(local: Float) -> Float:
 
 def fit(
     profile: Profile,
-    here: NDArray[np.bool_],
+    weight: Float,
     curve_of: Callable[[NDArray[np.bool_]], Curve],
     start: Callable[[Float], Float],
     axes: Float | None = None,
 ) -> Fit:
-    """Curve through the points of a profile where `here` (m,).
+    """Curve through the points of a profile that have a weight (m,), of their squared misses.
 
     curve_of: its curve, from the (m,) points used; start: (n, 2) local points -> (p,) first parameters; axes: of the
     frame, in place of those of the points.
     """
+    here = weight > 0.0
     frame = frame_of(profile.position[here])
     frame = frame if axes is None else Frame(frame.centre, axes)
     for round_left in reversed(range(ROUNDS)):
         part = profile.taken(here)
         local, direction = frame.local(part.position), part.random @ frame.axes.T
-        curve, whitening = curve_of(here), part.whitening()
+        curve, whitening = curve_of(here), _weighted(part.whitening(), weight[here])
         theta = start(local)
         for _ in range(ITERATIONS):
             e, by_theta, _ = _misses(curve, local, direction, theta)
@@ -146,9 +147,10 @@ def fit(
     solved = np.asarray(np.linalg.pinv(_white(whitening, by_theta)), dtype=np.float64)
     gradient = np.zeros((len(theta), len(profile.index), 2))
     gradient[:, here] = -(_gain(whitening, solved)[:, :, None] * by_point) @ frame.axes
-    free = len(e) - len(theta)
+    free = float(weight[here].sum()) - len(theta)
     chi2 = float(white @ white)
-    ratio = math.sqrt(chi2 / free) if chi2 > free + BEYOND_CHANCE * math.sqrt(2.0 * free) else 1.0
+    excess = chi2 > free + BEYOND_CHANCE * math.sqrt(2.0 * max(free, 0.0))
+    ratio = math.sqrt(chi2 / free) if excess and free > 0.0 else 1.0
     return Fit(theta, np.linalg.norm(solved, axis=1), gradient, here, frame, ratio)
 
 
@@ -159,6 +161,13 @@ def _misses(curve: Curve, local: Float, direction: Float, theta: Float) -> tuple
     least = GRAZING * np.linalg.norm(by_point, axis=1) * np.linalg.norm(direction, axis=1)
     step = np.where(np.abs(step) < least, np.copysign(least, step), step)
     return value / step, by_theta / step[:, None], by_point / step[:, None]
+
+
+def _weighted(whitening: tuple[Float, Float], weight: Float) -> tuple[Float, Float]:
+    """W for misses that each are times the root of their weight (n,)."""
+    diagonal, below = whitening
+    root = np.sqrt(weight)
+    return diagonal * root, below * np.append(0.0, root[:-1])
 
 
 def _white(whitening: tuple[Float, Float], values: Float) -> Float:

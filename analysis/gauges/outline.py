@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.gauges.fit import Fit
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.profile import Profile
-from analysis.gauges.read import Mask, crossing, curves_of, line_of, parts_of
+from analysis.gauges.read import crossing, curves_of, line_of, parts_of
 from render.base.arrays import Float
 
 ARC_POINTS = 65
@@ -36,7 +37,7 @@ def outline(gauge: Gauge, profile: Profile) -> tuple[list[Float], Float]:
     return curves, _between_lines(gauge, fits)
 
 
-def _span(one: Fit, profile: Profile, here: Mask) -> tuple[float, float]:
+def _span(one: Fit, profile: Profile, here: NDArray[np.bool_]) -> tuple[float, float]:
     """Along the fit's frame, from the first to the last of the points."""
     along = one.frame.local(profile.position[here])[:, 0]
     return float(along.min()), float(along.max())
@@ -47,9 +48,9 @@ def _polynomial(one: Fit, low: float, high: float) -> Float:
     return one.frame.out(np.column_stack([along, np.polynomial.polynomial.polyval(along, one.theta)]))
 
 
-def _levels(one: Fit, profile: Profile, parts: list[Mask]) -> tuple[list[Float], Float]:
+def _levels(one: Fit, profile: Profile, parts: list[Float]) -> tuple[list[Float], Float]:
     constant, slope, height = one.theta
-    spans = [_span(one, profile, part) for part in parts]
+    spans = [_span(one, profile, part > 0.0) for part in parts]
     curves = []
     for up, span in zip((0.0, height), spans, strict=True):
         along = np.array(span)

@@ -14,6 +14,8 @@ from render.base.arrays import Float
 from render.base.pose import transform_points
 from render.frame import LaserCurve
 
+SOFT_END = 0.1
+"""Of a region's length, at each of its ends, over which points come to count in full."""
 NEARLY_ONE = 1.0 - 1e-9
 ANY_SIGMA = 1e-6
 """m, of a truth without measured points beside it: all its points weigh alike."""
@@ -38,9 +40,13 @@ class Profile:
     correlation_length: Float
     """(m,) scan lines that err alike, as of `Points`."""
 
-    def within(self, low: float, high: float) -> NDArray[np.bool_]:
-        """(m,) across the fan between two places, m."""
-        return np.asarray((self.position[:, 0] >= low) & (self.position[:, 0] <= high))
+    def weight(self, low: float, high: float) -> Float:
+        """(m,) weights of the points across the fan between two places, m: 0 outside and at the ends, 1 in the middle.
+
+        With hard ends, noise would decide whether a point on an end counts, and those that it moves in would err alike.
+        """
+        inside = np.minimum(self.position[:, 0] - low, high - self.position[:, 0])
+        return np.asarray(np.clip(inside / (SOFT_END * (high - low)), 0.0, 1.0))
 
     def taken(self, here: NDArray[np.bool_]) -> Profile:
         """The part of it at (m,) points."""

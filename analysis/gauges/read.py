@@ -7,14 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import REGIONS, Gauge, Verdict
 from analysis.gauges.profile import Profile
 from render.base.arrays import Float
 
-Mask = NDArray[np.bool_]
 NAN = float("nan")
 FLATTEST = 1e-6
 """Angle, rad, between two lines below which they do not cross anywhere near."""
@@ -78,9 +76,9 @@ def _true_value(gauge: Gauge, truth: Profile | None) -> float:
     return NAN if isinstance(found, str) else found[0]
 
 
-def parts_of(gauge: Gauge, profile: Profile) -> list[Mask] | str:
-    """The (m,) points within each region, or why they are too few."""
-    parts = [profile.within(*region) for region in gauge.regions]
+def parts_of(gauge: Gauge, profile: Profile) -> list[Float] | str:
+    """The weights (m,) of the points in each region, or why they are too few."""
+    parts = [profile.weight(*region) for region in gauge.regions]
     for name, part, region in zip(REGIONS[gauge.kind], parts, gauge.regions, strict=True):
         least = PARAMETERS.get(gauge.kind, 2) + SPARE
         if (there := np.count_nonzero(part)) < least:
@@ -123,12 +121,12 @@ NOTHING = {
 Function = Callable[[Sequence[Float]], float]
 
 
-def curves_of(gauge: Gauge, profile: Profile, parts: list[Mask]) -> tuple[list[Fit], Function]:
+def curves_of(gauge: Gauge, profile: Profile, parts: list[Float]) -> tuple[list[Fit], Function]:
     """The curves that a value is of, and the value of their parameters."""
     match gauge.kind:
         case "step":
-            whole = parts[0] | parts[1]
-            fits = [fit(profile, whole, lambda here: two_levels(parts[1][here]), lambda local: _zeros(3))]
+            whole = np.maximum(*parts)
+            fits = [fit(profile, whole, lambda here: two_levels(parts[1][here] > 0.0), lambda local: _zeros(3))]
             return fits, lambda theta: theta[0][2] / math.sqrt(1.0 + theta[0][1] ** 2)
         case "radius":
             return [fit(profile, parts[0], lambda here: circle, circle_start)], lambda theta: abs(theta[0][2])
@@ -146,7 +144,7 @@ def curves_of(gauge: Gauge, profile: Profile, parts: list[Mask]) -> tuple[list[F
             return fits, lambda theta: _of_lines(gauge, [line_of(*pair) for pair in zip(fits, theta, strict=True)])
 
 
-def _polynomial(profile: Profile, part: Mask, degree: int, axes: Float | None = None) -> Fit:
+def _polynomial(profile: Profile, part: Float, degree: int, axes: Float | None = None) -> Fit:
     return fit(profile, part, lambda here: polynomial(degree), lambda local: _zeros(degree + 1), axes)
 
 

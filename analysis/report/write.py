@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -160,9 +161,18 @@ def _detail(report: ReportInput, frame: FrameResult, i: int) -> dict[str, Any]:
 def _facts(report: ReportInput) -> str:
     camera = report.scene.camera
     frames = "1 frame" if len(report.record.steps) == 1 else f"{len(report.record.steps)} frames"
-    made = f"{report.created} · " if report.created else ""
+    made = f"{_when(report.created)} · " if report.created else ""
     scale = "" if report.image_scale == 1.0 else f", image scale {report.image_scale:g}: not the scanner's figures"
     return f"{made}{frames} · camera {camera.width} × {camera.height} px{scale}"  # noqa: RUF001
+
+
+def _when(created: str) -> str:
+    """As clocks showed it where the scan was made: 22 November 2026, 19:03. What is no time stays."""
+    try:
+        at = datetime.datetime.strptime(created[:19], "%Y-%m-%d %H:%M:%S")
+    except ValueError:
+        return created
+    return f"{at.day} {at:%B %Y, %H:%M}"
 
 
 def _tiles(found: Total) -> list[tuple[str, str, str]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from pydantic import BaseModel
@@ -10,6 +12,7 @@ from pydantic import BaseModel
 from render.base.errors import InputError
 from render.base.pose import Pose
 from render.laser.laser import LineLaser
+from render.material.lambertian import Lambertian
 from render.scene.lights import PointLight, RectangleLight
 from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
 from render.scene.scene import SceneObject
@@ -25,6 +28,7 @@ from studio.editing.placement import (
     vector,
 )
 from studio.project.document import FieldPath, replaced, value_at
+from studio.project.mesh_import import ImportedMesh
 from studio.project.project import Project
 
 LASERS: FieldPath = ("scene", "rig", "lasers")
@@ -32,6 +36,9 @@ OBJECTS: FieldPath = ("scene", "objects")
 LIGHTS: FieldPath = ("scene", "lights")
 LISTS = (LASERS, OBJECTS, LIGHTS)
 """Where items can be added, removed and put in another order."""
+
+SMOOTH_BELOW = rounded(math.radians(30.0))
+"""Between facets of a part of a STEP file, whose true edges are sharper."""
 
 Result = tuple[Project, FieldPath]
 Kind = type[Parametric]
@@ -84,6 +91,21 @@ def add_mesh(
     return _append(
         project, OBJECTS, SceneObject(name=name, shape=shape, T_world_object=Pose(translation=vector(place)))
     )
+
+
+def add_parts(project: Project, parts: Sequence[ImportedMesh]) -> Result:
+    """An object for each part of an assembly, where the assembly has it, its middle as of `add_mesh`.
+
+    Each in its colour, as far as the file tells it, and shaded as the curved surface that its facets stand for.
+    """
+    path: FieldPath = OBJECTS
+    for part in parts:
+        project, path = add_mesh(project, part.path, part.unit, part.bounds)
+        name = unique_name(part.name or "part", _names(project, OBJECTS) - {value_at(project, path).name})
+        material = Lambertian() if part.colour is None else Lambertian(albedo=part.colour)
+        changed = {"name": name, "material": material, "crease_angle": SMOOTH_BELOW}
+        project = replaced(project, path, value_at(project, path).model_copy(update=changed))
+    return project, path
 
 
 def add_light(project: Project, kind: type[PointLight] | type[RectangleLight]) -> Result:

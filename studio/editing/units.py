@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from dataclasses import dataclass
 
 from render.base.errors import InputError
+from studio.editing.arithmetic import evaluate
 
 FACTORS = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "in": 0.0254},
@@ -18,6 +20,8 @@ FACTORS = {
 SHOWN = {"m": "mm", "rad": "deg", "W": "mW", "s": "ms"}
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_OPERATION = re.compile(r"[-+*(]|/\s*[\d.,(]")
+"""A unit may hold a slash as well, before a letter."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +49,14 @@ class Unit:
         return f"{self.format(value)} {self.shown}".rstrip()
 
     def parse(self, text: str) -> float:
-        """The stored value of what was typed: "12", "0.4 m", "1,5". InputError: no number, or not such a unit."""
+        """The stored value of what was typed: "12", "0.4 m", "1,5", "150+25". InputError: no number, no such unit."""
         match = _NUMBER.fullmatch(text)
+        if match is None or _OPERATION.search(match[2]):
+            units = {self.shown: 1.0 / self.factor, **FACTORS.get(self.stored, {})}
+            with contextlib.suppress(ValueError):
+                found = evaluate(text, units, 1.0 / self.factor)
+                if math.isfinite(found):
+                    return float(f"{found:.12g}")
         if match is None:
             what = "a number is missing" if not text.strip() else "this is not a number"
             raise InputError(what, allowed=f"a number in {self.shown}" if self.shown else "a number")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,6 +18,13 @@ from studio.preview.scintillation import speckle_px
 
 SPECKLED = 64
 """Places along the line at which the effect of speckle is worked out."""
+
+
+GOOD_PX = 0.05
+"""Sigma of a well exposed line, px."""
+UNSEEN = 0.1
+UNKNOWN_SIGMA = 1e-5
+"""m, of a rig whose laser is nowhere in view."""
 
 
 class Range(NamedTuple):
@@ -129,6 +137,20 @@ def readouts(look: Look, laser: int) -> Readouts:
         photon_sigma=_median(bound * depth),
         speckle_sigma=_median(speckle * depth[some]),
     )
+
+
+def facet_chord(lasers: Sequence[Readouts]) -> float:
+    """How far facets may be off a curved part, m, so that no depth tells: a tenth of the least predicted sigma.
+
+    Of lasers that hit nothing, the sigma of a line found to GOOD_PX.
+    """
+    sigmas = []
+    for one in lasers:
+        if one.depth_sigma is not None and one.depth_sigma > 0.0:
+            sigmas.append(one.depth_sigma)
+        elif one.working_depth_per_px is not None:
+            sigmas.append(GOOD_PX * min(one.working_depth_per_px))
+    return UNSEEN * min(sigmas, default=UNKNOWN_SIGMA)
 
 
 def _working_resolution(

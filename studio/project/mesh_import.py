@@ -15,6 +15,7 @@ from render.mesh.mesh_headers import MAX_FILE_BYTES
 from render.mesh.trimesh_reader import EXTENSIONS, SideFiles, read_parts, side_files
 from render.scene.scene import SceneObject
 from render.scene.shape import UNITS, MeshFile, Unit
+from studio.project.step_file import is_step, read_step, write_parts
 
 FOLDER = "meshes"
 TOO_LARGE = 5.0
@@ -29,6 +30,12 @@ class ImportedMesh:
     unit: Unit
     bounds: tuple[tuple[float, ...], tuple[float, ...]]
     triangles: int
+    name: str = ""
+    """Of a part of an assembly."""
+    colour: tuple[float, float, float] | None = None
+    """Linear reflectance, where a STEP file tells it."""
+    closed: bool | None = None
+    """Of a part of a STEP file: without a gap between its faces."""
 
     @property
     def size(self) -> tuple[float, ...]:
@@ -37,12 +44,12 @@ class ImportedMesh:
 
 def is_mesh(file: Path) -> bool:
     """By its suffix."""
-    return file.suffix[1:].lower() in EXTENSIONS
+    return file.suffix[1:].lower() in EXTENSIONS or is_step(file)
 
 
 def needs_copy(file: Path, root: Path) -> bool:
-    """The file is outside the project's folder, where a project may not read."""
-    return not file.resolve().is_relative_to(root.resolve())
+    """The file is outside the project's folder, where a project may not read; of a STEP file, meshes are made there."""
+    return is_step(file) or not file.resolve().is_relative_to(root.resolve())
 
 
 def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
@@ -52,7 +59,7 @@ def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
     files; view: width of what the camera sees, m, to tell metres from millimetres. What was copied is removed again if
     the mesh is no good. InputError: no mesh, damaged, or the folder cannot be written.
     """
-    if not is_mesh(file):
+    if file.suffix[1:].lower() not in EXTENSIONS:
         allowed = ", ".join(f".{name}" for name in EXTENSIONS)
         raise InputError("this is not a mesh file", where=str(file), found=file.suffix or file.name, allowed=allowed)
     check_regular(file, MAX_FILE_BYTES, "mesh file")
@@ -66,6 +73,37 @@ def import_mesh(file: Path, root: Path, view: float) -> ImportedMesh:
         raise
 
 
+def import_step(file: Path, root: Path, chord: float) -> list[ImportedMesh]:
+    """The parts of a STEP file as meshes in `meshes/` of the project, each with the bounds of the whole assembly.
+
+    root: the project's folder; chord: how far facets may be off the true surface, m. InputError: as `read_step`, or
+    the folder cannot be written; nothing is left behind then.
+    """
+    parts = read_step(file, chord)
+    folder, number = root.resolve() / FOLDER / file.stem, 1
+    while folder.exists():
+        number += 1
+        folder = root.resolve() / FOLDER / f"{file.stem} {number}"
+    places = np.concatenate([part.vertices for part in parts])
+    bounds = tuple(places.min(axis=0).tolist()), tuple(places.max(axis=0).tolist())
+    made: list[Path] = []
+    try:
+        meshes = []
+        for part, copy in zip(parts, write_parts(parts, folder, made), strict=True):
+            path = copy.relative_to(root.resolve()).as_posix()
+            # the full checks, as rendering will make them
+            load_mesh(SceneObject(name=copy.stem[:100], shape=MeshFile(path=path, unit="mm")), root)
+            name = part.name.strip()[:100] or copy.stem
+            meshes.append(ImportedMesh(path, "mm", bounds, len(part.triangles), name, part.colour, part.closed))
+        return meshes
+    except BaseException:
+        for copy in made:
+            copy.unlink(missing_ok=True)
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
+
+
 def copied_beside(file: Path, root: Path, folder: str) -> str:
     """A file's path relative to the project; one from outside is copied into `folder` of it. InputError: cannot be."""
     if not needs_copy(file, root):
@@ -76,7 +114,7 @@ def copied_beside(file: Path, root: Path, folder: str) -> str:
 def _copied(file: Path, folder: Path, made: list[Path]) -> Path:
     """The file in a folder of the project; the same bytes there are used again, another file of that name is kept."""
     check_regular(file, MAX_FILE_BYTES)
-    sides = side_files(file, file.parent) if is_mesh(file) else []
+    sides = side_files(file, file.parent) if file.suffix[1:].lower() in EXTENSIONS else []
     target, number = folder / file.name, 1
     while target.exists() and sha256(target) != sha256(file):
         number += 1

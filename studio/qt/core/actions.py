@@ -85,7 +85,12 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("theme_light", "View/Theme", "&Light", "", "", "", True),
     Command("full_screen", "View", "&Full screen", "F11", "", "", True),
     Command(
-        "import_mesh", "Scene", "Import &mesh…", "Ctrl+I", "mesh", "STL, PLY, OBJ, GLB; or drop files on the window"
+        "import_mesh",
+        "Scene",
+        "Import &mesh…",
+        "Ctrl+I",
+        "mesh",
+        "STL, PLY, OBJ, GLB, STEP; or drop them on the window",
     ),
     "Scene/-",
     Command("add", "Scene", "&Add"),

@@ -156,6 +156,10 @@ def style_sheet(c: Colours) -> str:
     QToolButton#workspace:checked {{ background: {c.accent}; color: {c.on_accent}; border-color: {c.accent}; }}
     QToolButton[popupMode="2"] {{ padding-right: 17px; }}
     QToolButton::menu-indicator {{ subcontrol-origin: padding; subcontrol-position: center right; right: 3px; }}
+    QPushButton#primary:enabled {{ background: {c.accent}; color: {c.on_accent}; border: 1px solid {c.accent};
+        border-radius: 3px; padding: 3px 14px; font-weight: 600; }}
+    QPushButton#primary:enabled:hover {{ background: {mixed(c.accent, c.text, 0.85)}; }}
+    QPushButton#choice {{ text-align: left; padding-left: 4px; }}
     QMenuBar {{ background: {c.window}; }}
     QMenuBar::item {{ padding: 4px 9px; background: transparent; border-radius: 4px; }}
     QMenuBar::item:selected {{ background: {mixed(c.text, c.window, 0.10)}; }}

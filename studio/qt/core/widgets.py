@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QBoxLayout, QLabel, QProgressBar, QPushButton, QSplitter, QWidget
+from PySide6.QtWidgets import QBoxLayout, QFormLayout, QLabel, QProgressBar, QPushButton, QSplitter, QWidget
 
 
 class ElidedLabel(QLabel):
@@ -33,6 +33,17 @@ def text_button(text: str, tip: str = "", name: str = "") -> QPushButton:
     button.setObjectName(name)
     button.setToolTip(tip)
     return button
+
+
+def align_labels(*forms: QFormLayout) -> None:
+    """Make the fields of forms that stand under each other begin at one place."""
+    labels = []
+    for form in forms:
+        items = (form.itemAt(row, QFormLayout.ItemRole.LabelRole) for row in range(form.rowCount()))
+        labels += [widget for item in items if item is not None and (widget := item.widget()) is not None]
+    width = max(label.sizeHint().width() for label in labels)
+    for label in labels:
+        label.setMinimumWidth(width)
 
 
 def thin_bar() -> QProgressBar:

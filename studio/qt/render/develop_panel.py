@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QLabel,
     QMenu,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -28,6 +27,7 @@ from render.sensor.develop import Image
 from studio.project.document import FieldPath
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Render, Session
+from studio.qt.core.widgets import text_button
 from studio.qt.forms.log_field import LogField
 from studio.qt.image.line_overlay import swatch
 from studio.runtime.jobs import Job, Progress
@@ -77,7 +77,7 @@ class DevelopPanel(QWidget):
         self.possible = QCheckBox("that the laser can have made")
         self.possible.setToolTip("On the laser's plane, within its fan and the working volume, no wider than its sheet")
         self.powers: list[LogField] = []
-        self.methods_button = QPushButton()
+        self.methods_button = text_button("", name="choice")
         self.methods_button.setToolTip("Every chosen method measures the same image")
         self.methods_menu = QMenu(self.methods_button)
         self.methods_button.setMenu(self.methods_menu)

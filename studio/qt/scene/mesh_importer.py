@@ -10,13 +10,16 @@ from PySide6.QtWidgets import QFileDialog, QMessageBox, QWidget
 
 from render.base.errors import InputError
 from studio.editing.placement import field_of_view
-from studio.editing.scene_edits import add_mesh
-from studio.project.mesh_import import ImportedMesh, import_mesh, needs_copy
+from studio.editing.scene_edits import add_mesh, add_parts
+from studio.preview.readouts import facet_chord, readouts
+from studio.project.mesh_import import ImportedMesh, import_mesh, import_step, needs_copy
+from studio.project.step_file import LARGEST_CHORD, LEAST_CHORD, is_step
 from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.runtime.error_messages import trouble
 
-MESH_FILES = "Meshes (*.stl *.ply *.obj *.glb *.gltf *.off);;All files (*)"
+MESH_FILES = "Meshes and STEP (*.stl *.ply *.obj *.glb *.gltf *.off *.step *.stp);;All files (*)"
 Take = Callable[[ImportedMesh], None]
 
 
@@ -24,19 +27,25 @@ class ImportThread(QThread):
     """Reads one file after the other."""
 
     imported = Signal(object)
+    """A list: the meshes of one file, several of them where it is an assembly."""
     failed = Signal(object, object)
     """The file and the exception."""
 
-    def __init__(self, files: list[Path], root: Path, view: float) -> None:
+    def __init__(self, files: list[Path], root: Path, view: float, chord: float) -> None:
+        """chord: how far the facets of a STEP file may be off its surfaces, m."""
         super().__init__()
-        self.files, self.root, self.view = files, root, view
+        self.files, self.root, self.view, self.chord = files, root, view, chord
 
     def run(self) -> None:
         for file in self.files:
             if self.isInterruptionRequested():
                 return
             try:
-                self.imported.emit(import_mesh(file, self.root, self.view))
+                self.imported.emit(
+                    import_step(file, self.root, self.chord)
+                    if is_step(file)
+                    else [import_mesh(file, self.root, self.view)]
+                )
             except (InputError, OSError, MemoryError) as error:
                 self.failed.emit(file, error)
 
@@ -83,20 +92,28 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
     if not files or (document.path is not None and not may_copy(parent, files, document.root)):
         return
 
-    def done(mesh: ImportedMesh) -> None:
+    def done(meshes: list[ImportedMesh]) -> None:
         if session.document is not document:
             return  # another project was opened meanwhile
-        (take or (lambda made: _add(session, made)))(mesh)
-        size = " x ".join(f"{1e3 * side:.4g}" for side in mesh.size)
-        text = f"{Path(mesh.path).name}: {size} mm, {mesh.triangles} triangles, read as {mesh.unit}"
-        session.message.emit("info", text)
+        if take is None:
+            _add(session, meshes)
+        elif len(meshes) == 1:
+            take(meshes[0])
+        else:
+            session.message.emit("error", f"an assembly of {len(meshes)} parts is not one mesh; import it instead")
+            return
+        session.message.emit("info", _told(meshes, chord))
 
     def failed(file: Path, error: BaseException) -> None:
         what = trouble(error, f"import {file.name}")
         session.message.emit("error", f"{file.name}: {error}")
         show_trouble(parent, what)
 
-    thread = ImportThread(files, document.root, field_of_view(session.project.scene))
+    scene = session.project.scene
+    look = live(session).look if any(is_step(file) for file in files) else None
+    chord = facet_chord([] if look is None else [readouts(look, i) for i in range(len(look.scene.lasers))])
+    chord = min(max(chord, LEAST_CHORD), LARGEST_CHORD)
+    thread = ImportThread(files, document.root, field_of_view(scene), chord)
     thread.imported.connect(done)
     thread.failed.connect(failed)
     thread.finished.connect(lambda: running.discard(thread))
@@ -109,7 +126,25 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
     thread.start()
 
 
-def _add(session: Session, mesh: ImportedMesh) -> None:
-    project, path = add_mesh(session.project, mesh.path, mesh.unit, mesh.bounds)
-    session.document.apply(f"import {Path(mesh.path).name}", project)
+def _told(meshes: list[ImportedMesh], chord: float) -> str:
+    """What was imported, in words."""
+    first = meshes[0]
+    size = " x ".join(f"{1e3 * side:.4g}" for side in first.size)
+    triangles = sum(mesh.triangles for mesh in meshes)
+    if first.closed is None:
+        return f"{Path(first.path).name}: {size} mm, {triangles} triangles, read as {first.unit}"
+    parts = "1 part" if len(meshes) == 1 else f"{len(meshes)} parts"
+    gaps = [mesh.name for mesh in meshes if not mesh.closed]
+    closed = f"; not closed: {', '.join(gaps[:3])}" if gaps else ", closed"
+    facets = f"facets at most {1e6 * chord:.2g} µm off (a tenth of the predicted depth sigma)"
+    return f"{parts}, {size} mm, {triangles} triangles{closed}; {facets}"
+
+
+def _add(session: Session, meshes: list[ImportedMesh]) -> None:
+    first = meshes[0]
+    if first.closed is None:
+        project, path = add_mesh(session.project, first.path, first.unit, first.bounds)
+    else:
+        project, path = add_parts(session.project, meshes)
+    session.document.apply(f"import {Path(first.path).name}", project)
     session.select(path)

@@ -29,7 +29,7 @@ from render.base.threads import thread_count
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import ElidedLabel, flush, text_button, thin_bar
+from studio.qt.core.widgets import ElidedLabel, align_labels, flush, text_button, thin_bar
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
 from studio.runtime.jobs import Job, State
@@ -280,6 +280,7 @@ class StudyPanel(QWidget):
         runs.addStretch(1)
         last = QFormLayout()
         last.addRow("Repeats", runs)
+        align_labels(form, self.editor.form, last)
         inside = QWidget()
         column = QVBoxLayout(inside)
         column.setContentsMargins(8, 8, 8, 4)

@@ -81,7 +81,7 @@ class SweepEditor(QWidget):
         self.samples.setKeyboardTracking(False)
         self.tolerance.setKeyboardTracking(False)
         self.tolerance.setToolTip("Of the range: the search ends in a bracket of this width, or where noise decides")
-        self.methods_button = text_button("")
+        self.methods_button = text_button("", name="choice")
         self.methods_button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.methods_menu = QMenu(self.methods_button)
         self.methods_button.setMenu(self.methods_menu)

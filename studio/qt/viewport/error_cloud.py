@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtCore import QObject, QPointF, QRect, QRectF, Qt
 from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
@@ -193,7 +193,6 @@ class ColourBar(QWidget):
         super().__init__(view)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.title, self.unit, self.limit, self.note = "", "", 1.0, ""
-        self.resize(QSize(128, 208))
         view.installEventFilter(self)
         self._place()
 
@@ -226,7 +225,8 @@ class ColourBar(QWidget):
         painter.setPen(QColor(c.warning))
         painter.drawText(QRect(12, self.height() - 24, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.note)
         painter.setPen(QColor(c.text))
-        for share, text in ((0.0, f"+{self.limit:g}"), (0.5, "0"), (1.0, f"\u2212{self.limit:g}")):
+        zero = ((0.5, "0"),) if bar.height() > 60 else ()
+        for share, text in ((0.0, f"+{self.limit:g}"), *zero, (1.0, f"\u2212{self.limit:g}")):
             y = bar.top() + round(share * bar.height())
             painter.drawLine(bar.right() + 2, y, bar.right() + 6, y)
             box = QRect(bar.right() + 10, y - 10, self.width() - bar.right() - 12, 20)
@@ -234,6 +234,7 @@ class ColourBar(QWidget):
 
     def _place(self) -> None:
         if (view := self.parentWidget()) is not None:
+            self.resize(128, min(208, view.height() - 24))
             self.move(view.width() - self.width() - 12, view.height() - self.height() - 12)
 
 

@@ -10,7 +10,6 @@ from analysis.gauges.profile import Profile
 
 PITCH = 2e-4
 ACROSS = (np.arange(-100, 100) + 0.5) * PITCH
-"""No point is on an end of a region, where its noise would decide whether it counts."""
 REGION = {
     "step": ((-0.015, -0.003), (0.003, 0.015)),
     "width": ((0.012, 0.02), (-0.009, -0.002), (0.002, 0.009)),

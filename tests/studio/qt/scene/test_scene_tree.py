@@ -17,10 +17,12 @@ from studio.editing import scene_edits
 from studio.editing.scene_edits import LASERS, LIGHTS, OBJECTS
 from studio.project.document import Document, FieldPath
 from studio.project.project import Project
+from studio.project.step_file import LARGEST_CHORD, LEAST_CHORD, parts_of
 from studio.project.templates import template_folder
 from studio.qt.core.session import Session
 from studio.qt.scene import mesh_importer, scene_actions
 from studio.qt.scene.scene_tree import DETAIL, EYE, NAME, SceneTree
+from tests.studio.project.step_text import BOX, glb
 
 
 @pytest.fixture
@@ -329,6 +331,23 @@ class TestDropping:
         assert tree.item((*OBJECTS, 2)).isSelected()
         assert (session.document.root / "meshes" / "part.stl").is_file()
         assert "100 x 50 x 20 mm" in told[-1] and "read as mm" in told[-1]
+        session.document.undo()
+        assert names(session) == ["table", "step block"]
+
+    def test_the_parts_of_a_step_file_are_one_step_to_undo(
+        self, qtbot: QtBot, session: Session, tree: SceneTree, outside: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        told: list[str] = []
+        session.message.connect(lambda level, text: told.append(text))
+        parts = parts_of(glb({"pin": [(BOX, (0.6, 0.1, 0.1))]}, [{"name": n, "mesh": 0} for n in ("a", "b")]), "")
+        chords: list[float] = []
+        monkeypatch.setattr("studio.project.mesh_import.read_step", lambda file, chord: chords.append(chord) or parts)
+        self.agree(monkeypatch, True)
+        assert self.drop(tree, outside.with_suffix(".step"))
+        qtbot.waitUntil(lambda: "b" in names(session) and not mesh_importer.running)
+        assert names(session) == ["table", "step block", "a", "b"]
+        assert told[-1].startswith("2 parts, 20 x 40 x 60 mm, 24 triangles, closed; facets at most")
+        assert LEAST_CHORD <= chords[0] <= LARGEST_CHORD
         session.document.undo()
         assert names(session) == ["table", "step block"]
 

@@ -1,0 +1,106 @@
+"""STEP files become closed meshes in the file's unit, as near to the true surfaces as asked, placed as one assembly."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from render.base.errors import InputError
+from studio.editing.scene_edits import OBJECTS, add_parts
+from studio.project.document import value_at
+from studio.project.mesh_import import import_step
+from studio.project.project import Project
+from studio.project.step_file import Part, parts_of, read_step
+from studio.project.templates import template_folder
+from tests.studio.project.step_text import BOX, glb, pin
+
+needs_cascadio = pytest.mark.skipif(importlib.util.find_spec("cascadio") is None, reason="cascadio is not installed")
+RED, BLUE = (0.6, 0.0, 0.2), (0.0, 0.0, 1.0)
+
+
+def volume(part: Part) -> float:
+    return float(trimesh.Trimesh(part.vertices, part.triangles, process=False).volume)
+
+
+def two_boxes() -> bytes:
+    """One in two colours, and the same again, mirrored and moved by 0.1 m."""
+    in_x = np.ptp(BOX[:, :, 0], axis=1) == 0.0
+    matrix = np.diag([-1.0, 1.0, 1.0, 1.0])
+    matrix[0, 3] = 0.1
+    nodes = [{"name": "lid", "mesh": 0}, {"name": "copy", "mesh": 0, "matrix": matrix.T.ravel().tolist()}]
+    return glb({"box": [(BOX[in_x], RED), (BOX[~in_x], BLUE)]}, nodes)
+
+
+def test_faces_of_several_colours_are_one_closed_part_where_the_assembly_has_it() -> None:
+    copy, lid = parts_of(two_boxes(), "boxes")
+    assert [lid.name, copy.name] == ["lid", "copy"] and lid.closed and copy.closed
+    assert len(lid.vertices) == 8 and len(lid.triangles) == 12
+    assert volume(lid) == pytest.approx(48e-6, rel=1e-6) and volume(copy) == pytest.approx(48e-6, rel=1e-6)
+    assert copy.vertices[:, 0].min() == pytest.approx(0.09, rel=1e-6)
+    # 24 of 44 cm^2 are red; a byte holds a colour to 1 / 510
+    assert lid.colour == pytest.approx((0.6 * 24 / 44, 0.02, (0.2 * 24 + 20) / 44), abs=1 / 500)
+
+
+def test_a_part_with_a_gap_is_told() -> None:
+    (part,) = parts_of(glb({"box": [(BOX[1:], RED)]}, [{"name": "box", "mesh": 0}]), "box")
+    assert not part.closed
+
+
+def test_parts_are_objects_that_stand_to_each_other_as_in_the_assembly(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parts = parts_of(two_boxes(), "boxes")
+    monkeypatch.setattr("studio.project.mesh_import.read_step", lambda file, chord: parts)
+    meshes = import_step(tmp_path / "boxes.step", tmp_path, 1e-5)
+    again = import_step(tmp_path / "boxes.step", tmp_path, 1e-5)
+    assert [mesh.path for mesh in meshes] == ["meshes/boxes/copy.ply", "meshes/boxes/lid.ply"]
+    assert again[0].path == "meshes/boxes 2/copy.ply"
+
+    project = Project.load(template_folder("plane") / "project.json")
+    made, path = add_parts(project, meshes)
+    copy, lid = value_at(made, OBJECTS)[-2:]
+    assert (lid.name, copy.name) == ("lid", "copy") and path == (*OBJECTS, len(made.scene.objects) - 1)
+    assert lid.T_world_object == copy.T_world_object
+    assert lid.material.albedo == parts[1].colour and lid.shape.unit == "mm"
+    twice, _ = add_parts(made, meshes)
+    assert [item.name for item in twice.scene.objects[-2:]] == ["copy 2", "lid 2"]
+
+
+def test_without_cascadio_the_cure_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"cascadio.*not installed.*blazer-studio\[step\]"):
+        read_step(tmp_path / "part.step", 1e-5)
+
+
+@needs_cascadio
+@pytest.mark.parametrize("unit", ["mm", "m"])
+def test_a_pin_has_its_size_in_the_units_of_its_file_and_facets_within_the_chord(tmp_path: Path, unit: str) -> None:
+    file, size = tmp_path / "pin.step", 1e-3 if unit == "mm" else 1.0
+    radius, height = 0.01, 0.04
+    file.write_text(pin(radius / size, height / size, unit))
+    for chord in (5e-5, 5e-6):
+        (part,) = read_step(file, chord)
+        assert part.closed and part.name == "pin"
+        assert np.ptp(part.vertices[:, 2]) == pytest.approx(height, rel=1e-6)
+        faces = part.vertices[part.triangles]
+        sides = faces[np.ptp(faces[:, :, 2], axis=1) > 0.0]
+        middles = 0.5 * (sides + np.roll(sides, 1, axis=1))[:, :, :2]
+        off = radius - np.linalg.norm(middles, axis=2)
+        assert 0.1 * chord < off.max() <= chord * 1.001
+        assert volume(part) == pytest.approx(np.pi * radius**2 * height, rel=2.0 * chord / radius)
+        red, green, blue = part.colour or (0.0, 0.0, 0.0)
+        assert red > 0.5 and max(green, blue) < 0.1
+
+
+@needs_cascadio
+@pytest.mark.parametrize("text", ["solid pin", "ISO-10303-21;\nrubbish", "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n"])
+def test_what_is_no_step_file_leaves_a_message_and_no_files(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "part.stp"
+    file.write_text(text)
+    with pytest.raises(InputError, match="STEP file"):
+        import_step(file, tmp_path / "project", 1e-5)
+    assert not (tmp_path / "project").exists()
