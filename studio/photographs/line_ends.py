@@ -21,10 +21,10 @@ SURELY = 2.0
 """Standard deviations of the light along the line by which it is to be above half, but no more than midway to all."""
 LOW = 0.25
 """Quantile of light that is in part told by the wings of saturated peaks, which tend to say too much."""
-ASIDE, STRAY = 0.5, 4.0
-"""Widths from where the line goes on to, beyond which it is not the line; so many times its scatter if that is more."""
 WIDER = 3.0
 """Ratio of widths that is no longer one line's."""
+ASIDE, STRAY = 0.5, 4.0
+"""Widths from where the line goes on to, beyond which it is not the line; so many times its scatter if that is more."""
 SURE = 3
 """Scan lines one after the other that are the line's: there it begins."""
 JUMP = 3.0
