@@ -13,7 +13,7 @@ run: $(INSTALLED)
 	$(BIN)/python main.py
 
 test: system-tests lint
-	$(BIN)/pytest -n $(WORKERS)
+	$(BIN)/pytest -n $(WORKERS) --dist worksteal
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .
