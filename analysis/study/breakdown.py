@@ -126,11 +126,15 @@ def _bracket(search: Search, measured: Measured) -> tuple[float | None, float | 
     return good, bad
 
 
-def _breaks(search: Search, repeats: Float) -> bool:
-    """A run that measures nothing at all breaks any limit."""
+def breaks(limit: float, above: bool, repeats: Float) -> bool:
+    """Whether the mean of repeats (n,) is beyond a limit; where nothing at all was measured any limit is broken."""
     found = repeats[np.isfinite(repeats)]
     mean = float(found.mean()) if len(found) else math.nan
-    return not (mean <= search.limit if search.above else mean >= search.limit)
+    return not (mean <= limit if above else mean >= limit)
+
+
+def _breaks(search: Search, repeats: Float) -> bool:
+    return breaks(search.limit, search.above, repeats)
 
 
 def _standard_error(repeats: Float) -> float:

@@ -21,7 +21,7 @@ from studio.study.measuring import tasks
 from studio.study.page import sentences, write_page
 from studio.study.runner import run_study
 from studio.study.store import Store, described
-from studio.study.study import Study, ready_made
+from studio.study.study import SEARCHES, Study, ready_made
 from studio.study.tables import write_tables
 
 
@@ -58,8 +58,8 @@ def run_into(
         known = store.count()
         if not quiet:
             renders = len(tasks(first, study.image_scale, study.laser))
-            searches = sum(sweep.sampling == "bisection" for sweep in study.sweeps)
-            more = f", and what {searches} bisection(s) will ask for" if searches else ""
+            searches = sum(sweep.sampling in SEARCHES for sweep in study.sweeps)
+            more = f", and what {searches} search(es) will ask for" if searches else ""
             there = f"; {known} are there already" if known else ""
             print(f"{len(first)} cells of {renders} renders{more}{there}", file=sys.stderr)
         with stage_progress(quiet) as progress, stop_on_interrupt(never) as cancelled:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.study.boundary import Crossing, boundary
 from analysis.study.breakdown import Breakdown, breakdown
 from analysis.study.budget import Budget, budget
 from analysis.study.cause import cause
@@ -16,7 +17,7 @@ from analysis.study.pareto import Front, bootstrapped_front
 from studio.project.project import Project
 from studio.scan.stages import scaled
 from studio.study.bounds import Bound, bounds
-from studio.study.cells import Point, measured_along, methods_of, search_of
+from studio.study.cells import Point, along, lattice_of, methods_of, on_lattice, search_of, searched
 from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
 from studio.study.ray_units import RAY_SPEED, Throughput, throughput
 from studio.study.store import Row
@@ -50,6 +51,16 @@ class Broken:
 
 
 @dataclass(frozen=True)
+class Edge:
+    """The boundary of one method in a map, by column."""
+
+    method: str
+    crossings: tuple[Crossing, ...]
+    cells: int
+    """Of the lattice, that it took; each has all repeats."""
+
+
+@dataclass(frozen=True)
 class ErrorBudget:
     """What each effect makes of the depth error, by one method: of its bias, m, and of its variance, m^2."""
 
@@ -74,6 +85,8 @@ class Answer:
     """Of a chart of speed: what no method can beat."""
     throughput: Throughput | None = None
     """Of a chart of speed; None: of rows that were measured before it was."""
+    edges: tuple[Edge, ...] = ()
+    """Of a boundary, by method."""
 
 
 def answers(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Answer]:
@@ -100,6 +113,7 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
         _budgets(sweep, study, bases, groups),
         bounds(study, sweep, bases, list(dict.fromkeys(spot.point for spot in spots))),
         _throughput(study, sweep, bases, groups),
+        _edges(study, number, bases, rows),
     )
 
 
@@ -154,7 +168,7 @@ def _broken(
         return ()
     search, found = search_of(sweep), []
     for method in methods_of(study, sweep):
-        known = measured_along(study, number, method, bases, rows)
+        known = along(searched(study, number, method, bases, rows))
         if not {search.good, search.bad} <= known.keys():
             continue
         ended = breakdown(search, known)
@@ -163,6 +177,17 @@ def _broken(
             good, bad = (groups[(value,), method] for value in (search.good, ended.first_bad))
             why = cause(_means(good), _means(bad))
         found.append(Broken(method, ended, why))
+    return tuple(found)
+
+
+def _edges(study: Study, number: int, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> tuple[Edge, ...]:
+    sweep = study.sweeps[number]
+    if sweep.sampling != "boundary":
+        return ()
+    found = []
+    for method in methods_of(study, sweep):
+        known = on_lattice(sweep, searched(study, number, method, bases, rows))
+        found.append(Edge(method, tuple(boundary(lattice_of(sweep), known)), len(known)))
     return tuple(found)
 
 

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from analysis.study.boundary import Lattice, Node, next_nodes
 from analysis.study.breakdown import Search, next_values
 from render.base.errors import InputError
 from studio.project.project import MAX_SEED, Project
 from studio.study.effects import in_state
-from studio.study.study import EFFECTS_FIELD, MOST_CELLS, Study, Sweep, Value, with_fields
+from studio.study.study import EFFECTS_FIELD, MOST_CELLS, SEARCHES, Study, Sweep, Value, with_fields
 
 Point = tuple[Value, ...]
 """One value for each parameter of a sweep."""
@@ -48,9 +49,9 @@ class Cell:
         return changed.in_folder(self.varied.folder)
 
     def part_key(self, study: Study) -> str:
-        """Cells with the same one belong to one shard: those of a render, or of a bisection, which needs its own."""
+        """Cells with the same one belong to one shard: those of a render, or of a search, which needs its own."""
         sweep = study.sweeps[self.sweep]
-        return _hashed(_words([sweep.name, self.method])) if sweep.sampling == "bisection" else self.render_key
+        return _hashed(_words([sweep.name, self.method])) if sweep.sampling in SEARCHES else self.render_key
 
 
 @dataclass(frozen=True)
@@ -76,12 +77,19 @@ def search_of(sweep: Sweep) -> Search:
     return Search(parameter.low, parameter.high, limit.value, limit.above, logarithmic, sweep.tolerance)
 
 
+def lattice_of(sweep: Sweep) -> Lattice:
+    """The lattice of a boundary, of all combinations of both parameters' values."""
+    columns, rows = (len(one.grid()) for one in sweep.vary)
+    assert sweep.limit is not None
+    return Lattice(columns, rows, sweep.limit.value, sweep.limit.above)
+
+
 def methods_of(study: Study, sweep: Sweep) -> tuple[str, ...]:
     return sweep.methods or study.methods
 
 
 def points(sweep: Sweep) -> list[Point]:
-    """What a sweep without bisection measures, in order."""
+    """What a sweep without a search measures, in order."""
     if sweep.sampling == "sobol":
         from scipy.stats import qmc
 
@@ -95,6 +103,7 @@ def check_size(study: Study) -> int:
     total = 0
     for sweep in study.sweeps:
         many = sweep.samples if sweep.sampling == "sobol" else math.prod(len(one.grid()) for one in sweep.vary)
+        # a boundary takes a part of its lattice, how large is not known before
         total += 0 if sweep.sampling == "bisection" else many * len(methods_of(study, sweep)) * study.repeats
     if total > MOST_CELLS:
         cure = "vary less, or fewer values"
@@ -126,52 +135,62 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
 def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Shard = WHOLE) -> list[Cell]:
     """What is to be measured next of a shard, without what has been; empty: it is complete.
 
-    A bisection goes on by what it has measured, each method for itself.
+    A search goes on by what it has measured, each method for itself.
     """
     found: dict[str, Cell] = {}
     for number, sweep in enumerate(study.sweeps):
-        if sweep.sampling != "bisection":
+        if sweep.sampling not in SEARCHES:
             for cell in cells_at(study, number, bases, points(sweep)):
                 found.setdefault(cell.key, cell)
             continue
         for method in methods_of(study, sweep):
-            for cell in _bisected(study, number, method, bases, rows):
-                found.setdefault(cell.key, cell)
+            wanted = _next_points(sweep, searched(study, number, method, bases, rows))
+            for cell in cells_at(study, number, bases, wanted):
+                if cell.method == method:
+                    found.setdefault(cell.key, cell)
     return [cell for key, cell in found.items() if key not in rows and shard.holds(cell.part_key(study))]
 
 
-def measured_along(
+def searched(
     study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows
-) -> dict[float, np.ndarray]:
-    """Repeats of a bisection's measure by the parameter's value, as far as the search has asked for them."""
+) -> dict[Point, np.ndarray]:
+    """Repeats of a search's measure by point, as far as it has asked for them."""
     sweep = study.sweeps[number]
-    assert sweep.limit is not None
-    known: dict[float, np.ndarray] = {}
-    search = search_of(sweep)
+    known: dict[Point, np.ndarray] = {}
     while True:
-        values = next_values(search, known)
-        found = {value: _repeats(study, number, method, bases, rows, value) for value in values}
-        complete = {value: repeats for value, repeats in found.items() if repeats is not None}
+        wanted = _next_points(sweep, known)
+        found = {point: _repeats(study, number, method, bases, rows, point) for point in wanted}
+        complete = {point: repeats for point, repeats in found.items() if repeats is not None}
         known |= complete
-        if not values or len(complete) < len(values):
+        if not wanted or len(complete) < len(wanted):
             return known
 
 
-def _bisected(study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows) -> Iterator[Cell]:
-    known = measured_along(study, number, method, bases, rows)
-    values = next_values(search_of(study.sweeps[number]), known)
-    for cell in cells_at(study, number, bases, [(value,) for value in values]):
-        if cell.method == method:
-            yield cell
+def along(known: Mapping[Point, np.ndarray]) -> dict[float, np.ndarray]:
+    """What a bisection has measured, by the parameter's value."""
+    return {float(point[0]): repeats for point, repeats in known.items()}  # type: ignore[arg-type]
+
+
+def on_lattice(sweep: Sweep, known: Mapping[Point, np.ndarray]) -> dict[Node, np.ndarray]:
+    """What a boundary has measured, by column and row."""
+    column, row = ({value: i for i, value in enumerate(one.grid())} for one in sweep.vary)
+    return {(column[point[0]], row[point[1]]): repeats for point, repeats in known.items()}
+
+
+def _next_points(sweep: Sweep, known: Mapping[Point, np.ndarray]) -> list[Point]:
+    if sweep.sampling == "bisection":
+        return [(value,) for value in next_values(search_of(sweep), along(known))]
+    first, second = (one.grid() for one in sweep.vary)
+    return [(first[i], second[j]) for i, j in next_nodes(lattice_of(sweep), on_lattice(sweep, known))]
 
 
 def _repeats(
-    study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows, value: float
+    study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows, point: Point
 ) -> np.ndarray | None:
     """None: not all repeats are measured."""
     limit = study.sweeps[number].limit
     assert limit is not None
-    cells = [cell for cell in cells_at(study, number, bases, [(value,)]) if cell.method == method]
+    cells = [cell for cell in cells_at(study, number, bases, [point]) if cell.method == method]
     if not all(cell.key in rows for cell in cells):
         return None
     return np.array([rows[cell.key][limit.measure] for cell in cells], dtype=np.float64)

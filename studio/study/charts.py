@@ -11,6 +11,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from analysis.report.colour import INK, MUTED, method_colour, method_name
 from analysis.report.style import figure
 from studio.study.answers import Answer, Spot
+from studio.study.boundary_chart import DASHES, draw_edges
 from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
 from studio.study.measures import MEASURES, Measure
@@ -20,14 +21,13 @@ from studio.study.study import Parameter, Value
 MARKERS = "osD^vP*X<>"
 MOST_IN_LEGEND = 5
 """Methods; more are named at their marks."""
-DASHES = ("-", "--", "-.", ":")
 
 
 def chart(answer: Answer, labels: dict[str, str]) -> Any:
     """A matplotlib figure of one sweep. labels: of the fields, with their units."""
     if answer.sweep.chart == "budget":
         return budget_figure(answer.budgets[0])
-    draw = {"sweep": _sweep, "speed": _speed, "map": _map}[answer.sweep.chart]
+    draw = {"sweep": _sweep, "speed": _speed, "map": _boundary if answer.edges else _map}[answer.sweep.chart]
     with figure(3.4) as made:
         axes = made.subplots()
         draw(axes, answer, labels)
@@ -227,9 +227,21 @@ def _map(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     axes.figure.colorbar(mesh, ax=axes, label=_axis_label(measure))
     if sweep.limit is not None and sweep.limit.measure == sweep.measure and min(z.shape) > 1:
         axes.contour(x, y, z, levels=[sweep.limit.value * measure.scale], colors="white", linewidths=1.5)
-    for axis, parameter in zip("xy", sweep.vary, strict=True):
-        axes.set(**{f"{axis}label": field_label(parameter, labels), f"{axis}scale": _scale(parameter)})
+    _label_map(axes, answer, labels)
     axes.set_title(method_name(method), fontweight="normal")
+
+
+def _boundary(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
+    """Where the limit is crossed over two parameters, by each method."""
+    draw_edges(axes, answer)
+    _label_map(axes, answer, labels)
+    for axis, parameter in zip("xy", answer.sweep.vary, strict=True):
+        axes.set(**{f"{axis}lim": sorted((parameter.at(0.0), parameter.at(1.0)))})
+
+
+def _label_map(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
+    for axis, parameter in zip("xy", answer.sweep.vary, strict=True):
+        axes.set(**{f"{axis}label": field_label(parameter, labels), f"{axis}scale": _scale(parameter)})
 
 
 def _scale(parameter: Parameter) -> str:

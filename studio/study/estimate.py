@@ -10,14 +10,16 @@ import numpy as np
 
 from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
-from studio.study.cells import cells_at, check_size, methods_of, next_cells, points
+from studio.study.cells import cells_at, check_size, lattice_of, methods_of, next_cells, points
 from studio.study.measuring import measure_task, tasks, warm_up
 from studio.study.store import Row
-from studio.study.study import Study
+from studio.study.study import SEARCHES, Study
 from studio.study.tables import SECONDS, measured_cells
 
 ROW_BYTES, CHART_BYTES = 2500, 250_000
 """On disk: of a cell in the store and the tables, and of a sweep's chart alone and in the page."""
+A_COLUMN = 5
+"""Cells of a boundary's column, about."""
 
 Costs = tuple[float, float]
 """Processor seconds of a render, and of developing and measuring one cell of it."""
@@ -30,7 +32,7 @@ class Estimate:
     cells: int
     renders: int
     searched: int
-    """Cells that the bisections may ask for beside those."""
+    """Cells that the searches may ask for beside those."""
     seconds: float | None
     """Of one processor; None: no cell of some sweep was timed yet."""
     bytes: int
@@ -48,8 +50,10 @@ def estimate(
         mine = [cell for cell in missing if cell.sweep == number]
         frames = len(tasks(mine, study.image_scale, study.laser))
         more = 0
-        if sweep.sampling == "bisection" and mine:
+        if sweep.sampling in SEARCHES and mine:
             steps = math.ceil(math.log2(1.0 / sweep.tolerance)) + EXTRA
+            if sweep.sampling == "boundary":
+                steps = lattice_of(sweep).columns * A_COLUMN
             more = steps * study.repeats * len(methods_of(study, sweep))
         cells, renders, searched = cells + len(mine), renders + frames, searched + more
         cost = _known(study, number, bases, rows) or timed.get(sweep.name)

@@ -14,13 +14,14 @@ from analysis.report.style import png_uri
 from render.base.files import atomic_write
 from studio.project.project import Project
 from studio.study.answers import Answer, Broken, answers
+from studio.study.boundary_table import edge_rows, edge_sentences, write_edges
 from studio.study.bounds import Bound
 from studio.study.budget_table import HEADER, page_rows, sentences_of, write_budgets
 from studio.study.charts import chart, field_label, shown
 from studio.study.labels import field_labels
 from studio.study.measures import MEASURES
 from studio.study.store import Row
-from studio.study.study import Study
+from studio.study.study import Study, Sweep
 
 
 def write_page(
@@ -45,11 +46,12 @@ def write_page(
                 "picture": png_uri(made),
                 "lines": sentences(answer, labels),
                 "header": _header(answer, labels),
-                "table": page_rows(answer.budgets[0]) if answer.budgets else table(answer),
+                "table": _page_table(answer),
             }
         )
         write_budgets(folder, answer.budgets, number + 1)
         write_bounds(folder, answer, number + 1)
+        write_edges(folder, answer, number + 1)
     content = {
         "study": study,
         "parts": parts,
@@ -66,6 +68,8 @@ def write_page(
 def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
     """What a sweep found, in words."""
     said = [_breakdown_sentence(one, answer, labels) for one in answer.broken] + sentences_of(answer.budgets)
+    if answer.edges:
+        said += edge_sentences(answer, _limit_words(answer.sweep))
     said += [_bound_sentence(one, answer, labels) for one in answer.bounds]
     front = answer.front
     if front is not None and front.knee is not None:
@@ -81,13 +85,16 @@ def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
     return said
 
 
-def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -> str:
-    sweep, ended = answer.sweep, found.breakdown
+def _limit_words(sweep: Sweep) -> str:
     assert sweep.limit is not None
     measure = MEASURES[sweep.limit.measure]
     limit = f"{measure.label} {'below' if sweep.limit.above else 'above'} {sweep.limit.value * measure.scale:.4g}"
-    limit = f"{limit} {measure.unit}".rstrip()
-    parameter = field_label(sweep.vary[0], labels)
+    return f"{limit} {measure.unit}".rstrip()
+
+
+def _breakdown_sentence(found: Broken, answer: Answer, labels: dict[str, str]) -> str:
+    sweep, ended = answer.sweep, found.breakdown
+    limit, parameter = _limit_words(sweep), field_label(sweep.vary[0], labels)
     name = method_name(found.method)
     if ended.ending == "holds":
         return f"{name}: {limit} holds as far as {parameter} {shown(ended.last_good)}."
@@ -123,7 +130,22 @@ def write_bounds(folder: Path, answer: Answer, number: int) -> None:
 def _header(answer: Answer, labels: dict[str, str]) -> list[str]:
     if answer.budgets:
         return list(HEADER)
+    if answer.edges:
+        first, second = (field_label(one, labels) for one in answer.sweep.vary)
+        return [first, "method", second, "95 % interval", "limit"]
     return [*(field_label(one, labels) for one in answer.sweep.vary), "method", *columns(answer)]
+
+
+def _page_table(answer: Answer) -> list[list[str]]:
+    if answer.budgets:
+        return page_rows(answer.budgets[0])
+    if not answer.edges:
+        return table(answer)
+    rows = edge_rows(answer.sweep, answer.edges)
+    return [
+        [shown(x), method_name(method), _number(y), f"{_number(low)} to {_number(high)}", ending]
+        for x, method, y, low, high, ending in rows
+    ]
 
 
 def columns(answer: Answer) -> list[str]:

@@ -25,6 +25,8 @@ from studio.study.measures import MEASURES
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "studies"
 MOST_VALUES, MOST_CELLS, MOST_VARIED, MOST_SWEEPS = 10_000, 1_000_000, 8, 100
 Value = bool | int | float | str | None
+SEARCHES = ("bisection", "boundary")
+"""Samplings that go on by what they have measured, each method for itself."""
 EFFECTS_FIELD = "effects"
 """What a sweep of effects varies in place of a field: `studio.study.effects.STATES`."""
 
@@ -90,11 +92,12 @@ class Sweep(Model):
     base: str | None = quantity(None, label="Base project", help="In place of the study's.")
     set: dict[str, Value] = Field(default_factory=dict, description="Fields of the project that are fixed.")
     vary: tuple[Parameter, ...] = ()
-    sampling: Literal["grid", "sobol", "bisection", "effects"] = quantity(
+    sampling: Literal["grid", "sobol", "bisection", "boundary", "effects"] = quantity(
         "grid",
         label="Sampling",
         help="grid: all combinations. sobol: quasi-random in the ranges. bisection: where the limit is crossed, from "
-        "low, where it is to hold, to high. effects: what makes the error, each effect switched off and on alone.",
+        "low, where it is to hold, to high. boundary: the same along the second parameter, at each value of the "
+        "first. effects: what makes the error, each effect switched off and on alone.",
     )
     samples: int = quantity(64, label="Samples", help="Of sobol.", ge=2, le=65536)
     tolerance: float = quantity(0.01, label="Tolerance", help="Of bisection, as a share of the range.", gt=1e-6, le=0.5)
@@ -122,6 +125,11 @@ class Sweep(Model):
         return self.model_copy(update={"vary": (states,), "chart": "budget"})
 
     @model_validator(mode="after")
+    def _boundary_is_a_map(self) -> Self:
+        """What a boundary measures is of no use along one parameter."""
+        return self.model_copy(update={"chart": "map"}) if self.sampling == "boundary" else self
+
+    @model_validator(mode="after")
     def _fits(self) -> Self:
         check_measure(self.measure)
         if (self.chart == "budget") != (self.sampling == "effects"):
@@ -131,10 +139,12 @@ class Sweep(Model):
         fields = [one.field for one in self.vary]
         if len(set(fields)) < len(fields) or set(fields) & self.set.keys():
             raise ValueError("a field is there twice; allowed: each once in vary and set together")
-        if self.sampling in ("sobol", "bisection") and any(one.values for one in self.vary):
+        if self.sampling in ("sobol", *SEARCHES) and any(one.values for one in self.vary):
             raise ValueError(f"{self.sampling} takes ranges; allowed: low and high for every parameter")
         if self.sampling == "bisection" and (len(self.vary) != 1 or self.limit is None):
             raise ValueError("bisection looks for one limit along one parameter; allowed: one in vary, and a limit")
+        if self.sampling == "boundary" and (len(self.vary) != 2 or self.limit is None):
+            raise ValueError("a boundary is of one limit in a map of two parameters; allowed: two in vary, and a limit")
         if self.chart == "map" and len(self.vary) != 2:
             raise ValueError(f"a map has two parameters; found {len(self.vary)}; allowed: two in vary")
         return self
@@ -161,8 +171,8 @@ class Study(Model):
             raise ValueError(f"there is nothing to run; allowed: a method, and 1 to {MOST_SWEEPS} sweeps")
         if len(set(names)) < len(names):
             raise ValueError("two sweeps have one name; allowed: each its own")
-        if self.repeats < 3 and any(sweep.sampling in ("bisection", "effects") for sweep in self.sweeps):
-            raise ValueError("bisection and effects tell noise from change by repeats; allowed: repeats of at least 3")
+        if self.repeats < 3 and any(sweep.sampling in (*SEARCHES, "effects") for sweep in self.sweeps):
+            raise ValueError("searches and effects tell noise from change by repeats; allowed: repeats of at least 3")
         return self
 
     @classmethod

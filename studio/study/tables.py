@@ -15,11 +15,11 @@ import numpy as np
 
 from render.base.files import atomic_write
 from studio.project.project import Project
-from studio.study.cells import Cell, Point, cells_at, measured_along, methods_of, points
+from studio.study.cells import Cell, Point, cells_at, methods_of, points, searched
 from studio.study.measures import MEASURES
 from studio.study.ray_units import MILLION, RAY_SPEED
 from studio.study.store import Row
-from studio.study.study import Study
+from studio.study.study import SEARCHES, Study
 
 SECONDS = ("seconds_render", "seconds_develop", "seconds_extract")
 RAY_UNITS = "ray_units"
@@ -32,13 +32,10 @@ def measured_cells(
     """A sweep's cells that are measured, with their rows: by point, method and repeat, whatever the order of work."""
     sweep = study.sweeps[number]
     wanted: dict[str | None, list[Point]]
-    if sweep.sampling != "bisection":
+    if sweep.sampling not in SEARCHES:
         wanted = {None: points(sweep)}
     else:
-        wanted = {
-            method: [(value,) for value in sorted(measured_along(study, number, method, bases, rows))]
-            for method in methods_of(study, sweep)
-        }
+        wanted = {method: sorted(searched(study, number, method, bases, rows)) for method in methods_of(study, sweep)}
     for method, found in wanted.items():
         for cell in cells_at(study, number, bases, found):
             if cell.key in rows and method in (None, cell.method):

@@ -39,6 +39,7 @@ SAMPLINGS = [
     ("All combinations", "grid", "Every value of one field with every value of the others"),
     ("Quasi-random", "sobol", "Spread evenly over the ranges (Sobol)"),
     ("Search the limit", "bisection", "Where the limit is crossed, from the first end, where it holds, to the other"),
+    ("Search a boundary", "boundary", "Where the limit is crossed in a map: along the second field, over the first"),
 ]
 CHARTS = [
     ("Over the first field", "sweep", "A line for each method and each combination of the other fields"),
@@ -145,7 +146,7 @@ class SweepEditor(QWidget):
                 self.list.addWidget(row)
         for row, parameter in zip(self.rows, vary, strict=True):
             row.refresh(parameter)
-            row.allow_count(work.sweep.get("sampling", "grid") == "grid")
+            row.allow_count(work.sweep.get("sampling", "grid") in ("grid", "boundary"))
         self.hint.setVisible(not vary)
 
     def _remove(self, number: int) -> None:
@@ -188,7 +189,9 @@ class SweepEditor(QWidget):
         values: dict[str, Any] = {"sampling": sampling}
         values["samples"] = self.work.sweep.get("samples", SAMPLES) if sampling == "sobol" else None
         values["tolerance"] = self.work.sweep.get("tolerance", TOLERANCE) if sampling == "bisection" else None
-        if sampling == "bisection" and "limit" not in self.work.sweep:
+        if sampling == "boundary":
+            values["chart"] = "map"
+        if sampling in ("bisection", "boundary") and "limit" not in self.work.sweep:
             values["limit"] = self._first_limit()
         self.work.change_sweep(**values)
 

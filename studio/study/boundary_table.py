@@ -1,0 +1,67 @@
+"""A boundary in numbers: rows for the page, a CSV file in the project's units, and what it says in words."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from analysis.report.colour import method_name
+from render.base.files import atomic_write
+from studio.study.answers import Answer, Edge
+from studio.study.boundary_chart import column_value, row_value
+from studio.study.cells import lattice_of
+from studio.study.study import Sweep
+
+Row = tuple[float, str, float, float, float, str]
+"""First parameter, method, boundary in the second, its interval, ending."""
+
+
+def edge_rows(sweep: Sweep, edges: Sequence[Edge]) -> list[Row]:
+    """A row for each column of each method; NaN where the column has no boundary."""
+    rows: list[Row] = []
+    for edge in edges:
+        for one in edge.crossings:
+            low, high = sorted(row_value(sweep, row) for row in (one.low, one.high))
+            rows.append(
+                (column_value(sweep, one.column), edge.method, row_value(sweep, one.row), low, high, one.ending)
+            )
+    return rows
+
+
+def write_edges(folder: Path, answer: Answer, number: int) -> None:
+    """`boundary_N.csv`, of a chart that has some."""
+    if not answer.edges:
+        return
+    fields = [one.field for one in answer.sweep.vary]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([fields[0], "method", fields[1], "low", "high", "ending"])
+    for row in edge_rows(answer.sweep, answer.edges):
+        writer.writerow(["" if isinstance(one, float) and math.isnan(one) else one for one in row])
+    with atomic_write(folder / f"boundary_{number}.csv") as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+
+
+def edge_sentences(answer: Answer, limit: str) -> list[str]:
+    """limit: what is to hold, in words."""
+    return [_sentence(answer.sweep, edge, limit) for edge in answer.edges]
+
+
+def _sentence(sweep: Sweep, edge: Edge, limit: str) -> str:
+    lattice = lattice_of(sweep)
+    all_cells, known = lattice.columns * lattice.rows, len(edge.crossings)
+    count = {ending: sum(one.ending == ending for one in edge.crossings) for ending in ("found", "holds", "fails")}
+    others = [
+        f"{count[ending]} {words}"
+        for ending, words in (("holds", "keep it throughout"), ("fails", "break it throughout"))
+        if count[ending]
+    ]
+    known_of = f"{known} columns" if known == lattice.columns else f"{known} of {lattice.columns} columns so far"
+    return (
+        f"{method_name(edge.method)}: {limit} has its boundary in {count['found']} of {known_of}"
+        f"{'; ' if others else ''}{', '.join(others)}. It took {edge.cells} of the map's {all_cells} cells "
+        f"({edge.cells / all_cells:.0%})."
+    )
