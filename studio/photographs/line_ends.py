@@ -15,18 +15,16 @@ from studio.photographs.line_arrays import changed
 
 NEXT = 16
 """Scan lines that an end is compared with, and as many as blur may lengthen a line by."""
-HALF, TONED = 0.5, 0.735
-"""Of the number, at which half of the light is shown: as it is, and by the tone curve of sRGB (IEC 61966-2-1)."""
-SURELY = 2.0
-"""Standard deviations of the light along the line by which it is to be above half, but no more than midway to all."""
-LOW = 0.25
-"""Quantile of light that is in part told by the wings of saturated peaks, which tend to say too much."""
-WIDER = 3.0
-"""Ratio of widths that is no longer one line's."""
+HALF, TONED = 0.5, 0.63
+"""Of the number, at which half of the light is shown: as it is, and by a gamma of 1.5, midway to what eyes expect."""
 ASIDE, STRAY = 0.5, 4.0
 """Widths from where the line goes on to, beyond which it is not the line; so many times its scatter if that is more."""
+WIDER = 3.0
+"""Ratio of widths that is no longer one line's."""
+SURELY = 1.0
+"""Standard deviations of the light along the line by which it is to be above half, but no more than midway to all."""
 SURE = 3
-"""Scan lines one after the other that are the line's: there it begins."""
+"""Scan lines one after the other that are the line's: there it begins; fewer between two jumps are no piece of it."""
 JUMP = 3.0
 """Widths from one scan line to the next at which a piece of the line ends."""
 
@@ -65,7 +63,8 @@ class _Found:
 
     def usual(self, some: NDArray[np.intp]) -> float:
         """Amplitude of some of them."""
-        return float(np.quantile(self.amplitude[some], LOW if self.saturated[some].any() else 0.5))
+        # what is told by the wings of saturated peaks tends to be too much
+        return float(np.quantile(self.amplitude[some], 0.25 if self.saturated[some].any() else 0.5))
 
 
 def _past(found: _Found, half: float) -> NDArray[np.bool_]:
@@ -80,6 +79,8 @@ def _past(found: _Found, half: float) -> NDArray[np.bool_]:
         if len(piece) > 2 * NEXT:
             for inward in (piece, piece[::-1]):
                 past[inward[: _first(found, inward, half)]] = True
+        elif len(piece) < SURE and len(long):
+            past[piece] = True
         elif len(piece) <= NEXT and len(long):
             nearest = long[np.argsort(np.abs(long - piece.mean()), kind="stable")[:NEXT]]
             seen = float(np.median(width[piece])), float(np.median(found.amplitude[piece]))
@@ -99,7 +100,8 @@ def _first(found: _Found, inward: NDArray[np.intp], half: float) -> int:
         there.append(alike(found.width[at], found.amplitude[at], found.width[inside], usual))
         on.append(there[-1] and _goes_on(found, at, inside))
         surely.append(on[-1] and found.amplitude[at] >= asked * usual)
-    begins = [k for k in range(NEXT) if all(there[k : k + SURE])]
+    # one that is wild, as a saturated fit may be, is no end
+    begins = [k for k in range(NEXT) if there[k] and sum(there[k : k + SURE]) >= SURE - 1]
     likely = [k for k in range(NEXT) if on[k]] if begins else []
     return next((k for k in begins if surely[k]), likely[0] if likely else 0)
 

@@ -14,6 +14,7 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 import main
+from studio.photographs.image_files import has_coarse_colour
 from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
 
 SCENES: dict[str, tuple[Scene, int | None]] = {
@@ -222,3 +223,12 @@ def test_a_wider_view_of_the_same_wall_leaves_the_line_as_it_is(tmp_path: Path) 
     assert np.isfinite(found[0][0]).mean() >= 0.98
     np.testing.assert_allclose(found[0][0] - left, found[1][0], atol=1e-6)
     np.testing.assert_allclose(found[0][1], found[1][1], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("quality", "coarse"), [(None, False), (95, True), (88, True)])
+def test_colour_that_was_made_coarse_is_told_beside_a_bright_line_too(quality: int | None, coarse: bool) -> None:
+    image = photograph(Scene(peak=2500.0, colour=2, sigma=5.0), seed=4)
+    if quality is not None:
+        options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, 0x221111]
+        image = cv2.imdecode(cv2.imencode(".jpg", image, options)[1], cv2.IMREAD_COLOR)
+    assert has_coarse_colour(np.ascontiguousarray(image)) is coarse

@@ -75,7 +75,7 @@ def test_a_short_piece_far_off_is_the_line_only_if_it_is_as_bright() -> None:
 def test_a_tone_curve_shows_half_of_the_light_at_more_than_half_of_the_number() -> None:
     sharp = np.zeros(COUNT)
     sharp[FIRST : LAST + 1] = 1.0
-    shown = 200.0 * np.maximum(gaussian_filter1d(sharp, 1.5), 1e-6) ** (1.0 / 2.2)
+    shown = 200.0 * np.maximum(gaussian_filter1d(sharp, 1.5), 1e-6) ** (1.0 / 1.5)
     line = line_of(shown)
     assert np.flatnonzero(ended(line, TONED).valid[:, 0]).tolist() == list(range(FIRST, LAST + 1))
     assert ended(line).valid.sum() > LAST - FIRST + 1
