@@ -159,6 +159,7 @@ def style_sheet(c: Colours) -> str:
     QPushButton#primary:enabled {{ background: {c.accent}; color: {c.on_accent}; border: 1px solid {c.accent};
         border-radius: 3px; padding: 3px 14px; font-weight: 600; }}
     QPushButton#primary:enabled:hover {{ background: {mixed(c.accent, c.text, 0.85)}; }}
+    QToolButton#fix {{ color: {c.accent}; border-color: {c.accent}; padding: 0 9px; font-weight: 600; }}
     QPushButton#choice {{ text-align: left; padding-left: 4px; }}
     QMenuBar {{ background: {c.window}; }}
     QMenuBar::item {{ padding: 4px 9px; background: transparent; border-radius: 4px; }}

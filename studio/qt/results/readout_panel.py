@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QFrame, QGridLayout, QLabel, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFrame,
+    QGridLayout,
+    QLabel,
+    QScrollArea,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from studio.preview.readout_rows import Row, rows
 from studio.preview.readouts import readouts
+from studio.preview.remedies import Remedy
 from studio.qt.core import theme
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
+from studio.qt.results.remedy_list import RemedyList, sentence
 
 
 class ReadoutPanel(QWidget):
@@ -29,8 +43,15 @@ class ReadoutPanel(QWidget):
         self._hint.setObjectName("muted")
         self._labels: dict[str, tuple[QLabel, QLabel, QLabel]] = {}
         inner = QFrame()
-        self._grid = QGridLayout(inner)
-        self._grid.setContentsMargins(10, 8, 10, 8)
+        column = QVBoxLayout(inner)
+        column.setContentsMargins(10, 8, 10, 8)
+        self._grid = QGridLayout()
+        column.addLayout(self._grid)
+        self.fixes = RemedyList(session)
+        self._fix: dict[str, QToolButton] = {}
+        """In the rows that something would fix."""
+        column.addWidget(self.fixes)
+        column.addStretch(1)
         self._grid.setHorizontalSpacing(12)
         self._grid.setVerticalSpacing(5)
         self._grid.setColumnStretch(2, 1)
@@ -51,6 +72,7 @@ class ReadoutPanel(QWidget):
         session.problems_changed.connect(self._refresh)
         session.selection_changed.connect(self._follow_selection)
         theme.notice.changed.connect(self._paint)
+        self.fixes.changed.connect(self._offer_fixes)
         self._rows: tuple[Row, ...] = ()
         self._refresh()
 
@@ -85,13 +107,14 @@ class ReadoutPanel(QWidget):
         if shown != self._rows:
             self._rows = shown
             self._paint()
+        self.fixes.follow(self.laser, any(row.level for row in shown))
 
     def _paint(self) -> None:
         colours = theme.colours()
         keys = {row.key for row in self._rows}
         for key, labels in self._labels.items():
             for label in labels:
-                label.setVisible(key in keys)
+                label.setVisible(key in keys and not (key in self._fix and label is labels[2]))
         tints = {"": colours.text, "warning": colours.warning, "error": colours.error}
         for row in self._rows:
             name, value, note = self._labels.get(row.key) or self._add(row.key)
@@ -107,6 +130,28 @@ class ReadoutPanel(QWidget):
                 if label.styleSheet() != style:
                     label.setStyleSheet(style)
                 label.setToolTip(f"<p>{row.help}</p>")
+
+    def _offer_fixes(self) -> None:
+        """A button in each row that something would fix, in the place of its range."""
+        for key, button in self._fix.items():
+            button.hide()
+            button.deleteLater()
+            self._labels[key][2].show()
+        self._fix = {}
+        for one in self.fixes.found:
+            button = QToolButton()
+            button.setText("Fix")
+            button.setObjectName("fix")
+            button.setToolTip(f"<p>{sentence(one)}. Ctrl+Z takes it back.</p>")
+            button.clicked.connect(partial(self._apply, one))
+            name, _, note = self._labels[one.key]
+            note.hide()
+            line = self._grid.getItemPosition(self._grid.indexOf(name))[0]  # type: ignore[index]
+            self._grid.addWidget(button, line, 2, Qt.AlignmentFlag.AlignLeft)
+            self._fix[one.key] = button
+
+    def _apply(self, remedy: Remedy, _checked: bool = False) -> None:
+        self.fixes.apply(remedy)
 
     def _add(self, key: str) -> tuple[QLabel, QLabel, QLabel]:
         """A line of labels at the end."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtWidgets import QComboBox, QLabel
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
 from pytestqt.qtbot import QtBot
 
 from render.base.pose import Pose
@@ -72,3 +72,21 @@ def test_without_a_laser_it_says_what_to_do(qtbot: QtBot) -> None:
     panel._session.set(LASERS, ())
     qtbot.waitUntil(lambda: panel.rows() == ())
     assert label_of(panel, "Add a laser to the rig to see what it measures.").isVisible()
+
+
+def test_what_would_fix_it_is_applied_by_a_click_and_undone(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    session, fixes = panel._session, panel.fixes
+    assert not fixes.isVisible()
+    session.set((*LASERS, 0, "power"), 2.0)
+    qtbot.waitUntil(lambda: bool(fixes.found) and fixes.isVisible())
+    bad = session.project
+    apply = next(button for button in fixes.findChildren(QPushButton) if button.text() == "Apply")
+    apply.click()
+    qtbot.waitUntil(lambda: value_of(panel, "saturated") == "0%" and not fixes.isVisible())
+    assert session.project.sensor.exposure_time < bad.sensor.exposure_time
+    session.document.undo()
+    assert session.project == bad
+    qtbot.waitUntil(lambda: "saturated" in panel._fix)
+    panel._fix["saturated"].click()  # the same in its row
+    qtbot.waitUntil(lambda: value_of(panel, "saturated") == "0%" and not panel._fix)

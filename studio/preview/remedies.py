@@ -1,0 +1,196 @@
+"""What would fix a read-out that is out of range: changes of the project that are tried, each with what it gains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from render.base.errors import InputError
+from render.laser.laser import Waist
+from studio.editing.placing import aimed, at_angle
+from studio.editing.units import Unit
+from studio.preview.estimates import SHARP_PX
+from studio.preview.inspection import NARROW_PX, WIDE_PX
+from studio.preview.preview import Look
+from studio.preview.readout_rows import Row, rows
+from studio.preview.readouts import Readouts, readouts
+from studio.project.document import FieldPath, replaced
+from studio.project.project import Project
+
+FILLED = 0.7
+"""Of the full well, by the brightest pixel of the line: the rest is for noise and for light that is not foreseen."""
+ANGLES = (30.0, 20.0, 45.0)
+"""Degrees of triangulation, the best first."""
+STOPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0)
+TOLD_FROM = 0.02
+"""Change of the depth's sigma, as a share."""
+RANK = {"": 0, "warning": 1, "error": 2}
+EXPOSURE: FieldPath = ("sensor", "exposure_time")
+LENS: FieldPath = ("scene", "rig", "camera", "lens")
+Change = tuple[str, Project]
+"""What is done, and the project with it."""
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A change that brings a read-out nearer to its range, and none out of it."""
+
+    key: str
+    """Of the read-out's row."""
+    label: str
+    gain: str
+    """The read-out before and after."""
+    project: Project
+
+
+def remedies(look: Look, laser: int, look_at: Callable[[Project], Look]) -> tuple[Remedy, ...]:
+    """For each read-out that is out of range the first change that helps, if any does.
+
+    look_at: the same scene with another project; a change is tried by reading it out.
+    """
+    now = readouts(look, laser)
+    before = {row.key: row for row in rows(now)}
+    found: list[Remedy] = []
+    for row in before.values():
+        if not row.level or any(one.key == row.key for one in found):
+            continue
+        for label, project in _changes(row.key, look, laser, now):
+            then = readouts(look_at(project), laser)
+            after = {one.key: one for one in rows(then)}
+            if _helps(row.key, before, after):
+                gain = f"{row.label.lower()} {_value(row)} → {_value(after[row.key])}"
+                if now.depth_sigma and then.depth_sigma and abs(then.depth_sigma / now.depth_sigma - 1.0) > TOLD_FROM:
+                    gain += f", depth noise {before['sigma'].value} → {after['sigma'].value}"
+                found.append(Remedy(row.key, label, gain, project))
+                break
+    return tuple(found)
+
+
+def automatic_exposure(project: Project, now: Readouts) -> Change | None:
+    """An exposure that fills FILLED of the full well where the line is brightest; None: there is no line to go by.
+
+    InputError: it would be beyond what an exposure may be.
+    """
+    if now.peak_electrons is None or not now.peak_electrons.high > 0.0:
+        return None
+    before = project.sensor.exposure_time
+    time = float(f"{before * FILLED * now.full_well / now.peak_electrons.high:.3g}")
+    return _told("exposure", "s", before, time), replaced(project, EXPOSURE, time)
+
+
+def _changes(key: str, look: Look, laser: int, now: Readouts) -> Iterator[Change]:
+    """What may help a read-out, the least intrusive first; what no project may have is left out."""
+    tries = {
+        "peak": (_exposed,),
+        "saturated": (_exposed,),
+        "angle": tuple(_turned(angle) for angle in ANGLES),
+        "occluded": tuple(_turned(angle) for angle in ANGLES[1:]),
+        "working": (_aimed,),
+        "width": (_sheet,),
+        "blur": (_focused, _stopped_down),
+    }
+    for attempt in tries.get(key, ()):
+        try:
+            change = attempt(look, laser, now)
+        except InputError:
+            continue
+        if change is not None:
+            yield change
+
+
+def _exposed(look: Look, laser: int, now: Readouts) -> Change | None:
+    return automatic_exposure(look.project, now)
+
+
+def _turned(degrees: float) -> Callable[[Look, int, Readouts], Change | None]:
+    def change(look: Look, laser: int, now: Readouts) -> Change | None:
+        if now.triangulation_angle is None:
+            return None
+        scene = look.project.scene
+        T_rig_camera = scene.camera.T_rig_camera.matrix
+        points = look.lit(laser).curve.point
+        point = T_rig_camera[:3, :3] @ np.median(points, axis=0) + T_rig_camera[:3, 3]
+        before = scene.lasers[laser].T_rig_laser
+        pose = at_angle(before, T_rig_camera[:3, 3], point, math.radians(degrees))
+        label = _told("triangulation angle", "rad", now.triangulation_angle.middle, math.radians(degrees))
+        return label, replaced(look.project, (*_laser(laser), "T_rig_laser"), pose)
+
+    return change
+
+
+def _aimed(look: Look, laser: int, now: Readouts) -> Change | None:
+    """At the middle of what the camera sees, in the depth of the objects, else in that of the focus."""
+    scene = look.project.scene
+    to_camera = np.linalg.inv(scene.T_world_camera(look.step))
+    depths = [float((to_camera @ scene.T_world_object(item, look.step)[:, 3])[2]) for item in scene.visible_objects]
+    ahead = [depth for depth in depths if depth > 0.0]
+    depth = float(np.median(ahead)) if ahead else scene.camera.lens.focus_distance
+    if depth is None:
+        return None
+    point = (scene.camera.T_rig_camera.matrix @ [0.0, 0.0, depth, 1.0])[:3]
+    pose = aimed(scene.lasers[laser].T_rig_laser, point)
+    return "aim the laser at the camera's view", replaced(look.project, (*_laser(laser), "T_rig_laser"), pose)
+
+
+def _sheet(look: Look, laser: int, now: Readouts) -> Change | None:
+    if now.width_px is None:
+        return None
+    width = now.width_px.middle
+    wanted = 2.0 * NARROW_PX if width < NARROW_PX else 0.5 * WIDE_PX
+    sheet = look.project.scene.lasers[laser].sheet
+    if isinstance(sheet, Waist):
+        distance = float(np.median(look.lit(laser).curve.depth_range))
+        path: FieldPath = (*_laser(laser), "sheet", "focus_distance")
+        before, value = sheet.focus_distance, float(f"{distance:.3g}")
+        return _told("the laser's focus", "m", before, value), replaced(look.project, path, value)
+    path, before = (*_laser(laser), "sheet", "full_angle"), sheet.full_angle
+    value = float(f"{before * wanted / width:.3g}")
+    return _told("the sheet's divergence", "rad", before, value, "mrad"), replaced(look.project, path, value)
+
+
+def _focused(look: Look, laser: int, now: Readouts) -> Change | None:
+    """On the depth whose vergence is in the middle of the line's."""
+    if now.distance is None:
+        return None
+    before = look.project.scene.camera.lens.focus_distance
+    value = float(f"{2.0 / (1.0 / now.distance.low + 1.0 / now.distance.high):.4g}")
+    return _told("focus", "m", before, value), replaced(look.project, (*LENS, "focus_distance"), value)
+
+
+def _stopped_down(look: Look, laser: int, now: Readouts) -> Change | None:
+    """Focused, and stopped down until the line is sharp, exposed longer by what that costs of light."""
+    focused = _focused(look, laser, now)
+    if focused is None or now.blur_px is None:
+        return None
+    before = look.project.scene.camera.lens.f_number
+    # at best focus the blur left is about half of the depth's share
+    number = next((stop for stop in STOPS if stop >= before * max(1.0, now.blur_px.high / SHARP_PX)), None)
+    if number is None or number <= before:
+        return None
+    project = replaced(focused[1], (*LENS, "f_number"), number)
+    time = float(f"{project.sensor.exposure_time * (number / before) ** 2:.3g}")
+    label = f"f/{before:g} → f/{number:g}, {_told('exposure', 's', project.sensor.exposure_time, time)}"
+    return label, replaced(project, EXPOSURE, time)
+
+
+def _helps(key: str, before: dict[str, Row], after: dict[str, Row]) -> bool:
+    """The read-out is better by a level, and no other is worse."""
+    better = RANK[after[key].level] < RANK[before[key].level] and after[key].value != "-"
+    return better and all(RANK[row.level] <= RANK[before[row.key].level] for row in after.values() if row.key in before)
+
+
+def _value(row: Row) -> str:
+    return row.value if row.key != "saturated" else f"{row.value} of the lines"
+
+
+def _told(what: str, unit: str, before: float | None, after: float, shown: str = "") -> str:
+    as_shown = Unit.of(unit, shown)
+    was = "far away" if before is None else as_shown.format(float(f"{before:.4g}"))
+    return f"{what} {was} → {as_shown.with_unit(after)}"
+
+
+def _laser(index: int) -> FieldPath:
+    return ("scene", "rig", "lasers", index)
