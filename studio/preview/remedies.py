@@ -25,13 +25,13 @@ FILLED = 0.7
 ANGLES = (30.0, 20.0, 45.0)
 """Degrees of triangulation, the best first."""
 STOPS = (1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0)
+Change = tuple[str, Project]
+"""What is done, and the project with it."""
 TOLD_FROM = 0.02
 """Change of the depth's sigma, as a share."""
 RANK = {"": 0, "warning": 1, "error": 2}
 EXPOSURE: FieldPath = ("sensor", "exposure_time")
 LENS: FieldPath = ("scene", "rig", "camera", "lens")
-Change = tuple[str, Project]
-"""What is done, and the project with it."""
 
 
 @dataclass(frozen=True)
