@@ -58,7 +58,7 @@ def check_target(out: Path) -> None:
 
 def write_project(out: Path, project: Project, root: Path) -> Path:
     """The project and the files that it names, which move with it. InputError: another file is in the way."""
-    carry(project.scene, root, out.parent)
+    carry(project, root, out.parent)
     project.save(out)
     return out
 

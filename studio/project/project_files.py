@@ -13,6 +13,7 @@ from render.material.material import BumpMap, GreyTexture, NormalMap, Texture
 from render.mesh.trimesh_reader import side_files
 from render.scene.scene import Scene
 from render.scene.shape import MeshFile
+from studio.project.project import Project
 
 
 def named_files(item: BaseModel, where: str) -> dict[str, str]:
@@ -52,16 +53,20 @@ def bring(found: Path, target: Path) -> None:
                 shutil.copyfile(source, temporary)
 
 
-def carry(scene: Scene, root: Path, folder: Path) -> list[Path]:
-    """Copy the files the scene names from `root` to the same places below `folder`; returns what was written.
+def carry(project: Project, root: Path, folder: Path) -> list[Path]:
+    """Copy the files the project names from `root` to the same places below `folder`; returns what was written.
 
-    A file that is missing in `root` is passed over.
+    A chooser's weights take their card along. A file that is missing in `root` is passed over.
     InputError: another file is in the way, or `folder` is not writable.
     """
     if root.resolve() == folder.resolve():
         return []
     pairs = []
-    for relative, where in named_files(scene, "scene").items():
+    named = named_files(project.scene, "scene")
+    weights = project.extraction.chooser
+    if weights is not None:
+        named |= dict.fromkeys((weights, str(Path(weights).with_suffix(".json"))), "extraction.chooser")
+    for relative, where in named.items():
         beside = Path(relative).parent
         for each in (relative, *(str(beside / name) for name in side_files(inside(root, relative, where), root))):
             source, target = inside(root, each, where), inside(folder, each, where)

@@ -37,7 +37,7 @@ def template(key: str, autosave: Autosave) -> Document:
     project = Project.load(source / "project.json")
     try:
         root = autosave.draft()
-        carry(project.scene, source, root)
+        carry(project, source, root)
     except InputError:  # nothing can be imported into it then, but it can be looked at and saved elsewhere
         root = source
     return Document(project, None, root)
@@ -204,7 +204,7 @@ class FileActions(QObject):
         document = left[0].document()
         if left[0].is_draft:
             document.root = self.autosave.draft()
-            carry(document.project.scene, left[0].root, document.root)
+            carry(document.project, left[0].root, document.root)
         self.replace(document)
         self._pristine = document.project.model_copy(update={"name": ""})  # equal to nothing: it is unsaved work
         self.keep()
@@ -235,7 +235,7 @@ class FileActions(QObject):
     def _save(self, path: Path) -> bool:
         document = self.session.document
         try:
-            carry(document.project.scene, document.root, path.absolute().parent)
+            carry(document.project, document.root, path.absolute().parent)
             document.save(path.absolute())
         except (InputError, OSError, MemoryError) as error:
             self._tell(error, f"save {path.name}")

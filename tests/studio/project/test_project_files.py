@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 from render.camera.camera import Camera
 from render.material.material import Blend, Coated, Lambertian, Texture
 from render.scene.scene import Rig, Scene, SceneObject
 from render.scene.shape import MeshFile, Plane
+from studio.project.project import Project
 from studio.project.project_files import carry, missing_files, named_files
 
 SHINY = Blend(
@@ -39,9 +41,18 @@ def root(tmp_path: Path) -> Path:
 
 
 def test_every_texture_of_a_blend_is_taken_along(root: Path, tmp_path: Path) -> None:
-    written = carry(SCENE, root, tmp_path / "to")
+    written = carry(Project(scene=SCENE), root, tmp_path / "to")
     assert {file.relative_to(tmp_path / "to").as_posix() for file in written} == FILES
     assert all(file.read_text() == file.relative_to(tmp_path / "to").as_posix() for file in written)
+
+
+def test_a_chooser_s_weights_and_their_card_are_taken_along(root: Path, tmp_path: Path) -> None:
+    for name in ("mine.onnx", "mine.json"):
+        (root / name).write_text(name)
+    project = Project(scene=SCENE, extraction=ExtractionSettings(select="learned", chooser="mine.onnx"))
+    written = {file.name for file in carry(project, root, tmp_path / "to")}
+    assert {"mine.onnx", "mine.json"} <= written
+    assert (tmp_path / "to" / "mine.onnx").read_text() == "mine.onnx"
 
 
 def test_each_file_is_named_by_its_field() -> None:
@@ -61,7 +72,7 @@ def test_another_file_in_the_way_stops_before_anything_is_copied(root: Path, tmp
     other.parent.mkdir()
     other.write_text("something else")
     with pytest.raises(InputError, match="in the way"):
-        carry(SCENE, root, tmp_path / "to")
+        carry(Project(scene=SCENE), root, tmp_path / "to")
     assert [file.name for file in (tmp_path / "to").rglob("*") if file.is_file()] == ["wood.png"]
     assert other.read_text() == "something else"
 
@@ -69,4 +80,4 @@ def test_another_file_in_the_way_stops_before_anything_is_copied(root: Path, tmp
 def test_a_path_that_leaves_the_folder_is_refused(root: Path, tmp_path: Path) -> None:
     away = Scene(rig=RIG, objects=(SceneObject(name="part", shape=MeshFile(path="../part.ply")),))
     with pytest.raises(InputError):
-        carry(away, root, tmp_path / "to")
+        carry(Project(scene=away), root, tmp_path / "to")
