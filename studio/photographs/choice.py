@@ -13,6 +13,7 @@ from analysis.line.result import Flag, Line
 from analysis.line.selection.geometry import WorkingVolume
 from analysis.line.settings import ExtractionSettings
 from studio.photographs.completion import completed, offered, without_detours
+from studio.photographs.detours import without_detours_of
 from studio.photographs.line_arrays import changed, column, side_by_side
 from studio.photographs.line_ends import ended
 
@@ -20,7 +21,8 @@ from studio.photographs.line_ends import ended
 def selected(candidates: Line, settings: ExtractionSettings, volume: WorkingVolume | None) -> Line:
     """Peaks (n, k) -> (n, 1) by the selection, or, of the continuous one, (n, peaks): a chain each."""
     if settings.select != "continuous" or settings.peaks == 1:
-        return select(candidates, settings.select, volume, settings.chooser)
+        line = select(candidates, settings.select, volume, settings.chooser)
+        return without_detours_of(candidates, line) if settings.select == "continuous" and volume is None else line
     left, chains = candidates, []
     for _ in range(settings.peaks):
         chain = select(left, "continuous", volume)
