@@ -6,8 +6,8 @@ of pixel i, a fit moves by
     dp / dy_i  =  H^-1  dmu_i/dp  / v_i,        H = sum over i of dmu_i/dp (dmu_i/dp)^T / v_i
 
 (the influence function of an M-estimator at its own model; Huber, Robust Statistics, 1981, section 3.2). What is
-flagged as no single line moves about as the one that is fitted to it. Of all other methods, and of lines too narrow for
-their pixels, whose position is that of a posterior, by central differences of the method itself.
+flagged as no single line moves about as the one that is fitted to it. Lines too narrow for their pixels have the
+position of a posterior (`posterior_influence`). Of all other methods by central differences of the method itself.
 """
 
 from __future__ import annotations
@@ -20,9 +20,11 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from analysis.line.detection.channel import Lines, scan_lines
-from analysis.line.detection.detect import PRIOR_WIDTHS
+from analysis.line.detection.detect import NARROWEST, PRIOR_WIDTHS
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.measure import METHODS, measure, measure_with_neighbours
+from analysis.line.methods.narrow_line import COARSE
+from analysis.line.posterior_influence import posterior_influence
 from analysis.line.result import NEIGHBOURS, Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float, Float32
@@ -56,12 +58,12 @@ def influence(
     lines = scan_lines(np.asarray(image, np.float64), chosen, noise)
     found = np.zeros(lines.image.shape, np.float32)
     for k in range(line.u.shape[1]):
-        closed = line.valid[:, k] & (line.flag[:, k] != Flag.UNRESOLVED) & (line.method == "likelihood")
-        if closed.any():
-            _scatter(
-                found, np.flatnonzero(closed), *likelihood_influence(lines, line, chosen, np.flatnonzero(closed), k)
-            )
-        rest = np.flatnonzero(line.valid[:, k] & ~closed)
+        valid = np.flatnonzero(line.valid[:, k])
+        if line.method == "likelihood":
+            if len(valid):
+                _scatter(found, valid, *likelihood_influence(lines, line, chosen, valid, k))
+            continue
+        rest = valid
         if len(rest):
             alone = _alone(lines, chosen)
             tried = rest[np.unique(np.linspace(0, len(rest) - 1, TRIED).astype(int))] if alone else rest
@@ -78,29 +80,54 @@ def likelihood_influence(
 ) -> tuple[Int, Float]:
     """Rows (n,) of a likelihood line -> first pixel (n,) and weight (n, m) px / e-; zero where a pixel is not used."""
     u, width, height = line.u[rows, peak], line.width[rows, peak], line.amplitude[rows, peak]
-    half = np.ceil(np.minimum(REACH * width + EDGE, 6.0 * settings.max_width))
+    narrow = line.flag[rows, peak] == Flag.UNRESOLVED
+    looked = np.where(narrow, np.maximum(width, NARROWEST), width)
+    half = np.ceil(np.minimum(REACH * looked + EDGE, 6.0 * settings.max_width))
     m = 2 * int(half.max()) + 1
     first = np.rint(u).astype(np.int64) - m // 2
     x = first[:, None] + np.arange(m, dtype=np.float64)
-    _, mask, floor = lines.read(0, lines.count)
+    electrons, mask, floor = lines.read(0, lines.count)
     inside = np.clip(x.astype(np.int64), 0, mask.shape[1] - 1)
     used = (np.abs(x - u[:, None]) <= half[:, None]) & (x >= 0) & (x < mask.shape[1])
     used &= np.take_along_axis(mask[rows], inside, axis=1) == 0
-    held = np.take_along_axis(floor[rows], np.minimum(inside, floor.shape[1] - 1), axis=1)
-    g, by_centre, by_width = _profile((x - u[:, None]), width[:, None], settings.profile == "integrated")
-    mu = height[:, None] * g + line.background[rows, peak][:, None]
-    weight = np.where(used, 1.0 / np.maximum(np.maximum(mu + held, 0.1 * np.abs(held)), 1e-9), 0.0)
-    slopes = [g, height[:, None] * by_centre, np.ones_like(g)]
-    if settings.width is None:
-        slopes.append(height[:, None] * by_width)
+    held = np.take_along_axis(floor[rows], np.minimum(inside, floor.shape[1] - 1), axis=1).astype(np.float64)
+    background, integrated = line.background[rows, peak][:, None], settings.profile == "integrated"
+    by_centre, by_background = _fit_influence(
+        (x - u[:, None], width[:, None], height[:, None], background, held), used, settings.width is None, integrated
+    )
+    if narrow.any():
+        # their neighbours tell the width that they share, too
+        lit = np.zeros(lines.count, np.bool_)
+        lit[np.clip(rows[narrow][:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1), 0, lines.count - 1)] = True
+        near = np.flatnonzero(narrow | (lit[rows] & (width < COARSE)))
+        seen = m // 2 + np.arange(-(reach := int(half[near].max())), reach + 1)
+        light = np.take_along_axis(electrons[rows[near]], inside[near], axis=1)
+        part = tuple(array[:, seen].astype(np.float64) for array in (x[near], light, held[near], used[near]))
+        pixels = *part, background[near]
+        told = u[near], line.sigma_u[rows[near], peak]
+        moved = posterior_influence(pixels, *told, by_background[near][:, seen], settings.width, integrated)
+        by_centre[narrow] = 0.0
+        by_centre[np.ix_(narrow, seen)] = moved[narrow[near]]
+    return first, by_centre
+
+
+def _fit_influence(
+    model: tuple[Float, Float, Float, Float, Float], used: NDArray[np.bool_], free: bool, integrated: bool
+) -> tuple[Float, Float]:
+    """Distance (n, m), width, height, background (n, 1), floor (n, m); free: the width is fitted as well -> (n, m) how
+    far each pixel moves the centre, px / e-, and the background."""
+    distance, width, height, background, floor = model
+    g, by_centre, by_width = _profile(distance, width, integrated)
+    mu = height * g + background
+    weight = np.where(used, 1.0 / np.maximum(np.maximum(mu + floor, 0.1 * np.abs(floor)), 1e-9), 0.0)
+    slopes = [g, height * by_centre, np.ones_like(g), *([height * by_width] if free else [])]
     jacobian = np.stack(slopes, axis=2)
     information = np.einsum("nij,nik,ni->njk", jacobian, jacobian, weight)
     scale = np.sqrt(np.maximum(np.einsum("njj->nj", information), 1e-300))
     information /= scale[:, :, None] * scale[:, None, :]
-    unit = np.zeros((len(rows), len(slopes), 1))
-    unit[:, 1, 0] = 1.0
-    row = (np.linalg.pinv(information, hermitian=True) @ unit)[..., 0] / scale / scale[:, 1:2]
-    return first, np.einsum("nj,nij->ni", row, jacobian) * weight
+    rows = np.linalg.pinv(information, hermitian=True)[:, 1:3] / scale[:, None, :] / scale[:, 1:3, None]
+    moved = np.einsum("npj,nij,ni->pni", rows, jacobian, weight)
+    return moved[0], moved[1]
 
 
 def difference_influence(

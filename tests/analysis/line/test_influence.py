@@ -10,6 +10,7 @@ from analysis.line.detection.channel import scan_lines
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
 from analysis.line.influence import difference_influence, influence, likelihood_influence
+from analysis.line.result import Flag
 from analysis.line.settings import ExtractionSettings
 
 NOISE = NoiseModel(gain=0.5, black_level=8.0, read_noise=5.0)
@@ -59,6 +60,25 @@ def test_likelihood_in_closed_form_is_as_by_differences() -> None:
     start = int(first[0] - other[0])
     same = differences[:, start : start + closed.shape[1]]
     np.testing.assert_allclose(same, closed, atol=0.01 * closed.max())
+
+
+@pytest.mark.parametrize("brightness", [0.2, 2.0])
+def test_a_narrow_line_is_moved_as_by_differences(brightness: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whose width its neighbours tell. Over the noise of its pixels, and a step below that of the brightest."""
+    monkeypatch.setattr("analysis.line.influence.STEP", 0.001)
+    background = NOISE.gain * GROUND + NOISE.black_level
+    image = background + brightness * (image_of(47.0 + np.linspace(0.0, 3.3, 40), 0.28) - background)
+    chosen = settings("likelihood")
+    line = extract(image, settings=chosen, noise=NOISE)
+    rows = np.flatnonzero(line.flag[:, 0] == Flag.UNRESOLVED)
+    assert len(rows) >= 36
+    first, differences = difference_influence(scan_lines(image, chosen, NOISE), line, chosen, rows, 0)
+    columns = first[:, None] + np.arange(differences.shape[1])
+    closed = np.take_along_axis(influence(image, line, chosen, NOISE)[rows], columns, axis=1)
+    noise = np.sqrt((np.take_along_axis(image[rows], columns, 1) - NOISE.black_level) / NOISE.gain + NOISE.floor)
+    apart, total = (np.sqrt(np.sum((part * noise) ** 2, axis=1)) for part in (closed - differences, differences))
+    # the posterior that the differences move is itself a sum over a grid that follows it
+    assert np.quantile(apart / total, 0.9) < 0.05 and np.median(apart / total) < 0.02
 
 
 def test_its_sum_with_the_noise_of_the_pixels_is_the_sigma_that_is_told() -> None:

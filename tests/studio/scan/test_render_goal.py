@@ -55,7 +55,7 @@ def line_in(project: Project, frame: Frame) -> Line:
 
 
 def test_a_weight_says_how_far_light_moves_a_row_over_the_allowed(world: World) -> None:
-    """Of a line of about a pixel, which a fit resolves; narrower ones have the weights of their neighbours."""
+    """Of a line of about a pixel, which a fit resolves; narrower ones have the weights of a posterior."""
     sheet = project_of().scene.lasers[0].sheet
     wide = project_of(transport="direct").replaced({"scene.rig.lasers[0].sheet.full_angle": 4.0 * sheet.full_angle})
     frame = rendered(wide, world)
