@@ -75,16 +75,19 @@ def _print(found: Advice, question: Question, project: Project) -> None:
         print("Bias in % of the depth error's RMS, sigma in % of itself; processor seconds of a frame, medians.")
     asked = f"{100.0 * question.within:g} %"
     for number, proof in enumerate(found.proofs, 1):
-        print(f"Proof {number}: {_sentence(proof, asked)}")
+        print(f"Proof {number}: {_sentence(proof, question.within)}")
     if found.proved is None:
         print(f"No cheaper project is known that measures within {asked} of this one.")
     if question.image_scale != 1.0:
         print(f"All this holds at image scale {question.image_scale:g}; --scale 1 asks the scanner itself.")
 
 
-def _sentence(proof: Proof, asked: str) -> str:
+def _sentence(proof: Proof, share: float) -> str:
+    asked = f"{100.0 * share:g} %"
     found, parts = proof.found, ", ".join(f"{part.name} {part.change}" for part in proof.parts)
     within = f"within {asked}" if proof.alike else f"not shown to be within {asked}"
+    if found.undecided(share):
+        within += ", nor could it be by so few: the intervals are wider than that, and more --seeds or rows narrow them"
     pays = "" if proof.holds or not proof.alike else ", which is not worth a change"
     return (
         f"{parts}: on {len(proof.seeds)} fresh seeds bias changes by {_percent(found.bias)}, sigma by "

@@ -19,6 +19,7 @@ from analysis.study.intervals import Interval, mean_interval
 from render.base.errors import InputError
 from studio.project.project import MAX_SEED, Project
 from studio.runtime.workers import Engine
+from studio.study.effects import without_subsurface
 from studio.study.runner import run_study
 from studio.study.store import Store
 from studio.study.study import Study
@@ -67,6 +68,11 @@ class Change:
         """All three intervals lie within it."""
         found = (self.bias, self.sigma, self.completeness)
         return all(-share <= one.low and one.high <= share for one in found)
+
+    def undecided(self, share: float) -> bool:
+        """An interval is so wide that no change, not even none, could be shown to lie within it."""
+        found = (self.bias, self.sigma, self.completeness)
+        return any(one.high - one.low > 2.0 * share for one in found)
 
     def size(self) -> float:
         """The largest of the mean changes."""
@@ -151,6 +157,16 @@ def parts_of(project: Project) -> list[Part]:
     for bounces in (1, 2):
         if render.max_bounces is None or render.max_bounces > bounces:
             found.append(Part("ambient surfaces", f"at most {bounces}", {"render.max_bounces": bounces}))
+    if render.truth_images:
+        found.append(Part("per-pixel truth", "none", {"render.truth_images": False}))
+    shallow = without_subsurface(project).scene.objects
+    below = {
+        f"scene.objects[{i}].material": after.material.model_dump(mode="json")
+        for i, (before, after) in enumerate(zip(project.scene.objects, shallow, strict=True))
+        if before != after
+    }
+    if below:
+        found.append(Part("light below surfaces", "none: it leaves where it enters", below))
     if render.light_paths > 1 << 20:
         found.append(Part("light paths", f"{1 << 20}", {"render.light_paths": 1 << 20}))
     return list({(part.name, part.change): part for part in found}.values())

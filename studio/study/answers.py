@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.study.boundary import Crossing, boundary
 from analysis.study.breakdown import Breakdown, breakdown
 from analysis.study.budget import Budget, budget
 from analysis.study.cause import cause
@@ -17,7 +16,8 @@ from analysis.study.pareto import Front, bootstrapped_front
 from studio.project.project import Project
 from studio.scan.stages import scaled
 from studio.study.bounds import Bound, bounds
-from studio.study.cells import Point, along, lattice_of, methods_of, on_lattice, search_of, searched
+from studio.study.cells import Point, along, methods_of, search_of, searched
+from studio.study.edges import Edge, edges_of
 from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
 from studio.study.ray_units import RAY_SPEED, Throughput, throughput
 from studio.study.store import Row
@@ -113,7 +113,7 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
         _budgets(sweep, study, bases, groups),
         bounds(study, sweep, bases, list(dict.fromkeys(spot.point for spot in spots))),
         _throughput(study, sweep, bases, groups),
-        _edges(study, number, bases, rows),
+        edges_of(study, number, bases, rows),
     )
 
 
@@ -177,17 +177,6 @@ def _broken(
             good, bad = (groups[(value,), method] for value in (search.good, ended.first_bad))
             why = cause(_means(good), _means(bad))
         found.append(Broken(method, ended, why))
-    return tuple(found)
-
-
-def _edges(study: Study, number: int, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> tuple[Edge, ...]:
-    sweep = study.sweeps[number]
-    if sweep.sampling != "boundary":
-        return ()
-    found = []
-    for method in methods_of(study, sweep):
-        known = on_lattice(sweep, searched(study, number, method, bases, rows))
-        found.append(Edge(method, tuple(boundary(lattice_of(sweep), known)), len(known)))
     return tuple(found)
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from analysis.report.colour import GRID, INK, PAPER, method_colour, method_name
 from analysis.study.breakdown import breaks
-from studio.study.answers import Answer, Edge
+from studio.study.answers import Answer
+from studio.study.edges import Edge
 from studio.study.study import Sweep
 
 DASHES = ("-", "--", "-.", ":")

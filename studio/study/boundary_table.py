@@ -10,9 +10,10 @@ from pathlib import Path
 
 from analysis.report.colour import method_name
 from render.base.files import atomic_write
-from studio.study.answers import Answer, Edge
+from studio.study.answers import Answer
 from studio.study.boundary_chart import column_value, row_value
 from studio.study.cells import lattice_of
+from studio.study.edges import Edge
 from studio.study.study import Sweep
 
 Row = tuple[float, str, float, float, float, str]

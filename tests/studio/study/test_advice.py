@@ -12,7 +12,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 import main
+from analysis.study.intervals import Interval
 from render.base.errors import InputError
+from studio.commands.advise import _sentence
 from studio.project.project import Project
 from studio.study import advice
 from studio.study.advice import MOST_PROOFS, SCREENED, Question, advise, parts_of
@@ -117,8 +119,31 @@ def test_every_part_makes_a_project_that_is_allowed() -> None:
             assert project.replaced(part.values) != project
     cheapest = PLANE.replaced({"render.transport": "direct", "render.laser_error": 1.0, "render.indirect_error": 1.0,
                                "render.ambient_error": 1.0, "render.ambient_samples": 1, "render.max_bounces": 1,
-                               "render.light_paths": 1 << 20, "render.goal": {"depth": 1.0}})  # fmt: skip
+                               "render.light_paths": 1 << 20, "render.truth_images": False,
+                               "render.goal": {"depth": 1.0}})  # fmt: skip
     assert parts_of(cheapest) == []
+
+
+def test_light_below_surfaces_and_truth_images_are_offered_where_there_are_some() -> None:
+    wax = {"kind": "subsurface", "scattering_albedo": 0.99, "mean_free_path": 1e-3}
+    project = PLANE.replaced({"scene.objects[0].material": wax})
+    parts = {part.name: part for part in parts_of(project)}
+    cheaper = project.replaced({**parts["light below surfaces"].values, **parts["per-pixel truth"].values})
+    assert cheaper.scene.objects[0].material.kind == "lambertian" and not cheaper.render.truth_images
+    assert "light below surfaces" not in {part.name for part in parts_of(PLANE)}
+
+
+def test_an_interval_that_is_wider_than_what_was_asked_is_told_to_decide_nothing() -> None:
+    def change(half: float, mean: float = 0.0) -> advice.Change:
+        one = Interval(mean, mean - half, mean + half, 8)
+        return advice.Change(one, one, one, seconds=1.0, seconds_before=4.0)
+
+    narrow, moved, wide = change(0.01), change(0.01, 0.05), change(0.05)
+    assert narrow.within(0.03) and not narrow.undecided(0.03)
+    assert not moved.within(0.03) and not moved.undecided(0.03)
+    assert not wide.within(0.03) and wide.undecided(0.03)
+    for found, told in ((moved, False), (wide, True)):
+        assert ("more --seeds" in _sentence(advice.Proof((), found, (1, 2), False), 0.03)) == told
 
 
 def test_a_small_project_becomes_cheaper_in_truth_and_takes_its_files_along(tmp_path: Path) -> None:
