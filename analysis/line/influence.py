@@ -58,20 +58,17 @@ def influence(
     lines = scan_lines(np.asarray(image, np.float64), chosen, noise)
     found = np.zeros(lines.image.shape, np.float32)
     for k in range(line.u.shape[1]):
-        valid = np.flatnonzero(line.valid[:, k])
-        if line.method == "likelihood":
-            if len(valid):
-                _scatter(found, valid, *likelihood_influence(lines, line, chosen, valid, k))
-            continue
-        rest = valid
-        if len(rest):
+        rows = np.flatnonzero(line.valid[:, k])
+        if len(rows) and line.method == "likelihood":
+            _scatter(found, rows, *likelihood_influence(lines, line, chosen, rows, k))
+        elif len(rows):
             alone = _alone(lines, chosen)
-            tried = rest[np.unique(np.linspace(0, len(rest) - 1, TRIED).astype(int))] if alone else rest
+            tried = rows[np.unique(np.linspace(0, len(rows) - 1, TRIED).astype(int))] if alone else rows
             place, measured = difference_influence(lines, line, chosen, tried, k, threads)
             # what is twice as bright is moved by twice the light
             measured *= line.amplitude[tried, k][:, None]
-            first, weight = _of_nearest(line.u[rest, k], rest, line.u[tried, k], tried, place, measured)
-            _scatter(found, rest, first, weight / line.amplitude[rest, k][:, None])
+            first, weight = _of_nearest(line.u[rows, k], rows, line.u[tried, k], tried, place, measured)
+            _scatter(found, rows, first, weight / line.amplitude[rows, k][:, None])
     return found if line.axis == "rows" else np.ascontiguousarray(found.swapaxes(0, 1))
 
 

@@ -28,16 +28,6 @@ Groups = dict[tuple[Point, str], list[Row]]
 
 
 @dataclass(frozen=True)
-class Edge:
-    """The boundary of one method in a map, by column."""
-
-    method: str
-    crossings: tuple[Crossing, ...]
-    cells: int
-    """Of the lattice, that it took; each has all repeats."""
-
-
-@dataclass(frozen=True)
 class Spot:
     """One mark of a chart: a point of a sweep by one method, with what its repeats say."""
 
