@@ -38,13 +38,14 @@ Change = tuple[str, Project]
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change that brings a read-out nearer to its range, and none out of it."""
+    """A change that brings a read-out nearer to its range, and none out of it.
+
+    key: of the read-out's row; gain: the read-out before and after; project: with the change.
+    """
 
     key: str
-    """Of the read-out's row."""
     label: str
     gain: str
-    """The read-out before and after."""
     project: Project
 
 
