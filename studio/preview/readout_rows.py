@@ -50,6 +50,14 @@ def rows(r: Readouts) -> tuple[Row, ...]:
             "above 60° much is occluded.",
             _outside(math.radians(5), math.radians(10), math.radians(60), math.radians(75)),
         ),
+        _ranged(
+            "standoff",
+            "Stand-off",
+            r.distance,
+            " mm",
+            lambda value: _digits(1e3 * value),
+            "Depth of the lit line, from the camera along its axis.",
+        ),
         Row("working", "Working range", _working(r), "", *_working_level(r)),
         _ranged(
             "depth",

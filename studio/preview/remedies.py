@@ -8,8 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.laser.laser import Waist
+from studio.editing.placement import working_distance
 from studio.editing.placing import aimed, at_angle
 from studio.editing.units import Unit
 from studio.preview.estimates import SHARP_PX
@@ -36,13 +38,14 @@ LENS: FieldPath = ("scene", "rig", "camera", "lens")
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change that brings a read-out nearer to its range, and none out of it."""
+    """A change that brings a read-out nearer to its range, and none out of it.
+
+    key: of the read-out's row; gain: the read-out before and after; project: with the change.
+    """
 
     key: str
-    """Of the read-out's row."""
     label: str
     gain: str
-    """The read-out before and after."""
     project: Project
 
 
@@ -81,6 +84,14 @@ def automatic_exposure(project: Project, now: Readouts) -> Change | None:
     return _told("exposure", "s", before, time), replaced(project, EXPOSURE, time)
 
 
+def lit_point(look: Look, laser: int) -> Float:
+    """(3,) the middle of the lit line in the rig's frame; where there is none, of the camera's axis in its range."""
+    T_rig_camera = look.scene.camera.T_rig_camera.matrix
+    points = look.lit(laser).curve.point
+    point = np.median(points, axis=0) if len(points) else np.array([0.0, 0.0, working_distance(look.scene)])
+    return np.asarray(T_rig_camera[:3, :3] @ point + T_rig_camera[:3, 3])
+
+
 def _changes(key: str, look: Look, laser: int, now: Readouts) -> Iterator[Change]:
     """What may help a read-out, the least intrusive first; what no project may have is left out."""
     tries = {
@@ -110,11 +121,8 @@ def _turned(degrees: float) -> Callable[[Look, int, Readouts], Change | None]:
         if now.triangulation_angle is None:
             return None
         scene = look.project.scene
-        T_rig_camera = scene.camera.T_rig_camera.matrix
-        points = look.lit(laser).curve.point
-        point = T_rig_camera[:3, :3] @ np.median(points, axis=0) + T_rig_camera[:3, 3]
-        before = scene.lasers[laser].T_rig_laser
-        pose = at_angle(before, T_rig_camera[:3, 3], point, math.radians(degrees))
+        before, camera = scene.lasers[laser].T_rig_laser, scene.camera.T_rig_camera.matrix[:3, 3]
+        pose = at_angle(before, camera, lit_point(look, laser), math.radians(degrees))
         label = _told("triangulation angle", "rad", now.triangulation_angle.middle, math.radians(degrees))
         return label, replaced(look.project, (*_laser(laser), "T_rig_laser"), pose)
 

@@ -19,10 +19,10 @@ from PySide6.QtWidgets import (
 
 from studio.preview.readout_rows import Row, rows
 from studio.preview.readouts import readouts
-from studio.preview.remedies import Remedy
 from studio.qt.core import theme
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
+from studio.qt.results.placing_fields import PlacingField, PlacingFields
 from studio.qt.results.remedy_list import RemedyList, sentence
 
 
@@ -41,15 +41,16 @@ class ReadoutPanel(QWidget):
         self.problem = QLabel("Not of the scene as it is set: the scene tree marks what cannot be.", wordWrap=True)
         self.problem.setObjectName("warning")
         self._hint.setObjectName("muted")
-        self._labels: dict[str, tuple[QLabel, QLabel, QLabel]] = {}
+        self._labels: dict[str, tuple[QLabel, QLabel | PlacingField, QLabel]] = {}
         inner = QFrame()
         column = QVBoxLayout(inner)
         column.setContentsMargins(10, 8, 10, 8)
         self._grid = QGridLayout()
         column.addLayout(self._grid)
         self.fixes = RemedyList(session)
+        self.placing = PlacingFields(session, inner)
         self._fix: dict[str, QToolButton] = {}
-        """In the rows that something would fix."""
+        """Seen in the rows that something would fix."""
         column.addWidget(self.fixes)
         column.addStretch(1)
         self._grid.setHorizontalSpacing(12)
@@ -103,7 +104,10 @@ class ReadoutPanel(QWidget):
         self._hint.setVisible(not names)
         self.problem.setVisible(bool(names and self._session.problems))
         self._area.setVisible(bool(names))
-        shown = rows(readouts(look, self.laser)) if names and self._live.ready else ()
+        found = readouts(look, self.laser) if names and self._live.ready else None
+        shown = () if found is None else rows(found)
+        if found is not None:
+            self.placing.show_values(look, self.laser, found)
         if shown != self._rows:
             self._rows = shown
             self._paint()
@@ -112,56 +116,63 @@ class ReadoutPanel(QWidget):
     def _paint(self) -> None:
         colours = theme.colours()
         keys = {row.key for row in self._rows}
+        offered = {one.key for one in self.fixes.found}
         for key, labels in self._labels.items():
             for label in labels:
-                label.setVisible(key in keys and not (key in self._fix and label is labels[2]))
+                label.setVisible(key in keys and not (key in offered and label is labels[2]))
         tints = {"": colours.text, "warning": colours.warning, "error": colours.error}
         for row in self._rows:
             name, value, note = self._labels.get(row.key) or self._add(row.key)
             name.setText(row.label)
-            value.setText(row.value)
+            if isinstance(value, QLabel):
+                value.setText(row.value)
             note.setText(row.note)
             for label, style in (
                 (name, f"color: {colours.muted}"),
                 (value, f"color: {tints[row.level]}; font-weight: 600"),
                 (note, f"color: {colours.muted}"),
             ):
+                label.setToolTip(f"<p>{row.help}</p>")
+                if not isinstance(label, QLabel):
+                    label.mark(row.level)
+                    continue
                 # a style sheet costs more to set than all the numbers to compute
                 if label.styleSheet() != style:
                     label.setStyleSheet(style)
-                label.setToolTip(f"<p>{row.help}</p>")
 
     def _offer_fixes(self) -> None:
         """A button in each row that something would fix, in the place of its range."""
+        offered = {one.key: one for one in self.fixes.found}
         for key, button in self._fix.items():
-            button.hide()
-            button.deleteLater()
-            self._labels[key][2].show()
-        self._fix = {}
+            button.setVisible(key in offered)
+            self._labels[key][2].setVisible(key not in offered)
+            if key in offered:
+                button.setToolTip(f"<p>{sentence(offered[key])}. Ctrl+Z takes it back.</p>")
+
+    def _apply(self, key: str, _checked: bool = False) -> None:
         for one in self.fixes.found:
-            button = QToolButton()
-            button.setText("Fix")
-            button.setObjectName("fix")
-            button.setToolTip(f"<p>{sentence(one)}. Ctrl+Z takes it back.</p>")
-            button.clicked.connect(partial(self._apply, one))
-            name, _, note = self._labels[one.key]
-            note.hide()
-            line = self._grid.getItemPosition(self._grid.indexOf(name))[0]  # type: ignore[index]
-            self._grid.addWidget(button, line, 2, Qt.AlignmentFlag.AlignLeft)
-            self._fix[one.key] = button
+            if one.key == key:
+                self.fixes.apply(one)
+                return
 
-    def _apply(self, remedy: Remedy, _checked: bool = False) -> None:
-        self.fixes.apply(remedy)
-
-    def _add(self, key: str) -> tuple[QLabel, QLabel, QLabel]:
+    def _add(self, key: str) -> tuple[QLabel, QLabel | PlacingField, QLabel]:
         """A line of labels at the end."""
-        name, value, note = QLabel(), QLabel(), QLabel()
-        value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        value.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        name, value, note = QLabel(), self.placing.fields.get(key) or QLabel(), QLabel()
+        if isinstance(value, QLabel):
+            value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            value.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         # a narrow panel may cut the ranges off, never the values
         note.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         line = self._grid.rowCount()
         for column, label in enumerate((name, value, note)):
             self._grid.addWidget(label, line, column)
+            label.show()
+        button = QToolButton()
+        button.setText("Fix")
+        button.setObjectName("fix")
+        button.clicked.connect(partial(self._apply, key))
+        self._grid.addWidget(button, line, 2, Qt.AlignmentFlag.AlignLeft)
+        button.hide()
+        self._fix[key] = button
         self._labels[key] = (name, value, note)
         return name, value, note

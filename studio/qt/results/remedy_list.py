@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QPushButton, QWidget
 
 from studio.preview.preview import Look
 from studio.preview.remedies import Remedy, remedies
@@ -34,6 +34,8 @@ class RemedyList(QWidget):
         self.grid = QGridLayout(self)
         self.grid.setContentsMargins(0, 8, 0, 0)
         self.grid.setColumnStretch(0, 1)
+        self.grid.addWidget(QLabel("<b>What would fix it</b>"), 0, 0, 1, 2)
+        self._rows: list[tuple[QLabel, QPushButton]] = []
         self._show(())
 
     def follow(self, laser: int, needed: bool) -> None:
@@ -70,19 +72,21 @@ class RemedyList(QWidget):
             self.found = found
             return
         self.found = found
+        for i, one in enumerate(found):
+            if i == len(self._rows):
+                self._rows.append(self._add(i))
+            self._rows[i][0].setText(sentence(one))
+        for i, row in enumerate(self._rows):
+            for widget in row:
+                widget.setVisible(i < len(found))
         self.changed.emit()
-        while (item := self.grid.takeAt(0)) is not None:
-            if (widget := item.widget()) is not None:
-                widget.hide()
-                widget.deleteLater()
-        head = QLabel("<b>What would fix it</b>")
-        self.grid.addWidget(head, 0, 0, 1, 2)
-        for i, one in enumerate(found, start=1):
-            told = QLabel(sentence(one), wordWrap=True)
-            button = text_button("Apply", "Ctrl+Z takes it back")
-            button.clicked.connect(partial(self._apply_row, i - 1))
-            self.grid.addWidget(told, i, 0)
-            self.grid.addWidget(button, i, 1)
+
+    def _add(self, index: int) -> tuple[QLabel, QPushButton]:
+        told, button = QLabel(wordWrap=True), text_button("Apply", "Ctrl+Z takes it back")
+        button.clicked.connect(partial(self._apply_row, index))
+        self.grid.addWidget(told, index + 1, 0)
+        self.grid.addWidget(button, index + 1, 1)
+        return told, button
 
     def _apply_row(self, index: int, _checked: bool = False) -> None:
         if index < len(self.found):

@@ -87,6 +87,6 @@ def test_what_would_fix_it_is_applied_by_a_click_and_undone(qtbot: QtBot) -> Non
     assert session.project.sensor.exposure_time < bad.sensor.exposure_time
     session.document.undo()
     assert session.project == bad
-    qtbot.waitUntil(lambda: "saturated" in panel._fix)
+    qtbot.waitUntil(lambda: panel._fix["saturated"].isVisible())
     panel._fix["saturated"].click()  # the same in its row
-    qtbot.waitUntil(lambda: value_of(panel, "saturated") == "0%" and not panel._fix)
+    qtbot.waitUntil(lambda: value_of(panel, "saturated") == "0%" and not panel._fix["saturated"].isVisible())

@@ -1,0 +1,149 @@
+"""Baseline, triangulation angle and stand-off as numbers that move laser and rig: typed, or dragged sideways."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtWidgets import QWidget
+
+from render.base.arrays import Float
+from render.base.errors import InputError
+from studio.editing.forms import FieldSpec
+from studio.editing.placement import vector
+from studio.editing.placing import at_angle, at_baseline
+from studio.editing.units import Unit
+from studio.preview.preview import Look
+from studio.preview.readouts import Readouts, readouts
+from studio.preview.remedies import lit_point
+from studio.project.document import FieldPath, replaced
+from studio.project.project import Project
+from studio.qt.core import theme
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session
+from studio.qt.forms.number_field import NumberField
+
+SPECS = {
+    "baseline": FieldSpec("baseline", "Baseline", "", "number", None, unit=Unit.of("m"), low=1e-3, high=100.0),
+    "angle": FieldSpec(
+        "angle", "Angle", "", "number", None, unit=Unit.of("rad"), low=math.radians(0.1), high=math.radians(175.0)
+    ),
+    "standoff": FieldSpec("standoff", "Stand-off", "", "number", None, unit=Unit.of("m"), low=1e-3, high=100.0),
+}
+"""By the key of the read-out's row."""
+LABELS = {"baseline": "baseline", "angle": "triangulation angle", "standoff": "stand-off"}
+DIGITS = 4
+TRIES, NEAR = 4, 1e-4
+"""How often a move is corrected by what is then read, and the share of the value that is near enough."""
+Start = tuple[Project, Float, dict[str, float | None]]
+"""Project, lit point and read-outs before anything moved."""
+WIDTH = 96
+
+
+class PlacingField(NumberField):
+    """A read-out that can be set."""
+
+    def mark(self, level: str) -> None:
+        """In the colour of what is out of range."""
+        colours = theme.colours()
+        colour = {"": colours.text, "warning": colours.warning, "error": colours.error}[level]
+        style = f"color: {colour}; font-weight: 600"
+        if self.styleSheet() != style:
+            self.setStyleSheet(style)
+
+
+class PlacingFields(QObject):
+    """Three fields, each of which moves what it is of from where it was when its drag began."""
+
+    def __init__(self, session: Session, panel: QWidget) -> None:
+        """panel: holds the fields, which are hidden until it lays them out."""
+        super().__init__(panel)
+        self.session = session
+        self.laser = 0
+        self.values: dict[str, float | None] = {}
+        self._point: Float = np.zeros(3)
+        self._start: Start | None = None
+        self.fields = {key: PlacingField(spec, panel) for key, spec in SPECS.items()}
+        for key, field in self.fields.items():
+            field.hide()
+            field.setAlignment(Qt.AlignmentFlag.AlignRight)
+            field.setFixedWidth(WIDTH)
+            field.entered.connect(partial(self.set, key))
+            field.drag_began.connect(self._begin)
+            field.dragged.connect(partial(self._drag, key))
+            field.drag_ended.connect(self._end)
+
+    def show_values(self, look: Look, laser: int, found: Readouts) -> None:
+        """Follow the read-outs of a laser."""
+        self.laser, self._point = laser, lit_point(look, laser)
+        self.values = _values(found)
+        for key, field in self.fields.items():
+            value = self.values[key]
+            field.setEnabled(value is not None)
+            if not field.hasFocus() or not field.pending:
+                scale = field.spec.unit.factor
+                field.show_value(None if value is None else float(f"{value * scale:.{DIGITS}g}") / scale)
+
+    def set(self, key: str, value: float) -> None:
+        """Move the laser, or the rig, so that the read-out becomes a value; one step to undo."""
+        self._move(key, value, (self.session.project, self._point, self.values), "")
+
+    def _begin(self) -> None:
+        self._start = (self.session.project, self._point, dict(self.values))
+        self.session.begin_drag()
+
+    def _drag(self, key: str, value: float) -> None:
+        if self._start is not None:
+            self._move(key, value, self._start, f"drag {key}")
+
+    def _end(self, keep: bool) -> None:
+        start, self._start = self._start, None
+        self.session.end_drag()
+        if not keep and start is not None and self.session.project != start[0]:
+            self.session.document.undo()
+
+    def _move(self, key: str, value: float, start: Start, merge: str) -> None:
+        """By as much as makes the read-out the value: what is lit moves over the part, which may be of any shape."""
+        asked, made = value, None
+        try:
+            for _ in range(TRIES):
+                made = self._moved(key, asked, start)
+                found = self._read(key, made)
+                if found is None or abs(found - value) <= NEAR * abs(value):
+                    break
+                asked = SPECS[key].clamped(asked + value - found)
+        except InputError as error:
+            self.session.message.emit("error", str(error))
+            return
+        if made is not None:
+            self.session.document.apply(f"set the {LABELS[key]}", made, merge)
+
+    def _moved(self, key: str, value: float, start: Start) -> Project:
+        project, point, before = start
+        scene = project.scene
+        camera = scene.camera.T_rig_camera.matrix[:3, 3]
+        path: FieldPath = ("scene", "rig", "lasers", self.laser, "T_rig_laser")
+        pose = scene.lasers[self.laser].T_rig_laser
+        if key == "baseline":
+            return replaced(project, path, at_baseline(pose, camera, point, value))
+        if key == "angle":
+            return replaced(project, path, at_angle(pose, camera, point, value))
+        away = (value - (before[key] or 0.0)) * scene.T_world_camera()[:3, 2]
+        moved = vector(np.array(scene.rig.T_world_rig.translation) - away)
+        return replaced(project, ("scene", "rig", "T_world_rig", "translation"), moved)
+
+    def _read(self, key: str, project: Project) -> float | None:
+        view = live(self.session)
+        look = view.preview.look(project, self.session.document.root, view.step, wait=False)
+        return _values(readouts(look, self.laser))[key]
+
+
+def _values(found: Readouts) -> dict[str, float | None]:
+    angle, distance = found.triangulation_angle, found.distance
+    return {
+        "baseline": found.baseline,
+        "angle": None if angle is None else angle.middle,
+        "standoff": None if distance is None else distance.middle,
+    }

@@ -1,0 +1,59 @@
+"""Baseline, angle and stand-off of Design are numbers that move things, each to where it then reads what was asked."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from studio.preview.readouts import readouts
+from studio.qt.core.live_preview import live
+from studio.qt.results.readout_panel import ReadoutPanel
+from tests.studio.qt.results.test_readout_panel import panel_on
+
+
+def read(panel: ReadoutPanel, key: str) -> float:
+    """After the view has followed the project."""
+    view = live(panel._session)
+    view.refresh()
+    found = readouts(view.look, 0)
+    assert found.triangulation_angle is not None and found.distance is not None
+    return {
+        "baseline": found.baseline,
+        "angle": found.triangulation_angle.middle,
+        "standoff": found.distance.middle,
+    }[key]
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "value"),
+    [("baseline", "150+2 in", 0.2008), ("angle", "30", math.radians(30.0)), ("standoff", "1 m", 1.0)],
+)
+def test_a_number_that_is_typed_is_read_afterwards(qtbot: QtBot, key: str, text: str, value: float) -> None:
+    panel = panel_on(qtbot)
+    field, session = panel.placing.fields[key], panel._session
+    before, distance = session.project, read(panel, "standoff")
+    field.setText(text)
+    field.pending = True
+    field.enter()
+    assert read(panel, key) == pytest.approx(value, rel=2e-4)
+    if key != "standoff":
+        assert read(panel, "standoff") == pytest.approx(distance, rel=0.02)
+    session.document.undo()
+    assert session.project == before
+
+
+def test_a_drag_is_one_step_to_undo_and_escape_gives_it_up(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    field, session = panel.placing.fields["baseline"], panel._session
+    before = session.project
+    for keep in (False, True):
+        field.drag_began.emit()
+        for value in (0.21, 0.25, 0.3):
+            field.dragged.emit(value)
+        assert read(panel, "baseline") == pytest.approx(0.3)
+        field.drag_ended.emit(keep)
+        assert (session.project == before) is not keep
+    session.document.undo()
+    assert session.project == before
