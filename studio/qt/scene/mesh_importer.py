@@ -102,7 +102,7 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
         else:
             session.message.emit("error", f"an assembly of {len(meshes)} parts is not one mesh; import it instead")
             return
-        session.message.emit("info", _told(meshes, chord))
+        session.message.emit("info", _told(meshes, chord, wanted))
 
     def failed(file: Path, error: BaseException) -> None:
         what = trouble(error, f"import {file.name}")
@@ -111,8 +111,8 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
 
     scene = session.project.scene
     look = live(session).look if any(is_step(file) for file in files) else None
-    chord = facet_chord([] if look is None else [readouts(look, i) for i in range(len(look.scene.lasers))])
-    chord = min(max(chord, LEAST_CHORD), LARGEST_CHORD)
+    wanted = facet_chord([] if look is None else [readouts(look, i) for i in range(len(look.scene.lasers))])
+    chord = min(max(wanted, LEAST_CHORD), LARGEST_CHORD)
     thread = ImportThread(files, document.root, field_of_view(scene), chord)
     thread.imported.connect(done)
     thread.failed.connect(failed)
@@ -126,8 +126,8 @@ def import_meshes(session: Session, files: list[Path], parent: QWidget, take: Ta
     thread.start()
 
 
-def _told(meshes: list[ImportedMesh], chord: float) -> str:
-    """What was imported, in words."""
+def _told(meshes: list[ImportedMesh], chord: float, wanted: float) -> str:
+    """What was imported, in words. chord, wanted: how far facets are off, and a tenth of the depth's sigma, m."""
     first = meshes[0]
     size = " x ".join(f"{1e3 * side:.4g}" for side in first.size)
     triangles = sum(mesh.triangles for mesh in meshes)
@@ -136,7 +136,9 @@ def _told(meshes: list[ImportedMesh], chord: float) -> str:
     parts = "1 part" if len(meshes) == 1 else f"{len(meshes)} parts"
     gaps = [mesh.name for mesh in meshes if not mesh.closed]
     closed = f"; not closed: {', '.join(gaps[:3])}" if gaps else ", closed"
-    facets = f"facets at most {1e6 * chord:.2g} µm off (a tenth of the predicted depth sigma)"
+    tenth = "a tenth of the predicted depth sigma"
+    why = tenth if chord == wanted else f"{tenth} is {1e6 * wanted:.2g} µm"
+    facets = f"facets at most {1e6 * chord:.2g} µm off ({why})"
     return f"{parts}, {size} mm, {triangles} triangles{closed}; {facets}"
 
 
