@@ -6,6 +6,7 @@ heard, so that tests of it mean the same however they were started.
 
 from __future__ import annotations
 
+import gc
 import signal
 
 from hypothesis import settings
@@ -15,3 +16,8 @@ settings.load_profile("repeatable")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish() -> None:
+    """What collecting made lives to the end: no search for garbage needs to look at it again."""
+    gc.freeze()

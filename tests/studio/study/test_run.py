@@ -115,7 +115,7 @@ def test_a_study_that_is_stopped_anywhere_goes_on_to_the_same_table(whole: tuple
         return patience < 0
 
     for attempt in range(100):
-        patience = chance.randrange(40 * (attempt + 1))  # looks, of which a render takes many
+        patience = chance.randrange(15 * (attempt + 1))  # looks, of which a render takes many
         try:
             again = run(tmp_path, cancelled=impatient)
             break
