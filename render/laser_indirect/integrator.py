@@ -177,11 +177,13 @@ def indirect_images(
             sums = so_far.total, so_far.weight
             so_far.line = so_far.line.look(waves.buffers, sums, so_far.next_weight, aim.weigh, aim.laser)
         so_far.add(waves.buffers, wave_moments, clamp, run.threads)
+        # a target of zero is never reached: the paths that there may be end the render
+        off = so_far.error / target if target > 0.0 else math.inf
         if so_far.line is not None:
-            so_far.line.judge(so_far.line_error, so_far.error / target, so_far.paths, most_paths)
+            so_far.line.judge(so_far.line_error, off, so_far.paths, most_paths)
         run.keep(so_far)
         # the error falls with the root of the paths, at least
-        over = min(so_far.error / target, math.inf if aim is None else so_far.line_error)
+        over = min(off, math.inf if aim is None else so_far.line_error)
         done = max(over**-2, so_far.paths / most_paths) if over > 0.0 else 1.0
         run.progress(min(0.99, done))
         if time_is_over():

@@ -325,3 +325,9 @@ def test_an_integrating_sphere_is_evenly_lit_by_all_light_but_the_first(albedo):
     assert radiance.mean() == pytest.approx(expected, rel=0.015)
     halves = radiance[:, : radiance.shape[1] // 2].mean(), radiance[:, radiance.shape[1] // 2 :].mean()
     assert halves == pytest.approx((expected, expected), rel=0.03)
+
+
+def test_a_target_of_zero_ends_with_the_paths_that_there_may_be():
+    _, parts = setting([turned_groove()], [Lambertian(albedo=0.5)])
+    image = indirect_image(*parts, target=0.0, most_paths=1 << 13)
+    assert image.paths >= 1 << 13 and 0.0 < image.error < np.inf
