@@ -40,16 +40,16 @@ class PhotonMap(NamedTuple):
 
 def photon_map(vertices: Records, paths: Records, radius: float, light_paths: int) -> PhotonMap:
     """Sort light vertices that only merging can use into cells of twice the radius."""
-    alone = paths["all_specular"] & paths["after_specular"]
-    vertices, paths = vertices[alone], paths[alone]
-    points = vertices["p"]
-    corner = points.min(axis=0) - 2.0 * radius if len(vertices) else np.zeros(3)
+    alone = np.flatnonzero(paths["all_specular"] & paths["after_specular"])
+    points = vertices["p"][alone]
+    corner = points.min(axis=0) - 2.0 * radius if len(alone) else np.zeros(3)
     size = 2.0 * radius
     place = np.floor((points - corner) / size).astype(np.int64)
     cell = (place[:, 0] << 42) | (place[:, 1] << 21) | place[:, 2]
     order = np.argsort(cell, kind="stable")
-    power, fan_bin = paths["throughput"][order], paths["fan_bin"][order].astype(np.int64)
-    return PhotonMap(vertices[order], power, fan_bin, cell[order], corner, size, light_paths)
+    sorted_alone = alone[order]
+    power, fan_bin = paths["throughput"][sorted_alone], paths["fan_bin"][sorted_alone].astype(np.int64)
+    return PhotonMap(vertices.take(sorted_alone), power, fan_bin, cell[order], corner, size, light_paths)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
