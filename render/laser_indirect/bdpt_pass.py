@@ -103,13 +103,17 @@ class BdptPass:
     """Kinds of light that are traced besides plain interreflection (`render.laser_indirect.path_vertex`)."""
     specular: bool
     """Some material is a mirror or clear glass."""
+    nested: bool
+    """Some transparent bodies overlap."""
     interiors: tuple[int, int]
-    """The overlapping bodies that the laser and the camera are within (`render.world.interior_list`)."""
+    """Of them, those that the laser and the camera are within (`render.world.interior_list`)."""
 
     @classmethod
     def of(cls, placed: PlacedLaser, reference_distance: float, seed: int, kinds: int = ALL_KINDS) -> BdptPass:
         world, camera, laser, T_world_camera, T_world_laser = placed
         surface = world.surface_at((laser.wavelength_nm,) * 3)
+        nested, ends = has_overlaps(surface), (T_world_laser[:3, 3], T_world_camera[:3, 3])
+        at_laser, at_camera = (surroundings(world, surface, end)[0] if nested else 0 for end in ends)
         return cls(
             world=world,
             surface=surface,
@@ -122,10 +126,8 @@ class BdptPass:
             seed=seed,
             kinds=kinds,
             specular=bool(kinds & CAUSTIC) and any_specular(surface),
-            interiors=(
-                surroundings(world, surface, T_world_laser[:3, 3])[0],
-                surroundings(world, surface, T_world_camera[:3, 3])[0],
-            ),
+            nested=nested,
+            interiors=(at_laser, at_camera),
         )
 
     def run(
@@ -265,12 +267,12 @@ class BdptPass:
         # a chunk's first rays lie side by side in the image, or in the sheet
         triangle, distance = rays.intersect(start, towards, coherent=depth == 0)
         walking = np.flatnonzero(paths["medium"] >= 0).astype(np.int32)
-        distance, nested = distance[walking], has_overlaps(self.surface)
+        distance = distance[walking]
         for step in range(MOST_STEPS):
-            before = walking.copy() if nested else walking
+            before = walking.copy() if self.nested else walking
             left = random_walk_step(walking, distance, paths, context, depth, step, origin, direction, triangle)
             walking = walking[:left]
-            if nested:
+            if self.nested:
                 # a flight that ends on a hidden boundary goes on beyond it, as if it had begun there
                 ended = np.setdiff1d(before, walking, assume_unique=True)
                 ahead = origin, direction, triangle, paths["interior"], np.zeros(3)
@@ -280,7 +282,7 @@ class BdptPass:
             triangle[walking], distance = rays.intersect(
                 (origin[walking] - rays.centre).astype(np.float32), direction[walking].astype(np.float32)
             )
-        if nested:
+        if self.nested:
             interior = paths["interior"].copy()
             pass_hidden(self.surface, rays, (origin - rays.centre).astype(np.float32), towards, triangle, interior)
             paths["interior"] = interior
@@ -291,7 +293,7 @@ class BdptPass:
         """Splat the connections that nothing occludes."""
         if connected:
             ends = connections.origin[:connected], connections.direction[:connected], connections.distance[:connected]
-            if has_overlaps(self.surface):
+            if self.nested:
                 interior = connections.interior[:connected]
                 occluded = occluded_by_visible(self.surface, self.world.rays, *ends, interior)
             else:
