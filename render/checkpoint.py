@@ -27,7 +27,7 @@ from render.world.world import World
 
 T = TypeVar("T")
 
-TARGETS = {"goal", "indirect_error", "light_paths", "ambient_error", "ambient_samples", "truth_images"}
+CHANGEABLE = {"goal", "indirect_error", "light_paths", "ambient_error", "ambient_samples", "truth_images"}
 """Settings that say when to end, which may be others when a render goes on."""
 MAX_BYTES = 2**33
 CURE = "delete it, or render without --resume"
@@ -152,7 +152,7 @@ def fingerprint(
         "mesh, place or texture": _digest(*arrays),
         "material": _digest(materials),
         "camera, laser, lamp or motion": _digest(repr(rest)),
-        "render setting": _digest(repr(settings.model_dump(mode="json", exclude=TARGETS))),
+        "render setting": _digest(repr(settings.model_dump(mode="json", exclude=CHANGEABLE))),
         "step or seed": f"{step}, {seed}",
         "version of the program": _program(),
     }

@@ -55,7 +55,7 @@ class Connection(NamedTuple):
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def power_heuristic(used: float, other: float) -> float:
-    """MIS weight of a sample by its own pdf and the other technique's (Veach 1997, 9.2.4)."""
+    """MIS weight of a sample by its own pdf and the other technique's (Veach 1997, 9.2.3)."""
     return used * used / (used * used + other * other)
 
 

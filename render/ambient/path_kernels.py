@@ -1,7 +1,7 @@
 """One bounce of the path tracer for ambient light: all paths of a wavefront meet their next surface together.
 
 At each surface a lamp is sampled and connected by a shadow ray (NEE), and the path goes on as the BSDF is sampled.
-Lamps with an area are found both ways, with MIS weights by the power heuristic (Veach 1997, 9.2.4). The environment,
+Lamps with an area are found both ways, with MIS weights by the power heuristic (Veach 1997, 9.2.3). The environment,
 the same from everywhere, is found by BSDF sampling, which no other pdf could better; point lights by NEE only. A
 specular BSDF has no pdf: a light that it leads to has weight 1.
 

@@ -101,7 +101,7 @@ class IndirectPilot:
     caustic: tuple[float, float]
     """Through clear glass or off mirrors, with an edge left that a connection can lie on."""
     specular_chain: tuple[float, float]
-    """Through clear glass or off mirrors on both sides of a single rough surface."""
+    """Through clear glass or off mirrors on both sides of each rough surface."""
     subsurface: tuple[float, float]
     """Through a medium."""
     effects: dict[str, float] = field(default_factory=dict)
@@ -168,6 +168,7 @@ def indirect_images(
     shown = so_far.paths
     while unfinished():
         try:
+            # after the passes of the two looks
             waves.trace(PASSES_A_WAVE * (2 + so_far.waves), sampling_of(so_far, so_far.next_paths))
         except Cancelled:
             if so_far.passes and run.keep_partial():
@@ -248,13 +249,13 @@ def initialise_guiding(
     reserve_for_specular(camera_paths, specular, LOOK_PATHS)
     guide = first_guide(camera_paths, camera)
     guide_moments = np.zeros((len(guide.cumulative), BINS))
-    size = min(max(1 << (pixels >> 8).bit_length() - 1, LEAST_PASS), MOST_PASS)
+    size = min(max(1 << max((pixels >> 8).bit_length() - 1, 0), LEAST_PASS), MOST_PASS)
     sums = np.zeros(pixels), np.zeros(pixels, np.float32)
     return Accumulator(kinds, fan, size, 1, share, specular, camera_paths, guide, guide_moments, *sums)
 
 
 def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: Float, camera: Camera) -> None:
-    """Refine the guiding by a second look, whose buffers are zeroed, and set the size of the passes to come."""
+    """Refine the guiding by a second look, whose buffers are zeroed, and say how far passes may grow."""
     first.guide = update_guide(first.guide, wave_moments, first.guide_moments)
     first.camera_share, camera_radiance = camera_reachable_share(buffers)
     if len(first.specular):
@@ -276,7 +277,10 @@ def arrived_paths(camera_radiance: Float32) -> Float:
 
 
 def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
-    """What techniques that start at the camera can make: share of the light, (pixels,) radiance; buffers are zeroed."""
+    """What techniques that start at the camera could make, whichever found it: share of the light, (pixels,) radiance.
+
+    The buffers are zeroed.
+    """
     camera_radiance = np.zeros_like(buffers[0].camera_radiance)
     light, by_camera, *_ = sum_passes(buffers, np.zeros(len(camera_radiance)), camera_radiance)
     for buffer in buffers:
@@ -335,6 +339,7 @@ def indirect_pilot(
     for number in range(passes):
         buffer = empty_buffer(camera.width * camera.height)
         task.run(number, sampling, buffer, run.cancelled)
+        # by bits of kind: none, CAUSTIC, SUBSURFACE_LIGHT, both of them; and SPECULAR_CHAIN
         interreflection, caustic, subsurface, both, specular_chain = buffer.sums
         sums.append((interreflection, caustic, specular_chain, subsurface + both))
         if effect is not None:

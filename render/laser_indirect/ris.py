@@ -1,8 +1,8 @@
 """Connecting a camera vertex to one of many light vertices by resampled importance sampling (RIS).
 
-Of M candidates x_j, drawn with pdf p(x_j) along the lit curve, one is chosen in proportion to its weight
-w_j = f(x_j) / (M p(x_j)), f the target function, and contributes sum(w_j) / f times what it brings (Talbot et al.
-2005). A single shadow ray tests it for all.
+Of M candidates x_i, drawn with probability p(x_i) along the lit curve, one is chosen in proportion to its weight
+W_i = g(x_i) / (M p(x_i)), g the target function, and contributes sum(W_i) / g(x) times what it brings (Talbot et al.
+2005). A single shadow ray tests it for all. The letters are those of `render/README.md`, section 4.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from render.plan import GroupQuality, Plan
 
 Record = dict[str, Any]
 NAN = float("nan")
-TARGETS = {
+TARGET_NAMES = {
     "direct": ("laser_error", None, "samples"),
     "indirect": ("indirect_error", "light_paths", "light paths"),
     "ambient": ("ambient_error", "ambient_samples", "samples a pixel"),
@@ -54,7 +54,7 @@ def quality_of_counts(counts: Counts, lasers: Sequence[str], targets: Mapping[st
     """
     found = []
     for group, quantities in OF_GROUPS.items():
-        error_name, most_name, unit = TARGETS[group]
+        error_name, most_name, unit = TARGET_NAMES[group]
         for i, laser in enumerate((None,) if group == "ambient" else lasers):
             number = {
                 name: counts.get(quantity if laser is None else quantity.of(i)) for name, quantity in quantities.items()

@@ -2,8 +2,8 @@
 
     optics      each light group through defocus and the lens's point spread, each laser's through its speckle: all off
                 unless the sensor's switches say so; a thin lens is rendered with its defocus, which is not done twice
-    signal      mu    = sum over light groups of radiance x response, x the pixel's own gain (PRNU)
-    charge      e     ~ Poisson(mu + dark current x exposure)
+    signal      mu    = sum over light groups of radiance x response (optics, cos^4, photons, QE: `response.py`)
+    charge      e     ~ Poisson(mu x the pixel's own gain (PRNU) + dark current x exposure)
     read-out    e    += the pixel's own offset (DSNU) + Gaussian read noise;  e <= full well
     numbers     DN    = round(K e + black level), clipped to 0 .. 2^bits - 1
     processing  what a webcam or a phone makes of them (`processing.py`); off unless the sensor has it

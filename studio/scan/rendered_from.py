@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from render.base.errors import InputError
-from render.checkpoint import TARGETS
+from render.checkpoint import CHANGEABLE
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
 from studio.project.input_files import changed_files, listed
@@ -53,7 +53,7 @@ def differences(record: Mapping[str, Any], project: Project, *, resume: bool = F
     then, now = settings.model_dump(mode="json"), project.render.model_dump(mode="json")
     pairs: list[tuple[str, Any, Any]] = [("seed", record.get("seed"), project.seed)]
     if resume:
-        fixed = then.keys() - TARGETS
+        fixed = then.keys() - CHANGEABLE
         pairs += [
             ("scene", _plain(scene), _plain(project.scene)),
             ("render", {name: then[name] for name in fixed}, {name: now[name] for name in fixed}),

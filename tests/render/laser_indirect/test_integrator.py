@@ -331,3 +331,11 @@ def test_a_target_of_zero_ends_with_the_paths_that_there_may_be():
     _, parts = setting([turned_groove()], [Lambertian(albedo=0.5)])
     image = indirect_image(*parts, target=0.0, most_paths=1 << 13)
     assert image.paths >= 1 << 13 and 0.0 < image.error < np.inf
+
+
+def test_an_image_of_a_hundred_pixels_is_rendered_as_any_other():
+    _, placed = setting([turned_groove()], [Lambertian(albedo=0.5)], paper_camera(0.005))
+    assert placed[1].width * placed[1].height < 256
+    image = indirect_image(*placed, target=0.2, run=Run(seed=1))
+    assert image.radiance.sum() > 0.0
+    assert image.error < 0.2
