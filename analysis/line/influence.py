@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from analysis.line.detection.channel import Lines, scan_lines
-from analysis.line.detection.detect import NARROWEST, PRIOR_WIDTHS
+from analysis.line.detection.detect import CENTRE, PLATEAU, PRIOR_WIDTHS, SEED_COLUMNS, WIDTH, Limits, detect
+from analysis.line.detection.detect import REACH as SEED_REACH
 from analysis.line.detection.noise import NoiseModel
-from analysis.line.measure import METHODS, measure, measure_with_neighbours
-from analysis.line.methods.narrow_line import COARSE
+from analysis.line.measure import METHODS, limits_of, measure, measure_with_neighbours
+from analysis.line.methods.narrow_line import COARSE, NARROWEST
 from analysis.line.posterior_influence import posterior_influence
 from analysis.line.result import NEIGHBOURS, Flag, Line
 from analysis.line.settings import ExtractionSettings
@@ -32,8 +33,11 @@ from render.base.arrays import Float, Float32
 Int = NDArray[np.int64]
 Flags = NDArray[np.uint8]
 
-REACH, EDGE = 4.0, 1.5
-"""Sigmas and pixels on either side of a line that its fit looks at (`methods.gaussian_fit`)."""
+REACH, PLATEAU_REACH, EDGE = 4.0, 2.5, 1.5
+"""Sigmas, sigmas from a saturated plateau, and pixels on either side of a line that its fit looks at
+(`methods.gaussian_fit`)."""
+SEEDS = 5
+"""Peaks of a scan line among which the one that was measured is found again."""
 WIDEST = 64
 """px; farther from a line no pixel is tried."""
 STEP = 0.01
@@ -78,14 +82,13 @@ def likelihood_influence(
     """Rows (n,) of a likelihood line -> first pixel (n,) and weight (n, m) px / e-; zero where a pixel is not used."""
     u, width, height = line.u[rows, peak], line.width[rows, peak], line.amplitude[rows, peak]
     narrow = line.flag[rows, peak] == Flag.UNRESOLVED
-    looked = np.where(narrow, np.maximum(width, NARROWEST), width)
-    half = np.ceil(np.minimum(REACH * looked + EDGE, 6.0 * settings.max_width))
-    m = 2 * int(half.max()) + 1
+    electrons, mask, floor = lines.read(0, lines.count)
+    middle, half = _fit_windows((electrons[rows], mask[rows], floor[rows]), limits_of(lines, settings), u, width)
+    m = 2 * (int(half.max()) + 1) + 1
     first = np.rint(u).astype(np.int64) - m // 2
     x = first[:, None] + np.arange(m, dtype=np.float64)
-    electrons, mask, floor = lines.read(0, lines.count)
     inside = np.clip(x.astype(np.int64), 0, mask.shape[1] - 1)
-    used = (np.abs(x - u[:, None]) <= half[:, None]) & (x >= 0) & (x < mask.shape[1])
+    used = (np.abs(x - middle[:, None]) <= half[:, None]) & (x >= 0) & (x < mask.shape[1])
     used &= np.take_along_axis(mask[rows], inside, axis=1) == 0
     held = np.take_along_axis(floor[rows], np.minimum(inside, floor.shape[1] - 1), axis=1).astype(np.float64)
     background, integrated = line.background[rows, peak][:, None], settings.profile == "integrated"
@@ -97,7 +100,7 @@ def likelihood_influence(
         lit = np.zeros(lines.count, np.bool_)
         lit[np.clip(rows[narrow][:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1), 0, lines.count - 1)] = True
         near = np.flatnonzero(narrow | (lit[rows] & (width < COARSE)))
-        seen = m // 2 + np.arange(-(reach := int(half[near].max())), reach + 1)
+        seen = m // 2 + np.arange(-(reach := int(half[near].max()) + 1), reach + 1)
         light = np.take_along_axis(electrons[rows[near]], inside[near], axis=1)
         part = tuple(array[:, seen].astype(np.float64) for array in (x[near], light, held[near], used[near]))
         pixels = *part, background[near]
@@ -106,6 +109,23 @@ def likelihood_influence(
         by_centre[narrow] = 0.0
         by_centre[np.ix_(narrow, seen)] = moved[narrow[near]]
     return first, by_centre
+
+
+def _fit_windows(light: tuple[Float32, Flags, Float32], limits: Limits, u: Float, width: Float) -> tuple[Float, Float]:
+    """Electrons, masks and floors of scan lines (n, w), positions and widths (n,) -> middle and half (n,) of the pixels
+    that each fit looked at: those of its seed, unless the fit is much narrower or wider (`methods.gaussian_fit`)."""
+    seeds, flags = np.zeros((len(u), SEEDS, SEED_COLUMNS)), np.empty((len(u), SEEDS), np.uint8)
+    detect(*light, limits, seeds, flags)
+    apart = np.abs(seeds[:, :, CENTRE] - u[:, None])
+    seed = seeds[np.arange(len(u)), np.argmin(np.where(np.isnan(apart), np.inf, apart), axis=1)]
+
+    def half(sigma: Float) -> Float:
+        wanted = np.maximum(REACH * sigma + EDGE, seed[:, PLATEAU] + PLATEAU_REACH * sigma + EDGE)
+        return np.asarray(np.ceil(np.minimum(np.minimum(wanted, seed[:, SEED_REACH]), 6.0 * limits.max_width)))
+
+    first, again = half(seed[:, WIDTH]), half(np.maximum(width, NARROWEST))
+    kept = (limits.width > 0.0) | ((0.5 * first <= again) & (again <= 1.15 * first + 1.0))
+    return np.where(kept, seed[:, CENTRE], u), np.where(kept, first, again)
 
 
 def _fit_influence(

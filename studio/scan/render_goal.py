@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import correlate1d, median_filter
+from scipy.ndimage import correlate1d, maximum_filter1d, median_filter
 
 from analysis.line.detection.matched_filter import BLOCK, NOISE_GAIN, TAPS
 from analysis.line.detection.noise import NoiseModel
@@ -35,6 +35,10 @@ NEAREST = 0.25
 """Of the detection threshold, in the noise of line and rival: nearer than this to a change the sensor decides."""
 AROUND = 3.0
 """Sigmas of a line within which it is itself the peak."""
+DECISION = 3.0
+"""Times the goal, of a pixel's own noise: ambient light that is known so well on the pixels of a line leaves it to the
+sensor which of two answers a fit gives, one line or two, a wide or a narrow one. The influence function knows of one
+answer alone."""
 DIRECT = 0.1
 """Share of the goal's variance that direct light has. Its error falls with the power 1.5 of the rays, that of all other
 light with the power 0.5, and it takes a hundredth of the time: a tenth costs it about twice the rays of a third."""
@@ -71,20 +75,24 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     lasers, peaks = [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
     for i, laser in enumerate(scene.lasers):
-        moved, risen = _weights(project, frame, i, allowed, threads)
+        moved, risen, decided = _weights(project, frame, i, allowed, threads)
         response = _tiled(joule * laser_response(sensor, laser.wavelength_nm), illumination)
         lasers.append(moved * response)
         peaks.append(risen * response)
         # a whole row counts as one sum there, of which a quarter of its pixels may come near
         even = risen / math.sqrt(max(0.25 * illumination.shape[1 if axis == "rows" else 0] / CELL, 1.0))
+        used = np.count_nonzero(decided, axis=1 if axis == "rows" else 0).clip(1)
+        share = DECISION * goal.depth * np.expand_dims(np.sqrt(used), 1 if axis == "rows" else 0)
+        even = np.maximum(even, decided / share)
         ambient = np.maximum(ambient, np.maximum(np.abs(moved), even) * bands)
     return Importance(tuple(lasers), ambient, axis, tuple(peaks), allowed, direct)
 
 
 def _weights(
     project: Project, frame: Frame, laser: int, allowed: float, threads: int | None
-) -> tuple[Float32, Float32]:
-    """(h, w) how far an electron moves the line over what is allowed, and how far it goes to make or hide a peak."""
+) -> tuple[Float32, Float32, Float32]:
+    """(h, w) how far an electron moves the line over what is allowed, how far it goes to make or hide a peak, and
+    1 over the noise of each pixel that the line is measured on, 0 of others."""
     powers = [one.power if i == laser else 0.0 for i, one in enumerate(project.scene.lasers)]
     electrons = expected_electrons(frame, project.scene, project.sensor, threads=threads, laser_power=powers)
     image = _expected_image(project, electrons)
@@ -99,7 +107,10 @@ def _weights(
     sigma = _sigma(line, derivative, electrons, noise, axis)
     moved = derivative / np.expand_dims(allowed * sigma, axis)
     risen = _peaks(electrons if axis == 1 else electrons.T, line, noise, settings, threads)
-    return moved.astype(np.float32), np.ascontiguousarray(risen if axis == 1 else risen.T)
+    # one more on either side, as windows begin with the pixel
+    near = maximum_filter1d(derivative != 0.0, 3, axis=axis)
+    decided = near / np.sqrt(np.maximum(electrons + noise.floor, 1e-2))
+    return moved.astype(np.float32), np.ascontiguousarray(risen if axis == 1 else risen.T), decided.astype(np.float32)
 
 
 def _expected_image(project: Project, electrons: Float32) -> Image:

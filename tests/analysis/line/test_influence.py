@@ -81,6 +81,17 @@ def test_a_narrow_line_is_moved_as_by_differences(brightness: float, monkeypatch
     assert np.quantile(apart / total, 0.9) < 0.05 and np.median(apart / total) < 0.02
 
 
+@pytest.mark.parametrize("sigma", [0.3, 0.7, SIGMA])
+def test_all_pixels_that_the_fit_looks_at_have_influence(sigma: float) -> None:
+    """A fit keeps the window of its seed, which is wider than a narrow line."""
+    image, chosen = image_of(PLACES, sigma), settings("likelihood")
+    line = extract(image, settings=chosen, noise=NOISE)
+    found = influence(image, line, chosen, NOISE)
+    for row in range(1, 8):
+        by_hand = np.array([moved(image, row, column, 20.0, "likelihood") for column in range(32, 64)])
+        assert np.abs(by_hand[found[row, 32:64] == 0.0]).max() < 0.01 * np.abs(by_hand).max()
+
+
 def test_its_sum_with_the_noise_of_the_pixels_is_the_sigma_that_is_told() -> None:
     image = image_of(PLACES)
     electrons = (image - NOISE.black_level) / NOISE.gain

@@ -80,6 +80,22 @@ def test_a_weight_says_how_far_light_moves_a_row_over_the_allowed(world: World) 
     assert alike.mean() >= 0.95 and np.corrcoef(told, moved)[0, 1] > 0.95
 
 
+def test_ambient_light_is_known_to_a_share_of_the_noise_of_every_pixel_of_the_line(frame: Frame) -> None:
+    """Those too that hardly move it: by the width that they tell, the fit of a narrow line has more than one answer."""
+    project = project_of()
+    weight = importance(project, DepthGoal(depth=0.1), frame, 2).ambient
+    electrons = expected_electrons(frame, project.scene, project.sensor)
+    line = line_in(project, frame)
+    # each of the pixels that a fit looks at, at most 13 here, has an equal part of the sum of squares
+    lamp = np.ones_like(frame.laser_direct[0])
+    lit = replace(frame, laser_direct=(0.0 * lamp,), laser_indirect=(0.0 * lamp,), ambient=np.stack([lamp] * 3, axis=2))
+    of_radiance = expected_electrons(lit, project.scene, project.sensor)
+    for row in np.flatnonzero(line.valid[:, 0])[::20]:
+        columns = int(round(line.u[row, 0])) + np.arange(-3, 4)
+        allowed = of_radiance[row, columns] / (weight[row, columns] * np.sqrt(electrons[row, columns] + 49.0))
+        assert (allowed <= 0.3 * np.sqrt(13.0) * 1.01).all()
+
+
 def test_the_goal_is_reached_in_nineteen_rows_of_twenty(world: World) -> None:
     """Rendered with other seeds, the reflections put each row elsewhere: by less than the goal.
 
