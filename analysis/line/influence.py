@@ -49,12 +49,19 @@ TRIED = 64
 
 
 def influence(
-    image: NDArray[Any], line: Line, settings: ExtractionSettings, noise: NoiseModel, threads: int | None = None
+    image: NDArray[Any],
+    line: Line,
+    settings: ExtractionSettings,
+    noise: NoiseModel,
+    threads: int | None = None,
+    *,
+    shared: bool = False,
 ) -> Float32:
     """Image (h, w) of DN, Line measured in it -> (h, w) px / e-, summed over its peaks; zero far from any.
 
     settings: those that the line was measured with; `line.method` tells what "auto" picked. Methods that look at
-    neighbouring scan lines, or smooth over them, are taken to move with all of these at once.
+    neighbouring scan lines, or smooth over them, are taken to move with all of these at once. shared: the pixels of a
+    narrow line stand for those of the neighbours too that tell its width, as if all had errors of one size.
     """
     chosen = settings.model_copy(update={"method": line.method})
     if line.method == "likelihood":
@@ -64,7 +71,7 @@ def influence(
     for k in range(line.u.shape[1]):
         rows = np.flatnonzero(line.valid[:, k])
         if len(rows) and line.method == "likelihood":
-            _scatter(found, rows, *likelihood_influence(lines, line, chosen, rows, k))
+            _scatter(found, rows, *likelihood_influence(lines, line, chosen, rows, k, shared=shared))
         elif len(rows):
             alone = _alone(lines, chosen)
             tried = rows[np.unique(np.linspace(0, len(rows) - 1, TRIED).astype(int))] if alone else rows
@@ -77,9 +84,10 @@ def influence(
 
 
 def likelihood_influence(
-    lines: Lines, line: Line, settings: ExtractionSettings, rows: Int, peak: int
+    lines: Lines, line: Line, settings: ExtractionSettings, rows: Int, peak: int, *, shared: bool = False
 ) -> tuple[Int, Float]:
-    """Rows (n,) of a likelihood line -> first pixel (n,) and weight (n, m) px / e-; zero where a pixel is not used."""
+    """Rows (n,) of a likelihood line -> first pixel (n,) and weight (n, m) px / e-; zero where a pixel is not used.
+    shared: as for `influence`."""
     u, width, height = line.u[rows, peak], line.width[rows, peak], line.amplitude[rows, peak]
     narrow = line.flag[rows, peak] == Flag.UNRESOLVED
     electrons, mask, floor = lines.read(0, lines.count)
@@ -105,10 +113,25 @@ def likelihood_influence(
         part = tuple(array[:, seen].astype(np.float64) for array in (x[near], light, held[near], used[near]))
         pixels = *part, background[near]
         told = u[near], line.sigma_u[rows[near], peak]
-        moved = posterior_influence(pixels, *told, by_background[near][:, seen], settings.width, integrated)
+        moved, widened = posterior_influence(pixels, *told, by_background[near][:, seen], settings.width, integrated)
+        if shared and line.shared_u is not None:
+            variance = np.maximum(part[1] + part[2], 1e-2)
+            moved = _with_neighbours(moved, widened, variance, line.shared_u[rows[near], peak])
         by_centre[narrow] = 0.0
         by_centre[np.ix_(narrow, seen)] = moved[narrow[near]]
     return first, by_centre
+
+
+def _with_neighbours(moved: Float, widened: Float, variance: Float, shared_u: Float) -> Float:
+    """How far each pixel moves place and width (n, m), and its variance, e-^2 -> weight (n, m) px / e-, with that of
+    the neighbours' pixels as if they were the own ones, whose noise moves the place by shared_u (n,) px.
+
+    They move the place by the width that they tell, so that what changes no line's width has no such effect.
+    """
+    noise = np.sqrt(np.sum(widened**2 * variance, axis=1))
+    more = np.divide(np.abs(shared_u), noise, out=np.zeros_like(noise), where=noise > 0.0)[:, None] * widened
+    # of one sign with the own ones, so that together they count for no less
+    return moved + np.copysign(1.0, np.sum(moved * more * variance, axis=1))[:, None] * more
 
 
 def _fit_windows(light: tuple[Float32, Flags, Float32], limits: Limits, u: Float, width: Float) -> tuple[Float, Float]:

@@ -102,7 +102,7 @@ def _weights(
     if image.pattern is not None and settings.pattern is None:
         settings = settings.model_copy(update={"pattern": image.pattern})
     # of a selection the candidates' method is the one that measured them
-    derivative = influence(image.pixels, line, settings, noise, threads)
+    derivative = influence(image.pixels, line, settings, noise, threads, shared=True)
     axis = 1 if line.axis == "rows" else 0
     sigma = _sigma(line, derivative, electrons, noise, axis)
     moved = derivative / np.expand_dims(allowed * sigma, axis)
