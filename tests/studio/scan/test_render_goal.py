@@ -15,12 +15,13 @@ from render.render import render_world
 from render.run import Run
 from render.scene.settings import DepthGoal
 from render.sensor.develop import expected_electrons
+from render.sensor.response import relative_illumination
 from render.world.placed import PlacedScene
 from render.world.world import World, build_world
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.line_extraction import extract_line
-from studio.scan.render_goal import _expected_image, goal_of, importance
+from studio.scan.render_goal import _expected_image, goal_of, importance, undecided_rows
 from studio.scan.stages import Clock, render_step, scaled
 
 FOLDER = template_folder("weld_seam")
@@ -120,6 +121,23 @@ def test_the_goal_is_reached_in_nineteen_rows_of_twenty(world: World) -> None:
     assert found.sum() >= 0.99 * reference.valid.sum()
     deviation = u.std(axis=0, ddof=1)[found] / reference.sigma_u[found, 0]
     assert np.mean(deviation < 0.1) >= 0.95
+
+
+def test_rows_with_two_lines_alike_are_told_as_undecided(frame: Frame) -> None:
+    """The strongest is the line; of two alike any noise decides. A second one half as bright decides nothing."""
+    project, goal = project_of(), DepthGoal(depth=0.1)
+    rows, light = np.flatnonzero(line_in(project, frame).valid[:, 0])[20:100:10], frame.laser_direct[0]
+    seen = relative_illumination(project.scene.camera, 2)
+
+    def with_second(share: float) -> Frame:
+        image = light.copy()
+        image[rows] += share * np.roll((light * seen)[rows], 60, axis=1) / seen[rows]
+        return replace(frame, laser_direct=(image,), laser_indirect=(), ambient=None)
+
+    alone = replace(frame, laser_indirect=(), ambient=None)
+    before = undecided_rows(project, goal, alone, 0, 2)
+    assert undecided_rows(project, goal, with_second(1.0), 0, 2) >= before + len(rows) - 1
+    assert undecided_rows(project, goal, with_second(0.5), 0, 2) <= before + 1
 
 
 def test_a_small_share_that_moves_rows_is_rendered(world: World) -> None:
