@@ -53,3 +53,8 @@ LINES_KNOWN = 0.95
 What is told of them all is the deviation that so many are below."""
 CELL = 4
 """Pixels; about as many as peaks are looked for with."""
+
+
+def known_below(deviations: Float) -> float:
+    """Of scan lines (n,): what `LINES_KNOWN` of them are below."""
+    return float(np.quantile(deviations, LINES_KNOWN)) if len(deviations) else 0.0

@@ -150,6 +150,13 @@ class GroupQuality:
     out_of_reach: bool = False
     """Of the line: its goal would have taken far more work than is allowed, or than the error of the image, which was
     rendered in its place."""
+    lines: int | None = None
+    """Of the line: scan lines with a line."""
+    unknown: int | None = None
+    """Of the line: those of `lines` that this light's noise moves by more than the target, as far as can be told."""
+    undecided: int | None = None
+    """Of direct light for the line: scan lines in which noise as small as the goal decides between two answers of the
+    line extraction, so that another render may find another one; None: not looked at."""
     coarse_error: float | None = None
     """Of ambient light that is rendered for the line: relative RMS error of what is interpolated, where no error
     matters, found on held-out pixels; None: nothing is."""

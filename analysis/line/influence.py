@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from analysis.line.detection.channel import Lines, scan_lines
-from analysis.line.detection.detect import NARROWEST, PRIOR_WIDTHS
+from analysis.line.detection.detect import CENTRE, PLATEAU, PRIOR_WIDTHS, SEED_COLUMNS, WIDTH, Limits, detect
+from analysis.line.detection.detect import REACH as SEED_REACH
 from analysis.line.detection.noise import NoiseModel
-from analysis.line.measure import METHODS, measure, measure_with_neighbours
-from analysis.line.methods.narrow_line import COARSE
+from analysis.line.measure import METHODS, limits_of, measure, measure_with_neighbours
+from analysis.line.methods.narrow_line import COARSE, NARROWEST
 from analysis.line.posterior_influence import posterior_influence
 from analysis.line.result import NEIGHBOURS, Flag, Line
 from analysis.line.settings import ExtractionSettings
@@ -32,8 +33,11 @@ from render.base.arrays import Float, Float32
 Int = NDArray[np.int64]
 Flags = NDArray[np.uint8]
 
-REACH, EDGE = 4.0, 1.5
-"""Sigmas and pixels on either side of a line that its fit looks at (`methods.gaussian_fit`)."""
+REACH, PLATEAU_REACH, EDGE = 4.0, 2.5, 1.5
+"""Sigmas, sigmas from a saturated plateau, and pixels on either side of a line that its fit looks at
+(`methods.gaussian_fit`)."""
+SEEDS = 5
+"""Peaks of a scan line among which the one that was measured is found again."""
 WIDEST = 64
 """px; farther from a line no pixel is tried."""
 STEP = 0.01
@@ -45,12 +49,19 @@ TRIED = 64
 
 
 def influence(
-    image: NDArray[Any], line: Line, settings: ExtractionSettings, noise: NoiseModel, threads: int | None = None
+    image: NDArray[Any],
+    line: Line,
+    settings: ExtractionSettings,
+    noise: NoiseModel,
+    threads: int | None = None,
+    *,
+    shared: bool = False,
 ) -> Float32:
     """Image (h, w) of DN, Line measured in it -> (h, w) px / e-, summed over its peaks; zero far from any.
 
     settings: those that the line was measured with; `line.method` tells what "auto" picked. Methods that look at
-    neighbouring scan lines, or smooth over them, are taken to move with all of these at once.
+    neighbouring scan lines, or smooth over them, are taken to move with all of these at once. shared: the pixels of a
+    narrow line stand for those of the neighbours too that tell its width, as if all had errors of one size.
     """
     chosen = settings.model_copy(update={"method": line.method})
     if line.method == "likelihood":
@@ -60,7 +71,7 @@ def influence(
     for k in range(line.u.shape[1]):
         rows = np.flatnonzero(line.valid[:, k])
         if len(rows) and line.method == "likelihood":
-            _scatter(found, rows, *likelihood_influence(lines, line, chosen, rows, k))
+            _scatter(found, rows, *likelihood_influence(lines, line, chosen, rows, k, shared=shared))
         elif len(rows):
             alone = _alone(lines, chosen)
             tried = rows[np.unique(np.linspace(0, len(rows) - 1, TRIED).astype(int))] if alone else rows
@@ -73,19 +84,19 @@ def influence(
 
 
 def likelihood_influence(
-    lines: Lines, line: Line, settings: ExtractionSettings, rows: Int, peak: int
+    lines: Lines, line: Line, settings: ExtractionSettings, rows: Int, peak: int, *, shared: bool = False
 ) -> tuple[Int, Float]:
-    """Rows (n,) of a likelihood line -> first pixel (n,) and weight (n, m) px / e-; zero where a pixel is not used."""
+    """Rows (n,) of a likelihood line -> first pixel (n,) and weight (n, m) px / e-; zero where a pixel is not used.
+    shared: as for `influence`."""
     u, width, height = line.u[rows, peak], line.width[rows, peak], line.amplitude[rows, peak]
     narrow = line.flag[rows, peak] == Flag.UNRESOLVED
-    looked = np.where(narrow, np.maximum(width, NARROWEST), width)
-    half = np.ceil(np.minimum(REACH * looked + EDGE, 6.0 * settings.max_width))
-    m = 2 * int(half.max()) + 1
+    electrons, mask, floor = lines.read(0, lines.count)
+    middle, half = _fit_windows((electrons[rows], mask[rows], floor[rows]), limits_of(lines, settings), u, width)
+    m = 2 * (int(half.max()) + 1) + 1
     first = np.rint(u).astype(np.int64) - m // 2
     x = first[:, None] + np.arange(m, dtype=np.float64)
-    electrons, mask, floor = lines.read(0, lines.count)
     inside = np.clip(x.astype(np.int64), 0, mask.shape[1] - 1)
-    used = (np.abs(x - u[:, None]) <= half[:, None]) & (x >= 0) & (x < mask.shape[1])
+    used = (np.abs(x - middle[:, None]) <= half[:, None]) & (x >= 0) & (x < mask.shape[1])
     used &= np.take_along_axis(mask[rows], inside, axis=1) == 0
     held = np.take_along_axis(floor[rows], np.minimum(inside, floor.shape[1] - 1), axis=1).astype(np.float64)
     background, integrated = line.background[rows, peak][:, None], settings.profile == "integrated"
@@ -97,15 +108,47 @@ def likelihood_influence(
         lit = np.zeros(lines.count, np.bool_)
         lit[np.clip(rows[narrow][:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1), 0, lines.count - 1)] = True
         near = np.flatnonzero(narrow | (lit[rows] & (width < COARSE)))
-        seen = m // 2 + np.arange(-(reach := int(half[near].max())), reach + 1)
+        seen = m // 2 + np.arange(-(reach := int(half[near].max()) + 1), reach + 1)
         light = np.take_along_axis(electrons[rows[near]], inside[near], axis=1)
         part = tuple(array[:, seen].astype(np.float64) for array in (x[near], light, held[near], used[near]))
         pixels = *part, background[near]
         told = u[near], line.sigma_u[rows[near], peak]
-        moved = posterior_influence(pixels, *told, by_background[near][:, seen], settings.width, integrated)
+        moved, widened = posterior_influence(pixels, *told, by_background[near][:, seen], settings.width, integrated)
+        if shared and line.shared_u is not None:
+            variance = np.maximum(part[1] + part[2], 1e-2)
+            moved = _with_neighbours(moved, widened, variance, line.shared_u[rows[near], peak])
         by_centre[narrow] = 0.0
         by_centre[np.ix_(narrow, seen)] = moved[narrow[near]]
     return first, by_centre
+
+
+def _with_neighbours(moved: Float, widened: Float, variance: Float, shared_u: Float) -> Float:
+    """How far each pixel moves place and width (n, m), and its variance, e-^2 -> weight (n, m) px / e-, with that of
+    the neighbours' pixels as if they were the own ones, whose noise moves the place by shared_u (n,) px.
+
+    They move the place by the width that they tell, so that what changes no line's width has no such effect.
+    """
+    noise = np.sqrt(np.sum(widened**2 * variance, axis=1))
+    more = np.divide(np.abs(shared_u), noise, out=np.zeros_like(noise), where=noise > 0.0)[:, None] * widened
+    # of one sign with the own ones, so that together they count for no less
+    return moved + np.copysign(1.0, np.sum(moved * more * variance, axis=1))[:, None] * more
+
+
+def _fit_windows(light: tuple[Float32, Flags, Float32], limits: Limits, u: Float, width: Float) -> tuple[Float, Float]:
+    """Electrons, masks and floors of scan lines (n, w), positions and widths (n,) -> middle and half (n,) of the pixels
+    that each fit looked at: those of its seed, unless the fit is much narrower or wider (`methods.gaussian_fit`)."""
+    seeds, flags = np.zeros((len(u), SEEDS, SEED_COLUMNS)), np.empty((len(u), SEEDS), np.uint8)
+    detect(*light, limits, seeds, flags)
+    apart = np.abs(seeds[:, :, CENTRE] - u[:, None])
+    seed = seeds[np.arange(len(u)), np.argmin(np.where(np.isnan(apart), np.inf, apart), axis=1)]
+
+    def half(sigma: Float) -> Float:
+        wanted = np.maximum(REACH * sigma + EDGE, seed[:, PLATEAU] + PLATEAU_REACH * sigma + EDGE)
+        return np.asarray(np.ceil(np.minimum(np.minimum(wanted, seed[:, SEED_REACH]), 6.0 * limits.max_width)))
+
+    first, again = half(seed[:, WIDTH]), half(np.maximum(width, NARROWEST))
+    kept = (limits.width > 0.0) | ((0.5 * first <= again) & (again <= 1.15 * first + 1.0))
+    return np.where(kept, seed[:, CENTRE], u), np.where(kept, first, again)
 
 
 def _fit_influence(

@@ -83,6 +83,17 @@ METHODS = {
 }
 
 
+def limits_of(lines: Lines, settings: ExtractionSettings) -> Limits:
+    """What counts as a line in these scan lines."""
+    return Limits(
+        threshold=settings.threshold,
+        step=lines.noise.step / lines.noise.gain,
+        gain=response_gain(smoothing_correlation(settings.smoothing)),
+        width=settings.width or 0.0,
+        max_width=settings.max_width,
+    )
+
+
 def measure(lines: Lines, settings: ExtractionSettings, threads: int | None, judge: bool = False) -> Line:
     """Scan lines -> Line with arrays (n, peaks); a chunk writes its own rows, so threads change nothing.
 
@@ -108,13 +119,7 @@ def measure_with_neighbours(
     tells_width = estimator.measure is measure_gaussian and settings.width is None
     out = np.empty((lines.count, settings.peaks, COLUMNS if tells_width else TOLD))
     flags = np.empty((lines.count, settings.peaks), np.uint8)
-    limits = Limits(
-        threshold=settings.threshold,
-        step=lines.noise.step / lines.noise.gain,
-        gain=response_gain(correlation),
-        width=settings.width or 0.0,
-        max_width=settings.max_width,
-    )
+    limits = limits_of(lines, settings)
     options = Options(
         variant=estimator.variant,
         integrated=settings.profile == "integrated",

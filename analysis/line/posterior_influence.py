@@ -6,7 +6,8 @@ family: Brown, Fundamentals of Statistical Exponential Families, 1986, 2.3),
     dc / dy_i  =  Cov(c, d log L / dy_i)  +  Cov(c, d log L / db)  db / dy_i,      d log L / dy_i = log m_i(c, s),
 
 with m_i the mean of the pixel. The light is the one that fits best, so that its own change adds nothing; the background
-b is the fit's. What neighbours tell of the width stays as it is.
+b is the fit's. What neighbours tell of the width stays as it is; what the pixels tell of the width themselves follows
+likewise, with s in place of c.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ place (n, k); mean of the m + 1 scores, and their covariance with the place (n, 
 
 def posterior_influence(
     pixels: Pixels, u: Float, sigma_u: Float, by_background: Float, width: float | None, integrated: bool
-) -> Float:
-    """Neighbouring scan lines (n, m) -> weight (n, m) px / e-.
+) -> tuple[Float, Float]:
+    """Neighbouring scan lines (n, m) -> weights (n, m) of the place and of the width, px / e-.
 
     u, sigma_u (n,) px as measured; by_background (n, m): how far each pixel moves the background; width: px, if known.
     """
@@ -41,10 +42,11 @@ def posterior_influence(
         told = np.hstack([log - log.max(axis=1, keepdims=True) for log in look[:2]])
         shared = width_priors(told, u, sigma_u)
         prior = np.zeros((len(u), len(widths))) if shared is None else shared[0]
-        moved = _over_widths(pixels, look, u, prior, integrated)
+        both = _over_widths(pixels, look, u, prior, integrated)
     else:
-        moved = look[4][:, 0, 1]
-    return np.asarray((moved[:, :-1] + moved[:, -1:] * by_background) * pixels[3])
+        both = np.stack((look[4][:, 0, 1], np.zeros_like(look[4][:, 0, 1])))
+    place, wide = (both[..., :-1] + both[..., -1:] * by_background) * pixels[3]
+    return place, wide
 
 
 def _each_width(pixels: Pixels, widths: Float, u: Float, integrated: bool) -> Told:
@@ -61,12 +63,12 @@ def _each_width(pixels: Pixels, widths: Float, u: Float, integrated: bool) -> To
 
 
 def _over_widths(pixels: Pixels, look: Told, u: Float, prior: Float, integrated: bool) -> Float:
-    """Covariance (n, m + 1) of place and scores over all widths, of a look at PRIOR_WIDTHS; the prior's logarithm
-    (n, len(PRIOR_WIDTHS))."""
+    """Covariance (2, n, m + 1) of place and width with scores over all widths, of a look at PRIOR_WIDTHS; the prior's
+    logarithm (n, len(PRIOR_WIDTHS))."""
     widths: Float = np.broadcast_to(PRIOR_WIDTHS, prior.shape)
     step = np.full(len(u), PRIOR_WIDTHS[1] - PRIOR_WIDTHS[0])
     weight = _weights(look[1] + prior, widths)
-    moved = _covariance(look, weight, u)
+    moved = _covariance(look, weight, u, widths)
     left = np.arange(len(u))
     for _ in range(LOOKS):
         mean = (weight * widths).sum(axis=1)
@@ -83,7 +85,7 @@ def _over_widths(pixels: Pixels, look: Told, u: Float, prior: Float, integrated:
         assert len(some) == 5
         look = _each_width(some, widths, u[left], integrated)
         weight = _weights(look[1] + _prior_at(prior[left], widths), widths)
-        moved[left] = _covariance(look, weight, u[left])
+        moved[:, left] = _covariance(look, weight, u[left], widths)
     return moved
 
 
@@ -94,14 +96,15 @@ def _weights(log: Float, widths: Float) -> Float:
     return np.asarray(weight / weight.sum(axis=1, keepdims=True))
 
 
-def _covariance(look: Told, weight: Float, u: Float) -> Float:
-    """By the law of total covariance, (n, m + 1)."""
+def _covariance(look: Told, weight: Float, u: Float, widths: Float) -> Float:
+    """By the law of total covariance, (2, n, m + 1)."""
     _, _, place, _, scores = look
-    apart = place - u[:, None]
-    mean = np.einsum("nk,nki->ni", weight, scores[:, :, 0])
-    within = np.einsum("nk,nki->ni", weight, scores[:, :, 1])
-    between = np.einsum("nk,nk,nki->ni", weight, apart, scores[:, :, 0])
-    return np.asarray(within + between - (weight * apart).sum(axis=1)[:, None] * mean)
+    # (2, n, k): place and width, from their means
+    apart = np.stack((place - u[:, None], widths))
+    apart -= np.einsum("nk,ank->an", weight, apart)[..., None]
+    found = np.einsum("nk,ank,nki->ani", weight, apart, scores[:, :, 0])
+    found[0] += np.einsum("nk,nki->ni", weight, scores[:, :, 1])
+    return np.asarray(found)
 
 
 def _prior_at(prior: Float, widths: Float) -> Float:

@@ -50,6 +50,9 @@ def quality_lines(quality: tuple[GroupQuality, ...]) -> list[tuple[str, str]]:
     for laser, noise in line_noise(quality).items():
         told = f"moves {LINES_KNOWN:.0%} of the rows by at most {noise:.2g} sigma"
         told = told if math.isfinite(noise) else "how far it moves the line is not known"
+        undecided = sum(one.undecided or 0 for one in quality if one.laser == laser)
+        if undecided:
+            told += f"; {undecided} rows hang on less than that, and may come out another way"
         lines.append((f"{laser}, noise of all light", told))
     return lines
 
@@ -75,6 +78,8 @@ def quality_text(quality: GroupQuality) -> str:
             f"noise moves the line by {quality.error:.2g} sigma" if math.isfinite(quality.error) else "line not known"
         )
         parts.append(f"{known}, goal {quality.target:.2g}{' out of reach' if quality.out_of_reach else ''}")
+        if quality.unknown:
+            parts.append(f"{quality.unknown} of {quality.lines} rows by more")
         if quality.image_error is not None and math.isfinite(quality.image_error):
             end = "" if quality.image_target is None else f", which ends it at {quality.image_target:.0%}"
             places = 2 if quality.group == "direct" else 0

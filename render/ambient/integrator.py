@@ -63,6 +63,10 @@ class AmbientImage:
     coarse_error: float | None = None
     """Relative RMS error of what was interpolated where no error matters, on held-out pixels; None: nothing was.
     `error` is then that of the scan lines over the allowed one (`render.ambient.measured_light`)."""
+    lines: int | None = None
+    """Scan lines of which that is, once they were looked at."""
+    unknown: int | None = None
+    """Those whose own error is above the allowed one."""
 
 
 def ambient_images(

@@ -107,5 +107,7 @@ def quality_of(image: AmbientImage, settings: RenderSettings, importance: Import
         invalid=image.invalid,
         clamped=image.clamped if clamped else None,
         clamped_radiance=image.clamped_radiance if clamped else None,
+        lines=image.lines,
+        unknown=image.unknown,
         coarse_error=image.coarse_error,
     )

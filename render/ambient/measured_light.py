@@ -21,7 +21,7 @@ from render.ambient.line_samples import (
 from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
-from render.importance import LINES_KNOWN, Importance
+from render.importance import Importance, known_below
 from render.run import Run
 from render.world.placed import PlacedScene
 
@@ -84,12 +84,14 @@ def seen_from(placed: PlacedScene, *settings: object) -> tuple[object, ...]:
 def _image(coarse: CoarseImage, film: PixelSamples, band: Band, *, begun: bool = True) -> AmbientImage:
     """The coarse image with the band in it, once that has been sampled."""
     radiance, error, total = coarse.radiance, float("nan"), coarse.samples + film.total
+    lines: int | None = None
+    unknown: int | None = None
     if begun:
         # whoever shows the first image still holds it
         radiance = radiance.copy()
         radiance.reshape(-1, 3)[band.pixels] = film.means(band.pixels).mean(axis=1)
         deviations = line_deviations(film, band)
-        error = float(np.quantile(deviations, LINES_KNOWN)) if len(deviations) else 0.0
+        error, lines, unknown = known_below(deviations), len(deviations), int(np.sum(deviations > 1.0))
     return AmbientImage(
         radiance,
         error,
@@ -98,4 +100,6 @@ def _image(coarse: CoarseImage, film: PixelSamples, band: Band, *, begun: bool =
         coarse.clamped + int(film.invalid_counts[CLAMPED]),
         (coarse.cut * coarse.samples + film.cut) / total,
         coarse.error,
+        lines,
+        unknown,
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from render.frame import Estimate, Frame
-from render.importance import LINES_KNOWN, Importance
+from render.importance import Importance, known_below
 from render.laser_direct.integrator import DirectImage, direct_image
 from render.light_group import LightGroup, Shares
 from render.plan import GroupPlan, GroupQuality, TransportStep
@@ -92,8 +92,7 @@ def known_lines(placed: PlacedLaser, target: float, importance: Importance, lase
 
 def line_deviation(image: DirectImage, importance: Importance, laser: int) -> float:
     """By how much the error of the image moves `LINES_KNOWN` of the lines at most, over their own sigma."""
-    deviations = importance.line_deviations(laser, image.deviation())
-    return float(np.quantile(deviations, LINES_KNOWN)) if len(deviations) else 0.0
+    return known_below(importance.line_deviations(laser, image.deviation()))
 
 
 def quality_of(
@@ -103,15 +102,18 @@ def quality_of(
 
     importance: where errors of the light of laser number `index` matter, once the line is the goal.
     """
+    deviations = np.zeros(0) if importance is None else importance.line_deviations(index, image.deviation())
     return GroupQuality(
         "direct",
         laser,
-        image.error if importance is None else line_deviation(image, importance, index),
+        image.error if importance is None else known_below(deviations),
         settings.laser_error if importance is None else importance.direct,
         image.samples,
         "samples",
         of="image" if importance is None else "line",
         image_error=None if importance is None else image.error,
+        lines=None if importance is None else len(deviations),
+        unknown=None if importance is None else int(np.sum(deviations > importance.direct)),
         invalid=image.invalid,
         lit_pixels=image.pixels,
     )

@@ -79,6 +79,10 @@ class IndirectImage:
     """Estimated deviation of the measured line over the allowed one; infinite: not known."""
     out_of_reach: bool = False
     """The line's goal would have taken far more paths than that of the image, or than are allowed."""
+    lines: int | None = None
+    """Scan lines with a line; None: no error of theirs is asked for."""
+    unknown: int | None = None
+    """Those whose own estimated deviation is above the allowed one."""
 
 
 @dataclass(frozen=True)
@@ -154,8 +158,17 @@ def indirect_images(
     def image() -> IndirectImage:
         counts = so_far.paths, round(so_far.invalid), round(so_far.clamped)
         clamped_radiance = so_far.clamped_radiance / so_far.weight / so_far.total.size
+        lines = None if so_far.line is None else int(so_far.line.projection.lit.sum())
+        unknown = None if so_far.line is None else so_far.line.unknown(so_far.weight)
         return IndirectImage(
-            so_far.radiance(shape), so_far.error, *counts, clamped_radiance, so_far.line_deviation, given_up()
+            so_far.radiance(shape),
+            so_far.error,
+            *counts,
+            clamped_radiance,
+            so_far.line_deviation,
+            given_up(),
+            lines,
+            unknown,
         )
 
     def given_up() -> bool:

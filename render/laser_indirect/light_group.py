@@ -117,6 +117,8 @@ def quality_of(
         of="image" if allowed is None else "line",
         image_error=None if allowed is None else image.error,
         image_target=None if allowed is None else settings.indirect_error,
+        lines=image.lines,
+        unknown=image.unknown,
         out_of_reach=image.out_of_reach,
         invalid=image.invalid,
         clamped=image.clamped if clamped else None,

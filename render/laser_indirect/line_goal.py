@@ -194,6 +194,13 @@ class LineErrors:
         worst = max(_all_but_unmet(self.moved[self.projection.lit]), _all_but_unmet(rows))
         return math.sqrt(scale * worst)
 
+    def unknown(self, weights: float) -> int:
+        """Lit lines whose own estimated deviation is above the allowed one; weights: as for `deviation`."""
+        lit = self.projection.lit
+        if not self.measured:
+            return int(lit.sum())
+        return int(np.sum(self.moved[lit] * self.all_waves / self.measured > weights**2))
+
     def judge(self, error: float, image_error: float, paths: int, most: float) -> None:
         """Whether the goal is out of reach, from how far it and that of the image are exceeded after so many light
         paths; the render ends by the image's error or after `most`."""

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import correlate1d, median_filter
+from scipy.ndimage import correlate1d, maximum_filter1d, median_filter
 
 from analysis.line.detection.matched_filter import BLOCK, NOISE_GAIN, TAPS
 from analysis.line.detection.noise import NoiseModel
@@ -35,9 +35,15 @@ NEAREST = 0.25
 """Of the detection threshold, in the noise of line and rival: nearer than this to a change the sensor decides."""
 AROUND = 3.0
 """Sigmas of a line within which it is itself the peak."""
+DECISION = 3.0
+"""Times the goal, of a pixel's own noise: ambient light that is known so well on the pixels of a line leaves it to the
+sensor which of two answers a fit gives, one line or two, a wide or a narrow one. The influence function knows of one
+answer alone."""
 DIRECT = 0.1
 """Share of the goal's variance that direct light has. Its error falls with the power 1.5 of the rays, that of all other
 light with the power 0.5, and it takes a hundredth of the time: a tenth costs it about twice the rays of a third."""
+PAIRS, JUMP = 2, 3.0
+"""Pairs of images with opposite noise, and times the goal by which they must not differ from a straight line."""
 ROWS = 64
 """Scan lines at a time, which a processor's cache holds."""
 
@@ -52,13 +58,8 @@ def goal_of(project: Project, threads: int | None = None) -> Callable[[Frame], I
 
 def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | None = None) -> Importance:
     """Of a frame as far as it is known. InputError: as `develop` and `extract`."""
+    project = _as_far_as_known(project, frame)
     scene, sensor = project.scene, project.sensor
-    if frame.truth is None or project.extraction.exposures > 1:
-        # a blur that is left out makes the line sharper, an exposure that is left out brighter: both ask for more
-        sensor = sensor.model_copy(update={"defocus": False})
-        project = project.model_copy(
-            update={"sensor": sensor, "extraction": project.extraction.model_copy(update={"exposures": 1})}
-        )
     axis = project.extraction.axis
     illumination = relative_illumination(scene.camera, threads)
     joule = joules_per_radiance(scene.camera, sensor)
@@ -71,22 +72,59 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     lasers, peaks = [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
     for i, laser in enumerate(scene.lasers):
-        moved, risen = _weights(project, frame, i, allowed, threads)
+        moved, risen, decided = _weights(project, frame, i, allowed, threads)
         response = _tiled(joule * laser_response(sensor, laser.wavelength_nm), illumination)
         lasers.append(moved * response)
         peaks.append(risen * response)
         # a whole row counts as one sum there, of which a quarter of its pixels may come near
         even = risen / math.sqrt(max(0.25 * illumination.shape[1 if axis == "rows" else 0] / CELL, 1.0))
+        used = np.count_nonzero(decided, axis=1 if axis == "rows" else 0).clip(1)
+        share = DECISION * goal.depth * np.expand_dims(np.sqrt(used), 1 if axis == "rows" else 0)
+        even = np.maximum(even, decided / share)
         ambient = np.maximum(ambient, np.maximum(np.abs(moved), even) * bands)
     return Importance(tuple(lasers), ambient, axis, tuple(peaks), allowed, direct)
 
 
+def _as_far_as_known(project: Project, frame: Frame) -> Project:
+    """A blur that is left out makes the line sharper, an exposure that is left out brighter: both ask for more."""
+    if frame.truth is not None and project.extraction.exposures == 1:
+        return project
+    sensor = project.sensor.model_copy(update={"defocus": False})
+    extraction = project.extraction.model_copy(update={"exposures": 1})
+    return project.model_copy(update={"sensor": sensor, "extraction": extraction})
+
+
+def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, threads: int | None = None) -> int:
+    """Scan lines where noise as small as the goal allows decides between two answers of the line extraction.
+
+    To every pixel goes noise of DECISION goals of its own, and its opposite: what moves with the light moves as far one
+    way as the other, what jumps does not. The sensor's noise is a good deal larger; but of an image without noise, or
+    with the same, another render may find another answer. InputError: as `develop` and `extract`.
+    """
+    project = _as_far_as_known(project, frame)
+    electrons = _electrons(project, frame, laser, threads)
+    image = _expected_image(project, electrons)
+    line = extract_line(project, image, laser, threads)
+    deviation = DECISION * goal.depth * np.sqrt(np.maximum(electrons + noise_model(image, project, laser).floor, 1e-2))
+    found = np.zeros(len(line.valid), np.bool_)
+    for pair in range(PAIRS):
+        drawn = np.random.default_rng((project.seed, laser, pair)).standard_normal(electrons.shape, np.float32)
+        one, other = (
+            extract_line(project, _expected_image(project, electrons + sign * deviation * drawn), laser, threads)
+            for sign in (1.0, -1.0)
+        )
+        bent = np.abs(one.u + other.u - 2.0 * line.u) > JUMP * goal.depth * line.sigma_u
+        changed = (one.valid != line.valid) | (other.valid != line.valid)
+        found |= np.any(changed | (line.valid & bent), axis=1)
+    return int(found.sum())
+
+
 def _weights(
     project: Project, frame: Frame, laser: int, allowed: float, threads: int | None
-) -> tuple[Float32, Float32]:
-    """(h, w) how far an electron moves the line over what is allowed, and how far it goes to make or hide a peak."""
-    powers = [one.power if i == laser else 0.0 for i, one in enumerate(project.scene.lasers)]
-    electrons = expected_electrons(frame, project.scene, project.sensor, threads=threads, laser_power=powers)
+) -> tuple[Float32, Float32, Float32]:
+    """(h, w) how far an electron moves the line over what is allowed, how far it goes to make or hide a peak, and
+    1 over the noise of each pixel that the line is measured on, 0 of others."""
+    electrons = _electrons(project, frame, laser, threads)
     image = _expected_image(project, electrons)
     noise = noise_model(image, project, laser)
     line = extract_line(project, image, laser, threads)
@@ -94,12 +132,21 @@ def _weights(
     if image.pattern is not None and settings.pattern is None:
         settings = settings.model_copy(update={"pattern": image.pattern})
     # of a selection the candidates' method is the one that measured them
-    derivative = influence(image.pixels, line, settings, noise, threads)
+    derivative = influence(image.pixels, line, settings, noise, threads, shared=True)
     axis = 1 if line.axis == "rows" else 0
     sigma = _sigma(line, derivative, electrons, noise, axis)
     moved = derivative / np.expand_dims(allowed * sigma, axis)
     risen = _peaks(electrons if axis == 1 else electrons.T, line, noise, settings, threads)
-    return moved.astype(np.float32), np.ascontiguousarray(risen if axis == 1 else risen.T)
+    # one more on either side, as windows begin with the pixel
+    near = maximum_filter1d(derivative != 0.0, 3, axis=axis)
+    decided = near / np.sqrt(np.maximum(electrons + noise.floor, 1e-2))
+    return moved.astype(np.float32), np.ascontiguousarray(risen if axis == 1 else risen.T), decided.astype(np.float32)
+
+
+def _electrons(project: Project, frame: Frame, laser: int, threads: int | None) -> Float32:
+    """(h, w) mean electrons while one laser fires."""
+    powers = [one.power if i == laser else 0.0 for i, one in enumerate(project.scene.lasers)]
+    return expected_electrons(frame, project.scene, project.sensor, threads=threads, laser_power=powers)
 
 
 def _expected_image(project: Project, electrons: Float32) -> Image:

@@ -20,6 +20,7 @@ from render.progressive import frames
 from render.run import Run, never
 from render.scan_plan import ScanPlan
 from render.scene.motion import NoMotion
+from render.scene.settings import DepthGoal
 from render.sensor.develop import Image
 from render.sensor.sensor import Sensor
 from render.world.placed import PlacedScene
@@ -28,8 +29,11 @@ from studio.project.project import Project
 from studio.runtime.console import FRAMES, StageProgress
 from studio.scan.exposure import expose
 from studio.scan.line_extraction import extract_line
-from studio.scan.render_goal import goal_of
+from studio.scan.render_goal import goal_of, undecided_rows
 from studio.scan.spacetime_window import Passing, along_time
+
+JUDGING = "rows that hang on little"
+"""Stage in which rows are looked for that noise as small as the goal decides."""
 
 
 @dataclass(frozen=True)
@@ -121,9 +125,27 @@ def render_step(
     placed, watch = PlacedScene(world, project.scene, step), RenderClock(clock.progress)
     for frame in frames(placed, project.render, run, watch, axis=project.extraction.axis, scan=scan):
         refined(frame)
+    if project.render.goal is not None and step == 0:
+        frame = _judged(project, frame, project.render.goal, clock, run.threads)
+        refined(frame)
     for name, spent in frame.seconds.items():
         clock.seconds[name] = clock.seconds.get(name, 0.0) + spent
     return frame
+
+
+def _judged(project: Project, frame: Frame, goal: DepthGoal, clock: Clock, threads: int | None) -> Frame:
+    """The frame with what is undecided in its rows, once for a scan: it takes about five extractions."""
+    if not any(one.of == "line" for one in frame.quality):
+        return frame
+    with clock.stage(JUDGING):
+        found = {
+            laser.name: undecided_rows(project, goal, frame, i, threads) for i, laser in enumerate(project.scene.lasers)
+        }
+    quality = (
+        replace(one, undecided=found[one.laser]) if one.group == "direct" and one.laser in found else one
+        for one in frame.quality
+    )
+    return replace(frame, quality=tuple(quality))
 
 
 def develop_step(

@@ -81,6 +81,34 @@ def test_a_narrow_line_is_moved_as_by_differences(brightness: float, monkeypatch
     assert np.quantile(apart / total, 0.9) < 0.05 and np.median(apart / total) < 0.02
 
 
+@pytest.mark.parametrize("sigma", [0.3, 0.7, SIGMA])
+def test_all_pixels_that_the_fit_looks_at_have_influence(sigma: float) -> None:
+    """A fit keeps the window of its seed, which is wider than a narrow line."""
+    image, chosen = image_of(PLACES, sigma), settings("likelihood")
+    line = extract(image, settings=chosen, noise=NOISE)
+    found = influence(image, line, chosen, NOISE)
+    for row in range(1, 8):
+        by_hand = np.array([moved(image, row, column, 20.0, "likelihood") for column in range(32, 64)])
+        assert np.abs(by_hand[found[row, 32:64] == 0.0]).max() < 0.01 * np.abs(by_hand).max()
+
+
+def test_what_neighbours_tell_of_the_width_adds_the_variance_that_it_has_by_the_sensor() -> None:
+    """As independent of the line's own pixels, and no less than these alone."""
+    image, chosen = image_of(47.0 + np.linspace(0.0, 3.3, 40), 0.2), settings("likelihood")
+    line = extract(image, settings=chosen, noise=NOISE)
+    assert line.shared_u is not None
+    rows = np.flatnonzero(line.shared_u[:, 0] > 0.1 * line.sigma_u[:, 0])
+    assert len(rows) > 10
+    variance = (image - NOISE.black_level) / NOISE.gain + NOISE.floor
+    own, both = (influence(image, line, chosen, NOISE, shared=shared).astype(np.float64) for shared in (False, True))
+    alone, more, total = (np.sum(part**2 * variance, axis=1)[rows] for part in (own, both - own, both))
+    np.testing.assert_allclose(np.sqrt(more), line.shared_u[rows, 0], rtol=1e-4)
+    assert (total >= alone + more - 1e-9).all()
+    # light that is even moves neither place nor width
+    even = np.abs(both.sum(axis=1))[rows] / np.abs(both).sum(axis=1)[rows]
+    assert even.max() < 0.1
+
+
 def test_its_sum_with_the_noise_of_the_pixels_is_the_sigma_that_is_told() -> None:
     image = image_of(PLACES)
     electrons = (image - NOISE.black_level) / NOISE.gain

@@ -116,6 +116,15 @@ def test_light_for_what_is_measured_tells_scan_lines_and_what_is_interpolated():
     assert quality_text(replace(measured, error=math.nan)).startswith("line not known, goal 0.1, elsewhere")
 
 
+def test_rows_that_are_not_known_to_the_goal_are_told() -> None:
+    direct = replace(DIRECT, of="line", error=0.02, target=0.03, lines=900, unknown=0)
+    reflected = replace(INDIRECT, of="line", error=0.05, target=0.07, lines=900, unknown=31)
+    told = dict(quality_lines((replace(direct, undecided=7), reflected)))
+    assert "31 of 900 rows by more" in told["red, reflected on"] and "rows by more" not in told["red, direct"]
+    assert told["red, noise of all light"].endswith("7 rows hang on less than that, and may come out another way")
+    assert "hang" not in str(quality_lines((direct, reflected)))
+
+
 def test_what_all_light_does_to_the_line_is_told_by_the_root_of_the_sum_of_squares() -> None:
     lines = [replace(one, of="line", error=error) for one, error in ((DIRECT, 0.03), (INDIRECT, 0.04), (AMBIENT, 0.12))]
     assert line_noise(tuple(lines)) == {"red": pytest.approx(0.13)}

@@ -312,3 +312,4 @@ def test_a_frame_that_knows_what_matters_is_rendered_to_that():
     (quality,) = last.quality
     assert isinstance(quality, GroupQuality) and quality.reached and quality.of == "line" and quality.target == 0.07
     assert 0.0 < quality.coarse_error <= COARSE_ERROR
+    assert quality.lines > 0 and 0 <= quality.unknown <= 0.05 * quality.lines

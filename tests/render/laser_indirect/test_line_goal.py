@@ -83,6 +83,21 @@ def test_a_few_bad_lines_do_not_speak_for_those_about_them() -> None:
     assert errors.error(weights) == pytest.approx(without.error(weights), rel=0.2)
 
 
+def test_lines_that_are_known_less_well_are_counted() -> None:
+    """One in twenty is ten times as noisy, and the weights are such that only these are above the allowed deviation."""
+    rng, errors, weights = np.random.default_rng(7), LineErrors.of(importance(), 0), 0.0
+    assert errors.unknown(1.0) == HEIGHT
+    for size in (1, 1, 2, 4):
+        buffers = passes(rng)
+        for buffer in buffers:
+            rows = buffer.image.reshape(HEIGHT, WIDTH)[::20]
+            rows[:] = 5.0 + 10.0 * (rows - 5.0)
+        errors.add(buffers, weight=float(size), size=float(size))
+        weights += 4.0 * size
+    # a deviation of 0.15 or 1.5: of 12 degrees of freedom, a tenth of these at most below 1
+    assert HEIGHT // 20 - 2 <= errors.unknown(weights) <= HEIGHT // 20 + 2
+
+
 def test_light_that_few_passes_hold_counts_for_all_lines_that_it_may_meet() -> None:
     """A hundredth of the lines has all of it in each pass, other ones each time: no line is known."""
     rng, errors = np.random.default_rng(5), LineErrors.of(importance(), 0)
