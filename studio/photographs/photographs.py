@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.line.along.smooth import smooth_along
 from analysis.line.detection.channel import check_image
 from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise, residual_ratio
@@ -82,7 +83,8 @@ def extract_photograph(
     file and what is wrong: unreadable, of the wrong type or size, black, saturated, not a number, without the channel
     asked for.
     """
-    settings = look.settings
+    # what is smoothed along is the line that was selected, with all its noise
+    settings = look.settings.model_copy(update={"smooth_along": False})
     with naming(path):
         taken, off = look.read(path)
         whole = check_image(taken.pixels)
@@ -113,6 +115,7 @@ def extract_photograph(
             line = ended(line, half)
         line = with_shared_noise(line) if shared else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
+        line = smooth_along(line) if look.settings.smooth_along else line
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
 
@@ -240,7 +243,7 @@ def fuse_files(paths: Sequence[Path], times: Sequence[float], look: Look) -> Fus
         noise = noise.model_copy(update={"saturation": full})
         fused = fuse(images, times, noise)
         plain = settings.model_copy(
-            update={"method": "likelihood", "peaks": 1, "select": "strongest", "smoothing": 0.0}
+            update={"method": "likelihood", "peaks": 1, "select": "strongest", "smoothing": 0.0, "smooth_along": False}
         )
         for _ in range(GAIN_ROUNDS):  # all exposures together say more of the gain than one
             line = extract(fused.electrons, settings=plain, noise=fused.noise, variance=fused.variance)

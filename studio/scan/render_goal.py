@@ -52,6 +52,9 @@ def goal_of(project: Project, threads: int | None = None) -> Callable[[Frame], I
 
 def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | None = None) -> Importance:
     """Of a frame as far as it is known. InputError: as `develop` and `extract`."""
+    # what counts is the noise that the sensor gives each scan line, before neighbours are asked
+    alone = project.extraction.model_copy(update={"smooth_along": False})
+    project = project.model_copy(update={"extraction": alone})
     scene, sensor = project.scene, project.sensor
     if frame.truth is None or project.extraction.exposures > 1:
         # a blur that is left out makes the line sharper, an exposure that is left out brighter: both ask for more

@@ -1,0 +1,221 @@
+"""Positions estimated along the line: by how much sigma falls, what it covers, and what is not smoothed away."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.ndimage import gaussian_filter1d
+
+from analysis.line.along.curve import Kind, Shock, Stretch, curve_through
+from analysis.line.along.five_diagonals import of_second_differences, sandwich
+from analysis.line.along.smooth import smooth_along, smoothed
+from analysis.line.extract import extract
+from analysis.line.result import Flag, Line
+from analysis.line.settings import ExtractionSettings
+from tests.analysis.line.line_images import electrons, expected, exposed
+
+ROWS, SIGMA = 2048, 0.05
+Y = np.arange(ROWS)
+SURFACES = {
+    "bead": 60.0 + 4.0 * np.sin(Y / 200.0),
+    "thread": 60.0 + 4.0 * np.sin(Y / 30.0),
+    "flat": 50.0 + 0.031 * Y,
+    "folds": 60.0 + 0.4 * np.abs(Y % 200 - 100.3),
+    "steps": 60.0 + 5.0 * (Y // 150 % 2) + 0.02 * Y,
+}
+LENGTHS = {"white": 1.0, "blurred": 2.0 * math.sqrt(math.pi) * 1.5}
+"""Scan lines that err alike: of a blur by s, 2 sqrt(pi) s."""
+
+
+def noise(kind: str, rng: np.random.Generator) -> np.ndarray:
+    """(n,) of variance 1."""
+    white = rng.normal(size=ROWS + 200)
+    if kind == "white":
+        return white[:ROWS]
+    return gaussian_filter1d(white, 1.5)[100 : 100 + ROWS] * math.sqrt(LENGTHS[kind])
+
+
+def measured(surface: str, kind: str, seed: int):
+    """What is smoothed of one line of two sigmas, and its errors before and after."""
+    sigma = SIGMA * np.where(Y % 700 < 350, 1.0, 0.6)
+    before = sigma * noise(kind, np.random.default_rng(seed))
+    full = np.full(ROWS, LENGTHS[kind])
+    found = smoothed(SURFACES[surface] + before, sigma, full, np.zeros(ROWS))
+    return found, before, found.u - SURFACES[surface]
+
+
+@pytest.mark.parametrize("kind", LENGTHS)
+@pytest.mark.parametrize("surface", SURFACES)
+def test_errors_fall_as_sigma_tells_and_two_sigmas_hold_them(surface: str, kind: str) -> None:
+    lines = [measured(surface, kind, seed) for seed in range(10)]
+    ratio = np.concatenate([after / found.sigma for found, _, after in lines])
+    squares, told = (np.mean([np.mean(one) for one in many]) for many in (
+        [after**2 for _, _, after in lines], [found.sigma**2 for found, _, _ in lines]
+    ))  # fmt: skip
+    raw = np.mean([np.mean(before**2) for _, before, _ in lines])
+    covered = np.mean(np.abs(ratio) < 2.0)
+    print(f"\n{math.sqrt(squares / raw):.3f} told {math.sqrt(told / raw):.3f} covered {covered:.3f}")
+    assert 0.92 < covered < 0.97
+    assert math.sqrt(told / squares) == pytest.approx(1.0, abs=0.12)
+    assert squares < 0.6 * raw
+
+
+@pytest.mark.parametrize("kind", LENGTHS)
+def test_the_error_left_is_that_of_the_spline_s_equivalent_kernel(kind: str) -> None:
+    """Of a smooth line the variance falls to 3 sqrt(2) / 16 length / h (Silverman, 1984, eq. 3.2)."""
+    squares, predicted = [], []
+    for seed in range(24):
+        found, before, after = measured("bead", kind, 100 + seed)
+        inner = slice(100, -100)
+        predicted.append(np.nanmean((3.0 * math.sqrt(2.0) / 16.0 * LENGTHS[kind] / found.reach * before.var())[inner]))
+        squares.append(np.mean(after[inner] ** 2))
+    # some 24 * 1848 / (4 h) independent values: four standard errors, and a tenth for what bends
+    independent = 24 * 1848 / (4.0 * np.median(found.reach) * LENGTHS[kind])
+    assert np.mean(squares) / np.mean(predicted) == pytest.approx(1.0, abs=0.1 + 4.0 * math.sqrt(2.0 / independent))
+
+
+@pytest.mark.parametrize("kind", LENGTHS)
+def test_means_over_many_scan_lines_are_known_as_well_as_before(kind: str) -> None:
+    means, told = [], []
+    for seed in range(24):
+        found, _, after = measured("flat", kind, 200 + seed)
+        for block in np.split(np.arange(64, 1984), 8):
+            means.append(after[block].mean())
+            told.append(np.mean(found.sigma[block] ** 2 * found.length[block]) / len(block))
+    # 192 means: four standard errors of their variance
+    assert np.var(means) / np.mean(told) == pytest.approx(1.0, abs=4.0 * math.sqrt(2.0 / 192))
+
+
+def test_steps_are_kept_where_they_are() -> None:
+    found, _, after = measured("steps", "white", 5)
+    edges = np.flatnonzero(np.diff(Y // 150)) + 1
+    assert found.shocks[Kind.STEP] == len(edges)
+    beside = np.concatenate([edges - 1, edges])
+    assert np.all(np.abs(after[beside]) < 4.0 * found.sigma[beside])
+    assert np.all(found.sigma[beside] <= SIGMA)
+    assert np.median(found.sigma) < 0.3 * SIGMA
+
+
+def test_corners_are_kept_and_sigma_knows_them() -> None:
+    found, _, after = measured("folds", "white", 6)
+    corners = np.flatnonzero((Y % 100 == 0) & (Y > 0) & (Y < 2040))
+    assert found.shocks[Kind.CORNER] + found.shocks[Kind.STEP] == len(corners)
+    near = (corners[:, None] + np.arange(-3, 4)).ravel()
+    assert np.all(np.abs(after[near]) < 4.5 * found.sigma[near])
+
+
+def test_strays_are_left_as_they_were_and_pull_nothing() -> None:
+    sigma, rows = np.full(ROWS, SIGMA), np.array([300, 700, 1500])
+    u = SURFACES["bead"] + SIGMA * noise("white", np.random.default_rng(7))
+    without = smoothed(u, sigma, np.ones(ROWS), np.zeros(ROWS))
+    u[rows] += (3.0, -1.0, 40.0)
+    found = smoothed(u, sigma, np.ones(ROWS), np.zeros(ROWS))
+    assert found.shocks[Kind.STRAY] == 3
+    np.testing.assert_array_equal(found.u[rows], u[rows])
+    np.testing.assert_array_equal(found.sigma[rows], SIGMA)
+    rest = np.setdiff1d(Y, rows)
+    assert np.all(np.abs(found.u - without.u)[rest] < 2.0 * found.sigma[rest])
+
+
+def test_a_line_without_noise_stays_as_it_is() -> None:
+    for surface in ("thread", "steps"):
+        u = SURFACES[surface][:600]
+        found = smoothed(u, np.full(600, 1e-4), np.ones(600), np.zeros(600))
+        np.testing.assert_allclose(found.u, u, atol=4e-4, err_msg=surface)
+
+
+def test_gaps_are_bridged_and_ends_and_short_pieces_left_alone() -> None:
+    u = SURFACES["bead"] + SIGMA * noise("white", np.random.default_rng(8))
+    u[400:405], u[800:900], u[910:1000] = np.nan, np.nan, np.nan
+    found = smoothed(u, np.full(ROWS, SIGMA), np.ones(ROWS), np.zeros(ROWS))
+    assert np.isnan(found.u[400:405]).all()
+    assert np.isnan(found.reach[900:910]).all()
+    np.testing.assert_array_equal(found.u[900:910], u[900:910])
+    assert np.all(found.sigma[390:400] < 0.6 * SIGMA)
+
+
+def test_diagonals_are_those_of_the_whole_matrices() -> None:
+    rng = np.random.default_rng(9)
+    n = 30
+    there = rng.random(n) > 0.1
+    stretch = Stretch(rng.normal(size=n), rng.uniform(0.5, 2.0, n), 3.0, there)
+    curve = curve_through(stretch, [Shock(Kind.CORNER, 10), Shock(Kind.STEP, 20), Shock(Kind.STRAY, 5)])
+
+    def whole(diagonals: np.ndarray) -> np.ndarray:
+        upper = sum(np.diag(values[: n - d], d) for d, values in enumerate(diagonals))
+        return np.asarray(upper + np.triu(upper, 1).T)
+
+    noise_inverse = whole(curve.noise)
+    seconds = np.diff(np.eye(n), 2, axis=0)
+    weights = np.where(curve.bent[2:], 1.0 / curve.q[2:], 0.0)
+    inverse = np.linalg.inv(noise_inverse + seconds.T @ (weights[:, None] * seconds))
+    np.testing.assert_allclose(curve.u, inverse @ noise_inverse @ stretch.u, rtol=1e-8)
+    for d, values in enumerate(curve.covariance):
+        np.testing.assert_allclose(values[: n - d], np.diag(inverse, d), rtol=1e-8, atol=1e-12)
+    bends = seconds @ inverse @ seconds.T
+    for later in range(3):
+        mine = of_second_differences(curve.covariance, later)[2 : n - later]
+        np.testing.assert_allclose(mine, np.diag(bends, later), rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(
+        sandwich(curve.noise, curve.covariance), np.diag(noise_inverse @ inverse @ noise_inverse), rtol=1e-8
+    )
+
+
+def test_the_noise_of_a_whole_line_has_the_length_and_sigma_told() -> None:
+    stretch = Stretch(np.zeros(400), np.ones(400), 5.0, np.ones(400, np.bool_))
+    noise_inverse = curve_through(stretch).noise
+    whole = sum(np.diag(values[: 400 - d], d) for d, values in enumerate(noise_inverse))
+    covariance = np.linalg.inv(whole + np.triu(whole, 1).T)
+    assert covariance[200, 200] == pytest.approx(1.0, rel=1e-9)
+    assert covariance[200].sum() == pytest.approx(5.0, rel=1e-6)
+
+
+def line_of(u: np.ndarray, flag: np.ndarray | None = None, **other) -> Line:
+    column = np.full((ROWS, 1), SIGMA)
+    flags = np.zeros((ROWS, 1), np.uint8) if flag is None else flag[:, None].astype(np.uint8)
+    return Line("rows", "likelihood", u[:, None], column, column, column, column, column, flags, **other)
+
+
+def test_what_errs_by_its_shape_is_not_averaged() -> None:
+    u = SURFACES["bead"] + SIGMA * noise("white", np.random.default_rng(10))
+    flag = np.where((Y > 500) & (Y < 600), Flag.MISFIT, np.where(Y > 1900, Flag.BLENDED, Flag.OK))
+    found = smooth_along(line_of(u, flag))
+    same = (found.u == u[:, None])[:, 0]
+    np.testing.assert_array_equal(same, flag != Flag.OK)
+    np.testing.assert_array_equal((found.sigma_u == SIGMA)[:, 0], same)
+
+
+def test_an_error_in_common_is_not_averaged_away() -> None:
+    u = SURFACES["flat"] + 0.03 * noise("white", np.random.default_rng(11))
+    found = smooth_along(line_of(u, shared_u=np.full((ROWS, 1), 0.04)))
+    assert found.shared_u is not None
+    np.testing.assert_allclose(found.shared_u, 0.04, rtol=1e-6)
+    assert np.all(found.sigma_u > 0.04) and np.median(found.sigma_u) == pytest.approx(0.0402, abs=2e-4)
+
+
+def test_a_line_without_sigmas_is_left_and_it_is_told() -> None:
+    line = line_of(SURFACES["bead"])
+    found = smooth_along(replace(line, sigma_u=np.full_like(line.u, np.nan)))
+    np.testing.assert_array_equal(found.u, line.u)
+    assert "not smoothed" in found.note
+
+
+def test_an_image_of_a_weld_is_measured_to_a_third_of_the_sigma() -> None:
+    centre = 60.0 + np.where(Y[:600] < 300, 0.02 * Y[:600], 12.0 + 3.0 * np.cos(Y[:600] / 60.0))
+    image = exposed(expected(120, centre, 600.0, 2.0, 20.0), 5.0, np.random.default_rng(12))
+    alone = extract(image, noise=electrons(5))
+    found = extract(image, noise=electrons(5), smooth_along=True)
+    assert "smoothed along the line over" in found.note and "1 step kept" in found.note
+    before, after = ((one.u[:, 0] - centre) for one in (alone, found))
+    assert np.sqrt(np.mean(after**2)) < 0.5 * np.sqrt(np.mean(before**2))
+    assert 0.9 < np.mean(np.abs(after) < 2.0 * found.sigma_u[:, 0]) < 0.99
+    np.testing.assert_array_equal(found.width, alone.width)
+
+
+def test_along_time_and_along_the_line_are_not_both_done() -> None:
+    with pytest.raises(ValidationError, match="spacetime and smooth_along"):
+        ExtractionSettings(spacetime=True, smooth_along=True)
