@@ -54,7 +54,7 @@ def extract(
     chosen = settings_of(settings, **changes)
     array = check_image(image)
     if noise is None:
-        noise = estimate_noise(array, chosen)
+        noise = estimate_noise(array, chosen, threads=threads)
     lines = scan_lines(array, chosen, noise, variance)
     note = ""
     if chosen.method == "auto":

@@ -93,7 +93,7 @@ def extract_photograph(
         light, corner = measured_light(path, whole, off, look, taken.lossy)
         if light is None:
             return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
-        noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy)
+        noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy, threads=threads)
         alone = settings.select == "strongest" and volume is None
         # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
         half = TONED if taken.lossy else HALF
