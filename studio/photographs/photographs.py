@@ -83,7 +83,7 @@ def extract_photograph(
     file and what is wrong: unreadable, of the wrong type or size, black, saturated, not a number, without the channel
     asked for.
     """
-    # what is smoothed along is the line that was selected, with all its noise
+    # what is smoothed along is the line that was selected, with its noise, and not with what all scan lines share
     settings = look.settings.model_copy(update={"smooth_along": False})
     with naming(path):
         taken, off = look.read(path)
@@ -114,8 +114,8 @@ def extract_photograph(
         if settings.select == "continuous":
             line = ended(line, half)
         line = with_shared_noise(line) if shared else line
-        line = with_mosaic(line, look.channel) if taken.lossy else line
         line = smooth_along(line) if look.settings.smooth_along else line
+        line = with_mosaic(line, look.channel) if taken.lossy else line
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
 

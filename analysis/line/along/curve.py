@@ -1,14 +1,13 @@
 """The likeliest smooth curve through positions along the line, how smooth it is chosen by the positions themselves.
 
-Positions u (n,) are a curve f and noise S e, and of the curve's second differences D f only the variance is known:
+Positions u (n,) are a curve f and noise, and of the curve's second differences D f only the variance is known:
 
-    |W e|^2 = e' R^-1 e,   D f ~ N(0, Q):   f = A^-1 P u,   cov f = A^-1,
-    P = S^-1 W'W S^-1,     A = P + D' Q^-1 D
+    D f ~ N(0, Q):   f = A^-1 P u,   cov f = A^-1,   A = P + D' Q^-1 D,   P = 1 / (sigma^2 length)
 
-(Whittaker, Proc. Edinburgh Math. Soc. 41, 63, 1923; as a prior: Wahba, J. R. Statist. Soc. B 40, 364, 1978). S holds
-the sigmas told. R is the correlation of a noise (1 - a B)^2 e = white, near that of a blur, with the length told. The
-marginal likelihood chooses Q, one number q between two breaks (fixed point of Harville, J. Am. Statist. Assoc. 72, 320,
-1977), and with it the smoothing length
+(Whittaker, Proc. Edinburgh Math. Soc. 41, 63, 1923; as a prior: Wahba, J. R. Statist. Soc. B 40, 364, 1978). Noise of
+which `length` neighbours err alike is taken as white and so many times as strong: that is what it is to a curve that
+bends over more scan lines than that, whatever its correlations are. The marginal likelihood chooses Q, one number q
+between two breaks (fixed point of Harville, J. Am. Statist. Assoc. 72, 320, 1977), and with it the smoothing length
 
     h = (sigma^2 length / q)^(1/4),   at which sigma^2 falls to 3 sqrt(2) / 16 sigma^2 length / h
 
@@ -18,7 +17,6 @@ smoother than the model asks of it may be off.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -28,9 +26,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.optimize import brentq
 
-from analysis.line.along.five_diagonals import SECOND, gram, inverse_diagonals, of_second_differences, times
+from analysis.line.along.five_diagonals import SECOND, gram, inverse_diagonals, of_second_differences
 from render.base.arrays import Float
 
 Mask = NDArray[np.bool_]
@@ -51,8 +48,6 @@ UNSEEN = 1e-6
 """Weight of a scan line without a position, which is interpolated there, for a matrix that has an inverse."""
 SMOOTHEST, DOUBT = 0.75, 4.0
 """Share of the curve's variance that is noise, and degrees of freedom that speak for none being so smooth."""
-ALIKE = 0.99
-"""a of the longest correlation there is."""
 
 
 class Kind(IntEnum):
@@ -78,14 +73,19 @@ class Stretch:
     u: Float
     sigma: Float
     """(n,) px."""
-    length: float
-    """Scan lines that err alike."""
+    length: Float
+    """(n,) scan lines that err alike."""
     there: Mask
+
+    @property
+    def white(self) -> Float:
+        """(n,) px^2: variance of the noise taken as white."""
+        return np.asarray(self.sigma**2 * self.length)
 
 
 @dataclass(frozen=True)
 class Curve:
-    """The curve through a stretch, with some shocks; arrays (n,) by scan line, n x n matrices as diagonals."""
+    """The curve through a stretch, with some shocks; arrays (n,) by scan line."""
 
     stretch: Stretch
     used: Mask
@@ -94,10 +94,10 @@ class Curve:
     """Second differences, by their last row, that follow the model; False: free, and on the first two rows none."""
     q: Float
     """px^2, of second differences."""
-    noise: Float
-    """(3, n) P, px^-2."""
+    weight: Float
+    """P, px^-2."""
     factor: Float
-    """(3, n) of A."""
+    """(3, n) Cholesky's of A, as diagonals."""
 
     @cached_property
     def covariance(self) -> Float:
@@ -121,11 +121,11 @@ class Curve:
     @property
     def reach(self) -> Float:
         """Smoothing lengths, scan lines."""
-        return np.asarray((self.stretch.sigma**2 * self.stretch.length / self.q) ** 0.25)
+        return np.asarray((self.stretch.white / self.q) ** 0.25)
 
     def smoothed(self, data: Float) -> Float:
         """Other data (n, k), averaged as the positions are."""
-        return np.asarray(cho_solve_banded((self.factor, True), times(self.noise, data)))
+        return np.asarray(cho_solve_banded((self.factor, True), self.weight[:, None] * data))
 
     def variance(self) -> Float:
         """px^2, of the curve's error: noise, and of what the curve may be off as much as its bends call for.
@@ -133,30 +133,30 @@ class Curve:
         Second differences that follow each other smoothly belong to a curve that is smoother than the model, off by
         next to nothing: then noise is 3/4 of the model's variance, and of their changes from row to row as well.
         """
+        whole, own = self.covariance[0], self.stretch.sigma**2
         pairs = self.bent[1:] & self.bent[:-1]
         if not pairs.any():
-            return np.asarray(self.covariance[0])
+            return np.minimum(whole, own)
         covariance = of_second_differences(self.covariance, 1)[:-1]
         expected = ((self.told[1:] + self.told[:-1] + 2.0 * covariance) / self.q[1:])[pairs].sum()
         found = (np.diff(self.bend) ** 2 / self.q[1:])[pairs].sum()
         known = max(float((self.told / self.q)[self.bent].sum()), 0.0)
         share = (known * found / max(float(expected), 1e-12) + DOUBT) / (known + DOUBT)
-        own = np.minimum(self.covariance[0] / self.stretch.sigma**2, 1.0)  # 1: nothing but its own position
-        return np.asarray(self.covariance[0] * (1.0 - (1.0 - np.clip(share, SMOOTHEST, 1.0)) * (1.0 - own)))
+        alone = np.minimum(whole * self.weight, 1.0)  # 1: told by nothing but its own position
+        return np.minimum(whole * (1.0 - (1.0 - np.clip(share, SMOOTHEST, 1.0)) * (1.0 - alone)), own)
 
 
 def curve_through(stretch: Stretch, shocks: Sequence[Shock] = (), start: Float | None = None) -> Curve:
     """The curve with the likeliest q of each piece between breaks; start (n,): q to begin with."""
     used, bent = _marked(stretch.there, shocks)
-    noise = _noise(stretch, used)
-    white = stretch.sigma**2 * stretch.length
+    white = stretch.white
     piece = np.cumsum(bent & ~np.concatenate([[False], bent[:-1]]))  # what is free goes with the one before
     rows = np.maximum(np.bincount(piece), 1)
     typical = np.exp(np.bincount(piece, np.log(white)) / rows)
     longest = np.clip(rows / PIECE, SHORTEST, LONGEST)
     q = white / FIRST**4 if start is None else start
     for _ in range(STEPS):
-        curve = _curve(stretch, used, bent, q, noise)
+        curve = _curve(stretch, used, bent, q)
         squares = np.where(bent, curve.bend**2, 0.0)
         known = np.where(bent, np.maximum(curve.told / q, 0.0), 0.0)
         pooled = squares.sum() / max(float(known.sum()), 1e-12)
@@ -164,18 +164,21 @@ def curve_through(stretch: Stretch, shocks: Sequence[Shock] = (), start: Float |
         before, q = q, np.clip(likeliest, typical / longest**4, typical / SHORTEST**4)[piece]
         if not bent.any() or np.abs(np.log(q / before))[bent].max() < SETTLED:
             break
-    return _curve(stretch, used, bent, q, noise)
+    return _curve(stretch, used, bent, q)
 
 
 def with_shocks(curve: Curve, shocks: Sequence[Shock]) -> Curve:
     """The same curve with other shocks, as smooth as before."""
     used, bent = _marked(curve.stretch.there, shocks)
-    return _curve(curve.stretch, used, bent, curve.q, _noise(curve.stretch, used))
+    return _curve(curve.stretch, used, bent, curve.q)
 
 
-def _curve(stretch: Stretch, used: Mask, bent: Mask, q: Float, noise: Float) -> Curve:
-    bends = np.where(bent[:, None], SECOND / np.sqrt(q)[:, None], 0.0)
-    return Curve(stretch, used, bent, q, noise, cholesky_banded(noise + gram(bends), lower=True))
+def _curve(stretch: Stretch, used: Mask, bent: Mask, q: Float) -> Curve:
+    weight = 1.0 / stretch.white
+    weight[~used] = UNSEEN * np.median(weight[used])
+    whole = gram(np.where(bent[:, None], SECOND / np.sqrt(q)[:, None], 0.0))
+    whole[0] += weight
+    return Curve(stretch, used, bent, q, weight, cholesky_banded(whole, lower=True))
 
 
 def _marked(there: Mask, shocks: Sequence[Shock]) -> tuple[Mask, Mask]:
@@ -188,33 +191,3 @@ def _marked(there: Mask, shocks: Sequence[Shock]) -> tuple[Mask, Mask]:
         else:
             bent[max(row - FREE, 0) : row + FREE + int(kind)] = False
     return used, bent
-
-
-def _noise(stretch: Stretch, used: Mask) -> Float:
-    """(3, n) P."""
-    sigma = stretch.sigma
-    before = [np.concatenate([np.ones(k), sigma[: len(sigma) - k]]) for k in range(3)]
-    noise = gram(_whitening(used, stretch.length) / np.stack(before, axis=1))
-    noise[0][~used] = UNSEEN * np.median(noise[0][used])
-    return noise
-
-
-def _whitening(used: Mask, length: float) -> Float:
-    """(n, 3) W: noise on rows k, k - 1 and k - 2 -> white noise of variance 1; 0 on rows that are not used.
-
-    Rows after a gap are taken as related to the one before it, or, of two rows and more, not.
-    """
-
-    def longer(a: float) -> float:
-        return (1.0 + a) ** 3 / ((1.0 + a * a) * (1.0 - a)) - length
-
-    a = 0.0 if length <= 1.0 else ALIKE if longer(ALIKE) < 0.0 else float(brentq(longer, 0.0, ALIKE))
-    near, far = ((1.0 + k * (1.0 - a * a) / (1.0 + a * a)) * a**k for k in (1, 2))
-    one = used & np.concatenate([[False], used[:-1]])
-    two = used & np.concatenate([[False, False], used[:-2]])
-    out = np.zeros((len(used), 3))
-    out[used] = (1.0, 0.0, 0.0)
-    out[one] = np.array([1.0, -near, 0.0]) / math.sqrt(1.0 - near * near)
-    out[two] = np.array([1.0, 0.0, -far]) / math.sqrt(1.0 - far * far)
-    out[one & two] = np.array([1.0, -2.0 * a, a * a]) / math.sqrt((1.0 - a * a) ** 3 / (1.0 + a * a))
-    return out

@@ -9,7 +9,7 @@ from render.base.arrays import Float
 
 SECOND = np.array([1.0, -2.0, 1.0])
 """Of the rows k, k - 1 and k - 2 in the second difference that ends on row k."""
-KNOWN = 5
+KNOWN = 4
 """Diagonals of an inverse that are worked out, this one and those to one side."""
 
 
@@ -19,15 +19,6 @@ def gram(rows: Float) -> Float:
     for i in range(3):
         for j in range(i + 1):
             out[i - j, : len(rows) - i] += rows[i:, i] * rows[i:, j]
-    return out
-
-
-def times(matrix: Float, data: Float) -> Float:
-    """(3, n) matrix times (n, k) data -> (n, k)."""
-    out = matrix[0][:, None] * data
-    for d in (1, 2):
-        out[d:] += matrix[d, :-d, None] * data[:-d]
-        out[:-d] += matrix[d, :-d, None] * data[d:]
     return out
 
 
@@ -51,7 +42,7 @@ def inverse_diagonals(factor: Float) -> Float:
 def of_second_differences(inverse: Float, later: int) -> Float:
     """Covariances (KNOWN, n) -> (n,) that of the second difference ending on each row with the one `later` rows on.
 
-    0 on the first two rows, where none ends, and on the last `later`, from 0 to 2.
+    0 on the first two rows, where none ends, and on the last `later`, 0 or 1.
     """
     n = inverse.shape[1]
     out = np.zeros(n)
@@ -60,19 +51,4 @@ def of_second_differences(inverse: Float, later: int) -> Float:
         for j, right in enumerate(SECOND):
             one, other = k - i, k + later - j
             out[k] += left * right * inverse[np.abs(one - other), np.minimum(one, other)]
-    return out
-
-
-def sandwich(outer: Float, inverse: Float) -> Float:
-    """(3, n) P and (KNOWN, n) diagonals of Z -> (n,) the diagonal of P Z P."""
-    n = inverse.shape[1]
-    rows, known = np.arange(n), np.pad(inverse, ((0, 0), (2, 2)))
-    beside = np.zeros((5, n))  # entries (i, i + d) for d from -2 to 2
-    for d in range(3):
-        beside[2 + d, : n - d] = outer[d, : n - d]
-        beside[2 - d, d:] = outer[d, : n - d]
-    out = np.zeros(n)
-    for i in range(-2, 3):
-        for j in range(-2, 3):
-            out += beside[2 + i] * beside[2 + j] * known[abs(i - j), rows + min(i, j) + 2]
     return out

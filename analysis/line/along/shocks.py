@@ -3,7 +3,7 @@
 A shock is an unknown number in the mean of one second difference (a corner), of two in a row (a step) or of the noise
 of one position (a stray). By how much it raises twice the log likelihood follows from the curve without it,
 
-    m' (q - V)^-1 m,   m, V the second differences and their covariance;   r^2 / (P - P A^-1 P),   r = P (u - f)
+    m' (q - V)^-1 m,   m, V the second differences and their covariance;   P (u - f)^2 / (1 - P A^-1)
 
 and is chi-square distributed where there is none (de Jong and Penzer, J. Am. Statist. Assoc. 93, 796, 1998).
 """
@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from analysis.line.along.curve import Curve, Kind, Shock, Stretch, curve_through, with_shocks
-from analysis.line.along.five_diagonals import of_second_differences, sandwich, times
+from analysis.line.along.five_diagonals import of_second_differences
 from render.base.arrays import Float
 
 CHANCE = 0.05
@@ -77,10 +77,10 @@ def _gain(curve: Curve) -> Float:
     n = len(curve.u)
     one, two = float(chi2.isf(CHANCE / n, 1)), float(chi2.isf(CHANCE / n, 2))
     out = np.full((len(Kind), n), -np.inf)
-    residual = times(curve.noise, (curve.stretch.u - curve.u)[:, None])[:, 0]
-    known = curve.noise[0] - sandwich(curve.noise, curve.covariance)
-    sure = curve.used & (known > ROUNDING * curve.noise[0])
-    out[Kind.STRAY, sure] = residual[sure] ** 2 / known[sure] - one
+    known = 1.0 - curve.weight * curve.covariance[0]
+    sure = curve.used & (known > ROUNDING)
+    residual = curve.weight * (curve.stretch.u - curve.u) ** 2
+    out[Kind.STRAY, sure] = residual[sure] / known[sure] - one
     bend, told = curve.bend, curve.told
     sure = curve.bent & (told > ROUNDING * curve.q)
     out[Kind.CORNER, sure] = bend[sure] ** 2 / told[sure] - one

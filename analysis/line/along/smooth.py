@@ -1,8 +1,9 @@
 """A line estimated along itself: neighbouring scan lines look at one smooth surface, and say of it more than one does.
 
 What is assumed: the line is smooth between steps and corners, which are found and kept; sigma_u and correlation length
-are right, and noise that is alike is so as by a blur. Positions whose error is not noise are left as they are: those
-flagged `MISFIT` and `BLENDED`, strays, and those without a sigma.
+are right. Positions whose error is not noise are left as they are: those
+flagged `MISFIT` and `BLENDED`, strays, those that would be moved by more than the line is wide, and those without a
+sigma or with one that is not small beside that width.
 """
 
 from __future__ import annotations
@@ -23,8 +24,12 @@ FEWEST = 16
 """Positions that make a line."""
 SYSTEMATIC = (Flag.MISFIT, Flag.BLENDED)
 """Flags of positions whose errors neighbours have in common by what is there, not by chance."""
+SURE, MOVED = 0.5, 1.0
+"""Times the line's width that sigma_u is at most where a position tells of its neighbours, and that it is moved by."""
 APART = 1e-3
 """Share of sigma_u at least taken as what scan lines do not have in common."""
+FINEST = 0.01
+"""Times the typical sigma of a stretch that a position counts with at least."""
 
 
 @dataclass(frozen=True)
@@ -45,15 +50,16 @@ class Smoothed:
 
 def smooth_along(line: Line) -> Line:
     """A line (n, k) -> the same with the positions of each rank estimated along it; `note` tells what was done."""
-    length = np.ones_like(line.u) if line.length_apart is None else line.length_apart
+    length = np.ones_like(line.u) if line.length_apart is None else np.nan_to_num(line.length_apart, nan=1.0)
     shared = np.zeros_like(line.u) if line.shared_u is None else np.nan_to_num(line.shared_u)
     apart = np.sqrt(np.maximum(line.variance_apart, (APART * line.sigma_u) ** 2))
-    there = line.valid & ~np.isin(line.flag, SYSTEMATIC)
+    there = line.valid & ~np.isin(line.flag, SYSTEMATIC) & ~(line.sigma_u > SURE * line.width)
     ranks = [
         smoothed(np.where(there[:, k], line.u[:, k], np.nan), apart[:, k], length[:, k], shared[:, k])
         for k in range(line.u.shape[1])
     ]
     done = np.isfinite(np.stack([one.reach for one in ranks], axis=1))
+    done &= ~(np.abs(np.stack([one.u for one in ranks], axis=1) - line.u) > MOVED * line.width)
     note = "; ".join(filter(None, (line.note, _told(ranks))))
     if not done.any():
         return replace(line, note=note)
@@ -67,7 +73,7 @@ def smooth_along(line: Line) -> Line:
         line,
         u=changed(line.u, "u"),
         sigma_u=sigma,
-        length_apart=changed(length, "length"),
+        length_apart=changed(length if line.length_apart is None else line.length_apart, "length"),
         shared_u=None if line.shared_u is None else common,
         note=note,
     )
@@ -94,12 +100,11 @@ def _stretch_smoothed(line: Smoothed, rows: NDArray[np.intp]) -> Smoothed:
 
     middle = whole.mean()
     level = np.polynomial.Polynomial.fit(rows - middle, line.u[rows], 1)(whole - middle)
-    length = float(np.mean(line.length[rows]))
-    stretch = Stretch(filled(line.u) - level, filled(line.sigma), length, np.isin(whole, rows))
+    sigma = np.maximum(filled(line.sigma), FINEST * np.median(line.sigma[rows]))
+    stretch = Stretch(filled(line.u) - level, sigma, filled(line.length), np.isin(whole, rows))
     curve, shocks = curve_with_shocks(stretch)
     kept = np.flatnonzero(curve.used)
-    alike = stretch.sigma**2 * length
-    mean = curve.smoothed(np.stack([filled(line.shared), alike], axis=1))[kept]
+    mean = curve.smoothed(np.stack([filled(line.shared), stretch.white], axis=1))[kept]
     variance = curve.variance()[kept]
     at = whole[kept]
     out = replace(line, **{name: getattr(line, name).copy() for name in ("u", "sigma", "length", "shared", "reach")})
