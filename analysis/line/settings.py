@@ -84,7 +84,7 @@ class ExtractionSettings(Model):
     )
     smooth_along: bool = quantity(
         False,
-        label="Smoothed along",
+        label="Along the line",
         help="Each position by its neighbours on the line as well, over a length that the line itself tells; steps and "
         "corners stay. Takes the surface as smooth between them, and sigma as right.",
     )
