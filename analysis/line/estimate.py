@@ -50,7 +50,12 @@ FULL_WELL = 1e4
 
 
 def estimate_noise(
-    image: NDArray[Any], settings: ExtractionSettings, saturation: float | None = None, *, processed: bool = False
+    image: NDArray[Any],
+    settings: ExtractionSettings,
+    saturation: float | None = None,
+    *,
+    processed: bool = False,
+    threads: int | None = 1,
 ) -> NoiseModel:
     """Checked image (h, w) or (h, w, 3) -> NoiseModel that explains the noise of its background and its line.
 
@@ -94,20 +99,23 @@ def estimate_noise(
         """What a count of the background would scatter more than it does is black level: the line alone is a count."""
         return model(gain).model_copy(update={"black_level": max(level - still / gain, 0.0)})
 
+    def fitted(noise: NoiseModel) -> Line:
+        return measure(replace(lines, noise=noise), settings, threads)
+
     start = _full_scale(image) / FULL_WELL
     # numbers that are not whole have no full scale, and the line's peak may be far below it
-    split = _split(lines, raised, start, FARTHEST if integer else FARTHEST_SCALED, settings)
-    noise = model(_balanced(lines, model, start, settings)) if split is None else split
+    split = _split(lines, raised, start, FARTHEST if integer else FARTHEST_SCALED, fitted)
+    noise = model(_balanced(model, start, fitted)) if split is None else split
     if not (processed or image.ndim == 3):
-        noise = _told_by_ground(lines, noise, settings)
-    noise = _told_by_neighbours(lines, noise, settings)
+        noise = _told_by_ground(lines, noise, fitted)
+    noise, line = _told_by_neighbours(lines, noise, fitted)
     # a photograph in colour is demosaiced, whatever its background tells
-    return noise.model_copy(update={"alike": True}) if image.ndim == 3 or _alike(lines, noise, settings) else noise
+    return noise.model_copy(update={"alike": True}) if image.ndim == 3 or _alike(lines, noise, line) else noise
 
 
-def _alike(lines: Lines, noise: NoiseModel, settings: ExtractionSettings) -> bool:
+def _alike(lines: Lines, noise: NoiseModel, line: Line) -> bool:
     """The noise beside the line differs less between neighbouring pixels than between those that are apart."""
-    near, signal = _near_line(lines, noise, settings)
+    near, signal = _near_line(lines, line)
     ground = np.where(near == 0, signal, np.nan)  # where there is no line nothing is known to be beside it
     step = noise.step / noise.gain
     for values in (ground, ground[: len(ground) // RUN * RUN].reshape(-1, RUN, ground.shape[1]).swapaxes(1, 2)):
@@ -117,37 +125,33 @@ def _alike(lines: Lines, noise: NoiseModel, settings: ExtractionSettings) -> boo
     return False
 
 
-def _told_by_ground(lines: Lines, noise: NoiseModel, settings: ExtractionSettings) -> NoiseModel:
+def _told_by_ground(lines: Lines, noise: NoiseModel, fitted: Callable[[NoiseModel], Line]) -> NoiseModel:
     """The noise model with what a background that is not level says of gain and read noise."""
-    near, signal = _near_line(lines, noise, settings)
+    near, signal = _near_line(lines, fitted(noise))
     told = ground_transfer(np.where(near > 0, np.nan, signal), noise.step)
     if told is None:
         return noise
     noise = noise.model_copy(update={"gain": told[0], "read_noise": told[1], "black_level": 0.0, "scintillation": ()})
     for _ in range(2):  # the first finds whether the light scintillates, the second how far that reaches
-        tried = replace(lines, noise=noise)
-        found = scatter(tried, measure(tried, settings, threads=1))
+        found = scatter(replace(lines, noise=noise), fitted(noise))
         if found is not None:
             noise = noise.model_copy(update={"scintillation": found.scintillation})
     return noise
 
 
-def _near_line(
-    lines: Lines, noise: NoiseModel, settings: ExtractionSettings
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _near_line(lines: Lines, line: Line) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(n, w) 1 near the line, 0 far from it, NaN where there is none; and the signal, NaN where it is not usable."""
-    line = measure(replace(lines, noise=noise), settings, threads=1)
     signal, mask, _ = lines.read(0, lines.count)
     distance = np.abs(np.arange(signal.shape[1]) - line.u[:, :1]) - BESIDE * line.width[:, :1]
     near = np.where(np.isnan(distance), np.nan, distance <= 2.0)
     return near, np.where(mask == 0, signal, np.nan)
 
 
-def _balanced(lines: Lines, model: Callable[[float], NoiseModel], start: float, settings: ExtractionSettings) -> float:
+def _balanced(model: Callable[[float], NoiseModel], start: float, fitted: Callable[[NoiseModel], Line]) -> float:
     """The gain at which the reduced chi-square of the fits is 1."""
     log_gain, slope, before = math.log(start), -1.0, (0.0, 0.0)
     for number in range(ROUNDS):
-        ratio = residual_ratio(measure(replace(lines, noise=model(math.exp(log_gain))), settings, threads=1))
+        ratio = residual_ratio(fitted(model(math.exp(log_gain))))
         if ratio is None:
             break
         # secant on log(chi2) against log(gain): -1 where shot noise is all, flatter where read noise holds part of it
@@ -165,13 +169,12 @@ def _split(
     model: Callable[[float], NoiseModel],
     start: float,
     farthest: tuple[float, float],
-    settings: ExtractionSettings,
+    fitted: Callable[[NoiseModel], Line],
 ) -> NoiseModel | None:
     """The noise model whose residuals are in part a count and in part scintillation; None: too few lines tell."""
     gain, noise = start, model(start)
     for _ in range(SPLITS):
-        tried = replace(lines, noise=noise)
-        found = scatter(tried, measure(tried, settings, threads=1))
+        found = scatter(replace(lines, noise=noise), fitted(noise))
         if found is None:
             return None
         most = farthest[0] if found.scintillation else farthest[1]
@@ -183,34 +186,37 @@ def _split(
     return noise
 
 
-def _told_by_neighbours(lines: Lines, noise: NoiseModel, settings: ExtractionSettings) -> NoiseModel:
-    """The noise model of a narrow line, whose fit follows what multiplies the light of its three pixels.
+def _told_by_neighbours(
+    lines: Lines, noise: NoiseModel, fitted: Callable[[NoiseModel], Line]
+) -> tuple[NoiseModel, Line]:
+    """The noise model of a narrow line, whose fit follows what multiplies the light of its three pixels; and the line.
 
     What scatters the position from row to row, beyond what is told, then counts as scintillation, as far as the light
     itself scatters along the line: second differences, to which a smooth surface adds nothing.
     """
 
     def look(model: NoiseModel) -> tuple[Line, float]:
-        line = measure(replace(lines, noise=model), settings, threads=1)
+        line = fitted(model)
         known = line.sigma_u[line.valid]
         return line, float(np.median(known**2)) if len(known) else math.nan
 
     line, told = look(noise)
     scattered, count = _scattered(np.where(line.valid, line.u, np.nan)[:, 0])
     if count < FEWEST_BENDS or np.nanmedian(line.width) > NARROW or not scattered > EXCESS * told:
-        return noise
+        return noise, line
     # rounding moves a line as well, and may leave its light as it is
     coarse = noise.read_noise * noise.gain < noise.step / math.sqrt(12.0)
     most = 1.0 if coarse else _uneven_light(replace(lines, noise=noise), line)
     if most <= noise.contrast**2:
-        return noise
+        return noise, line
     table = noise.table if noise.scintillation else np.zeros((1, 1))
     tried = table.copy()
     tried[0, 0] += TRIAL
     _, more = look(noise.model_copy(update={"scintillation": _rows_of(tried)}))
     table = table.copy()
     table[0, 0] = min(table[0, 0] + TRIAL * (scattered - told) / max(more - told, 1e-12), most)
-    return noise.model_copy(update={"scintillation": _rows_of(table)})
+    noise = noise.model_copy(update={"scintillation": _rows_of(table)})
+    return noise, fitted(noise)
 
 
 def _scattered(values: NDArray[np.float64]) -> tuple[float, int]:

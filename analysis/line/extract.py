@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from analysis.line.along.smooth import smooth_along
 from analysis.line.choose import choose_method
 from analysis.line.detection.channel import check_image, scan_lines
 from analysis.line.detection.noise import NoiseModel
@@ -44,7 +45,8 @@ def extract(
     electrons; without it, it is estimated from the image (`estimate_noise`), and what neighbouring pixels have in
     common from the positions (`shared_noise`). variance (h, w) e-^2 replaces that of the noise model, for images that
     were combined from others. With a selection other than "strongest", or a working volume, one peak of several
-    candidates is taken: arrays (n, 1), `candidates` holds the rest. Scan lines without a position carry a flag that
+    candidates is taken: arrays (n, 1), `candidates` holds the rest. Smoothed along the line, where the settings ask for
+    it, are the positions that were selected. Scan lines without a position carry a flag that
     says why.
     Raises InputError: an image of the wrong type, shape or size, without a finite pixel, a channel it does not have,
     settings out of range.
@@ -52,7 +54,7 @@ def extract(
     chosen = settings_of(settings, **changes)
     array = check_image(image)
     if noise is None:
-        noise = estimate_noise(array, chosen)
+        noise = estimate_noise(array, chosen, threads=threads)
     lines = scan_lines(array, chosen, noise, variance)
     note = ""
     if chosen.method == "auto":
@@ -67,7 +69,8 @@ def extract(
     line = replace(measure(lines, wanted, threads, judge=variance is None), note=note)
     check_finite("line", positions=line.u[line.valid])
     line = line if alone else select(line, chosen.select, volume, chosen.chooser)
-    return with_shared_noise(line) if noise.alike else line
+    line = with_shared_noise(line) if noise.alike else line
+    return smooth_along(line) if chosen.smooth_along else line
 
 
 def select(candidates: Line, how: Select, volume: WorkingVolume | None = None, chooser: str | None = None) -> Line:

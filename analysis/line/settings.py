@@ -82,6 +82,12 @@ class ExtractionSettings(Model):
         ge=0,
         le=20,
     )
+    smooth_along: bool = quantity(
+        False,
+        label="Along the line",
+        help="Each position by its neighbours on the line as well, over a length that the line itself tells; steps and "
+        "corners stay. Takes the surface as smooth between them, and sigma as right.",
+    )
     profile: Literal["integrated", "point"] = quantity(
         "integrated", label="Profile", help="Gaussian integrated over each pixel, or taken at its centre."
     )
@@ -128,6 +134,12 @@ class ExtractionSettings(Model):
     def _volume_is_not_empty(self) -> ExtractionSettings:
         if self.farthest is not None and (self.nearest or 0.0) >= self.farthest:
             raise ValueError(f"nearest is {self.nearest} m, farthest {self.farthest} m; allowed: nearest < farthest")
+        return self
+
+    @model_validator(mode="after")
+    def _along_time_or_line(self) -> ExtractionSettings:
+        if self.spacetime and self.smooth_along:
+            raise ValueError("both spacetime and smooth_along are asked for; allowed: one of them")
         return self
 
     @model_validator(mode="after")

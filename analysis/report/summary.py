@@ -123,8 +123,9 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
         )
     if found.u.autocorrelation > 0.3:
         said.append(
-            f"Neighbouring scan lines err alike (correlation {found.u.autocorrelation:.2f}): the cause is "
-            "rather the surface's texture or shape than the sensor's noise, and averaging along the line gains little."
+            f"Neighbouring scan lines err alike (correlation {found.u.autocorrelation:.2f}): the cause is rather the "
+            "surface's texture or shape, or smoothing along the line, than the sensor's noise, and averaging along it "
+            "gains little."
         )
     if found.narrow > 0.1:
         said.append(

@@ -53,6 +53,13 @@ def extract_images(
     options = ImageOptions(**{field.name: given.pop(field.name) for field in fields(ImageOptions)})
     if options.spacetime + options.ridges + (options.hdr is not None) > 1:
         raise InputError("only one of these at a time", where="--hdr, --spacetime, --ridges")
+    if given.get("smooth_along") and (options.spacetime or options.ridges):
+        raise InputError(
+            "there is no line by scan lines to be smoothed along",
+            where="--smooth-along",
+            found="--ridges" if options.ridges else "--spacetime",
+            allowed="neither of them beside it",
+        )
     if out is not None:
         check_output(out)
     prepared = _prepared(images, options, given)

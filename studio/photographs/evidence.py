@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from analysis.line.detection.noise import image_saturation
 from analysis.line.result import Axis
 from analysis.line.selection.continuity import cheapest_chain
+from render.base.threads import map_chunks
 
 Floats = NDArray[np.float32]
 Colour = Literal["mono", "red", "green", "blue"]
@@ -198,12 +199,17 @@ def find_evidence(
     mono = all(one.image.ndim == 2 for one in shrunk)
     allowed = [c for c in COMBINATIONS if colour is None or c.colour == colour]
     allowed = allowed[:1] if mono else allowed
-    scores: dict[Axis, dict[str, float]] = {}
-    for tried in AXES:
-        scores[tried] = {}
-        for combination in allowed:
-            chains = [chain_of(one, combination, tried) for one in shrunk]
-            scores[tried][combination.name] = float(np.mean([chain.score for chain in chains]))
+    tried = [(way, combination, one) for way in AXES for combination in allowed for one in shrunk]
+    found = np.zeros(len(tried))
+
+    def look(start: int, stop: int) -> None:
+        for k in range(start, stop):
+            way, combination, one = tried[k]
+            found[k] = score_of(one, combination, way)
+
+    map_chunks(look, len(tried), 1)
+    means = iter(found.reshape(-1, len(shrunk)).mean(axis=1).tolist())
+    scores: dict[Axis, dict[str, float]] = {way: {one.name: next(means) for one in allowed} for way in AXES}
     best_axis = axis if axis is not None else max(AXES, key=lambda way: max(scores[way].values()))
     highest = max(scores[best_axis].values())
     best = next(c for c in allowed if scores[best_axis][c.name] >= (1.0 - TIE) * highest)
@@ -266,13 +272,31 @@ def brightest(image: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(cv2.max(cv2.max(red, green), blue))
 
 
-def chain_of(shrunk: Shrunk, combination: Combination, axis: Axis) -> Chain:
-    """The cheapest chain of ridges in a shrunk image, and how clear it stands."""
-    return chains_of(shrunk, combination, axis, 1)[0]
+def score_of(shrunk: Shrunk, combination: Combination, axis: Axis) -> float:
+    """How clear the cheapest chain of ridges in a shrunk image stands."""
+    u, strength, scale = _ridges(shrunk, combination, axis)
+    choice = cheapest_chain(u, strength)
+    return _clearness(_at(choice, u), _at(choice, strength), _at(choice, scale), u, strength)[0]
 
 
 def chains_of(shrunk: Shrunk, combination: Combination, axis: Axis, count: int) -> list[Chain]:
-    """As many chains, far from each other, the cheapest first."""
+    """As many chains of ridges in a shrunk image, far from each other, the cheapest first."""
+    u, strength, scale = _ridges(shrunk, combination, axis)
+    found: list[Chain] = []
+    for _ in range(count):
+        choice = cheapest_chain(u, strength)
+        along, p, s = _at(choice, u), _at(choice, strength), _at(choice, scale)
+        score, clear, off = _clearness(along, p, s, u, strength)
+        u, strength = np.where(off, u, np.nan), np.where(off, strength, np.nan)
+        along = np.where(_clear_pieces(along, clear), along, np.nan)
+        found.append(Chain((along + 0.5) * shrunk.factor - 0.5, s * shrunk.factor, score))
+    return found
+
+
+def _ridges(
+    shrunk: Shrunk, combination: Combination, axis: Axis
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """`ridge_peaks` of a combination along an axis."""
     light, saturated, closed = combination.of(shrunk.image), shrunk.saturated, shrunk.closed
     if axis == "columns":
         light, saturated = np.ascontiguousarray(light.T), np.ascontiguousarray(saturated.T)
@@ -285,16 +309,7 @@ def chains_of(shrunk: Shrunk, combination: Combination, axis: Axis, count: int) 
         # them, as a window, stays as dark as it is
         element = np.ones((1, 2 * int(4.0 * SCALES[-1]) + 1), np.uint8)
         light = np.where(saturated, cv2.morphologyEx(light, cv2.MORPH_CLOSE, element), light)
-    u, strength, scale = ridge_peaks(light, closed)
-    found: list[Chain] = []
-    for _ in range(count):
-        choice = cheapest_chain(u, strength)
-        along, p, s = _at(choice, u), _at(choice, strength), _at(choice, scale)
-        score, clear, off = _clearness(along, p, s, u, strength)
-        u, strength = np.where(off, u, np.nan), np.where(off, strength, np.nan)
-        along = np.where(_clear_pieces(along, clear), along, np.nan)
-        found.append(Chain((along + 0.5) * shrunk.factor - 0.5, s * shrunk.factor, score))
-    return found
+    return ridge_peaks(light, closed)
 
 
 def ridge_peaks(

@@ -3,12 +3,16 @@
 A sharp end blurred by anything symmetric has half of its light exactly at the end. So a scan line at an end belongs to
 the line if it surely has half of the light of those next to it, a width like theirs, and lies where they go on to. A
 camera that makes pictures for the eye shows half of the light at more than half of the number.
+
+Beyond that, for as long as it may be, there is what lens and surface scatter: softer than the line and much dimmer. A
+dark surface dims the line and leaves its width, a depth out of focus widens it and leaves its light.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from analysis.line.result import Flag, Line
 from studio.photographs.line_arrays import changed
@@ -25,6 +29,8 @@ SURELY = 1.0
 """Standard deviations of the light along the line by which it is to be above half, but no more than midway to all."""
 SURE = 3
 """Scan lines one after the other that are the line's: there it begins; fewer between two jumps are no piece of it."""
+SOFTER, DIMMER, RUNNING = 1.5, 1.0 / 3.0, 7
+"""Width and amplitude over those of the line next to it, from which light is scattered; their running medians."""
 JUMP = 3.0
 """Widths from one scan line to the next at which a piece of the line ends."""
 
@@ -39,6 +45,9 @@ def ended(line: Line, half: float = HALF) -> Line:
     past = np.zeros(line.u.shape, np.bool_)
     for k in range(line.u.shape[1]):
         rows = np.flatnonzero(line.valid[:, k])
+        scattered = _scattered(_Found(rows, line, k))
+        past[rows[scattered], k] = True
+        rows = rows[~scattered]
         past[rows, k] = _past(_Found(rows, line, k), half)
     if not past.any():
         return line
@@ -65,6 +74,30 @@ class _Found:
         """Amplitude of some of them."""
         # what is told by the wings of saturated peaks tends to be too much
         return float(np.quantile(self.amplitude[some], 0.25 if self.saturated[some].any() else 0.5))
+
+
+def _scattered(found: _Found) -> NDArray[np.bool_]:
+    """Which of a line's scan lines (m,) show nothing but what is scattered beside it."""
+    out = np.zeros(len(found.rows), np.bool_)
+    if len(found.rows) <= RUNNING:
+        return out
+    width, light = (median_filter(values, RUNNING, mode="nearest") for values in (found.width, found.amplitude))
+    soft = width > SOFTER * np.median(found.width[found.amplitude >= np.median(found.amplitude)])
+    at = np.flatnonzero(soft)
+    for run in np.split(at, np.flatnonzero(np.diff(at) > 1) + 1):
+        if len(run) < SURE:
+            continue
+        first, last = found.rows[run[0]], found.rows[run[-1]]
+        sides = (
+            np.flatnonzero(~soft & (found.rows < first) & (found.rows >= first - NEXT)),
+            np.flatnonzero(~soft & (found.rows > last) & (found.rows <= last + NEXT)),
+        )
+        # the line's own end fades among the scan lines beside
+        beside = [float(np.quantile(found.amplitude[side], 0.75)) for side in sides if len(side) >= SURE]
+        saturated = found.saturated[np.concatenate([run, *sides])].any()
+        if beside and not saturated and np.median(light[run]) < DIMMER * min(beside):
+            out[run] = True
+    return out
 
 
 def _past(found: _Found, half: float) -> NDArray[np.bool_]:

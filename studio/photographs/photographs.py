@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.line.along.smooth import smooth_along
 from analysis.line.detection.channel import check_image
 from analysis.line.detection.noise import NoiseModel, image_saturation
 from analysis.line.estimate import estimate_noise, residual_ratio
@@ -82,7 +83,8 @@ def extract_photograph(
     file and what is wrong: unreadable, of the wrong type or size, black, saturated, not a number, without the channel
     asked for.
     """
-    settings = look.settings
+    # what is smoothed along is the line that was selected, with its noise, and not with what all scan lines share
+    settings = look.settings.model_copy(update={"smooth_along": False})
     with naming(path):
         taken, off = look.read(path)
         whole = check_image(taken.pixels)
@@ -91,7 +93,7 @@ def extract_photograph(
         light, corner = measured_light(path, whole, off, look, taken.lossy)
         if light is None:
             return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
-        noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy)
+        noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy, threads=threads)
         alone = settings.select == "strongest" and volume is None
         # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
         half = TONED if taken.lossy else HALF
@@ -112,6 +114,7 @@ def extract_photograph(
         if settings.select == "continuous":
             line = ended(line, half)
         line = with_shared_noise(line) if shared else line
+        line = smooth_along(line) if look.settings.smooth_along else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
@@ -240,7 +243,7 @@ def fuse_files(paths: Sequence[Path], times: Sequence[float], look: Look) -> Fus
         noise = noise.model_copy(update={"saturation": full})
         fused = fuse(images, times, noise)
         plain = settings.model_copy(
-            update={"method": "likelihood", "peaks": 1, "select": "strongest", "smoothing": 0.0}
+            update={"method": "likelihood", "peaks": 1, "select": "strongest", "smoothing": 0.0, "smooth_along": False}
         )
         for _ in range(GAIN_ROUNDS):  # all exposures together say more of the gain than one
             line = extract(fused.electrons, settings=plain, noise=fused.noise, variance=fused.variance)

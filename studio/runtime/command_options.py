@@ -88,10 +88,14 @@ def selecting(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+SMOOTH_ALONG = "Estimate positions with their neighbours on the line; steps and corners are kept."
+
+
 def measuring(command: Callable[..., Any]) -> Callable[..., Any]:
     """Settings of the line extraction in place of the project's."""
     for option in (
         click.option("--spacetime/--no-spacetime", default=None, help="Measure a moving scan along time."),
+        click.option("--smooth-along/--no-smooth-along", default=None, help=SMOOTH_ALONG),
         click.option(
             "--exposure-ratio",
             type=FiniteRange(1.0, 100.0, min_open=True),
@@ -152,6 +156,7 @@ def extracting(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--ridges", is_flag=True, help="Lines of any direction, as points with their normal (2-D Steger)."
         ),
+        click.option("--smooth-along/--no-smooth-along", default=None, help=SMOOTH_ALONG),
         click.option("--overlay", is_flag=True, help="Write a picture of each image with its line beside the table."),
         click.option("--hdr", metavar="TIMES", help="The images are exposures of one scene: 8,2,0.5. One table."),
         selecting,

@@ -84,7 +84,13 @@ def _write(scan: Scan, frame: Frame, state: RenderState, images: list[Image]) ->
 def line_band(project: Project, frame: Frame, images: list[Image]) -> NDArray[np.bool_]:
     """(h, w): the pixels about the exact line of each laser, and about all peaks that are found in its image."""
     # by the quickest method: it is the detection, the same for all, that tells where peaks are
-    settings = {"peaks": CANDIDATES, "select": "strongest", "geometry": False, "spacetime": False}
+    settings = {
+        "peaks": CANDIDATES,
+        "select": "strongest",
+        "geometry": False,
+        "spacetime": False,
+        "smooth_along": False,
+    }
     extraction = project.extraction.model_copy(update=settings)
     every = project.model_copy(update={"extraction": extraction})
     lines = [(curve.index.astype(np.float64), curve.position) for curve in frame.curves]

@@ -239,6 +239,8 @@ def beside() -> None:
     image = Image(pixels, sensor.bits, gain, sensor.black_level, float(top), noise, None, sensor.exposure_time)
     for method in METHODS:
         extract_line(project, image, 0, None, method)
+    along = project.extraction.model_copy(update={"smooth_along": True})
+    extract_line(project.model_copy(update={"extraction": along}), image, 0)
     scene = _blocks(CAMERA, (Glass(), Conductor(), WAX, Emitter()), 0.05)
     _rendered(scene.model_copy(update={"rig": Rig(camera=CAMERA)}), "subsurface")
 

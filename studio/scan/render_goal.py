@@ -86,7 +86,12 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
 
 
 def _as_far_as_known(project: Project, frame: Frame) -> Project:
-    """A blur that is left out makes the line sharper, an exposure that is left out brighter: both ask for more."""
+    """A blur that is left out makes the line sharper, an exposure that is left out brighter: both ask for more.
+
+    What counts is the noise that the sensor gives each scan line, before neighbours are asked.
+    """
+    alone = project.extraction.model_copy(update={"smooth_along": False})
+    project = project.model_copy(update={"extraction": alone})
     if frame.truth is not None and project.extraction.exposures == 1:
         return project
     sensor = project.sensor.model_copy(update={"defocus": False})

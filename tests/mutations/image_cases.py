@@ -61,6 +61,7 @@ def image(sources: Sources, place: Path, rng: Random, harm: bool) -> list[str]:
         for option in ("method", "laser", "axis", "channel", "pattern", "select")
         for word in _valid("extract", option, rng)
     ]
+    settings += ["--smooth-along"] if rng.random() < 0.2 else []
     return ["extract", name, *(settings if harm else ()), *common]
 
 

@@ -35,6 +35,9 @@ STARTS = (10.0, 100.0)
 SATURATING, ITS_PLACE, ITS_WIDTH = 300.0, 0.32, 0.2
 """The same where the glow saturates too, by GLOW and its place: half the plateau from its middle, and its width."""
 ITERATIONS = 40
+LOOK, HOPE = 4, 4.0
+"""Iterations after which a start is given up from which the best cost so far is out of reach, if all that are left
+lowered the cost so many times as much as the last."""
 SMALL = 1e-4
 """Squared standard deviations: a smaller step ends the iteration."""
 
@@ -90,9 +93,13 @@ def _normal(pixel: Array, n: int, p: Array, jacobian: Array, held: bool, hessian
         floor = pixel[FLOOR, i]
         weight = 1.0 / max(jacobian[6, i] + floor, 0.1 * abs(floor), 1e-9)
         for j in range(UNKNOWNS):
-            score[j] += weight * jacobian[j, i] * (pixel[ELECTRONS, i] - jacobian[6, i])
-            for k in range(UNKNOWNS):
-                hessian[j, k] += weight * jacobian[j, i] * jacobian[k, i]
+            weighed = weight * jacobian[j, i]
+            score[j] += weighed * (pixel[ELECTRONS, i] - jacobian[6, i])
+            for k in range(j + 1):
+                hessian[j, k] += weighed * jacobian[k, i]
+    for j in range(UNKNOWNS):
+        for k in range(j):
+            hessian[k, j] = hessian[j, k]
     for j in (4, 5):
         hessian[j, j] += 1.0 / (GLOW * GLOW)
         score[j] -= p[j] / (GLOW * GLOW)
@@ -103,15 +110,25 @@ def _normal(pixel: Array, n: int, p: Array, jacobian: Array, held: bool, hessian
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _fit(
-    pixel: Array, n: int, p: Array, seed: Array, options: Options, shape: Array, jacobian: Array, hessian: Array
+    pixel: Array, n: int, p: Array, seed: Array, options: Options, room: tuple[Array, Array, Array], best: float
 ) -> float:
-    """Refine p (6,) in place on pixels (4, n), its centre within the seed's plateau -> its cost, or infinity."""
+    """Refine p (6,) in place on pixels (4, n), its centre within the seed's plateau -> its cost, or infinity.
+
+    room: shape (3, n), jacobian (7, n) and hessian (6, 6), scratch. best: the cost of another fit, to be undercut.
+    """
+    shape, jacobian, hessian = room
     low, high = seed[CENTRE] - seed[PLATEAU] - 1.0, seed[CENTRE] + seed[PLATEAU] + 1.0
     score, step, trial = np.empty(UNKNOWNS), np.empty(UNKNOWNS), np.empty(UNKNOWNS)
     held, integrated, damping = options.known_width, options.integrated, 1e-3
     cost = _model(pixel, n, p, integrated, shape, jacobian)
     _normal(pixel, n, p, jacobian, held, hessian, score)
-    for _ in range(ITERATIONS):
+    before = cost
+    for iteration in range(ITERATIONS):
+        if iteration > 0 and iteration % LOOK == 0:
+            left = (ITERATIONS - iteration) / LOOK
+            if cost - HOPE * left * (before - cost) > best:
+                return np.inf
+            before = cost
         following, small = np.inf, False
         if solve(hessian, damping, score, step):
             trial[:] = p + step
@@ -174,7 +191,7 @@ def measure_with_glow(pixels: Pixels, seed: Array, n: int, single: Array, option
             trial[0], trial[1] = full * over, seed[CENTRE]
             if not options.known_width:
                 trial[2] = max(seed[PLATEAU] / math.sqrt(2.0 * math.log(over)), NARROWEST_SATURATED)
-        found = _fit(pixel, n, trial, seed, options, shape, jacobian, hessian)
+        found = _fit(pixel, n, trial, seed, options, (shape, jacobian, hessian), cost)
         if found < cost:
             cost = found
             p[:] = trial

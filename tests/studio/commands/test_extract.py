@@ -69,6 +69,7 @@ def test_exposures_are_fused_into_one_line_with_an_honest_sigma(tmp_path: Path) 
         (["a.png", "--geometry", "--nearest", "2", "--farthest", "1"], "nearest < farthest"),
         (["a.png", "b.png", "--spacetime"], "more frames"),
         (["a.png", "--spacetime", "--ridges"], "only one of these"),
+        (["a.png", "--ridges", "--smooth-along"], "to be smoothed along"),
         (["a.png", "--off", "b.png", "--off", "b.png", "--off", "b.png"], "one for each"),
     ],
 )

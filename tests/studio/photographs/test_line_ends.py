@@ -64,6 +64,20 @@ def test_a_line_that_fades_slowly_or_is_dark_in_its_middle_stays_whole() -> None
         assert ended(line).valid.sum() == line.valid.sum()
 
 
+def test_what_is_scattered_beside_the_line_is_none_of_it_however_long() -> None:
+    """Beyond an end, and in a gap; a dark surface leaves the line's width, a depth out of focus its light."""
+    rng = np.random.default_rng(8)
+    rows = np.arange(COUNT)
+    for there in (rows >= 140, np.abs(rows - 100) < 20):
+        for wider, dimmer, stays in ((2.5, 0.2, False), (1.0, 0.2, True), (2.5, 0.4, True)):
+            light = np.where(there, dimmer, 1.0) * 200.0 * rng.gamma(100.0, 0.01, COUNT)
+            width = np.where(there, wider, 1.0) * 2.0 * rng.gamma(100.0, 0.01, COUNT)
+            kept = ended(line_of(light, width=width)).valid[:, 0]
+            inside = there & (np.abs(rows - 100) < 17) if there[100] else rows >= 143
+            assert kept[inside].all() if stays else not kept[inside].any(), (wider, dimmer)
+            assert kept[~there].mean() > 0.97
+
+
 def test_a_short_piece_far_off_is_the_line_only_if_it_is_as_bright() -> None:
     for light, stays in ((20.0, False), (150.0, True)):
         amplitude, u = np.full(COUNT, 200.0), np.full(COUNT, 50.0)

@@ -1,0 +1,1 @@
+"""A line estimated along itself, steps and corners kept."""
