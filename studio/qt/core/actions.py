@@ -92,6 +92,7 @@ COMMANDS: tuple[Command | str, ...] = (
         "mesh",
         "STL, PLY, OBJ, GLB, STEP; or drop them on the window",
     ),
+    Command("replace_mesh", "Scene", "&Replace mesh…", "", "", "Another file; pose, scale and material stay"),
     "Scene/-",
     Command("add", "Scene", "&Add"),
     Command("presets", "Scene", "&Presets"),

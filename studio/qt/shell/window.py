@@ -23,6 +23,7 @@ from studio.qt.render.python_copy import copy_as_python
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
 from studio.qt.scene import scene_actions
+from studio.qt.scene.mesh_bar import replace_mesh
 from studio.qt.scene.mesh_importer import choose_meshes, import_meshes
 from studio.qt.shell.file_actions import FileActions
 from studio.qt.shell.help import Help, panel_with_focus
@@ -269,6 +270,7 @@ class MainWindow(QMainWindow):
             "copy_python": lambda: copy_as_python(session, session.shown),
             "deselect": lambda: session.select(()),
             "import_mesh": lambda: choose_meshes(session, self),
+            "replace_mesh": lambda: replace_mesh(session, self),
             "arrange": self.rearrange,
             "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
             "render": session.render_asked.emit,
