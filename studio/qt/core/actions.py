@@ -36,6 +36,7 @@ VIEW_KEYS = {
     "F": "frame what is selected",
     "A": "frame everything",
     "X": "arrows along the part or the world",
+    "T": "aim the laser at the next click",
 }
 """Key -> what it does while the 3D view has the focus."""
 COMMANDS: tuple[Command | str, ...] = (

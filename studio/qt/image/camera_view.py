@@ -37,6 +37,8 @@ DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 HOVER_HZ = 30
 LOW = 400
 """px of height, for picture and profile together."""
+WIDE = 1100
+"""px, for the name of every box."""
 LIVE = "Live estimate"
 
 
@@ -81,7 +83,7 @@ class CameraView(QWidget):
         super().resizeEvent(event)
         # a low panel shows the picture alone rather than two strips
         self.profile.setVisible(self.height() >= LOW)
-        self.overlay.show_names_within(self.lines.width())
+        self._name_boxes()
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -282,7 +284,7 @@ class CameraView(QWidget):
         curves = [look.lit_curve(i) for i in range(len(look.scene.lasers))]
         self.overlay.show_truth(curves)
         self.overlay.show_methods([])
-        self.overlay.show_names_within(self.lines.width())
+        self._name_boxes()
         self._draw_hover()
 
     # the render
@@ -323,13 +325,18 @@ class CameraView(QWidget):
             self.view.keep_place(before, size)
         self._read_out(self._cursor if before == size else None)
 
+    def _name_boxes(self) -> None:
+        """As far as there is room, which the names of lines need first."""
+        self.saturated.setText("Saturated" if self.is_live or self.width() >= WIDE else "")
+        self.overlay.show_names_within(self.lines.width())
+
     def _draw_overlay(self) -> None:
         shown = self.session.shown
         if shown is None or self.is_live:
             return
         self.overlay.show_truth(list(shown.frame.curves))
         self.overlay.show_methods([item.line for items in shown.measurements.values() for item in items])
-        self.overlay.show_names_within(self.lines.width())
+        self._name_boxes()
         self._draw_hover()
 
     # under the cursor
