@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
-    QLabel,
     QMenu,
     QToolButton,
     QWidget,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio.project.document import FieldPath
+from studio.qt.core.widgets import ElidedLabel
 
 if TYPE_CHECKING:
     from studio.qt.viewport.viewport import Viewport
@@ -73,7 +73,7 @@ class ViewportBar(QWidget):
         self.aim.setToolTip("The next click says what the selected laser, else the first, is to light (T)")
         self.aim.toggled.connect(viewport.begin_aim)
         layout.addWidget(self.aim)
-        self._text, self._grid = QLabel(), QLabel()
+        self._text, self._grid = ElidedLabel(), ElidedLabel()
         self._grid.setObjectName("muted")
         layout.addStretch(1)
         layout.addWidget(self._text)
