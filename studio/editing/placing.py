@@ -18,7 +18,7 @@ def aimed(pose: Pose, point: Float) -> Pose:
     axis, length = matrix[:3, 2], float(np.linalg.norm(towards))
     if length < 1e-9:
         return pose
-    matrix[:3, :3] = _between(axis, towards / length) @ matrix[:3, :3]
+    matrix[:3, :3] = least_turn(axis, towards / length) @ matrix[:3, :3]
     return _rounded(matrix)
 
 
@@ -51,13 +51,13 @@ def at_baseline(pose: Pose, camera: Float, point: Float, baseline: float) -> Pos
     direction = offset / length if length > 1e-9 else matrix[:3, 0]
     place = camera + baseline * direction
     before, after = point - matrix[:3, 3], point - place
-    turn = _between(before / np.linalg.norm(before), after / np.linalg.norm(after))
+    turn = least_turn(before / np.linalg.norm(before), after / np.linalg.norm(after))
     matrix[:3, :3] = turn @ matrix[:3, :3]
     matrix[:3, 3] = place
     return _rounded(matrix)
 
 
-def _between(a: Float, b: Float) -> Float:
+def least_turn(a: Float, b: Float) -> Float:
     """(3, 3) the least rotation that takes one unit vector to another."""
     axis = np.cross(a, b)
     sine = float(np.linalg.norm(axis))

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from render.base.errors import InputError
-from render.base.pose import Pose
+from render.base.pose import Pose, invert, transform_points
 from render.laser.laser import LineLaser
 from render.material.lambertian import Lambertian
 from render.scene.lights import PointLight, RectangleLight
@@ -18,6 +18,7 @@ from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
 from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile, Parametric, Plane
 from studio.editing.placement import (
+    Array,
     field_of_view,
     light_pose,
     new_laser,
@@ -27,6 +28,7 @@ from studio.editing.placement import (
     target,
     vector,
 )
+from studio.editing.placing import aimed
 from studio.project.document import FieldPath, replaced, value_at
 from studio.project.mesh_import import ImportedMesh
 from studio.project.project import Project
@@ -63,6 +65,14 @@ def unique_name(name: str, taken: set[str]) -> str:
 def add_laser(project: Project) -> Result:
     """A laser aimed at the middle of the working range, on the first free side of the camera."""
     return _append(project, LASERS, new_laser(project.scene, unique_name("laser", _names(project, LASERS))))
+
+
+def aim_laser(project: Project, laser: int, point: Array, step: int = 0) -> Result:
+    """A laser turned where it stands until its axis meets a point (3,) of the world, at a step of the motion."""
+    path: FieldPath = (*LASERS, laser)
+    place = transform_points(invert(project.scene.T_world_rig(step)), point)
+    pose = aimed(project.scene.lasers[laser].T_rig_laser, place)
+    return replaced(project, (*path, "T_rig_laser"), pose), path
 
 
 def add_primitive(project: Project, kind: type[Parametric]) -> Result:

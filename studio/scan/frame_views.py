@@ -21,6 +21,8 @@ from studio.scan.stages import scaled
 DEPTH_MAP = "viridis"
 SHAPE_BRIGHTNESS = 0.45
 """Of what a live picture shows beside the line."""
+SATURATED = "#ff2d78"
+"""Of pixels that are painted as saturated: no light and no theme has this colour."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +69,13 @@ def numbers(view: View, frame: Frame, images: list[Image]) -> NDArray[Any] | Non
     return None
 
 
-def picture(view: View, scene: Scene, frame: Frame, images: list[Image], bright: bool) -> Picture | None:
-    """(h, w) picture of a view; None: it is not there yet. bright: faint light is lifted (square root)."""
+def picture(
+    view: View, scene: Scene, frame: Frame, images: list[Image], bright: bool, paint: bool = False
+) -> Picture | None:
+    """(h, w) picture of a view; None: it is not there yet.
+
+    bright: faint light is lifted (square root). paint: what is saturated in an image, in its own colour.
+    """
     array = numbers(view, frame, images)
     if view.kind == "light":
         total = all_light(scene, frame)
@@ -78,8 +85,10 @@ def picture(view: View, scene: Scene, frame: Frame, images: list[Image], bright:
     if view.kind == "image":
         image = images[view.laser]
         if image.pixels.ndim == 3:  # as the camera hands it out
-            return colour(array.astype(np.float32), image.saturation, False)
-        return grey(array, image.black_level, image.saturation, bright)
+            drawn, full = colour(array.astype(np.float32), image.saturation, False), array.max(axis=2)
+        else:
+            drawn, full = grey(array, image.black_level, image.saturation, bright), array
+        return _painted(drawn, full >= image.saturation) if paint else drawn
     if view.kind == "ambient":
         return colour(array, white_level(array[..., 1]), bright)
     if view.kind == "depth":
@@ -132,17 +141,28 @@ def at_pixel(scene: Scene, frame: Frame, images: list[Image], row: int, column: 
     return rows
 
 
-def live_picture(project: Project, image: PreviewImage) -> Picture:
-    """(h, w) a preview: grey shape for the eye, and each laser's line as bright as the sensor would see it."""
+def live_picture(project: Project, image: PreviewImage, paint: bool = False) -> Picture:
+    """(h, w) a preview: grey shape for the eye, and each laser's line as bright as the sensor would see it.
+
+    paint: as of `picture`.
+    """
     small, sensor = scaled(project, image.scale), project.sensor
     frame = Frame(0, image.laser, None, (), None)
     full = min(sensor.full_well, (2**sensor.bits - 1 - sensor.black_level) / sensor.dn_per_electron)
     total = np.sqrt(image.shade) * np.float32(SHAPE_BRIGHTNESS)
+    saturated = np.zeros(total.shape[:2], np.bool_)
     for i, laser in enumerate(project.scene.lasers):
         power = [item.power if k == i else 0.0 for k, item in enumerate(project.scene.lasers)]
         electrons = expected_electrons(frame, small.scene, small.sensor, laser_power=power)
         line = np.sqrt(np.minimum(electrons / np.float32(full), 1.0))
+        saturated |= electrons >= full
         # pure hue hides how bright it is: half of it is white
         for band, share in enumerate(wavelength_colour(laser.wavelength_nm)):
             total[..., band] += np.float32(0.5 + 0.5 * share) * line
-    return colour(np.ascontiguousarray(total, np.float32), 1.0)
+    drawn = colour(np.ascontiguousarray(total, np.float32), 1.0)
+    return _painted(drawn, saturated) if paint else drawn
+
+
+def _painted(drawn: Picture, where: NDArray[np.bool_]) -> Picture:
+    drawn[where] = np.uint32(0xFF000000 | int(SATURATED[1:], 16))
+    return drawn

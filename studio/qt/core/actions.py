@@ -36,6 +36,7 @@ VIEW_KEYS = {
     "F": "frame what is selected",
     "A": "frame everything",
     "X": "arrows along the part or the world",
+    "T": "aim the laser at the next click",
 }
 """Key -> what it does while the 3D view has the focus."""
 COMMANDS: tuple[Command | str, ...] = (
@@ -92,6 +93,8 @@ COMMANDS: tuple[Command | str, ...] = (
         "mesh",
         "STL, PLY, OBJ, GLB, STEP; or drop them on the window",
     ),
+    Command("replace_mesh", "Scene", "&Replace mesh…", "", "", "Another file; pose, scale and material stay"),
+    Command("aim", "Scene", "A&im the laser at a click", "", "", "The next click in 3D says what it is to light (T)"),
     "Scene/-",
     Command("add", "Scene", "&Add"),
     Command("presets", "Scene", "&Presets"),
@@ -109,6 +112,7 @@ COMMANDS: tuple[Command | str, ...] = (
     "Measure/-",
     Command("frame_points", "Measure", "Points in &view", "Alt+P", "", "The measured points in the middle of the view"),
     Command("help", "Help", "&Contents", "F1", "help", "The page of the panel that has the focus"),
+    Command("search", "Help", "&Find a command…", "Ctrl+P", "", "Everything that the menus can do, by a few letters"),
     Command("shortcuts", "Help", "&Shortcuts", "Ctrl+/"),
     Command("tour", "Help", "&Guided tour"),
     "Help/-",

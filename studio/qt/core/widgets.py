@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QBoxLayout, QFormLayout, QLabel, QProgressBar, QPushButton, QSplitter, QWidget
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QFormLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QScrollArea,
+    QSizePolicy,
+    QSplitter,
+    QWidget,
+)
 
 
 class ElidedLabel(QLabel):
@@ -70,3 +80,21 @@ def upper_and_lower(upper: QWidget, lower: QWidget, sizes: tuple[int, int]) -> Q
         split.setStretchFactor(split.indexOf(widget), share)
     split.setSizes(list(sizes))
     return split
+
+
+def scrolled(panel: QWidget) -> QScrollArea:
+    """So that a low screen shows a part of a panel, and the window does not outgrow the screen."""
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setFrameShape(QScrollArea.Shape.NoFrame)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setMinimumWidth(panel.minimumSizeHint().width() + area.verticalScrollBar().sizeHint().width())
+    area.setWidget(panel)
+    return area
+
+
+def spring() -> QWidget:
+    """Takes what room is left in a bar."""
+    made = QWidget()
+    made.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+    return made

@@ -27,16 +27,18 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import ElidedLabel, flush, upper_and_lower
 from studio.qt.image.image_item import PictureView
-from studio.qt.image.line_overlay import LineOverlay
+from studio.qt.image.line_overlay import LineOverlay, swatch
 from studio.qt.image.row_profile import RowProfile
 from studio.runtime.jobs import Progress
-from studio.scan.frame_views import at_pixel, live_picture, picture, views
+from studio.scan.frame_views import SATURATED, at_pixel, live_picture, picture, views
 
 DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 """Of work for a live picture: while something is dragged, and when it has come to rest."""
 HOVER_HZ = 30
 LOW = 400
 """px of height, for picture and profile together."""
+WIDE = 1100
+"""px, for the name of every box."""
 LIVE = "Live estimate"
 
 
@@ -55,6 +57,9 @@ class CameraView(QWidget):
         self.choice.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
         self.bright = QCheckBox("Brighten")
         self.bright.setChecked(True)
+        self.saturated = QCheckBox("Saturated")
+        self.saturated.setIcon(swatch(SATURATED))
+        self.saturated.setChecked(True)
         self.readout = QLabel()
         self.badge = QFrame()
         self.badge_text = ElidedLabel()
@@ -78,7 +83,7 @@ class CameraView(QWidget):
         super().resizeEvent(event)
         # a low panel shows the picture alone rather than two strips
         self.profile.setVisible(self.height() >= LOW)
-        self.overlay.show_names_within(self.lines.width())
+        self._name_boxes()
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -112,11 +117,14 @@ class CameraView(QWidget):
     def _lay_out(self) -> None:
         self.choice.setToolTip("What to look at")
         self.bright.setToolTip("Square root of the light, to see what is faint")
+        self.saturated.setToolTip("Paint the pixels of an image that are saturated")
         bar = QHBoxLayout()
         bar.setContentsMargins(6, 4, 6, 4)
         bar.addWidget(self.choice)
         bar.addSpacing(8)
         bar.addWidget(self.bright)
+        bar.addSpacing(8)
+        bar.addWidget(self.saturated)
         bar.addSpacing(8)
         lines = self.lines
         lines.setLayout(self.overlay.bar)
@@ -167,7 +175,8 @@ class CameraView(QWidget):
         self.live.changed.connect(self._live_changed)
         self.live.loading.connect(lambda on: self._show_badge())
         self.choice.activated.connect(self._choose)
-        self.bright.toggled.connect(lambda on: self.refresh())
+        for box in (self.bright, self.saturated):
+            box.toggled.connect(lambda on: self.refresh())
         self.render_button.clicked.connect(session.render_asked)
 
     def _colour(self) -> None:
@@ -270,12 +279,12 @@ class CameraView(QWidget):
         look = self.live.look
         image = look.image(seconds=DRAG_SECONDS if self.session.dragging else REST_SECONDS)
         camera = look.scene.camera
-        drawn = live_picture(look.project, image)
+        drawn = live_picture(look.project, image, self.saturated.isChecked())
         self._place([drawn], (camera.width, camera.height))
         curves = [look.lit_curve(i) for i in range(len(look.scene.lasers))]
         self.overlay.show_truth(curves)
         self.overlay.show_methods([])
-        self.overlay.show_names_within(self.lines.width())
+        self._name_boxes()
         self._draw_hover()
 
     # the render
@@ -290,10 +299,11 @@ class CameraView(QWidget):
         shown, view = self.session.shown, self.choice.currentData()
         if shown is None or view is None or not self.isVisible():
             return
-        scene, frame, images, bright = shown.project.scene, shown.frame, list(shown.images), self.bright.isChecked()
+        scene, frame, images = shown.project.scene, shown.frame, list(shown.images)
+        bright, paint = self.bright.isChecked(), self.saturated.isChecked()
 
         def work(progress: Progress, cancelled: Cancel) -> list[Picture] | None:
-            made = picture(view, scene, frame, images, bright)
+            made = picture(view, scene, frame, images, bright, paint)
             return None if made is None else pyramid(made)
 
         def then(levels: list[Picture] | None) -> None:
@@ -315,13 +325,18 @@ class CameraView(QWidget):
             self.view.keep_place(before, size)
         self._read_out(self._cursor if before == size else None)
 
+    def _name_boxes(self) -> None:
+        """As far as there is room, which the names of lines need first."""
+        self.saturated.setText("Saturated" if self.is_live or self.width() >= WIDE else "")
+        self.overlay.show_names_within(self.lines.width())
+
     def _draw_overlay(self) -> None:
         shown = self.session.shown
         if shown is None or self.is_live:
             return
         self.overlay.show_truth(list(shown.frame.curves))
         self.overlay.show_methods([item.line for items in shown.measurements.values() for item in items])
-        self.overlay.show_names_within(self.lines.width())
+        self._name_boxes()
         self._draw_hover()
 
     # under the cursor

@@ -21,16 +21,22 @@ from PySide6.QtWidgets import (
 
 from analysis.line.settings import Method
 from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
+from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
 from render.sensor.develop import Image
+from studio.editing.units import Unit
+from studio.preview.readouts import readouts
+from studio.preview.remedies import FILLED, automatic_exposure
 from studio.project.document import FieldPath
 from studio.qt.core.jobs import JobRunner
+from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import text_button
 from studio.qt.forms.log_field import LogField
 from studio.qt.image.line_overlay import swatch
 from studio.runtime.jobs import Job, Progress
+from studio.scan.exposure import filling_exposure
 from studio.scan.redevelop import Development, develop_again, development, measure_again
 from studio.scan.results import METHODS
 from studio.scan.stages import Measurement
@@ -60,6 +66,10 @@ class DevelopPanel(QWidget):
         self._rest.timeout.connect(self._measure)
         self.exposure = LogField(1e-6, 1.0, 1e3, "ms", 4)
         self.exposure.setToolTip("Exposure time: longer is brighter, until the line saturates.")
+        self.automatic_exposure = text_button("Automatic")
+        self.automatic_exposure.setToolTip(
+            f"The line's brightest pixels at {FILLED:.0%} of full: of the render at full scale, else as estimated"
+        )
         self.automatic_gain = QCheckBox("full well fills the range")
         self.gain = LogField(1e-3, 100.0, 1.0, "DN/e-", 4)
         self.bits = QComboBox()
@@ -114,6 +124,7 @@ class DevelopPanel(QWidget):
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         form.setRowWrapPolicy(QFormLayout.RowWrapPolicy.WrapLongRows)
         form.addRow("Exposure", self.exposure)
+        form.addRow("", self.automatic_exposure)
         form.addRow("Gain", self.automatic_gain)
         form.addRow("", self.gain)
         form.addRow("Bit depth", self.bits)
@@ -146,6 +157,7 @@ class DevelopPanel(QWidget):
         for field in (self.exposure, self.gain):
             field.released.connect(self._end_merge)
         self.automatic_gain.clicked.connect(self._choose_gain)
+        self.automatic_exposure.clicked.connect(self.expose)
         self.bits.activated.connect(lambda i: session.set(("sensor", "bits"), self.bits.itemData(i), "bit depth"))
         self.exposures.activated.connect(
             lambda i: session.set(("extraction", "exposures"), self.exposures.itemData(i), "exposures")
@@ -166,6 +178,31 @@ class DevelopPanel(QWidget):
                 self._follow_project()
 
         return set_value
+
+    def expose(self) -> None:
+        """Choose the exposure time; where no line is to be seen it stays, and that is told."""
+        session = self.session
+        try:
+            time = self._filling()
+        except InputError as error:
+            session.message.emit("error", str(error))
+            return
+        if time is None:
+            session.message.emit("error", "no laser line is in the image: there is nothing to expose by")
+        elif session.set(("sensor", "exposure_time"), time, "automatic exposure"):
+            session.message.emit("info", f"exposure {Unit.of('s').with_unit(time)}")
+
+    def _filling(self) -> float | None:
+        """Exposure time, s, of the shown render, or of the estimate where that is small or no longer of the scene."""
+        project, render = self.session.project, self.session.shown
+        if render is not None and render.final and render.scanner_scale == 1.0 and not render.is_stale(project):
+            how = development(render.project, project)
+            return filling_exposure(how.project, render.frame, how.laser_power)
+        live(self.session).refresh()
+        look = live(self.session).look
+        found = [automatic_exposure(project, readouts(look, i)) for i in range(len(look.scene.lasers))]
+        times = [one[1].sensor.exposure_time for one in found if one is not None]
+        return min(times) if times else None
 
     def _end_merge(self) -> None:
         self.session.document.end_merge()

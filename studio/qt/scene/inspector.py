@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -9,17 +10,17 @@ from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QMenu, QScrollArea, QToolButton, QVBoxLayout, QWidget
 
 from render.base.errors import InputError
-from render.scene.shape import MeshFile
 from studio.editing.forms import Alternative, FieldSpec, describe_item, kind_label, start_value
 from studio.editing.presets import presets_for
 from studio.project.document import FieldPath, value_at
-from studio.project.mesh_import import ImportedMesh, copied_beside
+from studio.project.mesh_import import copied_beside
 from studio.project.project import Project
 from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.forms.fields import tool_button
 from studio.qt.forms.form import Form
 from studio.qt.scene import mesh_importer, scene_actions
+from studio.qt.scene.mesh_bar import MeshBar, take_mesh
 from studio.qt.scene.scene_icons import item_icon
 
 TITLES = {"scene": "Scene", "rig": "Rig", "camera": "Camera", "sensor": "Sensor", "render": "Render settings",
@@ -65,6 +66,7 @@ class Inspector(QWidget):
         self.problem = QLabel(wordWrap=True)
         self.problem.setObjectName("error")
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.mesh_bar = MeshBar(session)
         self.form = Form(session, self._choose_file)
         content = QWidget()
         column = QVBoxLayout(content)
@@ -73,6 +75,7 @@ class Inspector(QWidget):
         column.addLayout(head)
         column.addWidget(self.hint)
         column.addWidget(self.problem)
+        column.addWidget(self.mesh_bar)
         column.addWidget(self.form)
         column.addStretch(1)
         scroll = QScrollArea(widgetResizable=True)
@@ -135,7 +138,7 @@ class Inspector(QWidget):
         if path[-1] == "shape":
             file = mesh_importer.choose_mesh(self)
             if file is not None:
-                mesh_importer.import_meshes(self.session, [file], self, lambda mesh: self._take_mesh(path, mesh))
+                mesh_importer.import_meshes(self.session, [file], self, partial(take_mesh, self.session, path[:3]))
             return
         file = mesh_importer.choose_file(self, "Image", IMAGE_FILES)
         if file is None or not mesh_importer.may_copy(self, [file], root):
@@ -144,10 +147,6 @@ class Inspector(QWidget):
             self._take_image(path, kind, copied_beside(file, root, "textures"))
         except InputError as error:
             self.session.message.emit("error", str(error))
-
-    def _take_mesh(self, path: FieldPath, mesh: ImportedMesh) -> None:
-        shape = MeshFile(path=mesh.path, unit=mesh.unit)
-        self.session.set(path, shape, f"use {Path(mesh.path).name}")
 
     def _take_image(self, path: FieldPath, kind: Alternative | None, image: str) -> None:
         label = f"use {Path(image).name}"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QScrollArea, QSizePolicy, QToolBar, QToolButton, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QToolBar, QToolButton, QWidget
 
 from studio.project.autosave import Autosave
 from studio.project.mesh_import import is_mesh
@@ -19,11 +19,14 @@ from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
+from studio.qt.core.widgets import scrolled, spring
 from studio.qt.render.python_copy import copy_as_python
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
 from studio.qt.scene import scene_actions
+from studio.qt.scene.mesh_bar import replace_mesh
 from studio.qt.scene.mesh_importer import choose_meshes, import_meshes
+from studio.qt.shell.command_search import CommandSearch
 from studio.qt.shell.file_actions import FileActions
 from studio.qt.shell.help import Help, panel_with_focus
 from studio.qt.shell.memory import return_what_is_free
@@ -189,7 +192,7 @@ class MainWindow(QMainWindow):
                 continue
             dock = QDockWidget(panel.title, self)
             dock.setObjectName(panel.key)
-            dock.setWidget(_scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
+            dock.setWidget(scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
             # added here once; from now on Qt moves docks only by restoring a state
             self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
             dock.hide()
@@ -205,7 +208,7 @@ class MainWindow(QMainWindow):
         group = QActionGroup(self)
         for key in TOOLBAR:
             bar.addSeparator() if not key else bar.addAction(self.commands[key])
-        bar.addWidget(_spring())
+        bar.addWidget(spring())
         for each in WORKSPACES:
             action = self.commands[SWITCH[each.key]]
             group.addAction(action)
@@ -215,7 +218,7 @@ class MainWindow(QMainWindow):
             button.setDefaultAction(action)
             button.setText(each.title)
             bar.addWidget(button)
-        bar.addWidget(_spring())
+        bar.addWidget(spring())
         bar.addAction(self.commands["help"])
         self.addToolBar(bar)
         themes = QActionGroup(self)
@@ -269,6 +272,8 @@ class MainWindow(QMainWindow):
             "copy_python": lambda: copy_as_python(session, session.shown),
             "deselect": lambda: session.select(()),
             "import_mesh": lambda: choose_meshes(session, self),
+            "replace_mesh": lambda: replace_mesh(session, self),
+            "aim": self.panels["viewport"].begin_aim,  # type: ignore[attr-defined]
             "arrange": self.rearrange,
             "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
             "render": session.render_asked.emit,
@@ -278,6 +283,7 @@ class MainWindow(QMainWindow):
             "frame_points": self.cloud.frame,
             "log": lambda: self.show_panel("log"),
             "help": lambda: self.help.open_page(panel_with_focus(self.panels)),
+            "search": lambda: CommandSearch(self).open(),
             "shortcuts": lambda: CheatSheet(self).open(),
             "tour": self.start_tour,
             "about": lambda: about(self, version()),
@@ -381,20 +387,3 @@ def version() -> str:
         return metadata.version("blazer-studio")
     except metadata.PackageNotFoundError:
         return ""
-
-
-def _scrolled(panel: QWidget) -> QScrollArea:
-    """So that a low screen shows a part of a panel, and the window does not outgrow the screen."""
-    area = QScrollArea()
-    area.setWidgetResizable(True)
-    area.setFrameShape(QScrollArea.Shape.NoFrame)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setMinimumWidth(panel.minimumSizeHint().width() + area.verticalScrollBar().sizeHint().width())
-    area.setWidget(panel)
-    return area
-
-
-def _spring() -> QWidget:
-    spring = QWidget()
-    spring.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-    return spring

@@ -15,6 +15,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkCellPicker
 from render.base.arrays import Float
 from render.base.pose import transform_points
 from studio.editing.placement import working_distance
+from studio.editing.scene_edits import aim_laser
 from studio.preview.view_camera import STANDARD, through, turntable
 from studio.project.document import FieldPath, value_at
 from studio.qt.core import theme
@@ -95,10 +96,45 @@ class Viewport(QWidget):
 
     def look_through_laser(self) -> None:
         """Through the selected laser, else the first."""
-        count = len(self.session.project.scene.lasers)
-        chosen = self.session.selection[:4] if self.session.selection[:3] == LASERS else (*LASERS, 0)
-        if count:
-            self.look_through(chosen if int(chosen[3]) < count else (*LASERS, 0))
+        chosen = self._laser()
+        if chosen:
+            self.look_through(chosen)
+
+    def begin_aim(self, on: bool = True) -> None:
+        """The next click on a surface aims the selected laser, else the first, at it; off: it selects, as ever."""
+        if on and not self._laser():
+            self.session.message.emit("error", "the scene has no laser to aim")
+            on = False
+        on = on and not self.session.dragging
+        self.bar.aim.setChecked(on)
+        self.bar.tell("click what the laser is to light" if on else "")
+        self.view.tool = None if on else self.gizmo  # its handles may lie over what is to be lit
+        self.view.setCursor(Qt.CursorShape.CrossCursor if on else Qt.CursorShape.ArrowCursor)
+
+    def aim_at(self, x: float, y: float) -> None:
+        """Turn the laser to the surface under a point of the view; one step to undo."""
+        origin, direction = self.view.eye.ray(x, y, self.view.pixels)
+        distance = self._mesh_hit(origin, direction)[1]
+        if not math.isfinite(distance):
+            self.session.message.emit("error", "no surface is there; click on an object to aim the laser at it")
+            return
+        session, laser = self.session, int(self._laser()[3])
+        project, path = aim_laser(session.project, laser, origin + distance * direction, self.live.step)
+        session.document.apply(f"aim {session.project.scene.lasers[laser].name}", project)
+        session.select(path)
+        self.begin_aim(False)
+
+    def _laser(self) -> FieldPath:
+        """Of the selected laser, else of the first; () without any."""
+        count, selected = len(self.session.project.scene.lasers), self.session.selection
+        own = selected[:3] == LASERS and len(selected) > 3 and int(selected[3]) < count
+        return selected[:4] if own else (*LASERS, 0) if count else ()
+
+    def _clicked(self, x: float, y: float) -> None:
+        if self.bar.aim.isChecked():
+            self.aim_at(x, y)
+        else:
+            self.session.select(self.path_at(x, y))
 
     def set_parallel(self, parallel: bool) -> None:
         """Parallel projection: lengths across the view compare."""
@@ -128,7 +164,7 @@ class Viewport(QWidget):
         session.document_replaced.connect(self._start_anew)
         session.frame_requested.connect(lambda: self.frame(session.selection))
         theme.notice.changed.connect(self._paint)
-        view.clicked.connect(lambda x, y: session.select(self.path_at(x, y)))
+        view.clicked.connect(self._clicked)
         view.double_clicked.connect(self._frame_at)
         view.hovered.connect(self._hover_later)
         view.left.connect(self._hover.stop)
@@ -145,6 +181,7 @@ class Viewport(QWidget):
             "F": lambda: self.frame(self.session.selection),
             "A": self.frame,
             "X": lambda: self.set_local(not self.gizmo.local),
+            "T": lambda: self.begin_aim(not self.bar.aim.isChecked()),
         }
         for key in VIEW_KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
@@ -177,6 +214,7 @@ class Viewport(QWidget):
 
     def _start_anew(self) -> None:
         self._leave()
+        self.begin_aim(False)
         self._frame_soon = True
 
     def _leave(self) -> None:

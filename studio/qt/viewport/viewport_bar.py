@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
-    QLabel,
     QMenu,
     QToolButton,
     QWidget,
@@ -19,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from studio.project.document import FieldPath
+from studio.qt.core.widgets import ElidedLabel
 
 if TYPE_CHECKING:
     from studio.qt.viewport.viewport import Viewport
@@ -67,7 +67,13 @@ class ViewportBar(QWidget):
         self._axes.setToolTip("The gizmo moves along the world's axes, or the item's own (X)")
         self._axes.clicked.connect(viewport.set_local)
         layout.addWidget(self._axes)
-        self._text, self._grid = QLabel(), QLabel()
+        self.aim = QToolButton(self)
+        self.aim.setText("Aim")
+        self.aim.setCheckable(True)
+        self.aim.setToolTip("The next click says what the selected laser, else the first, is to light (T)")
+        self.aim.toggled.connect(viewport.begin_aim)
+        layout.addWidget(self.aim)
+        self._text, self._grid = ElidedLabel(), ElidedLabel()
         self._grid.setObjectName("muted")
         layout.addStretch(1)
         layout.addWidget(self._text)

@@ -96,6 +96,14 @@ class TestPlacement:
         plane = made.scene.laser_plane(0)
         assert plane[:3] @ [0, 0, working_distance(bare.scene)] + plane[3] == pytest.approx(0, abs=1e-6)
 
+    def test_an_aimed_laser_lights_the_point_of_the_world_at_any_step(self) -> None:
+        project = Project.load(template_folder("scan") / "project.json")
+        point = target(project.scene) + np.array([0.013, -0.02, 0.004])
+        made, path = scene_edits.aim_laser(project, 0, point, step=2)
+        x, y, z, _ = np.linalg.inv(made.scene.T_world_laser(0, 2)) @ [*point, 1.0]
+        assert path == (*scene_edits.LASERS, 0) and z > 0.0
+        assert math.hypot(x, y) < 1e-8
+
     def test_lights_shine_on_what_the_camera_looks_at_from_its_side(self, project: Project) -> None:
         for kind in (PointLight, RectangleLight):
             made, path = scene_edits.add_light(project, kind)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
+from studio.qt.core.live_preview import live
 from studio.qt.render.develop_panel import DevelopPanel
 from tests.studio.qt.small_session import small_session
 
@@ -157,3 +158,36 @@ def test_exposures_and_the_choice_of_peaks_are_the_projects_and_told(qtbot, pane
     assert "3 exposures fused" in panel.noted.text() and "fan" in panel.noted.text()
     session.document.undo()
     assert not panel.possible.isChecked()
+
+
+def test_one_click_exposes_by_the_render_and_is_one_step_to_undo(qtbot, panel):
+    session = panel.session
+    before = session.project.sensor.exposure_time
+    with qtbot.waitSignal(session.measured, timeout=20000):
+        qtbot.mouseClick(panel.automatic_exposure, Qt.MouseButton.LeftButton)
+    time = session.project.sensor.exposure_time
+    assert time != before and session.document.undo_label == "automatic exposure"
+    settle(qtbot, panel)
+    image = session.shown.images[0]
+    curve = session.shown.frame.curves[0]
+    rows = image.pixels[curve.index].max(axis=1) / image.saturation
+    # noise: a peak of thousands of electrons is a few percent off, and so is a sensor's black level
+    assert np.quantile(rows, 0.95) < 0.95 and np.quantile(rows, 0.995) > 0.6
+    session.document.undo()
+    assert session.project.sensor.exposure_time == before
+
+
+def test_without_a_render_the_exposure_is_as_estimated(qtbot, panel):
+    session, told = panel.session, []
+    session.message.connect(lambda level, text: told.append(level))
+    session.renders, session.shown = [], None
+    session.renders_changed.emit()
+    qtbot.waitUntil(lambda: not live(session).is_loading)
+    session.set(("sensor", "exposure_time"), 1e-6, "dark")
+    panel.expose()
+    assert session.project.sensor.exposure_time > 1e-5 and told[-1] == "info"
+    session.set(("scene", "objects"), (), "nothing to see")
+    qtbot.waitUntil(lambda: live(session).look.project is session.project)
+    before = session.project
+    panel.expose()
+    assert session.project is before and told[-1] == "error"

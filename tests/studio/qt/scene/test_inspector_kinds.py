@@ -87,6 +87,35 @@ class TestKinds:
         shape = session.project.scene.objects[1].shape
         assert (shape.path, shape.unit) == ("meshes/part.stl", "mm")
         qtbot.waitUntil(lambda: not mesh_importer.running)
+        self.place_and_replace(qtbot, session, inspector, outside, monkeypatch)
+
+    def place_and_replace(
+        self,
+        qtbot: QtBot,
+        session: Session,
+        inspector: Inspector,
+        outside: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        """A click for each: the longest side up, on the ground, and another file with pose and material as they are."""
+        bar = inspector.mesh_bar
+        qtbot.waitUntil(lambda: bar.ground.isEnabled())
+        assert bar.told.text().startswith("100 x 50 x 20 mm")
+        bar.axes["-x"].trigger()
+        qtbot.waitUntil(lambda: bar.ground.isEnabled() and bar.up.text().startswith("-x"))
+        qtbot.mouseClick(bar.ground, Qt.MouseButton.LeftButton)
+        placed = session.project.scene.objects[1]
+        assert placed.T_world_object.translation[2] == pytest.approx(0.05, abs=1e-9)
+        trimesh.creation.icosphere(1, 10.0).export(outside.with_name("ball.stl"))
+        monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: outside.with_name("ball.stl"))
+        qtbot.mouseClick(bar.replace, Qt.MouseButton.LeftButton)
+        qtbot.waitUntil(lambda: session.project.scene.objects[1].shape.path == "meshes/ball.stl")
+        qtbot.waitUntil(lambda: not mesh_importer.running)
+        assert session.project.scene.objects[1].model_copy(update={"shape": placed.shape}) == placed
+        session.document.undo()
+        assert session.project.scene.objects[1] == placed
+        session.select(("scene", "objects", 0))
+        assert not bar.isVisible()
 
     def test_a_file_dialog_that_is_cancelled_changes_nothing(
         self, qtbot: QtBot, session: Session, inspector: Inspector, monkeypatch: pytest.MonkeyPatch

@@ -81,6 +81,40 @@ def share_of(colour: tuple[int, int, int], image: np.ndarray, within: int = 40) 
     return float(np.mean(np.abs(image - colour).max(axis=2) < within))
 
 
+def test_a_click_aims_the_laser_at_the_surface_there(viewport: Viewport, qtbot: QtBot) -> None:
+    session, view = viewport.session, viewport.view
+    viewport.frame(BOX)
+    before = session.project.scene.lasers[0].T_rig_laser
+    at = on_screen(viewport, middle_of(viewport, 1)) + QPoint(9, -6)
+    qtbot.keyClick(view, Qt.Key.Key_T)
+    assert viewport.bar.aim.isChecked()
+    qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=at)
+    laser = session.project.scene.T_world_laser(0)
+    assert session.project.scene.lasers[0].T_rig_laser.translation == before.translation
+    assert session.selection == LASER and not viewport.bar.aim.isChecked()
+    # the ray of the laser's axis and that of the mouse meet on the box
+    origin, direction = view.eye.ray(at.x(), at.y(), view.pixels)
+    normal = np.cross(direction, laser[:3, 2])
+    apart = abs(float((laser[:3, 3] - origin) @ normal)) / np.linalg.norm(normal)
+    assert apart < 1e-6
+    session.document.undo()
+    assert session.project.scene.lasers[0].T_rig_laser == before
+
+
+def test_an_aim_at_nothing_is_told_and_another_press_ends_it(viewport: Viewport, qtbot: QtBot) -> None:
+    session, view, told = viewport.session, viewport.view, []
+    session.message.connect(lambda level, text: told.append(level))
+    before = session.project
+    viewport.begin_aim()
+    qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(3, 3))
+    assert told == ["error"] and session.project is before and viewport.bar.aim.isChecked()
+    qtbot.keyClick(view, Qt.Key.Key_T)
+    assert not viewport.bar.aim.isChecked()
+    session.set(("scene", "rig", "lasers"), (), "no lasers")
+    qtbot.keyClick(view, Qt.Key.Key_T)
+    assert told[-1] == "error" and not viewport.bar.aim.isChecked()
+
+
 def test_a_click_selects_what_is_under_the_mouse(viewport: Viewport, qtbot: QtBot) -> None:
     session, view = viewport.session, viewport.view
     viewport.frame(BOX)

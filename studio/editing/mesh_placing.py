@@ -1,0 +1,68 @@
+"""A mesh where it belongs: another file in its place, its up axis, on the ground, as large as the camera sees."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from render.base.arrays import Float
+from render.base.pose import Pose
+from render.scene.scene import Scene, SceneObject
+from render.scene.shape import MeshFile
+from studio.editing.placement import field_of_view, target, vector
+from studio.editing.placing import least_turn
+from studio.project.mesh_import import ImportedMesh
+
+UpAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+UP_AXES: tuple[UpAxis, ...] = get_args(UpAxis)
+FILLED = 0.8
+"""Of the camera's view, by a part that was fitted to it."""
+
+
+def with_mesh(item: SceneObject, mesh: ImportedMesh) -> SceneObject:
+    """Another mesh, in its own unit; name, pose, scale and material stay."""
+    return item.model_copy(update={"shape": MeshFile(path=mesh.path, unit=mesh.unit)})
+
+
+def up_axis(item: SceneObject) -> UpAxis | None:
+    """The axis of the file that points up in the world; None: none does."""
+    up = item.T_world_object.matrix[2, :3]
+    found = int(np.argmax(np.abs(up)))
+    return None if abs(up[found]) < 1.0 - 1e-6 else UP_AXES[2 * found + int(up[found] < 0.0)]
+
+
+def with_axis_up(item: SceneObject, vertices: Float, axis: UpAxis) -> SceneObject:
+    """Turned from how the file has it, by the least angle that makes an axis of it point up, about its middle.
+
+    vertices: (n, 3) m, in the object's frame, its scale included.
+    """
+    before, direction = item.T_world_object.matrix, np.zeros(3)
+    direction["xyz".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
+    turned = np.eye(4)
+    turned[:3, :3] = least_turn(direction, np.array([0.0, 0.0, 1.0]))
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
+    turned[:3, 3] = before[:3, :3] @ middle + before[:3, 3] - turned[:3, :3] @ middle
+    pose = Pose.from_matrix(turned)
+    return _moved(item, turned[:3, 3], vector(np.array(pose.rotation)))
+
+
+def on_ground(item: SceneObject, vertices: Float) -> SceneObject:
+    """Its lowest vertex at height zero. vertices: as of `with_axis_up`."""
+    matrix = item.T_world_object.matrix
+    lowest = float((vertices @ matrix[2, :3]).min())
+    return _moved(item, np.array([*matrix[:2, 3], -lowest]))
+
+
+def fitted(item: SceneObject, vertices: Float, scene: Scene) -> SceneObject:
+    """Scaled to FILLED of the camera's view, its middle in the middle of it. vertices: as of `with_axis_up`."""
+    matrix = item.T_world_object.matrix
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    scale = float(f"{item.scale * FILLED * field_of_view(scene) / float((high - low).max()):.3g}")
+    middle = matrix[:3, :3] @ (low + high) / 2.0 * (scale / item.scale)
+    return _moved(item.model_copy(update={"scale": scale}), target(scene) - middle)
+
+
+def _moved(item: SceneObject, place: Float, rotation: tuple[float, float, float] | None = None) -> SceneObject:
+    rotation = item.T_world_object.rotation if rotation is None else rotation
+    return item.model_copy(update={"T_world_object": Pose(translation=vector(place), rotation=rotation)})

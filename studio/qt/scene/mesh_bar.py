@@ -1,0 +1,146 @@
+"""Of a mesh file's object: replace it, choose what is up, fit it to the view, put it on the ground; a click each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtGui import QActionGroup
+from PySide6.QtWidgets import QGridLayout, QLabel, QMenu, QSizePolicy, QVBoxLayout, QWidget
+
+from render.base.arrays import Float
+from render.base.errors import InputError
+from render.scene.scene import SceneObject
+from render.scene.shape import MeshFile
+from studio.editing import mesh_placing
+from studio.editing.scene_edits import OBJECTS
+from studio.project.document import FieldPath, replaced, value_at
+from studio.project.mesh_import import ImportedMesh
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session
+from studio.qt.core.widgets import text_button
+from studio.qt.scene import mesh_importer
+
+
+class MeshBar(QWidget):
+    """Shown while an object of a mesh file is selected."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self.replace = text_button("Replace…", "Another mesh file in its place; pose, scale and material stay")
+        self.up = text_button("", "Which axis of the file points up", "choice")
+        self.fit = text_button("Fit to view", "Scale it to the camera's view, and put it in the middle of that")
+        self.ground = text_button("On the ground", "Its lowest point at height zero")
+        self.told = QLabel(wordWrap=True)
+        self.told.setObjectName("muted")
+        menu, group = QMenu(self.up), QActionGroup(self)
+        self.axes = {}
+        for axis in mesh_placing.UP_AXES:
+            action = self.axes[axis] = menu.addAction(f"{axis} is up")
+            action.setCheckable(True)
+            group.addAction(action)
+            action.triggered.connect(partial(self._turn_up, axis))
+        self.up.setMenu(menu)
+        self.up.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Ignored)  # as high as the others
+        grid = QGridLayout()
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(4)
+        for k, button in enumerate((self.replace, self.up, self.fit, self.ground)):
+            grid.addWidget(button, k // 2, k % 2)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(3)
+        column.addLayout(grid)
+        column.addWidget(self.told)
+        self.replace.clicked.connect(lambda: replace_mesh(session, self))
+        self.fit.clicked.connect(self._fit)
+        self.ground.clicked.connect(lambda: self._place("put on the ground", mesh_placing.on_ground))
+        live(session).changed.connect(self.refresh)
+        session.selection_changed.connect(self.refresh)
+        session.project_changed.connect(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Follow what is selected."""
+        item = selected_mesh(self.session)
+        self.setVisible(item is not None)
+        if item is None:
+            return
+        vertices = self._vertices(item)
+        for button in (self.up, self.fit, self.ground):
+            button.setEnabled(vertices is not None)
+        axis = mesh_placing.up_axis(item)
+        self.up.setText(f"{axis or 'Which'} is up")
+        for name, action in self.axes.items():
+            action.setChecked(name == axis)
+        if vertices is None:
+            self.told.setText("Hidden." if not item.visible else "Not read yet.")
+        else:
+            sides = vertices.max(axis=0) - vertices.min(axis=0)
+            self.told.setText(" x ".join(f"{1e3 * side:.4g}" for side in sides) + " mm along x, y, z of the file")
+
+    def _turn_up(self, axis: mesh_placing.UpAxis) -> None:
+        def turned(item: SceneObject, vertices: Float) -> SceneObject:
+            return mesh_placing.with_axis_up(item, vertices, axis)
+
+        self._place(f"{axis} up", turned)
+
+    def _fit(self) -> None:
+        scene = self.session.project.scene
+        self._place("fit to view", lambda item, vertices: mesh_placing.fitted(item, vertices, scene))
+
+    def _place(self, label: str, change: Callable[[SceneObject, Float], SceneObject]) -> None:
+        item, session = selected_mesh(self.session), self.session
+        vertices = None if item is None else self._vertices(item)
+        if item is None or vertices is None:
+            return
+        try:
+            project = replaced(session.project, session.selection[:3], change(item, vertices))
+        except InputError as error:
+            session.message.emit("error", str(error))
+        else:
+            session.document.apply(f"{label}: {item.name}", project)
+
+    def _vertices(self, item: SceneObject) -> Float | None:
+        """(n, 3) m in the object's frame, as they are drawn; None: they are not, or not as the item is now."""
+        look = live(self.session).look
+        found = (one for one in look.placed if look.scene.visible_objects[one.index] is item)
+        placed = next(found, None)
+        return None if placed is None else placed.body.surface.vertices
+
+
+def selected_mesh(session: Session) -> SceneObject | None:
+    """The selected object, if it is one of a mesh file."""
+    path = session.selection[:3]
+    if path[:2] != OBJECTS or len(path) < 3:
+        return None
+    try:
+        item = value_at(session.project, path)
+    except KeyError:
+        return None
+    return item if isinstance(item, SceneObject) and isinstance(item.shape, MeshFile) else None
+
+
+def replace_mesh(session: Session, parent: QWidget) -> None:
+    """Another file for the selected object, as a person picks it; told where none is selected."""
+    if selected_mesh(session) is None:
+        session.message.emit("error", "select an object of a mesh file; its mesh is what is replaced")
+        return
+    path = session.selection[:3]
+    file = mesh_importer.choose_mesh(parent)
+    if file is not None:
+        take = partial(take_mesh, session, path)
+        mesh_importer.import_meshes(session, [file], parent, take)
+
+
+def take_mesh(session: Session, path: FieldPath, mesh: ImportedMesh) -> None:
+    """Make a mesh that was read the shape of an object, unless that is gone meanwhile."""
+    try:
+        item = value_at(session.project, path)
+    except KeyError:
+        session.message.emit("error", "the object whose mesh was to be replaced is no longer there")
+        return
+    label = f"use {Path(mesh.path).name}"
+    session.document.apply(label, replaced(session.project, path, mesh_placing.with_mesh(item, mesh)))

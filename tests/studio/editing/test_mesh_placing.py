@@ -1,0 +1,68 @@
+"""A mesh on the ground, with another axis up, fitted to the view, or of another file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from render.base.arrays import Float
+from render.base.pose import Pose, transform_points
+from render.material.conductor import Conductor
+from render.scene.scene import SceneObject
+from render.scene.shape import MeshFile
+from studio.editing.mesh_placing import FILLED, UP_AXES, UpAxis, fitted, on_ground, up_axis, with_axis_up, with_mesh
+from studio.editing.placement import field_of_view, target
+from studio.project.mesh_import import ImportedMesh
+from studio.project.project import Project
+from studio.project.templates import template_folder
+
+NANOMETRE = 1e-9
+POSE = Pose(translation=(0.3, -0.1, 0.05), rotation=(0.4, -0.7, 1.1))
+ITEM = SceneObject(name="part", shape=MeshFile(path="part.stl", unit="mm"), scale=2.0, T_world_object=POSE)
+
+
+@pytest.fixture
+def vertices() -> Float:
+    """A cloud that is nowhere near its origin."""
+    return np.random.default_rng(5).normal([0.02, 0.05, -0.01], [0.03, 0.01, 0.02], (200, 3))
+
+
+def in_world(item: SceneObject, vertices: Float) -> Float:
+    return transform_points(item.T_world_object.matrix, vertices)
+
+
+def test_on_the_ground_the_lowest_vertex_is_at_zero_and_nothing_else_changes(vertices: Float) -> None:
+    down = on_ground(ITEM, vertices)
+    places = in_world(down, vertices)
+    assert abs(places[:, 2].min()) < NANOMETRE
+    assert places[:, :2] == pytest.approx(in_world(ITEM, vertices)[:, :2], abs=NANOMETRE)
+    assert down.model_copy(update={"T_world_object": POSE}) == ITEM
+
+
+@pytest.mark.parametrize("axis", UP_AXES)
+def test_the_axis_that_is_chosen_points_up_and_the_middle_stays(axis: UpAxis, vertices: Float) -> None:
+    turned = with_axis_up(ITEM, vertices, axis)
+    direction = np.zeros(3)
+    direction["xyz".index(axis[1])] = -1.0 if axis[0] == "-" else 1.0
+    assert turned.T_world_object.matrix[:3, :3] @ direction == pytest.approx([0.0, 0.0, 1.0], abs=1e-8)
+    assert up_axis(turned) == axis and up_axis(ITEM) is None
+    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2.0
+    assert in_world(turned, middle[None]) == pytest.approx(in_world(ITEM, middle[None]), abs=3 * NANOMETRE)
+
+
+def test_a_fitted_part_fills_its_share_of_the_view_about_its_middle(vertices: Float) -> None:
+    scene = Project.load(template_folder("step_block") / "project.json").scene
+    item = fitted(ITEM, vertices, scene)
+    scaled = vertices * item.scale / ITEM.scale
+    # three digits of the scale are kept
+    assert np.ptp(scaled, axis=0).max() == pytest.approx(FILLED * field_of_view(scene), rel=0.005)
+    middle = (scaled.min(axis=0) + scaled.max(axis=0)) / 2.0
+    assert in_world(item, middle[None])[0] == pytest.approx(target(scene), abs=2 * NANOMETRE)
+    assert item.T_world_object.rotation == POSE.rotation
+
+
+def test_another_file_takes_the_place_of_the_mesh_alone() -> None:
+    item = ITEM.model_copy(update={"material": Conductor()})
+    other = with_mesh(item, ImportedMesh("meshes/new.ply", "in", ((0, 0, 0), (1, 1, 1)), 12))
+    assert (other.shape.path, other.shape.unit) == ("meshes/new.ply", "in")
+    assert other.model_copy(update={"shape": item.shape}) == item
