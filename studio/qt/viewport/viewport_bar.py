@@ -61,18 +61,10 @@ class ViewportBar(QWidget):
             action.toggled.connect(lambda on, part=part: viewport.show_part(part, on))
         self._button("Show", "What is drawn besides the objects", shown)
         self._button("Snap", "Steps of a drag while Ctrl is held", self._snap_menu())
-        self._axes = QToolButton(self)
-        self._axes.setText("World axes")
-        self._axes.setCheckable(True)
-        self._axes.setToolTip("The gizmo moves along the world's axes, or the item's own (X)")
+        self._axes = self._switch("World axes", "The gizmo moves along the world's axes, or the item's own (X)")
         self._axes.clicked.connect(viewport.set_local)
-        layout.addWidget(self._axes)
-        self.aim = QToolButton(self)
-        self.aim.setText("Aim")
-        self.aim.setCheckable(True)
-        self.aim.setToolTip("The next click says what the selected laser, else the first, is to light (T)")
+        self.aim = self._switch("Aim", "The next click says what the selected laser, else the first, is to light (T)")
         self.aim.toggled.connect(viewport.begin_aim)
-        layout.addWidget(self.aim)
         self._text, self._grid = ElidedLabel(), ElidedLabel()
         self._grid.setObjectName("muted")
         layout.addStretch(1)
@@ -119,6 +111,14 @@ class ViewportBar(QWidget):
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self._layout.addWidget(button)
+
+    def _switch(self, text: str, tip: str) -> QToolButton:
+        switch = QToolButton(self)
+        switch.setText(text)
+        switch.setCheckable(True)
+        switch.setToolTip(tip)
+        self._layout.addWidget(switch)
+        return switch
 
     def _snap_menu(self) -> QMenu:
         gizmo = self._viewport.gizmo
