@@ -56,6 +56,17 @@ def goal_of(project: Project, threads: int | None = None) -> Callable[[Frame], I
     return lambda frame: importance(project, goal, frame, threads)
 
 
+def shares(goal: DepthGoal, *, reflected: bool, ambient: bool) -> tuple[float, float]:
+    """Of a row's sigma: what direct light may add, and each other light that there is.
+
+    The errors of the lights are independent, so that it is their variances that add up to the goal's.
+    """
+    others = int(reflected) + int(ambient)
+    if not others:
+        return goal.depth, goal.depth
+    return goal.depth * math.sqrt(DIRECT), goal.depth * math.sqrt((1.0 - DIRECT) / others)
+
+
 def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | None = None) -> Importance:
     """Of a frame as far as it is known. InputError: as `develop` and `extract`."""
     project = _as_far_as_known(project, frame)
@@ -64,11 +75,8 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     illumination = relative_illumination(scene.camera, threads)
     joule = joules_per_radiance(scene.camera, sensor)
     bands = _tiled(joule * band_response(sensor).sum(axis=2), illumination)
-    # the errors of the light groups are independent, so that it is their variances that add up to the goal's
     reflected = any(step.computed is not False for step in frame.plan.of("indirect"))
-    others = int(reflected) + int(frame.ambient is not None)
-    direct = goal.depth * (math.sqrt(DIRECT) if others else 1.0)
-    allowed = goal.depth * math.sqrt((1.0 - DIRECT) / others) if others else goal.depth
+    direct, allowed = shares(goal, reflected=reflected, ambient=frame.ambient is not None)
     lasers, peaks = [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
     for i, laser in enumerate(scene.lasers):
