@@ -27,8 +27,15 @@ LIGHT = {
     "glass)",
 }
 """Description of each step of a plan, by its group and name."""
+NAMES = {"direct": "direct", "indirect": "reflected on", "ambient": "ambient"}
+"""Of the light groups."""
 STAGES = {"direct": "laser light", "indirect": "reflected laser light", "ambient": "ambient light"}
 """Stage of the render in which each light group is made."""
+
+
+def noise_text(of_sigma: float, depth: float | None) -> str:
+    """Standard deviation over a row's own, and of its depth, m, where that is known."""
+    return f"{of_sigma:.2g} sigma" if depth is None else f"{of_sigma:.2g} sigma, {depth * 1e6:.2g} um"
 
 
 def sentences(plan: Plan) -> tuple[list[str], list[str]]:
@@ -66,7 +73,7 @@ def group_name(quality: GroupQuality) -> str:
     """Of a light group, with its laser's."""
     if quality.laser is None:
         return "ambient"
-    return f"{quality.laser}, {'direct' if quality.group == 'direct' else 'reflected on'}"
+    return f"{quality.laser}, {NAMES[quality.group]}"
 
 
 def quality_text(quality: GroupQuality) -> str:

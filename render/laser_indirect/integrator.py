@@ -158,18 +158,13 @@ def indirect_images(
     def image() -> IndirectImage:
         counts = so_far.paths, round(so_far.invalid), round(so_far.clamped)
         clamped_radiance = so_far.clamped_radiance / so_far.weight / so_far.total.size
-        lines = None if so_far.line is None else int(so_far.line.projection.lit.sum())
-        unknown = None if so_far.line is None else so_far.line.unknown(so_far.weight)
-        return IndirectImage(
-            so_far.radiance(shape),
-            so_far.error,
-            *counts,
-            clamped_radiance,
-            so_far.line_deviation,
-            given_up(),
-            lines,
-            unknown,
+        found = IndirectImage(
+            so_far.radiance(shape), so_far.error, *counts, clamped_radiance, so_far.line_deviation, given_up()
         )
+        line = so_far.line
+        if line is None:
+            return found
+        return replace(found, lines=int(line.projection.lit.sum()), unknown=line.unknown(so_far.weight))
 
     def given_up() -> bool:
         return so_far.line is not None and so_far.line.out_of_reach

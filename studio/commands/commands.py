@@ -121,6 +121,7 @@ def scan_into(
     check_output(folder)
     from analysis.report.light_text import plan_lines, stage_note
     from render.products import expected_plan
+    from studio.commands.noise_tables import print_foreseen
 
     quality: tuple[GroupQuality, ...] = ()
 
@@ -134,7 +135,7 @@ def scan_into(
         print_plan(plan_lines(plan), to_errors=True)
     frames = min(options.steps or project.scene.frame_count, project.scene.frame_count)
     with stage_progress(quiet, lambda stage: stage_note(stage, quality), frames=frames) as progress:
-        listener = Listener(progress, refined=refined)
+        listener = Listener(progress, foreseen=(lambda noise: None) if quiet else print_foreseen, refined=refined)
         return run_scan(project, root, out=folder, options=options, listener=listener, source=source)
 
 
@@ -145,7 +146,10 @@ def print_scan(done: ScanResult, *, quiet: bool, as_json: bool, more: Mapping[st
         print_json({"ok": True, "folder": str(done.folder), "files": files, **done.manifest, **more})
         return
     if not quiet:
+        from studio.commands.noise_tables import print_reached
+
         _print_light(done.manifest["light"])
+        print_reached(done.manifest["depth_noise"])
     _print_results(done.manifest)
     kept = {"all": "frame(s)", "band": "frame(s), a band of each,", "none": "frame(s) measured, none kept,"}
     told = f"{done.manifest['frame_count']} {kept[done.manifest['frames_kept']]}"

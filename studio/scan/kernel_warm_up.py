@@ -32,7 +32,7 @@ from render.material.material import Conductor, Emitter, Glass, Material, Subsur
 from render.run import Run, never
 from render.scene.lights import Environment, PointLight, RectangleLight
 from render.scene.scene import Rig, Scene, SceneObject
-from render.scene.settings import RenderSettings
+from render.scene.settings import DepthGoal, RenderSettings
 from render.scene.shape import Box, Plane
 from render.sensor.sensor import Sensor, SpectralCurve
 from studio.project.project import Project
@@ -183,10 +183,13 @@ def draw(cancelled: Cancel) -> None:
 
 
 def scan(cancelled: Cancel) -> None:
-    """The same, measured by every method. Raises whatever is broken."""
+    """The same, measured by every method, with what is foretold of it. Raises whatever is broken."""
+    from studio.scan.depth_noise import foreseen_noise
     from studio.scan.results import measure_frame
 
     project, frame, world, images, clock = _drawn(cancelled)
+    aimed = project.render.model_copy(update={"goal": DepthGoal()})
+    foreseen_noise(project.model_copy(update={"render": aimed}), template_folder(TEMPLATE))
     found = measure_frame(project, frame, world, images, clock, None, keep=False)
     if not found.lasers[0].extractions[0].points.valid.any():
         raise RuntimeError("the warm-up scan found no point: the installation is damaged")

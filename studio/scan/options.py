@@ -13,6 +13,7 @@ from render.run import Run, never
 from render.scan_plan import ScanPlan
 from studio.project.project import Project
 from studio.runtime.console import StageProgress, silent
+from studio.scan.depth_noise import DepthNoise
 from studio.scan.scan_folder import Begun
 from studio.scan.stages import Clock
 
@@ -51,6 +52,8 @@ class Listener:
 
     progress: StageProgress = silent
     cancelled: Cancel = never
+    foreseen: Callable[[tuple[DepthNoise, ...]], None] = lambda noise: None
+    """Hears before anything is rendered of the noise that rendering may add to the depth."""
     refined: Callable[[Frame], None] = lambda frame: None
     """Hears of every frame as it gets better."""
     measured: Callable[[FrameResult], None] = lambda result: None

@@ -17,6 +17,7 @@ from scipy.ndimage import correlate1d, maximum_filter1d, median_filter
 from analysis.line.detection.matched_filter import BLOCK, NOISE_GAIN, TAPS
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.influence import influence
+from analysis.line.methods.narrow_line import COARSE
 from analysis.line.result import Line
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float, Float32
@@ -36,9 +37,8 @@ NEAREST = 0.25
 AROUND = 3.0
 """Sigmas of a line within which it is itself the peak."""
 DECISION = 3.0
-"""Times the goal, of a pixel's own noise: ambient light that is known so well on the pixels of a line leaves it to the
-sensor which of two answers a fit gives, one line or two, a wide or a narrow one. The influence function knows of one
-answer alone."""
+"""Times the goal, of a pixel's own noise: ambient light that is known so well on the pixels of a narrow line leaves it
+to the sensor which of two widths its fit finds. The influence function knows of one answer alone."""
 DIRECT = 0.1
 """Share of the goal's variance that direct light has. Its error falls with the power 1.5 of the rays, that of all other
 light with the power 0.5, and it takes a hundredth of the time: a tenth costs it about twice the rays of a third."""
@@ -56,6 +56,17 @@ def goal_of(project: Project, threads: int | None = None) -> Callable[[Frame], I
     return lambda frame: importance(project, goal, frame, threads)
 
 
+def shares(goal: DepthGoal, *, reflected: bool, ambient: bool) -> tuple[float, float]:
+    """Of a row's sigma: what direct light may add, and each other light that there is.
+
+    The errors of the lights are independent, so that it is their variances that add up to the goal's.
+    """
+    others = int(reflected) + int(ambient)
+    if not others:
+        return goal.depth, goal.depth
+    return goal.depth * math.sqrt(DIRECT), goal.depth * math.sqrt((1.0 - DIRECT) / others)
+
+
 def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | None = None) -> Importance:
     """Of a frame as far as it is known. InputError: as `develop` and `extract`."""
     project = _as_far_as_known(project, frame)
@@ -64,11 +75,8 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     illumination = relative_illumination(scene.camera, threads)
     joule = joules_per_radiance(scene.camera, sensor)
     bands = _tiled(joule * band_response(sensor).sum(axis=2), illumination)
-    # the errors of the light groups are independent, so that it is their variances that add up to the goal's
     reflected = any(step.computed is not False for step in frame.plan.of("indirect"))
-    others = int(reflected) + int(frame.ambient is not None)
-    direct = goal.depth * (math.sqrt(DIRECT) if others else 1.0)
-    allowed = goal.depth * math.sqrt((1.0 - DIRECT) / others) if others else goal.depth
+    direct, allowed = shares(goal, reflected=reflected, ambient=frame.ambient is not None)
     lasers, peaks = [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
     for i, laser in enumerate(scene.lasers):
@@ -128,7 +136,7 @@ def _weights(
     project: Project, frame: Frame, laser: int, allowed: float, threads: int | None
 ) -> tuple[Float32, Float32, Float32]:
     """(h, w) how far an electron moves the line over what is allowed, how far it goes to make or hide a peak, and
-    1 over the noise of each pixel that the line is measured on, 0 of others."""
+    1 over the noise of each pixel that a narrow line is measured on, 0 of others."""
     electrons = _electrons(project, frame, laser, threads)
     image = _expected_image(project, electrons)
     noise = noise_model(image, project, laser)
@@ -143,7 +151,8 @@ def _weights(
     moved = derivative / np.expand_dims(allowed * sigma, axis)
     risen = _peaks(electrons if axis == 1 else electrons.T, line, noise, settings, threads)
     # one more on either side, as windows begin with the pixel
-    near = maximum_filter1d(derivative != 0.0, 3, axis=axis)
+    narrow = np.any(line.valid & (line.width < COARSE), axis=1)
+    near = maximum_filter1d((derivative != 0.0) & np.expand_dims(narrow, axis), 3, axis=axis)
     decided = near / np.sqrt(np.maximum(electrons + noise.floor, 1e-2))
     return moved.astype(np.float32), np.ascontiguousarray(risen if axis == 1 else risen.T), decided.astype(np.float32)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from render.base.errors import InputError
 from render.frame import Frame
-from render.output.light_record import plan_record, quality_record
+from render.output.light_record import plan_record, quality_from, quality_record
 from render.scan_plan import ScanPlan, plan_scan
 from render.world.world import World, build_world
 from studio.project.date_and_time import now
@@ -19,6 +19,7 @@ from studio.project.input_files import input_hashes
 from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
+from studio.scan.depth_noise import foreseen_noise, noise_records, reached_noise
 from studio.scan.frame_writer import FrameWriter
 from studio.scan.gauging import measures_record
 from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
@@ -103,6 +104,9 @@ def run_scan(
         )
         with clock.stage(PREPARING):
             warm_up(chain(*needed(project)), listener.progress, listener.cancelled)
+        with clock.stage("noise in depth"):
+            foreseen = foreseen_noise(project, root, options.threads)
+        listener.foreseen(foreseen)
         _take_frames(Scan(begun, clock, options, listener.refined), first, count, written, measuring)
         result: dict[str, Any] = {
             "name": project.name,
@@ -122,6 +126,13 @@ def run_scan(
             result["results"] = summarise(measuring.record)
             result["measures"] = measures_record(project.measures, measuring.record.readings)
             result["remarks"] = measuring.remarks()
+        noise = reached_noise(
+            foreseen,
+            quality_from(written.light[0]["groups"]),
+            None if measuring is None else measuring.record,
+            clock.seconds,
+        )
+        result["depth_noise"] = noise_records(noise)
         result["notes"] = cautions.notes(result.get("results", ()))
 
         def finish(reports: list[Path]) -> dict[str, Any]:

@@ -1,11 +1,15 @@
-"""Renders to the goal in depth beside renders of many times the light paths and samples, over several seeds.
+"""Whether what a render tells of its goal in depth is true: by renders of other seeds, independent of each other.
 
-    python tests/validation/goal.py [template ...] [--scale 0.25] [--seeds 4] [--times 16]    default: sample, V groove
+    python tests/validation/goal.py [template ...] [--scale 0.15] [--seeds 8]    default: v_groove weld_seam
 
-Every seed is rendered to the goal, and again far beyond it; both images are developed with the same noise. Of all
-seeds together the depth's sigma and bias are to agree within 3 % of sigma, and 99 % of the rows are to be found, missed
-or false in both. Told beside: by how much rows differ in the images without noise, over their own sigma, of which
-95 % are to be within the goal. Exit code 1: they are not.
+Every seed's light is made an image without the sensor's noise, and measured. How far the positions of a row scatter
+over the seeds, in that row's sigma, is what rendering adds: it is to be within the goal in 95 % of the rows, and as
+large as the frames say of themselves ("moves 95% of the rows by at most ..."). Rows that jump by JUMP goals are to be
+no more than those that a frame tells as not known, or undecided. Exit code 1: something is not so.
+
+Variances of few seeds scatter by themselves, so that the worst rows would look worse than they are. Where each is told
+by d degrees of freedom, log v scatters by psi_1(d / 2) more than the true ones do (Smyth, Statistical Applications in
+Genetics and Molecular Biology 3, 2004): by so much they are drawn to their mean.
 """
 
 from __future__ import annotations
@@ -13,82 +17,85 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.special import polygamma, psi
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import studio as blazer
+from render.importance import LINES_KNOWN
+from render.plan import line_noise
+from render.sensor.develop import expected_electrons
+from studio.scan.line_extraction import extract_line
+from studio.scan.render_goal import _expected_image
 
-FALSE = 5.0
-"""Pixels from the exact line at which a row is false; nearer it is found."""
-DEPTH, ROWS, MOVED = 0.03, 0.99, 0.95
-
-
-def kinds(line: blazer.ExtractedLine, frame: blazer.RenderedFrame) -> np.ndarray:
-    """(rows,) 0: missed, 1: found, 2: false."""
-    curve, u = frame.curves[0], line.u[:, 0]
-    nearest = np.full(len(u), np.inf)
-    np.minimum.at(nearest, curve.index, np.abs(np.nan_to_num(u[curve.index], nan=np.inf) - curve.position))
-    return np.where(~line.valid[:, 0], 0, np.where(nearest <= FALSE, 1, 2))
+TOLD = 0.9, 1.15
+"""Told over observed deviation of the rows that are known worst but for a twentieth."""
+JUMP = 5.0
+"""Goals by which a row lies from the median of all seeds."""
 
 
-def proved(template: str, scale: float, seeds: int, times: float) -> bool:
-    """One template's row of figures; whether all bars are met."""
+def line_of(frame: blazer.RenderedFrame) -> blazer.ExtractedLine:
+    """In the mean image, which is not even quantised."""
+    project = frame.project
+    electrons = expected_electrons(frame, project.scene, project.sensor)
+    return extract_line(project, _expected_image(project, electrons), 0, None)
+
+
+def true_variances(variances: np.ndarray, freedom: int) -> np.ndarray:
+    """Estimates (n,) of so many degrees of freedom -> with the spread of the true ones."""
+    log = np.log(np.maximum(variances, 1e-12)) - psi(0.5 * freedom) + np.log(0.5 * freedom)
+    own = max(1.0 - float(polygamma(1, 0.5 * freedom)) / max(float(log.var()), 1e-12), 0.0)
+    return np.exp(log.mean() + np.sqrt(own) * (log - log.mean()))
+
+
+def proved(template: str, scale: float, seeds: int) -> bool:
+    """One template's figures; whether all bars are met."""
     project = blazer.Project.load(template).replaced({"render.truth_images": False})
-    goal = project.render.goal
+    goal, name = project.render.goal, project.scene.lasers[0].name
     if goal is None:
         raise SystemExit(f"{template} asks for no goal in depth")
-    began, first = time.process_time(), blazer.render(project, image_scale=scale, seed=1)
-    spent = time.process_time() - began
-    paths = max((one.work for one in first.quality if one.group == "indirect"), default=0.0)
-    ambient = next((one.work for one in first.quality if one.group == "ambient"), 1.0)
-    long = {
-        **{"render.goal": None, "render.transport": "subsurface", "render.indirect_error": 2e-4},
-        # the long render's own direct light must not be what moves the rows
-        "render.laser_error": 1e-4,
-        **{"render.light_paths": int(min(max(times * paths, 1 << 20), 1 << 25)), "render.ambient_error": 2e-4},
-        "render.ambient_samples": int(min(max(times * ambient, 64), 1024)),
-    }
-    reference = blazer.render(project.replaced(long), image_scale=scale, seed=1000)
-    still = blazer.extract(blazer.develop(reference, noise=False))
-    figures, same, moved = [], [], []
-    for seed in range(1, seeds + 1):
-        frame = first if seed == 1 else blazer.render(project, image_scale=scale, seed=seed)
-        (errors, rows), (expected, expected_rows) = measured(frame, seed), measured(reference, seed)
-        figures.append([(e.depth_z.sigma, e.depth_z.robust_sigma, e.depth_z.bias) for e in (errors, expected)])
-        same.append(np.mean(rows == expected_rows))
-        other, seen = blazer.extract(blazer.develop(frame, noise=False)), still.valid[:, 0]
-        moved.append((other.u - still.u)[seen, 0] / still.sigma_u[seen, 0])
-    goals, longs = np.array(figures).swapaxes(0, 1)
-    sigma, robust = np.sqrt(np.mean(goals[:, :2] ** 2, axis=0)) / np.sqrt(np.mean(longs[:, :2] ** 2, axis=0))
-    bias = float(np.mean(goals[:, 2] - longs[:, 2])) / float(np.sqrt(np.mean(longs[:, 1] ** 2)))
-    deviation = np.sqrt(np.nanmean(np.square(moved), axis=0))
-    within, alike = float(np.mean(deviation <= goal.depth)), float(np.mean(same))
-    work = f"{long['render.light_paths']:.3g} and {long['render.ambient_samples']} samples a pixel"
-    print(f"{template}, scale {scale}, {seeds} seeds, {spent:.1f} processor s each; {paths:.3g} paths, long {work}")
-    print(f"    depth over the long render's: sigma {sigma:.3f}, robust {robust:.3f}; bias {bias:+.3f} robust sigma")
-    print(f"    rows found, missed, false alike: {alike:.2%}; light moves the median row by ", end="")
-    print(f"{np.nanmedian(deviation):.3f} sigma, {within:.1%} by at most {goal.depth:g}", flush=True)
-    depth = abs(robust - 1.0) <= DEPTH and abs(sigma - 1.0) <= DEPTH and abs(bias) <= DEPTH
-    return depth and alike >= ROWS and within >= MOVED
+    began = time.process_time()
+    frames = [blazer.render(project, image_scale=scale, seed=seed) for seed in range(1, seeds + 1)]
+    spent = (time.process_time() - began) / seeds
+    lines = [line_of(frame) for frame in frames]
+    u, seen = np.array([line.u[:, 0] for line in lines]), np.all([line.valid[:, 0] for line in lines], axis=0)
+    lost = int(np.any([line.valid[:, 0] for line in lines], axis=0).sum() - seen.sum())
+    sigma = np.median([line.sigma_u[:, 0] for line in lines], axis=0)
+    apart = ((u - np.median(u, axis=0)) / sigma)[:, seen]
+    moved = np.sqrt(true_variances(apart.var(axis=0, ddof=1), seeds - 1))
+    worst, within = float(np.quantile(moved, LINES_KNOWN)), float(np.mean(moved <= goal.depth))
+    told = float(np.sqrt(np.mean([line_noise(frame.quality)[name] ** 2 for frame in frames])))
+    jumps = np.sum(np.abs(apart) > JUMP * goal.depth, axis=1)
+    unsure = [sum((one.unknown or 0) + (one.undecided or 0) for one in frame.quality) for frame in frames]
+    print(f"{template}, scale {scale}: {seen.sum()} rows, {lost} not found by all of {seeds} seeds, {spent:.1f} s each")
+    print(f"    the median row moves by {np.median(moved):.3f} sigma, {LINES_KNOWN:.0%} by at most {worst:.3f}", end="")
+    print(f" (told {told:.3f}, {told / worst:.2f} times), {within:.1%} by at most {goal.depth:g}")
+    print(f"    rows that jump, by seed {jumps.tolist()}; told as not known {unsure}", flush=True)
+    alone(frames, lines[0], seen)
+    true = TOLD[0] <= told / worst <= TOLD[1]
+    return true and within >= LINES_KNOWN and bool(np.all(jumps <= np.array(unsure))) and lost <= 0.01 * seen.sum()
 
 
-def measured(frame: blazer.RenderedFrame, seed: int) -> tuple[blazer.PointErrors, np.ndarray]:
-    """Errors in depth, and the kind of each row, with one seed's noise."""
-    line = blazer.extract(blazer.develop(frame, seed=seed))
-    return blazer.compare(blazer.triangulate(line), frame), kinds(line, frame)
+def alone(frames: list[blazer.RenderedFrame], line: blazer.ExtractedLine, seen: np.ndarray) -> None:
+    """What each light does by itself, the others being that of the first seed; told and observed."""
+    for field, group in (("laser_direct", "direct"), ("laser_indirect", "indirect"), ("ambient", "ambient")):
+        u = np.array([line_of(replace(frames[0], **{field: getattr(f, field)})).u[:, 0] for f in frames])[:, seen]
+        moved = np.sqrt(true_variances((u / line.sigma_u[seen, 0]).var(axis=0, ddof=1), len(frames) - 1))
+        told = np.sqrt(np.mean([one.error**2 for f in frames for one in f.quality if one.group == group]))
+        print(f"    {group}: {np.nanquantile(moved, LINES_KNOWN):.3f}, told {told:.3f}")
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("templates", nargs="*", default=["weld_seam", "v_groove"])
-    parser.add_argument("--scale", type=float, default=0.25)
-    parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--times", type=float, default=16.0)
+    parser.add_argument("templates", nargs="*", default=["v_groove", "weld_seam"])
+    parser.add_argument("--scale", type=float, default=0.15)
+    parser.add_argument("--seeds", type=int, default=8)
     given = parser.parse_args()
-    found = [proved(template, given.scale, given.seeds, given.times) for template in given.templates]
+    found = [proved(template, given.scale, given.seeds) for template in given.templates]
     return 0 if all(found) else 1
 
 
