@@ -183,9 +183,11 @@ def draw(cancelled: Cancel) -> None:
 
 
 def scan(cancelled: Cancel) -> None:
-    """The same, measured by every method. Raises whatever is broken."""
+    """The same, measured by every method, and smoothed along. Raises whatever is broken."""
+    from analysis.line.along.smooth import smoothed
     from studio.scan.results import measure_frame
 
+    smoothed(np.zeros(32), np.ones(32), np.ones(32), np.zeros(32))
     project, frame, world, images, clock = _drawn(cancelled)
     found = measure_frame(project, frame, world, images, clock, None, keep=False)
     if not found.lasers[0].extractions[0].points.valid.any():
@@ -239,8 +241,6 @@ def beside() -> None:
     image = Image(pixels, sensor.bits, gain, sensor.black_level, float(top), noise, None, sensor.exposure_time)
     for method in METHODS:
         extract_line(project, image, 0, None, method)
-    along = project.extraction.model_copy(update={"smooth_along": True})
-    extract_line(project.model_copy(update={"extraction": along}), image, 0)
     scene = _blocks(CAMERA, (Glass(), Conductor(), WAX, Emitter()), 0.05)
     _rendered(scene.model_copy(update={"rig": Rig(camera=CAMERA)}), "subsurface")
 
