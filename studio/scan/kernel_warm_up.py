@@ -183,10 +183,12 @@ def draw(cancelled: Cancel) -> None:
 
 
 def scan(cancelled: Cancel) -> None:
-    """The same, measured by every method, with what is foretold of it. Raises whatever is broken."""
+    """The same, measured by every method, smoothed along, with what is foretold. Raises whatever is broken."""
+    from analysis.line.along.smooth import smoothed
     from studio.scan.depth_noise import foreseen_noise
     from studio.scan.results import measure_frame
 
+    smoothed(np.zeros(32), np.ones(32), np.ones(32), np.zeros(32))
     project, frame, world, images, clock = _drawn(cancelled)
     aimed = project.render.model_copy(update={"goal": DepthGoal()})
     foreseen_noise(project.model_copy(update={"render": aimed}), template_folder(TEMPLATE))
@@ -242,8 +244,6 @@ def beside() -> None:
     image = Image(pixels, sensor.bits, gain, sensor.black_level, float(top), noise, None, sensor.exposure_time)
     for method in METHODS:
         extract_line(project, image, 0, None, method)
-    along = project.extraction.model_copy(update={"smooth_along": True})
-    extract_line(project.model_copy(update={"extraction": along}), image, 0)
     scene = _blocks(CAMERA, (Glass(), Conductor(), WAX, Emitter()), 0.05)
     _rendered(scene.model_copy(update={"rig": Rig(camera=CAMERA)}), "subsurface")
 

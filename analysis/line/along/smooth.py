@@ -18,18 +18,14 @@ from analysis.line.along.shocks import curve_with_shocks
 from analysis.line.result import Flag, Line
 from render.base.arrays import Float
 
-GAP = 12
-"""Scan lines without a position beyond which a line is another one."""
-FEWEST = 16
-"""Positions that make a line."""
+GAP, FEWEST = 12, 16
+"""Scan lines without a position beyond which a line is another one, and positions that make a line."""
 SYSTEMATIC = (Flag.MISFIT, Flag.BLENDED)
 """Flags of positions whose errors neighbours have in common by what is there, not by chance."""
 SURE, MOVED = 0.5, 1.0
 """Times the line's width that sigma_u is at most where a position tells of its neighbours, and that it is moved by."""
-APART = 1e-3
-"""Share of sigma_u at least taken as what scan lines do not have in common."""
-FINEST = 0.01
-"""Times the typical sigma of a stretch that a position counts with at least."""
+APART, FINEST = 1e-3, 0.01
+"""Share of sigma_u at least taken as what scan lines do not have in common; of the typical one, as a position's own."""
 
 
 @dataclass(frozen=True)
