@@ -120,12 +120,9 @@ class CameraView(QWidget):
         self.saturated.setToolTip("Paint the pixels of an image that are saturated")
         bar = QHBoxLayout()
         bar.setContentsMargins(6, 4, 6, 4)
-        bar.addWidget(self.choice)
-        bar.addSpacing(8)
-        bar.addWidget(self.bright)
-        bar.addSpacing(8)
-        bar.addWidget(self.saturated)
-        bar.addSpacing(8)
+        for widget in (self.choice, self.bright, self.saturated):
+            bar.addWidget(widget)
+            bar.addSpacing(8)
         lines = self.lines
         lines.setLayout(self.overlay.bar)
         self.overlay.bar.setContentsMargins(0, 0, 0, 0)
