@@ -1,8 +1,7 @@
 """The noise of an image whose sensor is not known: read noise from neighbouring pixels, the rest from the line itself.
 
 Its fit leaves residuals: as large as chi-square says, and, where they grow faster than a count's would, split into
-what is a count and what multiplies the light (`residuals.py`). Where the background is not level it tells the gain
-better (`ground_transfer.py`).
+what is a count and what multiplies the light (`residuals.py`).
 """
 
 from __future__ import annotations
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 
 from analysis.line.detection.channel import COLOURS, MISSING, Lines, scan_lines
 from analysis.line.detection.noise import FULL_SCALES, NoiseModel, image_saturation
-from analysis.line.ground_transfer import ground_transfer
 from analysis.line.measure import measure
 from analysis.line.residuals import RUN, scatter
 from analysis.line.result import Line
@@ -106,8 +104,6 @@ def estimate_noise(
     # numbers that are not whole have no full scale, and the line's peak may be far below it
     split = _split(lines, raised, start, FARTHEST if integer else FARTHEST_SCALED, fitted)
     noise = model(_balanced(model, start, fitted)) if split is None else split
-    if not (processed or image.ndim == 3):
-        noise = _told_by_ground(lines, noise, fitted)
     noise, line = _told_by_neighbours(lines, noise, fitted)
     # a photograph in colour is demosaiced, whatever its background tells
     return noise.model_copy(update={"alike": True}) if image.ndim == 3 or _alike(lines, noise, line) else noise
@@ -115,36 +111,15 @@ def estimate_noise(
 
 def _alike(lines: Lines, noise: NoiseModel, line: Line) -> bool:
     """The noise beside the line differs less between neighbouring pixels than between those that are apart."""
-    near, signal = _near_line(lines, line)
-    ground = np.where(near == 0, signal, np.nan)  # where there is no line nothing is known to be beside it
+    signal, mask, _ = lines.read(0, lines.count)
+    far = np.abs(np.arange(signal.shape[1]) - line.u[:, :1]) > BESIDE * line.width[:, :1] + 2.0
+    ground = np.where(far & (mask == 0), signal, np.nan)
     step = noise.step / noise.gain
     for values in (ground, ground[: len(ground) // RUN * RUN].reshape(-1, RUN, ground.shape[1]).swapaxes(1, 2)):
-        beside, apart = (_mean_square_step(values, lag, step) for lag in (1, FAR))
-        if beside is not None and apart is not None and apart > MORE * beside:
+        near, apart = (_mean_square_step(values, lag, step) for lag in (1, FAR))
+        if near is not None and apart is not None and apart > MORE * near:
             return True
     return False
-
-
-def _told_by_ground(lines: Lines, noise: NoiseModel, fitted: Callable[[NoiseModel], Line]) -> NoiseModel:
-    """The noise model with what a background that is not level says of gain and read noise."""
-    near, signal = _near_line(lines, fitted(noise))
-    told = ground_transfer(np.where(near > 0, np.nan, signal), noise.step)
-    if told is None:
-        return noise
-    noise = noise.model_copy(update={"gain": told[0], "read_noise": told[1], "black_level": 0.0, "scintillation": ()})
-    for _ in range(2):  # the first finds whether the light scintillates, the second how far that reaches
-        found = scatter(replace(lines, noise=noise), fitted(noise))
-        if found is not None:
-            noise = noise.model_copy(update={"scintillation": found.scintillation})
-    return noise
-
-
-def _near_line(lines: Lines, line: Line) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n, w) 1 near the line, 0 far from it, NaN where there is none; and the signal, NaN where it is not usable."""
-    signal, mask, _ = lines.read(0, lines.count)
-    distance = np.abs(np.arange(signal.shape[1]) - line.u[:, :1]) - BESIDE * line.width[:, :1]
-    near = np.where(np.isnan(distance), np.nan, distance <= 2.0)
-    return near, np.where(mask == 0, signal, np.nan)
 
 
 def _balanced(model: Callable[[float], NoiseModel], start: float, fitted: Callable[[NoiseModel], Line]) -> float:
@@ -240,9 +215,7 @@ def _uneven_light(lines: Lines, line: Line) -> float:
     half = np.ceil(4.0 * np.nanmedian(line.width[:, 0]) + 1.0)
     x = np.arange(signal.shape[1])
     near = (np.abs(x - here[:, None]) <= half) & (mask == 0)
-    with np.errstate(invalid="ignore"):
-        slope = np.nanmedian(np.where(mask[:, 1:] == 0, np.diff(signal, axis=1), np.nan), axis=1, keepdims=True)
-    light = np.where(near, signal - line.background[:, :1] - np.nan_to_num(slope) * (x - here[:, None]), 0.0)
+    light = np.where(near, signal - line.background[:, :1], 0.0)
     total = light.sum(axis=1)
     total[~(total > 0.0)] = np.nan
     share = (np.where(near, np.maximum(light, 0.0), 0.0) ** 2).sum(axis=1) / total**2

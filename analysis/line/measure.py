@@ -23,16 +23,13 @@ from analysis.line.methods.phase import measure_phase
 from analysis.line.methods.seed_loop import (
     COLUMNS,
     CORRELATION_LENGTH,
-    LEAN,
     ROOM,
     SHARED,
-    SKEWNESS,
     TOLD,
     Options,
     Pixels,
     seed_kernel,
 )
-from analysis.line.methods.shared_flags import with_shared_flags
 from analysis.line.methods.shared_width import width_priors
 from analysis.line.methods.steger_2d import HALO, NORMAL_CENTROID, RIDGE, fill_gaps, measure_ridge
 from analysis.line.methods.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, measure_three_pixels
@@ -169,10 +166,6 @@ def measure_with_neighbours(
     # a position that says less than a guess along the whole scan line is none
     lost = out[..., 1] > lines.image.shape[1] / np.sqrt(12.0)
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
-    if judge and estimator.measure is measure_gaussian:
-        for k in range(settings.peaks):
-            peaks, leans = out[:, k, 1:3], (out[:, k, LEAN], out[:, k, SKEWNESS])
-            out[:, k, 1], flags[:, k] = with_shared_flags(peaks, flags[:, k], *leans)
     u, sigma_u, width, amplitude, background, chi2, length = (
         np.ascontiguousarray(out[..., j]) for j in range(CORRELATION_LENGTH + 1)
     )

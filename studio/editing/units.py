@@ -55,7 +55,7 @@ class Unit:
             units = {self.shown: 1.0 / self.factor, **FACTORS.get(self.stored, {})}
             with contextlib.suppress(ValueError):
                 found = evaluate(text, units, 1.0 / self.factor)
-                if math.isfinite(found):
+                if math.isfinite(found * self.factor):
                     return float(f"{found:.12g}")
         if match is None:
             what = "a number is missing" if not text.strip() else "this is not a number"
@@ -66,7 +66,7 @@ class Unit:
             allowed = ", ".join(name for name in known if name.isascii()) or self.shown or "no unit"
             raise InputError("this unit does not fit here", found=unit, allowed=allowed)
         stored = value * known[unit] if unit in known else value / self.factor
-        if not math.isfinite(stored):
+        if not (math.isfinite(stored) and math.isfinite(stored * self.factor)):
             raise InputError("the number is too large", found=text.strip())
         return stored
 

@@ -10,7 +10,6 @@ import numpy as np
 from render.frame import Frame
 from render.sampling.random import wrapped
 from render.sensor.develop import Image, develop, expected_electrons
-from studio.preview.remedies import FILLED
 from studio.project.project import Project
 
 APART = 1_000_003
@@ -44,8 +43,8 @@ def expose(
     return replace(images[0], shorter=tuple(images[1:]))
 
 
-def filling_exposure(project: Project, frame: Frame, power: Sequence[float]) -> float | None:
-    """Exposure time, s, by which the line fills FILLED of what the sensor can tell; None: no line is in the image.
+def filling_exposure(project: Project, frame: Frame, power: Sequence[float], share: float) -> float | None:
+    """Exposure time, s, by which the line fills a share of what the sensor can tell; None: no line is in the image.
 
     project: as the frame is developed; power: W of each laser. Of several lasers the brightest decides; light of
     lamps that falls on the line counts. InputError: as `develop`.
@@ -62,4 +61,4 @@ def filling_exposure(project: Project, frame: Frame, power: Sequence[float]) -> 
         about = electrons[curve.index[seen][:, None], across.clip(0, electrons.shape[1] - 1)]
         peaks.append(float(np.quantile(about.max(axis=1), BRIGHTEST)))
     full = min(sensor.full_well, (2**sensor.bits - 1 - sensor.black_level) / sensor.dn_per_electron)
-    return float(f"{sensor.exposure_time * FILLED * full / max(peaks):.3g}") if max(peaks) > 0.0 else None
+    return float(f"{sensor.exposure_time * share * full / max(peaks):.3g}") if max(peaks) > 0.0 else None

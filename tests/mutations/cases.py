@@ -14,6 +14,7 @@ from tests.mutations.place_cases import place_of_file
 from tests.mutations.project_cases import mesh, project, texture
 from tests.mutations.scan_cases import frame, manifest, report, sidecar
 from tests.mutations.sources import Sources, furnish
+from tests.mutations.window_cases import expression, step
 
 KINDS: dict[str, Callable[[Sources, Path, Random, bool], list[str]]] = {
     "project": project,
@@ -29,10 +30,13 @@ KINDS: dict[str, Callable[[Sources, Path, Random, bool], list[str]]] = {
     "recovery": recovery,
     "report": report,
     "calibration": calibration,
+    "step": step,
+    "expression": expression,
 }
 WEIGHTS = {
     "project": 24, "mesh": 16, "texture": 7, "image": 11, "frame": 6, "sidecar": 8, "manifest": 6, "place": 5,
     "option": 9, "preferences": 2, "recovery": 1.5, "report": 0.5, "calibration": 4,
+    "step": 0.5, "expression": 2,
 }  # fmt: skip
 """Percent of the cases."""
 

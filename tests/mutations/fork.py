@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import faulthandler
+import math
 import os
 import resource
 import select
@@ -18,9 +19,13 @@ from typing import Any
 import main
 from render.base.errors import InputError
 from studio.calibration.exchange import read_camera
+from studio.editing.units import Unit
+from studio.project import step_file
 from studio.project.autosave import find, sweep
-from studio.project.mesh_import import import_mesh
+from studio.project.mesh_import import import_mesh, import_step
+from studio.project.step_file import is_step
 from studio.runtime.preferences import PreferencesFile
+from studio.runtime.streams import clean
 
 MOST_SECONDS = 20
 """Of processor time, all threads together."""
@@ -132,7 +137,9 @@ def _import(*argv: str) -> None:
     root.mkdir(exist_ok=True)
     try:
         with warnings.catch_warnings(record=True):  # the window shows them
-            import_mesh(Path(argv[-1]), root, 0.2)
+            file = Path(argv[-1])
+            step_file.PATIENCE = PATIENCE / 2  # OpenCASCADE may facet for ever what is a kilometre wide
+            import_step(file, root, 1e-5) if is_step(file) else import_mesh(file, root, 0.2)
     except InputError as error:
         if "--debug" in argv:
             traceback.print_exc()
@@ -149,5 +156,23 @@ def _camera(*argv: str) -> None:
         sys.exit(2)
 
 
-FUNCTIONS = {"preferences": _preferences, "recovery": _recovery, "import": _import, "camera": _camera}
+def _expression(*argv: str) -> None:
+    """A number as it is typed into a field."""
+    try:
+        value = Unit.of(argv[-2]).parse(argv[-1])
+    except InputError as error:
+        print(f"error: {clean(str(error))}", file=sys.stderr)
+        sys.exit(2)
+    if not math.isfinite(value):
+        raise AssertionError("no field takes what is not finite")
+    print(Unit.of(argv[-2]).with_unit(value))
+
+
+FUNCTIONS = {
+    "preferences": _preferences,
+    "recovery": _recovery,
+    "import": _import,
+    "camera": _camera,
+    "expression": _expression,
+}
 """What the window does without a command line."""

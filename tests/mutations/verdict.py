@@ -125,7 +125,7 @@ def _of_result(file: Path) -> str | None:
             json.loads(file.read_text("utf-8"), parse_constant=_no_constant)
         except ValueError as error:
             return f"{file.name} is no strict JSON: {error}"
-    if file.suffix == ".ply" and file.parent.name != "meshes":  # there it is a mesh that was imported, as it came
+    if file.suffix == ".ply" and "meshes" not in file.parts:  # there it is a mesh that was imported, as it came
         points = read_ply(file)
         bad = [name for name in "xyz" if name in points and not np.isfinite(points[name]).all()]
         return f"NaN in {file.name}: {', '.join(bad)}" if bad else None

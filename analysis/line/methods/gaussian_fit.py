@@ -30,9 +30,7 @@ from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, me
 from analysis.line.methods.scintillation import position_variance, shared_variance
 from analysis.line.methods.seed_loop import (
     CORRELATION_LENGTH,
-    LEAN,
     SHARED,
-    SKEWNESS,
     TOLD,
     Array,
     Options,
@@ -169,8 +167,8 @@ def _tell_width(width: float, variance: float, out: Array) -> None:
 @njit(nogil=True, cache=True, error_model="numpy")
 def _asymmetry(
     pixel: Array, n: int, p: Array, held: bool, shape: Array, hessian: Array, factor: Array, projected: Array
-) -> tuple[float, float]:
-    """Score test for a third Hermite term in the profile: a normal deviate where the line is a Gaussian; its skewness.
+) -> float:
+    """Score test for a third Hermite term in the profile: a normal deviate where the line is a Gaussian.
 
     A neighbour leans a line to one side long before chi-square, which looks in every direction, sees it. held: the
     width is known. factor (4, 4), projected (4,): scratch.
@@ -188,11 +186,10 @@ def _asymmetry(
         cross[2] += 0.0 if held else weight * p[0] * shape[2, i]
         cross[3] += weight
     if not solve(hessian, 0.0, cross, factor, projected):
-        return 0.0, 0.0
+        return 0.0
     for j in range(4):
         square -= cross[j] * projected[j]
-    # a term c H_3 / 6 has the skewness c
-    return (moment / math.sqrt(square), 6.0 * moment / (square * p[0])) if square > 0.0 else (0.0, 0.0)
+    return float(moment / math.sqrt(square)) if square > 0.0 else 0.0
 
 
 @peak_kernel
@@ -229,9 +226,8 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
     # of a line below half a pixel three pixels hold all the light, which two lines would explain as well; and what
     # least squares leave over is more than chi-square expects, since they do not weigh
-    plain = options.judge and likelihood and independent and flag == Flag.OK.value
-    looked_at = plain and count > UNKNOWNS and p[2] >= COARSE
-    judged = looked_at and scattered < JUDGED
+    judged = options.judge and likelihood and independent and flag == Flag.OK.value
+    judged = judged and count > UNKNOWNS and p[2] >= COARSE and scattered < JUDGED
     if not converged and judged:
         p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
         for i in range(count):  # no model has told the variance yet: it is that of the pixels themselves
@@ -252,7 +248,8 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     if not solve(hessian, 0.0, unit, factor, row):
         return Flag.NOT_CONVERGED.value
     chi2 = _chi2_and_influence(pixel, count, p, likelihood, shape, row, scattered, weight)
-    out[0], out[2], out[3], out[4], light = p[1], p[2], p[0], p[3], trial_shape[0]
+    out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
+    light = trial_shape[0]
     for i in range(count):
         light[i] = p[0] * shape[0, i]
     noise, out[CORRELATION_LENGTH], speckled = position_variance(
@@ -269,12 +266,11 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
             _tell_width(p[2], row[2], out)
     if flag == Flag.OK.value and speckled > SPECKLED * p[2]:
         return Flag.SPECKLED.value
-    if not looked_at:
+    if not judged:
         return flag
     for i in range(count):
         pixel[VARIANCE, i] += scattered * light[i] * light[i]
-    out[LEAN], out[SKEWNESS] = _asymmetry(pixel, count, p, options.known_width, shape, hessian, factor, row)
-    if not judged or max(deviate(chi2, count - 4), abs(out[LEAN])) < UNLIKELY:
+    asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian, factor, row)
+    if max(deviate(chi2, count - 4), abs(asymmetry)) < UNLIKELY:
         return flag
-    out[SKEWNESS] = math.nan  # of the single line, which it is not
     return measure_misfit(pixels, seed, count, p, options, out)

@@ -8,7 +8,6 @@ import numpy as np
 from numba import njit
 
 from analysis.line.methods.line_profile import ELECTRONS, POSITION, VARIANCE, linear_variance
-from analysis.line.methods.narrow_line import COARSE
 from analysis.line.methods.seed_loop import Array, Options, Pixels
 from analysis.line.methods.two_lines import UNKNOWNS, fit_two_lines
 from analysis.line.methods.window import slope_variance
@@ -19,7 +18,7 @@ UNLIKELY = 4.5
 were one in 3,000, and one of those that is taken for two lines costs as much as all the noise."""
 PARTED, APART = 0.05, 1.2
 """Two lines part where sigma is less than this of their distance, so that the fit is linear, and the distance more than
-this of their own sigma, and the pixels resolve them: closer ones explain as well what is noise of another kind."""
+this of their own sigma: closer ones explain as well what is noise of another kind."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -57,7 +56,7 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
         noise = linear_variance(weight, pixel[VARIANCE], pixel[POSITION], n, pixels.correlation)
         sigma = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], n))
         distance = abs(both[5] - both[1])
-        parted = sigma < PARTED * distance and distance > APART * both[2] and both[2] >= COARSE
+        parted = sigma < PARTED * distance and distance > APART * both[2]
         out[0], out[2], out[3], out[4], out[5] = both[1], both[2], both[0], both[3], chi2 / max(n - UNKNOWNS, 1)
         out[1] = sigma if parted else math.hypot(sigma, both[1] - p[1])
         return Flag.OK.value if parted else Flag.BLENDED.value

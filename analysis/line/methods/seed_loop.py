@@ -3,11 +3,10 @@
     measure(pixels, y, seed, flag, options, out) -> flag
 
 pixels holds the scan line y and those around it, seed where `detect` saw a peak and how wide and high it is, flag
-what it said of it (OK or SATURATED). The kernel writes out: u, sigma_u, width, amplitude, background, chi2,
-correlation length; of a narrow line how its place and width vary together; of one that was judged how it leans
-(`shared_flags`); and what its pixels say of its width (`shared_width`), NaN where it has none. out is (COLUMNS,) of
-`measure_gaussian`, and (TOLD,) of all other kernels. It returns the flag that the peak keeps. An out without a position
-stays NaN.
+what it said of it (OK or SATURATED). The kernel writes out (COLUMNS,): u, sigma_u, width, amplitude, background,
+chi2, correlation length, and of a narrow line how its place and width vary together, and what its pixels say of its
+width (`shared_width`), NaN where it has none, and returns the flag that the peak keeps. An out without a position stays
+NaN.
 """
 
 from __future__ import annotations
@@ -28,11 +27,10 @@ from render.base.arrays import Float32
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-CORRELATION_LENGTH, SHARED, LEAN, SKEWNESS, TOLD = 6, 7, 8, 9, 10
-"""Columns of out: scan lines; covariance of place and width, px^2, of a narrow line; the skewness of its profile in
-standard deviations, and the skewness; from TOLD on the logarithm of the likelihood of each of PRIOR_WIDTHS at the place
-that is likeliest, and then that over all places; by methods that fit a width alone, and the first NaN where there is
-nothing to tell."""
+CORRELATION_LENGTH, SHARED, TOLD = 6, 7, 8
+"""Columns of out: scan lines; covariance of place and width, px^2, of a narrow line; from TOLD on the logarithm of the
+likelihood of each of PRIOR_WIDTHS at the place that is likeliest, and then that over all places; by methods that fit a
+width alone, and the first NaN where there is nothing to tell."""
 COLUMNS = TOLD + 2 * len(PRIOR_WIDTHS)
 """Of out."""
 ROOM = 11

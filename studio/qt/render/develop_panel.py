@@ -197,7 +197,7 @@ class DevelopPanel(QWidget):
         project, render = self.session.project, self.session.shown
         if render is not None and render.final and render.scanner_scale == 1.0 and not render.is_stale(project):
             how = development(render.project, project)
-            return filling_exposure(how.project, render.frame, how.laser_power)
+            return filling_exposure(how.project, render.frame, how.laser_power, FILLED)
         live(self.session).refresh()
         look = live(self.session).look
         found = [automatic_exposure(project, readouts(look, i)) for i in range(len(look.scene.lasers))]

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 
 from studio.project.document import FieldPath
 from studio.qt.core.widgets import ElidedLabel
+from studio.qt.forms.fields import tool_button
 
 if TYPE_CHECKING:
     from studio.qt.viewport.viewport import Viewport
@@ -61,9 +62,9 @@ class ViewportBar(QWidget):
             action.toggled.connect(lambda on, part=part: viewport.show_part(part, on))
         self._button("Show", "What is drawn besides the objects", shown)
         self._button("Snap", "Steps of a drag while Ctrl is held", self._snap_menu())
-        self._axes = self._switch("World axes", "The gizmo moves along the world's axes, or the item's own (X)")
+        self._axes = self._toggle("World axes", "The gizmo moves along the world's axes, or the item's own (X)")
         self._axes.clicked.connect(viewport.set_local)
-        self.aim = self._switch("Aim", "The next click says what the selected laser, else the first, is to light (T)")
+        self.aim = self._toggle("Aim", "The next click says what the selected laser, else the first, is to light (T)")
         self.aim.toggled.connect(viewport.begin_aim)
         self._text, self._grid = ElidedLabel(), ElidedLabel()
         self._grid.setObjectName("muted")
@@ -103,22 +104,18 @@ class ViewportBar(QWidget):
         action.triggered.connect(lambda _checked=False: handler())  # type: ignore[operator]
         menu.addAction(action)
 
+    def _toggle(self, text: str, tip: str) -> QToolButton:
+        button = tool_button(text, tip)
+        button.setCheckable(True)
+        self._layout.addWidget(button)
+        return button
+
     def _button(self, text: str, tip: str, menu: QMenu) -> None:
-        button = QToolButton(self)
-        button.setText(text)
-        button.setToolTip(tip)
+        button = tool_button(text, tip)
         button.setMenu(menu)
         button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextOnly)
         self._layout.addWidget(button)
-
-    def _switch(self, text: str, tip: str) -> QToolButton:
-        switch = QToolButton(self)
-        switch.setText(text)
-        switch.setCheckable(True)
-        switch.setToolTip(tip)
-        self._layout.addWidget(switch)
-        return switch
 
     def _snap_menu(self) -> QMenu:
         gizmo = self._viewport.gizmo

@@ -54,6 +54,8 @@ def test_the_units_are_those_of_the_field() -> None:
         "__import__",
         "1**2",
         "9e999-1",
+        "1e306 m",
+        "1e306 m + 1",
         "(" * 99,
         "1+" * 200 + "1",
         "2*--1",

@@ -45,7 +45,7 @@ def frame_of(project: Project, axis: str) -> Frame:
 @pytest.mark.parametrize("axis", ["rows", "columns"])
 def test_the_brightest_scan_lines_come_to_the_share_that_is_asked_for(project: Project, axis: str) -> None:
     frame = frame_of(project, axis)
-    time = filling_exposure(project, frame, [0.01])
+    time = filling_exposure(project, frame, [0.01], FILLED)
     assert time is not None
     image = develop(
         frame,
@@ -67,6 +67,6 @@ def test_twice_the_power_takes_half_the_time_and_a_laser_that_is_off_has_none(pr
     frame = replace(dark, ambient=None)
     sensor = project.sensor.model_copy(update={"dark_current": 0.0})
     project = project.model_copy(update={"sensor": sensor})
-    one, two = (filling_exposure(project, frame, [power]) for power in (0.01, 0.02))
+    one, two = (filling_exposure(project, frame, [power], FILLED) for power in (0.01, 0.02))
     assert one is not None and two is not None and one / two == pytest.approx(2.0, rel=0.006)
-    assert filling_exposure(project, frame, [0.0]) is None
+    assert filling_exposure(project, frame, [0.0], FILLED) is None
