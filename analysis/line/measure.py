@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,11 +19,14 @@ from analysis.line.methods.derivative import STEGER, ZERO_CROSSING, measure_deri
 from analysis.line.methods.fisher_scoring import LEAST_SQUARES, LIKELIHOOD
 from analysis.line.methods.gaussian_fit import measure_gaussian
 from analysis.line.methods.half_energy import measure_half_energy
+from analysis.line.methods.leaning import leans_as_neighbours_do, parts_alone
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
+from analysis.line.methods.misfit import UNLIKELY
 from analysis.line.methods.phase import measure_phase
 from analysis.line.methods.seed_loop import (
     COLUMNS,
     CORRELATION_LENGTH,
+    LEAN,
     ROOM,
     SHARED,
     TOLD,
@@ -118,13 +122,19 @@ def measure_with_neighbours(
         known_width=settings.width is not None,
         max_width=settings.max_width,
         filter_scale=settings.filter_scale,
-        judge=judge,
+        judge=UNLIKELY if judge else math.inf,
     )
 
     light = smoothed_covariances(lines.noise, settings.smoothing)
     scattering = light, lines.noise.table, lines.noise.fineness, 1.0 / correlation[0] ** 0.5
 
-    def work(start: int, stop: int, priors: NDArray[np.float64] | None, again: NDArray[np.bool_] | None) -> None:
+    def work(
+        start: int,
+        stop: int,
+        options: Options,
+        priors: NDArray[np.float64] | None = None,
+        again: NDArray[np.bool_] | None = None,
+    ) -> None:
         if again is not None and not again[start:stop].any():
             return
         first, last = max(0, start - halo), min(lines.count, stop + halo)
@@ -148,7 +158,8 @@ def measure_with_neighbours(
         run(pixels, seeds, found, options, measured)
         out[start:stop][chosen], flags[start:stop][chosen] = measured[chosen], found[chosen]
 
-    map_chunks(lambda start, stop: work(start, stop, priors, None), lines.count, TALL_CHUNK if halo else CHUNK, threads)
+    chunk = TALL_CHUNK if halo else CHUNK
+    map_chunks(lambda start, stop: work(start, stop, options, priors), lines.count, chunk, threads)
     together = np.zeros((lines.count, settings.peaks))
     if tells_width and priors is None:
         shared = [width_priors(out[:, k, TOLD:], out[:, k, 0], out[:, k, 1]) for k in range(settings.peaks)]
@@ -157,9 +168,19 @@ def measure_with_neighbours(
             priors = np.stack([none if one is None else one[0] for one in shared], axis=1)
             together = np.stack([none[:, 0] if one is None else one[1] for one in shared], axis=1)
             again: NDArray[np.bool_] = np.any(priors, axis=(1, 2))
-            map_chunks(lambda start, stop: work(start, stop, priors, again), lines.count, CHUNK, threads)
-    # a position that says less than a guess along the whole scan line is none
-    lost = out[..., 1] > lines.image.shape[1] / np.sqrt(12.0)
+            map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, CHUNK, threads)
+    farthest = lines.image.shape[1] / np.sqrt(12.0)  # of a guess along the whole scan line
+    if judge:
+        leaning = (flags == Flag.OK) & leans_as_neighbours_do(out[..., LEAN], out[..., CORRELATION_LENGTH])
+        if leaning.any():
+            double, single = options._replace(judge=0.0), out[leaning]
+            map_chunks(lambda start, stop: work(start, stop, double, priors, leaning), lines.count, CHUNK, threads)
+            unsure = ~(out[leaning][:, 1] < farthest)  # two lines may be any two: the single one is kept
+            out[leaning] = np.where(unsure[:, None], single, out[leaning])
+            flags[leaning] = np.where(unsure | (flags[leaning] == Flag.OK), Flag.BLENDED, flags[leaning])
+            flags[(flags == Flag.OK) & parts_alone(flags, out[..., LEAN])] = Flag.BLENDED
+    # a position that says less is none
+    lost = out[..., 1] > farthest
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
     u, sigma_u, width, amplitude, background, chi2, length = (
         np.ascontiguousarray(out[..., j]) for j in range(CORRELATION_LENGTH + 1)
