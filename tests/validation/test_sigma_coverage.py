@@ -1,7 +1,6 @@
 """Coverage of sigma over the whole grid: troubles x signals x widths, with the noise known and estimated.
 
 2 sigma hold 93 to 97 % and 1 sigma 65 to 71 % of the errors of the points in every cell, or of those without a flag.
-What neither holds nor is flagged is `is_beyond`.
 
 Run: pytest -m validation tests/validation/test_sigma_coverage.py -s, which prints every cell.
 """
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 
 from analysis.line.result import Flag
-from tests.analysis.line.troubles import PLAIN, SIGNALS, TROUBLES, WIDTHS, Coverage, Trouble, coverage, measured
+from tests.analysis.line.troubles import PLAIN, SIGNALS, TROUBLES, WIDTHS, Coverage, coverage, measured
 
 pytestmark = pytest.mark.validation
 
@@ -22,21 +21,8 @@ ROWS = 1000
 FEWEST = 100
 """Points without a flag that make a share."""
 MOST = 3.5
-"""Standard deviations of a share: 160 cells of two shares, one test in ten fails by chance at 3.5."""
+"""Standard deviations of a share: 360 cells of two shares, one run in five fails by chance at 3.5."""
 CELLS = [(name, signal, sigma) for name in TROUBLES for signal in SIGNALS for sigma in WIDTHS]
-
-
-def is_beyond(trouble: Trouble, signal: float, sigma: float, known: bool) -> str:
-    """Why a single scan line cannot know, "" where it can."""
-    if trouble.slope and not known and sigma == 0.6:
-        return "of three pixels on a slope hardly anything is left over that would tell the noise"
-    if trouble.neighbour and not known and sigma >= 2:
-        return "in an image of double lines what a line leaves over counts as noise of the unknown sensor"
-    if trouble.neighbour and sigma < 0.6:
-        return "of the three pixels of a narrow line none is left to judge it by"
-    if 0 < trouble.neighbour < 2 and 300 <= signal <= 1000:
-        return "two lines so close are told apart by the fit only where the noise helps it to"
-    return ""
 
 
 def holds(found: Coverage, sigma: float) -> bool:
@@ -63,9 +49,7 @@ def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: fl
         f"rms {found.rms:.4f} sigma {found.sigma:.4f} lost {found.lost:.3f} flagged {found.flagged:.3f}",
         end="",
     )
-    if (reason := is_beyond(trouble, signal, sigma, known)) != "":
-        pytest.skip(reason)
-    if not holds(found, sigma):  # or those that do not are flagged
+    if found.count == 0 or not holds(found, sigma):  # or those that do not are flagged
         alone = line.flag[:, 0] == Flag.OK
         found = coverage(replace(line, flag=np.where(alone[:, None], line.flag, Flag.NO_PEAK)), centre)
         assert found.count < FEWEST or holds(found, sigma)

@@ -36,6 +36,16 @@ def leans_as_neighbours_do(lean: Float, length: Float) -> NDArray[np.bool_]:
     return np.asarray(together & np.isfinite(lean))
 
 
+def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], single: Float, farthest: float) -> None:
+    """Flag lines (n, k) that were measured as two since they lean; without a sure position they get the single back.
+
+    out (n, k, columns), sigma_u the second of them; single (m, columns), as before; farthest: px, the largest sigma.
+    """
+    unsure = ~(out[leaning][:, 1] < farthest)
+    out[leaning] = np.where(unsure[:, None], single, out[leaning])
+    flags[leaning] = np.where(unsure | (flags[leaning] == Flag.OK), Flag.BLENDED, flags[leaning])
+
+
 def parts_alone(flag: NDArray[np.uint8], lean: Float) -> NDArray[np.bool_]:
     """Flags and leans as above (n, k) -> (n, k): of lines that were parted, those whose neighbours mostly do not."""
     parted = np.isinf(lean) & (flag == Flag.OK)
