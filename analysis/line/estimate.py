@@ -19,7 +19,7 @@ from analysis.line.detection.noise import FULL_SCALES, NoiseModel, image_saturat
 from analysis.line.ground_noise import ground_noise
 from analysis.line.measure import measure
 from analysis.line.residuals import RUN, scatter
-from analysis.line.result import Line
+from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -126,9 +126,10 @@ def _told_by_ground(
 
 
 def _ground(lines: Lines, line: Line) -> NDArray[np.float32]:
-    """Pixels (n, w) beside the line, NaN elsewhere."""
+    """Pixels (n, w) beside the line, and of scan lines that none rises on, NaN elsewhere."""
     signal, mask, _ = lines.read(0, lines.count)
     far = np.abs(np.arange(signal.shape[1]) - line.u[:, :1]) > BESIDE * line.width[:, :1] + 2.0
+    far |= line.flag[:, :1] == Flag.NO_PEAK
     return np.where(far & (mask == 0), signal, np.nan)
 
 
