@@ -29,9 +29,11 @@ def leans_as_neighbours_do(lean: Float, length: Float) -> NDArray[np.bool_]:
     NaN where nothing is known, and correlation lengths (n, k) -> (n, k): which were taken for a Gaussian and are none.
     """
     known = np.isfinite(length) & ~np.isnan(lean)
+    if not known.any():
+        return known
     deviate = np.where(known, np.clip(lean, -UNLIKELY, UNLIKELY), 0.0)
     square = np.where(known, np.maximum(length, 1.0) * deviate**2, 0.0)
-    total, spread, count = (of_neighbours(one) for one in (deviate, square, known.astype(np.float64)))
+    total, spread, count = np.split(of_neighbours(np.hstack((deviate, square, known.astype(np.float64)))), 3, axis=1)
     together = np.abs(total) > np.maximum(TOGETHER * np.sqrt(spread), LEAST * count)
     return np.asarray(together & np.isfinite(lean))
 
@@ -49,6 +51,8 @@ def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], 
 def parts_alone(flag: NDArray[np.uint8], lean: Float) -> NDArray[np.bool_]:
     """Flags and leans as above (n, k) -> (n, k): of lines that were parted, those whose neighbours mostly do not."""
     parted = np.isinf(lean) & (flag == Flag.OK)
+    if not parted.any():
+        return parted
     doubled = parted | (flag == Flag.BLENDED) | (flag == Flag.MISFIT)
     some, every = (of_neighbours(one.astype(np.float64)) for one in (parted, doubled))
     return np.asarray(parted & (some < MOST_PART * every))
