@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from analysis.line.detection.channel import COLOURS, MISSING, Lines, scan_lines
 from analysis.line.detection.noise import FULL_SCALES, NoiseModel, image_saturation
+from analysis.line.ground_noise import ground_noise
 from analysis.line.measure import measure
 from analysis.line.residuals import RUN, scatter
-from analysis.line.result import Line
+from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
+from render.base.arrays import Float
 from render.base.errors import InputError
 
 RUNS = 16
@@ -43,6 +45,8 @@ APART = 9
 """Pixels between two of which not both are in one block of a JPEG, nor within reach of a smoothing filter."""
 STEADY = 0.1
 """Change of the gain's logarithm at which splitting ends."""
+PLAUSIBLE = 1.6
+"""Times that what the fits leave over may differ from what the ground tells."""
 FULL_WELL = 1e4
 """Electrons taken for the highest number when no line says better."""
 
@@ -101,19 +105,45 @@ def estimate_noise(
         return measure(replace(lines, noise=noise), settings, threads)
 
     start = _full_scale(image) / FULL_WELL
+    # of a processed image neighbouring pixels tell too little
+    told = None if processed or image.ndim == 3 else _told_by_ground(lines, numbers, raised(start), fitted)
     # numbers that are not whole have no full scale, and the line's peak may be far below it
-    split = _split(lines, raised, start, FARTHEST if integer else FARTHEST_SCALED, fitted)
+    farthest = FARTHEST if integer else FARTHEST_SCALED
+    split = _split(lines, raised, start, farthest, fitted) if told is None else told
     noise = model(_balanced(model, start, fitted)) if split is None else split
     noise, line = _told_by_neighbours(lines, noise, fitted)
     # a photograph in colour is demosaiced, whatever its background tells
     return noise.model_copy(update={"alike": True}) if image.ndim == 3 or _alike(lines, noise, line) else noise
 
 
-def _alike(lines: Lines, noise: NoiseModel, line: Line) -> bool:
-    """The noise beside the line differs less between neighbouring pixels than between those that are apart."""
+def _told_by_ground(
+    lines: Lines, numbers: NoiseModel, first: NoiseModel, fitted: Callable[[NoiseModel], Line]
+) -> NoiseModel | None:
+    """The noise model by uneven ground, whose many levels tell more than what the fits leave over; None: it is even."""
+    line = fitted(first)
+    if not line.valid.any():
+        return None
+    found = ground_noise(_ground(lines, line))
+    if found is None:
+        return None
+    gain, still = found
+    read_noise = math.sqrt(max(still - numbers.step**2 / 12.0, 0.0)) / gain
+    noise = numbers.model_copy(update={"gain": gain, "read_noise": read_noise})
+    ratio = residual_ratio(fitted(noise))
+    return noise if ratio is not None and 1.0 / PLAUSIBLE < ratio < PLAUSIBLE else None
+
+
+def _ground(lines: Lines, line: Line) -> NDArray[np.float32]:
+    """Pixels (n, w) beside the line, and of scan lines that none rises on, NaN elsewhere."""
     signal, mask, _ = lines.read(0, lines.count)
     far = np.abs(np.arange(signal.shape[1]) - line.u[:, :1]) > BESIDE * line.width[:, :1] + 2.0
-    ground = np.where(far & (mask == 0), signal, np.nan)
+    far |= line.flag[:, :1] == Flag.NO_PEAK
+    return np.where(far & (mask == 0), signal, np.nan)
+
+
+def _alike(lines: Lines, noise: NoiseModel, line: Line) -> bool:
+    """The noise beside the line differs less between neighbouring pixels than between those that are apart."""
+    ground = _ground(lines, line)
     step = noise.step / noise.gain
     for values in (ground, ground[: len(ground) // RUN * RUN].reshape(-1, RUN, ground.shape[1]).swapaxes(1, 2)):
         near, apart = (_mean_square_step(values, lag, step) for lag in (1, FAR))
@@ -215,7 +245,9 @@ def _uneven_light(lines: Lines, line: Line) -> float:
     half = np.ceil(4.0 * np.nanmedian(line.width[:, 0]) + 1.0)
     x = np.arange(signal.shape[1])
     near = (np.abs(x - here[:, None]) <= half) & (mask == 0)
-    light = np.where(near, signal - line.background[:, :1], 0.0)
+    light = np.where(
+        near, signal - line.background[:, :1] - _slope(signal, mask, here, half) * (x - here[:, None]), 0.0
+    )
     total = light.sum(axis=1)
     total[~(total > 0.0)] = np.nan
     share = (np.where(near, np.maximum(light, 0.0), 0.0) ** 2).sum(axis=1) / total**2
@@ -226,6 +258,15 @@ def _uneven_light(lines: Lines, line: Line) -> float:
     spare = varied * math.sqrt(4.0 / max(count, 1))  # one standard error: differences overlap
     most = float((varied + spare - np.nanmedian(counted / total**2)) / np.nanmedian(share))
     return min(max(most, 0.0), 1.0)
+
+
+def _slope(signal: NDArray[np.float32], mask: NDArray[np.uint8], here: Float, half: float) -> Float:
+    """(n, 1) e-/px: of the ground of pixels (n, w) at distances of `half` to three times as far from the line (n,)."""
+    x = np.arange(signal.shape[1]) - here[:, None]
+    beside = (np.abs(x) > half) & (np.abs(x) <= 3.0 * half) & (mask == 0)
+    count = np.maximum(beside.sum(axis=1, keepdims=True), 1)
+    x = np.where(beside, x - np.where(beside, x, 0.0).sum(axis=1, keepdims=True) / count, 0.0)
+    return np.asarray((x * signal).sum(axis=1, keepdims=True) / np.maximum((x**2).sum(axis=1, keepdims=True), 1.0))
 
 
 def _rows_of(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:

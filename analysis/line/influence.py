@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from analysis.line.detection.channel import Lines, scan_lines
-from analysis.line.detection.detect import CENTRE, PLATEAU, PRIOR_WIDTHS, SEED_COLUMNS, WIDTH, Limits, detect
+from analysis.line.detection.detect import CENTRE, PLATEAU, SEED_COLUMNS, WIDTH, Limits, detect
 from analysis.line.detection.detect import REACH as SEED_REACH
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.measure import METHODS, limits_of, measure, measure_with_neighbours
@@ -213,16 +213,15 @@ def _moves_of_each(
     """
     tried = np.unique(rows)
     near = np.unique(np.clip(tried[:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1), 0, lines.count - 1))
-    _, priors = measure_with_neighbours(replace(lines, image=lines.image[near]), settings, threads, judge=True)
+    _, neighbours = measure_with_neighbours(replace(lines, image=lines.image[near]), settings, threads, judge=True)
     place = np.searchsorted(near, rows)
     peaks, flags = [], []
     for start in range(0, len(rows), AT_ONCE):
         some = slice(start, start + AT_ONCE)
         image = np.ascontiguousarray(lines.image[rows[some]], np.float64)
         image[np.arange(len(image)), pixel[some]] += step[some]
-        # all zero: no line needs any
-        told = np.zeros((len(image), settings.peaks, len(PRIOR_WIDTHS))) if priors is None else priors[place[some]]
-        found, _ = measure_with_neighbours(replace(lines, image=image), settings, threads, judge=True, priors=told)
+        told = neighbours.of(place[some])
+        found, _ = measure_with_neighbours(replace(lines, image=image), settings, threads, judge=True, told=told)
         peaks.append(np.where(found.valid, found.u, np.inf))
         flags.append(found.flag)
     return np.concatenate(peaks), np.concatenate(flags)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -18,11 +19,14 @@ from analysis.line.methods.derivative import STEGER, ZERO_CROSSING, measure_deri
 from analysis.line.methods.fisher_scoring import LEAST_SQUARES, LIKELIHOOD
 from analysis.line.methods.gaussian_fit import measure_gaussian
 from analysis.line.methods.half_energy import measure_half_energy
+from analysis.line.methods.leaning import keep_sure, leans_as_neighbours_do, parts_alone
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
+from analysis.line.methods.misfit import UNLIKELY
 from analysis.line.methods.phase import measure_phase
 from analysis.line.methods.seed_loop import (
     COLUMNS,
     CORRELATION_LENGTH,
+    LEAN,
     ROOM,
     SHARED,
     TOLD,
@@ -54,6 +58,23 @@ class Estimator(NamedTuple):
     variant: int = 0
     halo: int = 0
     """Scan lines on either side that it looks at; it then sees them without gaps."""
+
+
+class Neighbours(NamedTuple):
+    """What scan lines tell of the peaks (n, k) beside them."""
+
+    priors: NDArray[np.float64] | None
+    """(n, k, widths): column PRIOR of a seed; None where no peak needs any."""
+    leaning: NDArray[np.bool_]
+    """Taken for one line, and two by the neighbours."""
+    parted: NDArray[np.bool_]
+    """Parted by noise alone, as the neighbours do not part."""
+
+    def of(self, rows: NDArray[np.intp]) -> Neighbours:
+        """Of some scan lines (m,)."""
+        # all zero: no line needs any
+        priors = np.zeros((*self.leaning.shape, len(PRIOR_WIDTHS))) if self.priors is None else self.priors
+        return Neighbours(priors[rows], self.leaning[rows], self.parted[rows])
 
 
 METHODS = {
@@ -104,12 +125,13 @@ def measure_with_neighbours(
     settings: ExtractionSettings,
     threads: int | None,
     judge: bool = False,
-    priors: NDArray[np.float64] | None = None,
-) -> tuple[Line, NDArray[np.float64] | None]:
-    """As `measure`, and what neighbours tell of each peak's width (n, peaks, widths), None where no peak needs any.
+    told: Neighbours | None = None,
+) -> tuple[Line, Neighbours]:
+    """As `measure`, and what neighbours tell of each peak.
 
-    priors: that, as found before, so that a line whose own pixels change keeps the neighbours that it had.
+    told: that, as found before, so that a line whose own pixels change keeps the neighbours that it had.
     """
+    priors = None if told is None else told.priors
     estimator = METHODS[settings.method]
     run, halo = seed_kernel(estimator.measure), estimator.halo
     correlation = smoothing_correlation(settings.smoothing)
@@ -123,13 +145,19 @@ def measure_with_neighbours(
         known_width=settings.width is not None,
         max_width=settings.max_width,
         filter_scale=settings.filter_scale,
-        judge=judge,
+        judge=UNLIKELY if judge else math.inf,
     )
 
     light = smoothed_covariances(lines.noise, settings.smoothing)
     scattering = light, lines.noise.table, lines.noise.fineness, 1.0 / correlation[0] ** 0.5
 
-    def work(start: int, stop: int, priors: NDArray[np.float64] | None, again: NDArray[np.bool_] | None) -> None:
+    def work(
+        start: int,
+        stop: int,
+        options: Options,
+        priors: NDArray[np.float64] | None = None,
+        again: NDArray[np.bool_] | None = None,
+    ) -> None:
         if again is not None and not again[start:stop].any():
             return
         first, last = max(0, start - halo), min(lines.count, stop + halo)
@@ -153,22 +181,32 @@ def measure_with_neighbours(
         run(pixels, seeds, found, options, measured)
         out[start:stop][chosen], flags[start:stop][chosen] = measured[chosen], found[chosen]
 
-    map_chunks(lambda start, stop: work(start, stop, priors, None), lines.count, TALL_CHUNK if halo else CHUNK, threads)
+    chunk = TALL_CHUNK if halo else CHUNK
+    map_chunks(lambda start, stop: work(start, stop, options, priors), lines.count, chunk, threads)
     together = np.zeros((lines.count, settings.peaks))
-    if tells_width and priors is None:
+    if tells_width and told is None:
         shared = [width_priors(out[:, k, TOLD:], out[:, k, 0], out[:, k, 1]) for k in range(settings.peaks)]
         if any(one is not None for one in shared):
             none = np.zeros((lines.count, len(PRIOR_WIDTHS)))
             priors = np.stack([none if one is None else one[0] for one in shared], axis=1)
             together = np.stack([none[:, 0] if one is None else one[1] for one in shared], axis=1)
             again: NDArray[np.bool_] = np.any(priors, axis=(1, 2))
-            map_chunks(lambda start, stop: work(start, stop, priors, again), lines.count, CHUNK, threads)
-    # a position that says less than a guess along the whole scan line is none
-    lost = out[..., 1] > lines.image.shape[1] / np.sqrt(12.0)
+            map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, CHUNK, threads)
+    farthest = lines.image.shape[1] / np.sqrt(12.0)  # a position that says less than a guess is none
+    every = leans_as_neighbours_do(out[..., LEAN], out[..., CORRELATION_LENGTH]) if told is None else told.leaning
+    leaning = every & (flags == Flag.OK)
+    if leaning.any():
+        double, single = options._replace(judge=0.0), out[leaning]
+        map_chunks(lambda start, stop: work(start, stop, double, priors, leaning), lines.count, CHUNK, threads)
+        keep_sure(out, flags, leaning, single, farthest)
+    parted = parts_alone(flags, out[..., LEAN]) if told is None else told.parted
+    flags[parted & (flags == Flag.OK)] = Flag.BLENDED
+    lost = out[..., 1] > farthest
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
     u, sigma_u, width, amplitude, background, chi2, length = (
         np.ascontiguousarray(out[..., j]) for j in range(CORRELATION_LENGTH + 1)
     )
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
     common = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
-    return replace(line, length_apart=length, shared_u=common if common.any() else None), priors
+    line = replace(line, length_apart=length, shared_u=common if common.any() else None)
+    return line, Neighbours(priors, leaning, parted)

@@ -1,9 +1,6 @@
 """Coverage of sigma over the whole grid: troubles x signals x widths, with the noise known and estimated.
 
 2 sigma hold 93 to 97 % and 1 sigma 65 to 71 % of the errors of the points in every cell, or of those without a flag.
-What a single scan line cannot know, and is not flagged for, is `is_beyond`: faint neighbours, two peaks that share
-their pixels, narrow lines on steep slopes, and neighbours in noise that is estimated, which takes for noise what one
-line does not explain.
 
 Run: pytest -m validation tests/validation/test_sigma_coverage.py -s, which prints every cell.
 """
@@ -16,7 +13,7 @@ import numpy as np
 import pytest
 
 from analysis.line.result import Flag
-from tests.analysis.line.troubles import PLAIN, SIGNALS, TROUBLES, WIDTHS, Coverage, Trouble, coverage, measured
+from tests.analysis.line.troubles import PLAIN, SIGNALS, TROUBLES, WIDTHS, Coverage, coverage, measured
 
 pytestmark = pytest.mark.validation
 
@@ -24,29 +21,8 @@ ROWS = 1000
 FEWEST = 100
 """Points without a flag that make a share."""
 MOST = 3.5
-"""Standard deviations of a share: 160 cells of two shares, one test in ten fails by chance at 3.5."""
+"""Standard deviations of a share: 360 cells of two shares, one run in five fails by chance at 3.5."""
 CELLS = [(name, signal, sigma) for name in TROUBLES for signal in SIGNALS for sigma in WIDTHS]
-
-
-def is_beyond(trouble: Trouble, signal: float, sigma: float, known: bool) -> str:
-    """Why a single scan line cannot know, "" where it can."""
-    if trouble.neighbour and not known:
-        return "in an image of double lines what a line leaves over counts as noise of the unknown sensor"
-    if trouble.slope and not known and (sigma < 2 or trouble.slope * signal > 100):
-        return "of three pixels on a slope hardly anything is left over; of an unbounded slope the ground is no count"
-    if trouble.overexposure:
-        return "the wings alone cannot tell a halo from a line beside the plateau: flagged SATURATED"
-    if trouble.neighbour and sigma < 0.6:
-        return "of the three pixels of a narrow line none is left to judge it by"
-    if trouble.neighbour and signal < 1000:
-        return "a neighbour of 30 % leaves less over than the noise of so faint a line"
-    if trouble.neighbour and trouble.neighbour < 2 and signal < 3000:
-        return "so close a neighbour is mere width: flagged BLENDED where it is seen at all"
-    if trouble.neighbour >= 3 and sigma > 2:
-        return "two peaks that are detected as two share the pixels between them: each window ends half-way"
-    if trouble.slope and sigma < 0.6:
-        return "a narrow line on a steep slope does not rise above the slope's texture"
-    return ""
 
 
 def holds(found: Coverage, sigma: float) -> bool:
@@ -73,9 +49,7 @@ def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: fl
         f"rms {found.rms:.4f} sigma {found.sigma:.4f} lost {found.lost:.3f} flagged {found.flagged:.3f}",
         end="",
     )
-    if (reason := is_beyond(trouble, signal, sigma, known)) != "":
-        pytest.skip(reason)
-    if not holds(found, sigma):  # or those that do not are flagged
+    if found.count == 0 or not holds(found, sigma):  # or those that do not are flagged
         alone = line.flag[:, 0] == Flag.OK
         found = coverage(replace(line, flag=np.where(alone[:, None], line.flag, Flag.NO_PEAK)), centre)
         assert found.count < FEWEST or holds(found, sigma)

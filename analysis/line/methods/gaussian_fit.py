@@ -24,12 +24,13 @@ from analysis.line.detection.detect import (
 )
 from analysis.line.methods.fisher_scoring import LIKELIHOOD, optimise, solve
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE
-from analysis.line.methods.misfit import UNLIKELY, deviate, measure_misfit
+from analysis.line.methods.misfit import deviate, measure_misfit
 from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width
 from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, measure_with_glow, widen_saturated
 from analysis.line.methods.scintillation import position_variance, shared_variance
 from analysis.line.methods.seed_loop import (
     CORRELATION_LENGTH,
+    LEAN,
     SHARED,
     TOLD,
     Array,
@@ -49,6 +50,8 @@ SPECKLED = 0.06
 contrast no longer holds. By seeded trials of f/5.6 to f/11 on lines of 0.8 to 4 px."""
 JUDGED = 0.01
 """Relative variance of the light from which no fit is judged: what scintillates strongly keeps to no profile."""
+BESIDE = (1.5, 3.5)
+"""px from a narrow line; its own light does not reach so far."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -129,6 +132,8 @@ def _measure_narrow(
         chi2 += (y[i] - mu) ** 2 / max(mu + floor[i], 0.1 * abs(floor[i]))
         mass += light[i]
     out[5], out[CORRELATION_LENGTH] = chi2 / (n - 4), 1.0
+    if options.judge < math.inf:
+        out[LEAN] = _light_beside(pixel, n, p)
     if pixels.covariances.shape[1] > 0 and mass > 0.0:
         # the position takes the centre of mass of so few pixels as their width lets it, or better
         weigh_of_known_width(pixel, n, p, shape, weight)
@@ -192,6 +197,18 @@ def _asymmetry(
     return float(moment / math.sqrt(square)) if square > 0.0 else 0.0
 
 
+@njit(nogil=True, cache=True, error_model="numpy")
+def _light_beside(pixel: Array, n: int, p: Array) -> float:
+    """Light to the right of a narrow line less that to the left, in its standard deviations: 0 where it is alone."""
+    light = variance = 0.0
+    for i in range(n):
+        x = pixel[POSITION, i] - p[1]
+        if BESIDE[0] < abs(x) < BESIDE[1]:
+            light += math.copysign(pixel[ELECTRONS, i] - p[3], x)
+            variance += max(pixel[ELECTRONS, i] + pixel[FLOOR, i], 0.1 * abs(pixel[FLOOR, i]))
+    return light / math.sqrt(variance) if variance > 0.0 else 0.0
+
+
 @peak_kernel
 def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
     """Peak kernel (`seed_loop`). options.variant: LEAST_SQUARES or LIKELIHOOD. chi2 only for independent pixels."""
@@ -222,12 +239,12 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
             p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
         if not converged or seed[PRIOR] != 0.0 or _is_coarse(pixel, count, p, options, hessian):
             return _measure_narrow(pixels, pixel, count, p, seed, options, shape, out)
-    independent = pixels.correlation.shape[0] == 1
+    independent, asked = pixels.correlation.shape[0] == 1, options.judge < math.inf and likelihood
     scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
     # of a line below half a pixel three pixels hold all the light, which two lines would explain as well; and what
     # least squares leave over is more than chi-square expects, since they do not weigh
-    judged = options.judge and likelihood and independent and flag == Flag.OK.value
-    judged = judged and count > UNKNOWNS and p[2] >= COARSE and scattered < JUDGED
+    leans = asked and independent and flag == Flag.OK.value and count > UNKNOWNS and p[2] >= COARSE
+    judged = leans and (scattered < JUDGED or options.judge == 0.0)
     if not converged and judged:
         p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
         for i in range(count):  # no model has told the variance yet: it is that of the pixels themselves
@@ -266,11 +283,11 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
             _tell_width(p[2], row[2], out)
     if flag == Flag.OK.value and speckled > SPECKLED * p[2]:
         return Flag.SPECKLED.value
-    if not judged:
+    if not leans:
         return flag
     for i in range(count):
         pixel[VARIANCE, i] += scattered * light[i] * light[i]
     asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian, factor, row)
-    if max(deviate(chi2, count - 4), abs(asymmetry)) < UNLIKELY:
-        return flag
-    return measure_misfit(pixels, seed, count, p, options, out)
+    odd = judged and max(deviate(chi2, count - 4), abs(asymmetry)) >= options.judge
+    out[LEAN] = math.copysign(math.inf, asymmetry) if odd else asymmetry
+    return measure_misfit(pixels, seed, count, p, options, out) if odd else flag

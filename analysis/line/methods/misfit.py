@@ -16,6 +16,8 @@ from analysis.line.result import Flag
 UNLIKELY = 4.5
 """Standard normal deviates: one good line in 100,000 is measured again, by chi-square or by its asymmetry. At 3.7 it
 were one in 3,000, and one of those that is taken for two lines costs as much as all the noise."""
+FINEST = 0.4
+"""px; narrower lines do not part: three pixels with all the light of one may be two as well."""
 PARTED, APART = 0.05, 1.2
 """Two lines part where sigma is less than this of their distance, so that the fit is linear, and the distance more than
 this of their own sigma: closer ones explain as well what is noise of another kind."""
@@ -57,6 +59,7 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
         sigma = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], n))
         distance = abs(both[5] - both[1])
         parted = sigma < PARTED * distance and distance > APART * both[2]
+        parted = parted and (options.known_width or both[2] > FINEST)
         out[0], out[2], out[3], out[4], out[5] = both[1], both[2], both[0], both[3], chi2 / max(n - UNKNOWNS, 1)
         out[1] = sigma if parted else math.hypot(sigma, both[1] - p[1])
         return Flag.OK.value if parted else Flag.BLENDED.value

@@ -4,13 +4,14 @@
 
 pixels holds the scan line y and those around it, seed where `detect` saw a peak and how wide and high it is, flag
 what it said of it (OK or SATURATED). The kernel writes out (COLUMNS,): u, sigma_u, width, amplitude, background,
-chi2, correlation length, and of a narrow line how its place and width vary together, and what its pixels say of its
-width (`shared_width`), NaN where it has none, and returns the flag that the peak keeps. An out without a position stays
-NaN.
+chi2, correlation length, of a narrow line how its place and width vary together, how far the line leans to one side
+(`leaning`), and what its pixels say of its width (`shared_width`), NaN where it has none, and returns the flag that the
+peak keeps. An out without a position stays NaN.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
@@ -27,8 +28,9 @@ from render.base.arrays import Float32
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-CORRELATION_LENGTH, SHARED, TOLD = 6, 7, 8
-"""Columns of out: scan lines; covariance of place and width, px^2, of a narrow line; from TOLD on the logarithm of the
+CORRELATION_LENGTH, SHARED, LEAN, TOLD = 6, 7, 8, 9
+"""Columns of out: scan lines; covariance of place and width, px^2, of a narrow line; a normal deviate where the line is
+as one Gaussian, +-infinity where it is measured as something else; from TOLD on the logarithm of the
 likelihood of each of PRIOR_WIDTHS at the place that is likeliest, and then that over all places; by methods that fit a
 width alone, and the first NaN where there is nothing to tell."""
 COLUMNS = TOLD + 2 * len(PRIOR_WIDTHS)
@@ -75,8 +77,9 @@ class Options(NamedTuple):
     """px; wider is no line."""
     filter_scale: float
     """Sigma of a filter over that of the line."""
-    judge: bool = False
-    """Whether a fit that leaves too much over is taken for another thing than a line."""
+    judge: float = math.inf
+    """Standard normal deviates from which what a fit leaves over is taken for another thing than a line; 0: it is one
+    by its neighbours."""
 
 
 peak_kernel = register_jitable(error_model="numpy", inline="always")

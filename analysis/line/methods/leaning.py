@@ -1,0 +1,58 @@
+"""A second line that is too faint for one scan line to tell, but not for many neighbours, all of which it leans.
+
+    S = sum z / (sum L z^2)^(1/2)         over the neighbours; z lean, L how many of them err alike
+
+By the scatter of z itself (Student's t in Fisher's form), so that it holds where the noise is not known: of one
+Gaussian line S is a normal deviate but for its tails, of lines that all lean alike the root of their number.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.line.methods.misfit import UNLIKELY
+from analysis.line.methods.shared_width import of_neighbours
+from analysis.line.result import Flag
+from render.base.arrays import Float
+
+TOGETHER = 4.0
+"""S of 64 neighbours: Student's t of 4.6, by chance once in 50,000. Fewer than 16 cannot reach it."""
+LEAST = 0.1
+"""Mean lean; a smaller one moves a line by less than its sigma, and where there is no noise all lean alike."""
+MOST_PART = 0.9
+"""Share of the doubled neighbours that part; of fewer, those that do are the ones that noise has drawn apart."""
+
+
+def leans_as_neighbours_do(lean: Float, length: Float) -> NDArray[np.bool_]:
+    """Leans of lines (n, k), normal deviates where each is a Gaussian, infinite of those measured as something else,
+    NaN where nothing is known, and correlation lengths (n, k) -> (n, k): which were taken for a Gaussian and are none.
+    """
+    known = np.isfinite(length) & ~np.isnan(lean)
+    if not known.any():
+        return known
+    deviate = np.where(known, np.clip(lean, -UNLIKELY, UNLIKELY), 0.0)
+    square = np.where(known, np.maximum(length, 1.0) * deviate**2, 0.0)
+    total, spread, count = np.split(of_neighbours(np.hstack((deviate, square, known.astype(np.float64)))), 3, axis=1)
+    together = np.abs(total) > np.maximum(TOGETHER * np.sqrt(spread), LEAST * count)
+    return np.asarray(together & np.isfinite(lean))
+
+
+def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], single: Float, farthest: float) -> None:
+    """Flag lines (n, k) that were measured as two since they lean; without a sure position they get the single back.
+
+    out (n, k, columns), sigma_u the second of them; single (m, columns), as before; farthest: px, the largest sigma.
+    """
+    unsure = ~(out[leaning][:, 1] < farthest)
+    out[leaning] = np.where(unsure[:, None], single, out[leaning])
+    flags[leaning] = np.where(unsure | (flags[leaning] == Flag.OK), Flag.BLENDED, flags[leaning])
+
+
+def parts_alone(flag: NDArray[np.uint8], lean: Float) -> NDArray[np.bool_]:
+    """Flags and leans as above (n, k) -> (n, k): of lines that were parted, those whose neighbours mostly do not."""
+    parted = np.isinf(lean) & (flag == Flag.OK)
+    if not parted.any():
+        return parted
+    doubled = parted | (flag == Flag.BLENDED) | (flag == Flag.MISFIT)
+    some, every = (of_neighbours(one.astype(np.float64)) for one in (parted, doubled))
+    return np.asarray(parted & (some < MOST_PART * every))

@@ -1,0 +1,59 @@
+"""A second line that one scan line cannot tell, and many together can."""
+
+import numpy as np
+import pytest
+
+from analysis.line.extract import extract
+from analysis.line.methods.leaning import leans_as_neighbours_do, parts_alone
+from analysis.line.result import Flag
+from tests.analysis.line.troubles import PLAIN, TROUBLES, measured, photographed
+
+ROWS = 400
+
+
+def test_deviates_of_single_lines_do_not_lean_together_whatever_their_scale():
+    """5,000 lines, of which one in 50,000 would be flagged by chance, and 65 at a time."""
+    deviate = np.random.default_rng(1).normal(size=(5000, 1))
+    for scale in (0.5, 1.0, 3.0):
+        assert leans_as_neighbours_do(scale * deviate, np.ones_like(deviate)).mean() < 0.02
+
+
+def test_lines_that_err_alike_are_not_taken_for_lines_that_lean():
+    """Sixteen scan lines with one deviate are as good as one, if their correlation length tells it."""
+    deviate = np.repeat(np.random.default_rng(2).normal(size=(60, 1)), 16, axis=0)
+    assert leans_as_neighbours_do(deviate, np.ones_like(deviate)).mean() > 0.02
+    assert not leans_as_neighbours_do(deviate, np.full_like(deviate, 16.0)).any()
+
+
+def test_a_lean_of_one_standard_deviation_shows_among_neighbours_and_a_tiny_one_is_none():
+    deviate = np.random.default_rng(3).normal(size=(1000, 1))
+    assert leans_as_neighbours_do(deviate + 1.5, np.ones_like(deviate)).mean() > 0.98
+    assert not leans_as_neighbours_do(np.full((100, 1), 0.01), np.ones((100, 1))).any()
+
+
+def test_lines_that_only_noise_has_parted_are_found_by_their_neighbours():
+    lean = np.full((100, 1), np.inf)
+    flag = np.full((100, 1), Flag.OK, np.uint8)
+    assert not parts_alone(flag, lean).any()
+    flag[::2] = Flag.BLENDED
+    assert (parts_alone(flag, lean) == (flag == Flag.OK)).all()
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["noise known", "noise estimated"])
+@pytest.mark.parametrize("sigma", [0.6, 2.0])
+def test_a_neighbour_too_faint_for_one_scan_line_flags_all_of_them(sigma, known):
+    """Of 100 e- the neighbour moved the line by 0.6 to 5 sigmas, and hardly any was flagged."""
+    line, _ = measured(TROUBLES["neighbour at 1.4 sigma"], 100.0, sigma, ROWS, seed=4, known=known)
+    assert np.isin(line.flag[line.valid], (Flag.BLENDED, Flag.MISFIT)).mean() > 0.98
+
+
+def test_of_single_lines_hardly_any_is_flagged():
+    for sigma in (0.6, 2.0, 8.0):
+        line, _ = measured(PLAIN, 1000.0, sigma, ROWS, seed=5)
+        assert (line.flag != Flag.OK).mean() < 0.02
+
+
+def test_a_known_width_leaves_a_faint_neighbour_to_be_seen():
+    image, _, noise = photographed(TROUBLES["neighbour at 2 sigma"], 100.0, 2.0, ROWS, seed=6)
+    line = extract(image, noise=noise, width=2.0)
+    assert (line.flag[line.valid] != Flag.OK).mean() > 0.98
