@@ -138,8 +138,7 @@ def indirect_images(
     variances / sum of squares); with an aim it is enough that the measured line is known. `most_paths`, or the end of
     the time, ends it in any case. kinds: of light, besides plain interreflection (`render.laser_indirect.path_vertex`).
     clamp: most radiance of one pass in one pixel, W/(m^2 sr); biased. left: lasers that have their share of the time,
-    with this one. What it goes on from gives the
-    same image bit for bit as without interruption; what it keeps stays consistent when Cancelled is raised.
+    with this one. Resumed it gives the image of an uninterrupted run; what it keeps is whole when Cancelled is raised.
     """
     world, camera, laser, _, T_world_laser = placed
     low, high, reach = visible_fan_range(world, laser, T_world_laser)

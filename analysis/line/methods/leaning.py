@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.methods.misfit import UNLIKELY
-from analysis.line.methods.shared_width import of_neighbours
-from analysis.line.result import Flag
+from analysis.line.result import NEIGHBOURS, Flag
 from render.base.arrays import Float
 
 TOGETHER = 4.0
 """S of 64 neighbours: Student's t of 4.6, by chance once in 50,000. Fewer than 16 cannot reach it."""
 LEAST = 0.1
 """Mean lean; a smaller one moves a line by less than its sigma, and where there is no noise all lean alike."""
+UNIT = 2.0**-20
+"""Of sums."""
 MOST_PART = 0.9
 """Share of the doubled neighbours that part; of fewer, those that do are the ones that noise has drawn apart."""
 
@@ -33,7 +34,7 @@ def leans_as_neighbours_do(lean: Float, length: Float) -> NDArray[np.bool_]:
         return known
     deviate = np.where(known, np.clip(lean, -UNLIKELY, UNLIKELY), 0.0)
     square = np.where(known, np.maximum(length, 1.0) * deviate**2, 0.0)
-    total, spread, count = np.split(of_neighbours(np.hstack((deviate, square, known.astype(np.float64)))), 3, axis=1)
+    total, spread, count = np.split(_of_neighbours(np.hstack((deviate, square, known.astype(np.float64)))), 3, axis=1)
     together = np.abs(total) > np.maximum(TOGETHER * np.sqrt(spread), LEAST * count)
     return np.asarray(together & np.isfinite(lean))
 
@@ -54,5 +55,12 @@ def parts_alone(flag: NDArray[np.uint8], lean: Float) -> NDArray[np.bool_]:
     if not parted.any():
         return parted
     doubled = parted | (flag == Flag.BLENDED) | (flag == Flag.MISFIT)
-    some, every = (of_neighbours(one.astype(np.float64)) for one in (parted, doubled))
+    some, every = (_of_neighbours(one.astype(np.float64)) for one in (parted, doubled))
     return np.asarray(parted & (some < MOST_PART * every))
+
+
+def _of_neighbours(values: Float) -> Float:
+    """(n, m) -> sums over the neighbours of each, itself left out: of whole numbers, so that either end is alike."""
+    whole = np.rint(values / UNIT).astype(np.int64)
+    sums = np.cumsum(np.pad(whole, ((NEIGHBOURS + 1, NEIGHBOURS), (0, 0))), axis=0)
+    return np.asarray(UNIT * (sums[2 * NEIGHBOURS + 1 :] - sums[: -2 * NEIGHBOURS - 1] - whole))

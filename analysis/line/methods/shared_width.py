@@ -59,9 +59,9 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] |
     moved = _new_places(np.where(known, u, np.nan), sigma_u)
     alike = known
     for _ in range(2):
-        at_best, places = (of_neighbours(np.where(alike[:, None], part, 0.0)) for part in (best, mass - best))
-        count = of_neighbours(alike.astype(np.float64))
-        independent = 1.0 + of_neighbours(moved)
+        at_best, places = (_of_neighbours(np.where(alike[:, None], part, 0.0)) for part in (best, mass - best))
+        count = _of_neighbours(alike.astype(np.float64))
+        independent = 1.0 + _of_neighbours(moved)
         total = at_best + np.minimum(independent / np.maximum(count, 1.0), 1.0)[:, None] * places
         log = _weighed(total, BETWEEN)
         shared, _ = _moments(log, FINE_WIDTHS)
@@ -110,7 +110,7 @@ def _new_places(u: Float, sigma_u: Float) -> Float:
     return 0.5 * (moved + np.append(moved[1:], 0.0))
 
 
-def of_neighbours(values: Float) -> Float:
+def _of_neighbours(values: Float) -> Float:
     """(n, ..) -> sums over the neighbours of each, itself left out."""
     padded = np.pad(values, [(NEIGHBOURS, NEIGHBOURS)] + [(0, 0)] * (values.ndim - 1))
     total = np.zeros_like(values)

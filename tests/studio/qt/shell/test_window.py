@@ -26,7 +26,6 @@ from studio.qt.core import theme
 from studio.qt.core.actions import COMMANDS, VIEW_KEYS, Command
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render
-from studio.qt.shell.command_search import CommandSearch
 from studio.qt.shell.fault_notice import FaultNotice, offer
 from studio.qt.shell.help import FOLDER, PAGES
 from studio.qt.shell.panels import PANELS
@@ -266,31 +265,6 @@ class TestCommands:
     def test_every_command_does_something(self, window: MainWindow) -> None:
         for key, action in window.commands.by_key.items():
             assert action.receivers("2triggered(bool)") > 0, key
-
-    def test_a_command_is_found_by_a_few_letters_and_done(self, window: MainWindow, qtbot: QtBot) -> None:
-        session = window.session
-        count = len(session.project.scene.lights)
-        qtbot.keyClick(window, Qt.Key.Key_P, Qt.KeyboardModifier.ControlModifier)
-        search = next(one for one in QApplication.topLevelWidgets() if isinstance(one, CommandSearch))
-        names = {entry.name for entry in search.entries}
-        assert {"Undo", "Report as PDF", "Turntable", "Sphere", "Messages", "Inspector"} <= names
-        qtbot.keyClicks(search.line, "poi li")
-        assert search.list.item(0).text() == "Scene > Add > Point light"
-        qtbot.keyClick(search.line, Qt.Key.Key_Down)
-        qtbot.keyClick(search.line, Qt.Key.Key_Up)
-        with qtbot.waitSignal(session.project_changed):
-            qtbot.keyClick(search.line, Qt.Key.Key_Return)
-        assert len(session.project.scene.lights) == count + 1
-
-    def test_a_command_that_is_not_possible_now_stays_undone(self, window: MainWindow, qtbot: QtBot) -> None:
-        before = window.session.project
-        search = CommandSearch(window)
-        qtbot.addWidget(search)
-        search.show_found("redo")
-        search.choose()
-        search.show_found("no such thing")
-        search.choose()
-        assert search.isVisible() is False and window.session.project is before
 
     def test_undo_and_redo_say_what_they_will_do(self, window: MainWindow, qtbot: QtBot) -> None:
         session = window.session
