@@ -25,6 +25,8 @@ from render.sampling.random import normal, wrapped
 
 LARGEST_RADIUS = 12
 """Largest lag of the correlation, px: it truncates grains of several pixels only."""
+FINEST = 0.02
+"""Grain, in pixels, below which the covariance is scaled: 1,000 x 1,000 points are added up there."""
 NEGLIGIBLE = 2e-3
 """Correlation below which a lag is truncated."""
 TABLE, LIMIT = 4097, 6.0
@@ -139,6 +141,10 @@ def _covariance(grain: float) -> tuple[Float, float]:
     """(2 r + 1, 2 r + 1) C(m, n) for lambda N in pixels, and the evenness."""
     from scipy.special import j1
 
+    if grain < FINEST:
+        # many grains in a pixel: the variance of their mean falls with the square, and no two pixels share any
+        covariance, evenness = _covariance(FINEST)
+        return covariance * (grain / FINEST) ** 2, evenness
     reach = min(LARGEST_RADIUS, math.ceil(1.0 + 4.0 * grain))
     steps = max(8, math.ceil(10.0 / grain))
     offset = (np.arange((reach + 1) * steps) + 0.5) / steps

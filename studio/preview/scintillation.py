@@ -14,6 +14,8 @@ from render.camera.camera import Camera
 from render.sensor.sensor import Sensor
 from render.sensor.speckle import speckle
 
+WIDEST = 1000.0
+"""px; a wider line is none."""
 WINDOW = 4.0
 """Sigmas of the line on either side that its pixels are taken from."""
 
@@ -39,7 +41,8 @@ def speckle_px(
 ) -> Float:
     """(n,) standard deviation of the line's centre by speckle, px, as maximum likelihood measures it.
 
-    Of Gaussian lines: sigma px, position of the centre px, peak and background e- (n,); read variance e-^2.
+    Of Gaussian lines: sigma px, position of the centre px, peak and background e- (n,); read variance e-^2. NaN of
+    lines without a place, or wider than WIDEST.
 
         sqrt(sum_ij w_i w_j L_i L_j C_ij),  w = (dL/du / V) / sum (dL/du)^2 / V,  V = L + background + variance
 
@@ -49,6 +52,11 @@ def speckle_px(
     """
     from scipy.special import ndtr
 
+    known = np.isfinite(position) & (sigma > 0.0) & (sigma < WIDEST)
+    found = np.full(len(sigma), np.nan)
+    if not known.any():
+        return found
+    sigma, position, amplitude, background = (one[known] for one in (sigma, position, amplitude, background))
     covariance, fineness = _speckle(camera, wavelength_nm, depolarised)
     half = math.ceil(WINDOW * float(np.max(sigma))) + 1
     across = np.arange(-half, half + 1) - (position - np.round(position))[:, None]
@@ -63,7 +71,8 @@ def speckle_px(
     shared = covariance[0, 0] * np.sum(moved**2 * uneven, axis=1)
     for distance in range(1, min(len(covariance), 2 * half)):
         shared += 2.0 * covariance[0, distance] * np.sum(moved[:, distance:] * moved[:, :-distance], axis=1)
-    return np.asarray(np.sqrt(np.maximum(shared, 0.0)))
+    found[known] = np.sqrt(np.maximum(shared, 0.0))
+    return found
 
 
 def _speckle(camera: Camera, wavelength_nm: float, depolarised: bool) -> tuple[Float, float]:

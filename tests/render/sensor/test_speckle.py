@@ -177,3 +177,10 @@ def test_developing_with_speckle_adds_its_contrast_and_switched_off_nothing():
     np.testing.assert_array_equal(one.pixels, rough.pixels)
     smooth = develop(frame, scene, sensor.model_copy(update={"speckle": "polarised"}), seed=1, noise=False)
     assert np.ptp(smooth.pixels) == 0
+
+
+@pytest.mark.parametrize("grain", [0.01, 1e-5])
+def test_many_grains_in_a_pixel_leave_the_share_of_one_in_its_area(grain):
+    # integral of |2 J1(x) / x|^2 over the plane: a grain's area is 4 grain^2 / pi (Goodman 2007, eq. 4-62)
+    field = speckle(1000.0, grain, 1e-6)
+    assert field.contrast**2 == pytest.approx(4.0 * grain**2 / np.pi, rel=0.05)
