@@ -1,4 +1,7 @@
-"""What the light groups of a frame have in common: a plan, work, and estimates that get better."""
+"""What the light groups of a frame have in common: a plan, work, and estimates that get better.
+
+To add one: section 11 of `render/README.md`.
+"""
 
 from __future__ import annotations
 
