@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from analysis.line.along.curve import Curve, Kind, Shock, Stretch, curve_through, with_shocks
 from analysis.line.along.five_diagonals import of_second_differences
@@ -75,7 +75,7 @@ def _found(curve: Curve) -> list[Shock]:
 def _gain(curve: Curve) -> Float:
     """(3, n) by how much a shock of each `Kind` is likelier than chance, as chi-square; -inf where none can be."""
     n = len(curve.u)
-    one, two = float(chi2.isf(CHANCE / n, 1)), float(chi2.isf(CHANCE / n, 2))
+    one, two = float(chdtri(1, CHANCE / n)), float(chdtri(2, CHANCE / n))
     out = np.full((len(Kind), n), -np.inf)
     known = 1.0 - curve.weight * curve.covariance[0]
     sure = curve.used & (known > ROUNDING)
