@@ -37,7 +37,7 @@ RESOLVED = 1.1
 """px; of a narrower line pixels tell no more than that it leans."""
 FEWEST, COMMON = 6, 60.0
 """Runs, and Hotelling's T^2 of two numbers, of 16 runs by chance once in 80,000, from which all scan lines lean to one
-side."""
+side, or are flat or have tails alike."""
 SURE, SURE_OF_TWO = 3.0, 4.5
 """Standard errors from which a number is believed, and from which scintillation is of lines that are double."""
 
@@ -164,15 +164,16 @@ class _Rows:
         lean = np.stack([(z**2 - 3.0) * z, (z**4 - 10.0 * z**2 + 15.0) * z], axis=-1) * self.light[..., None]
         lean = self.left @ lean
         self.leans = self._is_common(lean)
-        if self.leans:
+        even = np.stack([z**4 - 6.0 * z**2 + 3.0, z**6 - 15.0 * z**4 + 45.0 * z**2 - 15.0], axis=-1)
+        flat = not narrow and self._is_common(self.left @ (even * self.light[..., None]))
+        if self.leans or flat:
             any_shape = self.left @ (np.where(usable, amplitude, 0.0)[..., None] * _splines(z / KNOTS))
             self.residual = self.residual - self._common(lean if narrow else any_shape)
 
     def _is_common(self, lean: Float) -> bool:
-        """Whether all residuals lean alike, by shapes (runs, RUN, n, m) that are odd: Hotelling's T^2 over the runs.
+        """Whether all residuals hold alike what shapes (runs, RUN, n, m) are: Hotelling's T^2 over the runs.
 
-        A second line beside the first is there on every scan line, noise is not. A lens with tails, which move nothing,
-        counts as noise.
+        A second line beside the first, or a lens out of focus, is there on every scan line, noise is not.
         """
         score, normal = self._projected(lean)
         total = score.sum(axis=0)

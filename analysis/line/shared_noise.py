@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import nnls
 
-from analysis.line.result import Line
+from analysis.line.result import Flag, Line
 from render.base.arrays import Float
 
 RUNS = (32, 64)
@@ -40,6 +40,9 @@ STRAY = 4.0
 """Robust standard deviations from its run's cubic at which a position is a stray."""
 EDGE, JUMP = 3.0, 1.0
 """Times the median variance from which a run shows an edge; so does a scatter of so many widths of the line."""
+FINEST = 1.1
+"""px; a narrower line of colours that are filled in, which widens it by 0.7 px, is narrower than the pixels that saw
+it are apart: where between them it is, nothing tells."""
 SURE, KNOWN = 3.0, 0.2
 """Standard errors from which a variance is believed to be above the one told, and how well that is known at best."""
 
@@ -64,8 +67,10 @@ class SharedNoise:
 
 def with_shared_noise(line: Line) -> Line:
     """A line (n, k) whose pixels share noise -> the same with what its first peaks scatter beyond their sigma_u, in
-    all peaks; as it is where they scatter as they tell, or are too few.
+    all peaks; as it is where they scatter as they tell, or are too few. Where it is narrow it is flagged `UNRESOLVED`.
     """
+    coarse = (line.flag == Flag.OK) & (line.width < FINEST)
+    line = replace(line, flag=np.where(coarse, Flag.UNRESOLVED, line.flag).astype(line.flag.dtype))
     noise = shared_noise(line.u[:, 0], line.sigma_u[:, 0], line.width[:, 0])
     if noise is None:
         return line

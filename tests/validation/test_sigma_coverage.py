@@ -21,7 +21,7 @@ ROWS = 1000
 FEWEST = 100
 """Points without a flag that make a share."""
 MOST = 3.5
-"""Standard deviations of a share: 360 cells of two shares, one run in five fails by chance at 3.5."""
+"""Standard deviations of a share: 560 cells of two shares, one run in three fails by chance at 3.5."""
 CELLS = [(name, signal, sigma) for name in TROUBLES for signal in SIGNALS for sigma in WIDTHS]
 
 

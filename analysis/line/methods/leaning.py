@@ -21,6 +21,9 @@ LEAST = 0.1
 """Mean lean; a smaller one moves a line by less than its sigma, and where there is no noise all lean alike."""
 UNIT = 2.0**-20
 """Of sums."""
+BESIDE, MANY = 16, 0.25
+"""Scan lines on either side, and the share of them, on both sides, that are measured as something else from which a
+line that looks like a Gaussian by itself is taken to be as they are."""
 MOST_PART = 0.9
 """Share of the doubled neighbours that part; of fewer, those that do are the ones that noise has drawn apart."""
 
@@ -36,7 +39,16 @@ def leans_as_neighbours_do(lean: Float, length: Float) -> NDArray[np.bool_]:
     square = np.where(known, np.maximum(length, 1.0) * deviate**2, 0.0)
     total, spread, count = np.split(_of_neighbours(np.hstack((deviate, square, known.astype(np.float64)))), 3, axis=1)
     together = np.abs(total) > np.maximum(TOGETHER * np.sqrt(spread), LEAST * count)
-    return np.asarray(together & np.isfinite(lean))
+    return np.asarray((together | _among_others(np.isinf(lean), known)) & np.isfinite(lean))
+
+
+def _among_others(odd: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n, k) -> (n, k): whether on both sides MANY of the lines beside a line are odd."""
+    sums = np.cumsum(np.pad(np.stack([odd & known, known]), ((0, 0), (BESIDE + 1, BESIDE), (0, 0))), axis=1, dtype=int)
+    above = sums[:, BESIDE : -BESIDE - 1] - sums[:, : -2 * BESIDE - 1]
+    below = sums[:, 2 * BESIDE + 1 :] - sums[:, BESIDE + 1 : -BESIDE]
+    enough = (above[1] > 0) & (below[1] > 0)
+    return np.asarray(enough & (above[0] >= MANY * above[1]) & (below[0] >= MANY * below[1]))
 
 
 def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], single: Float, farthest: float) -> None:

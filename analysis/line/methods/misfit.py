@@ -22,6 +22,10 @@ PARTED, APART = 0.05, 1.2
 """Two lines part where sigma is less than this of their distance, so that the fit is linear, and the distance more than
 this of their own sigma: closer ones explain as well what is noise of another kind."""
 
+EQUAL, DIP = 0.6, 3.0
+"""Two lines are a single one with a flat top, out of focus, where the fainter has more than this of the other's height
+and they are closer than this many of their sigmas: no dip between them tells two."""
+
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def deviate(chi2: float, freedom: int) -> float:
@@ -47,14 +51,15 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
     """A line that is no single Gaussian -> out (7,): as two, or as it is with a sigma that holds the misfit.
 
     pixels.room: what the fit of p (4,) left there. Returns OK for two lines that part. BLENDED for two that do not:
-    sigma holds how far the brighter one is from the single line. MISFIT for neither: sigma is that of the fit times
-    the root of chi-square (Birge, Phys. Rev. 40, 1932), and holds the distance to the centre of mass of the same
-    pixels, by which another estimator differs.
+    sigma holds how far the brighter one is from the single line. MISFIT for neither, or one with a flat top: sigma is
+    that of the fit times the root of chi-square (Birge, Phys. Rev. 40, 1932), and holds the distance to the centre of
+    mass of the same pixels, by which another estimator differs.
     """
     pixel, weight, both = pixels.room[:4], pixels.room[4], np.empty(UNKNOWNS)
     shift = abs(_centroid(pixel, n, p) - p[1])
     chi2 = fit_two_lines(pixel, n, p, options.known_width, options.integrated, pixels.room[5:11], both, weight)
-    if deviate(chi2, n - UNKNOWNS) < UNLIKELY:
+    flat = both[4] > EQUAL * both[0] and abs(both[5] - both[1]) < DIP * both[2]
+    if not flat and deviate(chi2, n - UNKNOWNS) < UNLIKELY:
         noise = linear_variance(weight, pixel[VARIANCE], pixel[POSITION], n, pixels.correlation)
         sigma = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], n))
         distance = abs(both[5] - both[1])

@@ -22,8 +22,9 @@ from analysis.line.result import NEIGHBOURS
 from render.base.arrays import Float
 
 FEWEST = 8
-STRANGE = 4.0
-"""Standard deviations from which a scan line does not share its neighbours' width."""
+STRANGE = 3.0, 5.0
+"""Standard deviations up to which a scan line wholly shares its neighbours' width, and from which it does not at all:
+a sharp limit between them let a little noise in one line move all of its neighbours."""
 SPREAD = 0.015
 """px; neighbours differ by as much."""
 SURE = 0.02
@@ -57,10 +58,10 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] |
     best, mass = np.split(np.where(known[:, None], told, 0.0), 2, axis=1)
     own, variance = _moments(mass, PRIOR_WIDTHS)
     moved = _new_places(np.where(known, u, np.nan), sigma_u)
-    alike = known
+    alike = known.astype(np.float64)
     for _ in range(2):
-        at_best, places = (_of_neighbours(np.where(alike[:, None], part, 0.0)) for part in (best, mass - best))
-        count = _of_neighbours(alike.astype(np.float64))
+        at_best, places = (_of_neighbours(alike[:, None] * part) for part in (best, mass - best))
+        count = _of_neighbours(alike)
         independent = 1.0 + _of_neighbours(moved)
         total = at_best + np.minimum(independent / np.maximum(count, 1.0), 1.0)[:, None] * places
         log = _weighed(total, BETWEEN)
@@ -71,8 +72,8 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] |
         # those that scatter more than their pixels say, by speckle, say less
         usual = apart[enough & np.isfinite(apart)]
         scatter = max(float(np.median(usual)) / 0.455, 1.0) if len(usual) else 1.0
-        alike = known & ~(apart > STRANGE**2 * scatter)
-    needed = enough & alike & (shared < WIDEST) & (variance * scatter > SURE**2)
+        alike = known * _alike(np.sqrt(np.nan_to_num(apart) / scatter))
+    needed = enough & (alike > 0.0) & (shared < WIDEST) & (variance * scatter > SURE**2)
     if not needed.any():
         return None
     log = (log - log.max(axis=1, keepdims=True)) / scatter
@@ -81,8 +82,14 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] |
     density = np.exp(log)
     apart = (PRIOR_WIDTHS[:, None] - FINE_WIDTHS) / SPREAD
     density = _weighed(density / density.sum(axis=1, keepdims=True), np.exp(-0.5 * apart**2))
-    shared = np.where(needed, np.sqrt(variance) / (variance + SPREAD**2), 0.0)
-    return np.where(needed[:, None], np.log(density + LEAST), 0.0), shared
+    shared = np.where(needed, alike * np.sqrt(variance) / (variance + SPREAD**2), 0.0)
+    return np.where(needed[:, None], alike[:, None] * np.log(density + LEAST), 0.0), shared
+
+
+def _alike(apart: Float) -> Float:
+    """Standard deviations from the neighbours' width -> the weight of a line among them, 1 to 0."""
+    near, far = STRANGE
+    return np.clip((far - apart) / (far - near), 0.0, 1.0)
 
 
 def _moments(log: Float, widths: Float) -> tuple[Float, Float]:

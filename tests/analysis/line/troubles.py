@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
 
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
@@ -33,8 +34,15 @@ class Trouble:
     """Peak over the full well; 0: nothing is clipped."""
     halo: float = 0.0
     """Height, of the peak, of a glow 3 sigmas beside, 4 sigmas wide."""
-    occluded: float = 0.0
-    """Light of the right-hand half of the line that is missing."""
+    edge: float = 1.0
+    """Light, of that to its left, beyond an edge that crosses the line by one px in `EDGE_ROWS` scan lines; of 0,
+    where the middle of the line is hidden nothing is compared."""
+    defocus: float = 0.0
+    """Radius of the circle of confusion in sigmas."""
+    reflection: float = 0.0
+    """Height, of the peak, of a light 3 sigmas wide that lies 5 sigmas beside, as a groove's other wall throws it."""
+    mosaic: bool = False
+    """Every other pixel of every other scan line is seen, the rest filled in from them."""
 
 
 PLAIN = Trouble()
@@ -48,7 +56,17 @@ TROUBLES = {
     "neighbour at 3 sigma": Trouble(neighbour=3.0),
     "saturated 30 times, halo": Trouble(overexposure=30.0, halo=0.005),
     "saturated 300 times, halo": Trouble(overexposure=300.0, halo=0.005),
+    "slanted edge to 30 %": Trouble(edge=0.3),
+    "partly occluded": Trouble(edge=0.0),
+    "defocus of 2 sigma": Trouble(defocus=2.0),
+    "reflection of 10 %": Trouble(reflection=0.1),
+    "mosaic": Trouble(mosaic=True),
 }
+EDGE_ROWS = 10.0
+SLANT = 0.0137
+"""px a scan line, of a line that a mosaic sees."""
+FINEST_PARTS = 5
+"""Of a pixel, and of a sigma, in which the light of a spoiled line is counted."""
 
 
 def photographed(
@@ -58,20 +76,58 @@ def photographed(
     rng = np.random.default_rng(seed)
     width = int(120 + 30 * sigma) // 2 * 2
     centre = width / 2 + rng.uniform(-0.5, 0.5, rows)
+    if trouble.mosaic:  # what is filled in is of other scan lines, and right where the line is straight
+        centre = width / 2 + SLANT * (np.arange(rows) - 0.5 * rows)
     peak = signal * max(trouble.overexposure, 1.0)
-    mean = expected(width, centre, peak, sigma, 0.0)
+    mean = _spoiled(trouble, width, centre, peak, sigma)
     if trouble.neighbour:
         mean += expected(width, centre + max(trouble.neighbour * sigma, 2.0), 0.3 * peak, sigma, 0.0)
     if trouble.halo:
         mean += expected(width, centre + 3.0 * sigma, trouble.halo * peak, 4.0 * sigma, 0.0)
+    if trouble.reflection:
+        mean += expected(width, centre + 5.0 * sigma, trouble.reflection * peak, 3.0 * sigma, 0.0)
     x = np.arange(width) - centre[:, None]
     slope = trouble.slope * peak * min(sigma / 0.6, 1.0) * min(2.0 / sigma, 1.0)
     ground = BACKGROUND + slope * x
     mean += ground - min(0.0, ground.min() - BACKGROUND)
     image = rng.poisson(mean) + rng.normal(0.0, READ_NOISE, mean.shape)
+    if trouble.edge == 0.0:
+        centre = np.where(edges(rows) > 0.0, centre, np.nan)
+    if trouble.mosaic:
+        return filled_in(image).astype(np.float32), centre, electrons(READ_NOISE, alike=True)
     if not trouble.overexposure:
         return image.astype(np.float32), centre, electrons(READ_NOISE)
     return np.minimum(image, signal).astype(np.float32), centre, electrons(READ_NOISE, saturation=signal)
+
+
+def _spoiled(trouble: Trouble, width: int, centre: Array, peak: float, sigma: float) -> Array:
+    """(rows, width) mean light of the line itself, in parts of a pixel where its shape is not that of a Gaussian."""
+    if trouble.defocus == 0.0 and trouble.edge == 1.0:
+        return expected(width, centre, peak, sigma, 0.0)
+    parts = max(FINEST_PARTS, int(np.ceil(FINEST_PARTS / sigma)) // 2 * 2 + 1)
+    light = expected(width * parts, (centre + 0.5) * parts - 0.5, peak / parts, sigma * parts, 0.0)
+    x = (np.arange(width * parts) + 0.5) / parts - 0.5 - centre[:, None]
+    if trouble.defocus:
+        radius = trouble.defocus * sigma * parts
+        offsets = np.arange(-int(radius), int(radius) + 1)
+        chord = np.sqrt(radius**2 - offsets**2)
+        light = convolve1d(light, chord / chord.sum(), axis=1)
+    if trouble.edge != 1.0:
+        light *= np.where(x > edges(len(centre))[:, None], trouble.edge, 1.0)
+    return np.asarray(light.reshape(len(centre), width, parts).sum(axis=2))
+
+
+def edges(rows: int) -> Array:
+    """(rows,) px from the line's centre to an edge that crosses it, in the middle of the scan lines from the left."""
+    return (np.arange(rows) - 0.5 * rows) / EDGE_ROWS
+
+
+def filled_in(image: Array) -> Array:
+    """A colour that a Bayer mosaic sees at even columns of even scan lines (h, w), bilinear between them."""
+    seen = np.zeros(image.shape)
+    seen[::2, ::2] = image[::2, ::2]
+    weights = np.array([0.5, 1.0, 0.5])
+    return np.asarray(convolve1d(convolve1d(seen, weights, axis=0), weights, axis=1))
 
 
 @dataclass(frozen=True)
@@ -93,7 +149,7 @@ class Coverage:
 
 def coverage(line: Line, centre: Array) -> Coverage:
     """How often the error is below sigma, and below twice sigma."""
-    good = line.valid[:, 0]
+    good = line.valid[:, 0] & np.isfinite(centre)
     error = np.abs(line.u[good, 0] - centre[good])
     sigma = line.sigma_u[good, 0]
     if not good.any():
@@ -103,8 +159,8 @@ def coverage(line: Line, centre: Array) -> Coverage:
         float(np.mean(error < sigma)),
         float(np.mean(error < 2.0 * sigma)),
         int(good.sum()),
-        float(np.mean(~good)),
-        float(np.mean(good & (line.flag[:, 0] != Flag.OK))),
+        float(np.mean(~good[np.isfinite(centre)])),
+        float(np.mean((good & (line.flag[:, 0] != Flag.OK))[np.isfinite(centre)])),
         rms,
         float(np.median(sigma)),
     )

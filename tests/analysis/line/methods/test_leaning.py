@@ -39,6 +39,14 @@ def test_lines_that_only_noise_has_parted_are_found_by_their_neighbours():
     assert (parts_alone(flag, lean) == (flag == Flag.OK)).all()
 
 
+def test_a_line_among_others_that_do_not_fit_is_none_either_and_one_beside_them_is():
+    lean = np.zeros((200, 1))
+    lean[:100:3] = np.inf
+    flagged = leans_as_neighbours_do(lean, np.ones_like(lean))[:, 0]
+    assert flagged[1:85][np.isfinite(lean[1:85, 0])].all()
+    assert not flagged[100:].any()
+
+
 @pytest.mark.parametrize("known", [True, False], ids=["noise known", "noise estimated"])
 @pytest.mark.parametrize("sigma", [0.6, 2.0])
 def test_a_neighbour_too_faint_for_one_scan_line_flags_all_of_them(sigma, known):
