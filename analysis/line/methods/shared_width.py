@@ -56,7 +56,7 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] |
     if known.sum() < FEWEST:
         return None
     best, mass = np.split(np.where(known[:, None], told, 0.0), 2, axis=1)
-    own, variance = _moments(mass, PRIOR_WIDTHS)
+    _, variance = _moments(mass, PRIOR_WIDTHS)
     moved = _new_places(np.where(known, u, np.nan), sigma_u)
     alike = known.astype(np.float64)
     for _ in range(2):
@@ -67,12 +67,11 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] |
         log = _weighed(total, BETWEEN)
         shared, _ = _moments(log, FINE_WIDTHS)
         enough = known & (count >= FEWEST)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            apart = (own - shared) ** 2 / variance
+        apart = _deviance(mass, shared)
         # those that scatter more than their pixels say, by speckle, say less
-        usual = apart[enough & np.isfinite(apart)]
+        usual = apart[enough]
         scatter = max(float(np.median(usual)) / 0.455, 1.0) if len(usual) else 1.0
-        alike = known * _alike(np.sqrt(np.nan_to_num(apart) / scatter))
+        alike = known * _alike(np.sqrt(apart / scatter))
     needed = enough & (alike > 0.0) & (shared < WIDEST) & (variance * scatter > SURE**2)
     if not needed.any():
         return None
@@ -90,6 +89,15 @@ def _alike(apart: Float) -> Float:
     """Standard deviations from the neighbours' width -> the weight of a line among them, 1 to 0."""
     near, far = STRANGE
     return np.clip((far - apart) / (far - near), 0.0, 1.0)
+
+
+def _deviance(log: Float, width: Float) -> Float:
+    """(n, m) logarithms of densities at PRIOR_WIDTHS and widths (n,) -> (n,) twice what a width is less likely than the
+    likeliest: chi-square where it is the true one, also where the density is far from normal."""
+    left = np.clip(np.searchsorted(PRIOR_WIDTHS, width) - 1, 0, len(PRIOR_WIDTHS) - 2)
+    along = (width - PRIOR_WIDTHS[left]) / (PRIOR_WIDTHS[left + 1] - PRIOR_WIDTHS[left])
+    rows = np.arange(len(log))
+    return 2.0 * (log.max(axis=1) - (1.0 - along) * log[rows, left] - along * log[rows, left + 1])
 
 
 def _moments(log: Float, widths: Float) -> tuple[Float, Float]:
