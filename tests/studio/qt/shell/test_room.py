@@ -109,7 +109,7 @@ def test_no_workspace_makes_the_window_larger_than_a_small_screen_at_1_5(window:
     window.session.add_render(Render(1, small_project(), world, frame))
     grown = []
     window.resize(size)
-    for key in ("setup", "render", "measure", "study", "setup", "measure", "render", "setup"):
+    for key in ("setup", "render", "measure", "study", "calibrate", "setup", "measure", "render", "setup"):
         window.switch_to(key)
         for item in ITEMS if key == "setup" else ():
             window.session.select(item)

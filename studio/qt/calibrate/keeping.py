@@ -1,0 +1,67 @@
+"""What was found is kept: as a calibration file, and in the open project, as a step of its history.
+
+What cannot be done is told in the work's `problem`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from render.base.errors import InputError
+from studio.qt.calibrate.calibration_work import CalibrationWork
+
+
+def save(work: CalibrationWork, file: Path) -> None:
+    """Write the calibration file, whole or not at all."""
+    from studio.calibration.calibration_file import write_calibration
+    from studio.calibration.solving import in_window
+
+    if work.solved is None:
+        return
+    try:
+        write_calibration(file, _data(work))
+    except InputError as error:
+        work.tell(in_window(error))
+        return
+    work.session.message.emit("info", f"Saved the calibration: {file}")
+    work.tell("")
+
+
+def use(work: CalibrationWork) -> None:
+    """Points of the project are made with what was found."""
+    if work.solved is not None:
+        _use(work, _data(work))
+
+
+def use_file(work: CalibrationWork, file: Path) -> None:
+    """Points of the project are made with a calibration file."""
+    from studio.project.calibration import read_calibration_file
+
+    try:
+        data = read_calibration_file(file, str(file))
+    except InputError as error:
+        work.tell(str(error))
+        return
+    _use(work, data)
+
+
+def _use(work: CalibrationWork, data: dict[str, Any]) -> None:
+    from studio.calibration.solving import of_project
+
+    try:
+        work.session.document.set(("calibration",), of_project(data), "use the calibration")
+    except InputError as error:
+        work.tell(f"The project does not take the calibration: {error}")
+        return
+    work.session.message.emit("info", "Points of the project are made with the calibration")
+    work.tell("")
+
+
+def _data(work: CalibrationWork) -> dict[str, Any]:
+    from studio.calibration.board_text import board_text
+    from studio.calibration.calibration_file import file_data
+
+    solved = work.solved
+    assert solved is not None
+    return file_data(solved.result, solved.size, board_text(solved.board))
