@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QStackedLayout, QTabBar, QToolButton, QVBoxLayout, QWidget
 
@@ -60,7 +60,9 @@ class BoardView(QWidget):
         self.laser.setToolTip("Whose depth error is shown")
         self.view, self.plot = PictureView(), DepthPlot()
         self.items = BoardItems(self.view.box)
-        self.fit = QToolButton(text="Fit", toolTip="The whole image")
+        self.fit = QToolButton()
+        self.fit.setText("Fit")
+        self.fit.setToolTip("The whole image")
         self.fit.clicked.connect(self.view.fit)
         self.caption = QLabel(wordWrap=True)
         self.caption.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -75,16 +77,12 @@ class BoardView(QWidget):
         self.laser.activated.connect(self.refresh)
         for changed in (self.work.material_changed, self.work.solved_changed, self.work.shown_changed):
             changed.connect(self.refresh)
+        theme.notice.changed.connect(self._colour)
         self._colour()
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.refresh()
-
-    def changeEvent(self, event: QEvent) -> None:
-        if event.type() == QEvent.Type.PaletteChange and hasattr(self, "plot"):
-            self._colour()
-        super().changeEvent(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.runner.close()

@@ -44,10 +44,9 @@ class CalibratePanel(QWidget):
 
     def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.session, self.runner = session, runner
-        self.work = one_of(CalibrationWork, session)
-        self.work.attach(runner)
         self.setMinimumWidth(NARROWEST)
+        self.session, self.runner, self.work = session, runner, one_of(CalibrationWork, session)
+        self.work.attach(runner)
         self.photographs = text_button("Photographs…", "A folder of photographs of a board; or drop it here")
         self.simulate = text_button("In silico", "Virtual boards before the open project's camera, beside the truth")
         self.source = ElidedLabel(Qt.TextElideMode.ElideMiddle)
@@ -179,6 +178,9 @@ class CalibratePanel(QWidget):
         self.runner.progress.connect(self._tell_progress)
 
     def _lay_out(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(8, 8, 8, 8)
+        column.setSpacing(6)
         sources = QHBoxLayout()
         sources.addWidget(self.photographs)
         sources.addWidget(self.simulate)
@@ -193,12 +195,9 @@ class CalibratePanel(QWidget):
         running.addWidget(self.stage, 1)
         running.addWidget(self.stop)
         buttons = QHBoxLayout()
-        buttons.addWidget(self.use)
-        buttons.addWidget(self.save)
+        for button in (self.use, self.save):
+            buttons.addWidget(button)
         buttons.addStretch(1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(8, 8, 8, 8)
-        column.setSpacing(6)
         column.addLayout(sources)
         column.addWidget(self.source)
         column.addLayout(form)

@@ -36,14 +36,8 @@ BOARD = "checkerboard:13x9:25mm"
 class CalibrationWork(QObject):
     """Never asks a person anything: what cannot be done is told in `problem`."""
 
-    material_changed = Signal()
-    """Other views, or none."""
-    solved_changed = Signal()
-    """`solved` is another one, or None."""
-    counted_changed = Signal()
-    """`dropped` holds others."""
-    shown_changed = Signal()
-    """`shown` is another view."""
+    material_changed, solved_changed, counted_changed, shown_changed = Signal(), Signal(), Signal(), Signal()
+    """`material`, `solved`, `dropped`, `shown` is another one, or none."""
     state_changed = Signal()
     """Work began or ended, `problem` is another one, or what is asked for."""
 
@@ -84,8 +78,8 @@ class CalibrationWork(QObject):
     def attach(self, jobs: JobRunner) -> None:
         """Work is done by the window's runner."""
         self.jobs = jobs
-        jobs.cancelled.connect(self._end)
-        jobs.failed.connect(self._end)
+        for ended in (jobs.cancelled, jobs.failed):
+            ended.connect(self._end)
 
     @property
     def running(self) -> bool:
@@ -200,9 +194,10 @@ class CalibrationWork(QObject):
 
     def show(self, name: str) -> None:
         """Look at another view."""
-        if name != self.shown:
-            self.shown = name
-            self.shown_changed.emit()
+        if name == self.shown:
+            return
+        self.shown = name
+        self.shown_changed.emit()
 
     def residuals(self) -> Residuals | None:
         """Of the view that is looked at; None: it has none."""

@@ -47,11 +47,10 @@ class ViewTable(QTableWidget):
         for column, kind in enumerate((mode.ResizeToContents, mode.ResizeToContents, mode.Stretch)):
             header.setSectionResizeMode(column, kind)
         header.setMinimumSectionSize(48)
-        work.material_changed.connect(self.refresh)
-        work.solved_changed.connect(self.refresh)
+        for changed in (work.material_changed, work.solved_changed, theme.notice.changed):
+            changed.connect(self.refresh)
         work.counted_changed.connect(self._show_ticks)
         work.shown_changed.connect(self._mark)
-        theme.notice.changed.connect(self.refresh)
         self.itemChanged.connect(self._tick)
         self.currentCellChanged.connect(self._choose)
         self.refresh()
