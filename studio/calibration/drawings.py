@@ -100,6 +100,7 @@ class DepthMap:
 def depth_map(one: DepthError, estimate: Estimate) -> DepthMap:
     """Of one laser, interpolated between the points of its working volume."""
     from scipy.interpolate import griddata
+    from scipy.spatial import QhullError
 
     volume, m = one.volume, estimate.planes[one.volume.laser]
     along = 1 if abs(m[0]) >= abs(m[1]) else 0
@@ -109,7 +110,10 @@ def depth_map(one: DepthError, estimate: Estimate) -> DepthMap:
     x, z = np.meshgrid(np.linspace(*across, MAP[0]), np.linspace(*depth, MAP[1]))
     wide, deep = max(np.ptp(across), 1e-9), max(np.ptp(depth), 1e-9)
     scaled = np.column_stack([place / wide, volume.depth / deep])
-    sigma = griddata(scaled, one.systematic, (x / wide, z / deep), method="linear")
+    try:
+        sigma = griddata(scaled, one.systematic, (x / wide, z / deep), method="linear")
+    except (QhullError, ValueError):  # too few points, or all of them on one line
+        sigma = np.full(x.shape, np.nan)
     return DepthMap(volume.laser, np.asarray(sigma), across, depth)
 
 

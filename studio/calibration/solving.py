@@ -15,6 +15,7 @@ from analysis.calibration.calibrate import Calibrated, Known, Request, calibrate
 from analysis.calibration.estimate import Estimate
 from render.base.errors import InputError
 from studio.calibration.calibration_file import read_calibration
+from studio.calibration.drawings import DepthMap, depth_map
 from studio.calibration.in_silico import true_depth_error
 from studio.calibration.material import Material
 from studio.calibration.view_residuals import Residuals, ViewRow, view_rows
@@ -28,6 +29,8 @@ class Solved:
 
     result: Calibrated
     rows: tuple[tuple[ViewRow, Residuals | None], ...]
+    maps: tuple[DepthMap, ...]
+    """Of `result.depth`."""
     true: tuple[tuple[float, float], ...] | None
     board: Board
     size: tuple[int, int]
@@ -43,7 +46,8 @@ def solve(
     result = calibrate(kept.views, board.target, request)
     rows = view_rows(material.views, dropped, material.notes, result, board.target)
     true = None if truth is None else tuple(true_depth_error(result, truth))
-    return Solved(result, tuple(rows), true, board, material.size, len(kept.views))
+    maps = tuple(depth_map(one, result.estimate) for one in result.depth)
+    return Solved(result, tuple(rows), maps, true, board, material.size, len(kept.views))
 
 
 def held_camera(file: Path | None, size: tuple[int, int]) -> Known:

@@ -17,7 +17,6 @@ from studio.calibration.drawings import (
     arrow_scale,
     covered,
     dark_squares,
-    depth_map,
     levels_of,
     outline,
 )
@@ -174,10 +173,11 @@ class BoardView(QWidget):
         advice = solved.result.advice
         if advice is None:
             return NO_LASER
-        rotation, translation = advised_pose(advice, solved.board)
-        pose = posed(solved.result, rotation, translation), rotation, translation
-        self.items.show_ghost(outline(solved.board, *pose), dark_squares(solved.board, *pose))
         told = next_sentence(advice, self.work.target_um)
+        if not told.startswith("enough"):
+            rotation, translation = advised_pose(advice, solved.board)
+            pose = posed(solved.result, rotation, translation), rotation, translation
+            self.items.show_ghost(outline(solved.board, *pose), dark_squares(solved.board, *pose))
         return f"{told[0].upper()}{told[1:]}"
 
     def _draw_coverage(self) -> str:
@@ -201,7 +201,7 @@ class BoardView(QWidget):
         solved = self.work.solved
         assert solved is not None
         one = solved.result.depth[number]
-        self.plot.show_map(depth_map(one, solved.result.estimate))
+        self.plot.show_map(solved.maps[number])
         self.caption.setText(
             f"Laser {one.volume.laser}: depth errs by {1e6 * one.rms:.1f} µm rms, where it is worst by "
             f"{1e6 * one.systematic.max():.1f} µm, by the calibration alone; no mean over scans removes it"

@@ -7,9 +7,10 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
+from studio.project.calibration import Calibration
 from studio.qt.calibrate.calibrate_panel import CalibratePanel
 from studio.qt.calibrate.calibration_work import CalibrationWork
-from studio.qt.calibrate.keeping import use
+from studio.qt.calibrate.keeping import remove, use
 from studio.qt.core.actions import Actions
 from studio.qt.core.session import Session, one_of
 
@@ -39,6 +40,8 @@ class CalibrateActions(QObject):
         actions.connect("save_calibration", panel.ask_and_save)
         actions.connect("use_calibration", lambda: use(self.work))
         actions.connect("use_calibration_file", panel.ask_and_use)
+        actions.connect("remove_calibration", lambda: remove(self.work))
+        session.project_changed.connect(self.refresh)
         self.work.solved_changed.connect(self.refresh)
         self.work.material_changed.connect(self.refresh)
         self.refresh()
@@ -46,6 +49,7 @@ class CalibrateActions(QObject):
     def refresh(self) -> None:
         for key in ("save_calibration", "use_calibration"):
             self.actions[key].setEnabled(self.work.solved is not None)
+        self.actions["remove_calibration"].setEnabled(self.work.session.project.calibration != Calibration())
         self.actions["drop_view"].setEnabled(self.work.material is not None)
 
     def toggle_view(self) -> None:

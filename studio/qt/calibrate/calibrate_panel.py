@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from studio.project.calibration import Calibration
 from studio.qt.calibrate.calibration_work import BOARD, CalibrationWork
 from studio.qt.calibrate.keeping import save, use, use_file
 from studio.qt.calibrate.view_table import ViewTable
@@ -83,9 +84,12 @@ class CalibratePanel(QWidget):
         self.stop = text_button("Stop", "What was found before stays")
         self.save = text_button("Save…", "The calibration file, which projects and later calibrations load")
         self.use = text_button("Use in project", "Points of the open project are made with what was found", "primary")
+        self.project = QLabel()
+        self.project.setObjectName("muted")
         self._lay_out()
         self._connect()
         self.refresh()
+        self._tell_project()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.work.close()
@@ -109,8 +113,14 @@ class CalibratePanel(QWidget):
         if not self.board.hasFocus():
             self.board.setText(work.board_text)
         self.lens.setEnabled(work.what != "laser")  # the known camera has its own
+        file = work.camera_file
+        self.what.setItemText(len(PARTS) - 1, f"Lasers, {file.name}" if file is not None else PARTS[-1][0])
         with QSignalBlocker(self.what):
             self.what.setCurrentIndex(next(i for i, (_, part) in enumerate(PARTS) if part == work.what))
+
+    def _tell_project(self) -> None:
+        calibrated = self.session.project.calibration != Calibration()
+        self.project.setText("The project has a calibration" if calibrated else "The project has no calibration")
 
     def ask_folder(self) -> None:
         """For the folder of photographs."""
@@ -176,6 +186,7 @@ class CalibratePanel(QWidget):
         for changed in (work.state_changed, work.material_changed, work.solved_changed):
             changed.connect(self.refresh)
         self.runner.progress.connect(self._tell_progress)
+        self.session.project_changed.connect(self._tell_project)
 
     def _lay_out(self) -> None:
         column = QVBoxLayout(self)
@@ -206,4 +217,5 @@ class CalibratePanel(QWidget):
         for widget in (self.problem, self.bar):
             column.addWidget(widget)
         column.addLayout(running)
+        column.addWidget(self.project)
         column.addLayout(buttons)

@@ -35,6 +35,9 @@ class DepthPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
     def show_map(self, shown: DepthMap) -> None:
         micrometres = 1e6 * shown.sigma
+        if not np.isfinite(micrometres).any():
+            self.picture.clear()
+            return
         low, high = float(np.nanmin(micrometres)), float(np.nanmax(micrometres))
         self.picture.setImage(micrometres, autoLevels=False)
         (x0, x1), (z0, z1) = shown.across, shown.depth

@@ -46,6 +46,13 @@ def use_file(work: CalibrationWork, file: Path) -> None:
     _use(work, data)
 
 
+def remove(work: CalibrationWork) -> None:
+    """Points of the project are made with its scene's camera and planes, as if they were exact."""
+    from studio.project.calibration import Calibration
+
+    work.session.set(("calibration",), Calibration(), "remove the calibration")
+
+
 def _use(work: CalibrationWork, data: dict[str, Any]) -> None:
     from studio.calibration.solving import of_project
 

@@ -127,6 +127,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("save_calibration", "Calibrate", "Sa&ve the calibration…", "", "", "A file that projects load"),
     Command("use_calibration", "Calibrate", "&Use it in the project", "", "", "Points are made with what was found"),
     Command("use_calibration_file", "Calibrate", "Use a calibration &file in the project…"),
+    Command("remove_calibration", "Calibrate", "&Remove it from the project", "", "", "Points are made by the scene"),
     Command("help", "Help", "&Contents", "F1", "help", "The page of the panel that has the focus"),
     Command("search", "Help", "&Find a command…", "Ctrl+P", "", "Everything that the menus can do, by a few letters"),
     Command("shortcuts", "Help", "&Shortcuts", "Ctrl+/"),

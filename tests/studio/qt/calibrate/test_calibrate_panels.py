@@ -12,6 +12,7 @@ from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from analysis.calibration.virtual import noisy
+from studio.calibration import material
 from studio.calibration.material import Material
 from studio.project.document import Document
 from studio.project.project import Project
@@ -31,10 +32,12 @@ from tests.studio.qt.shell.window_hands import drop as drop_on
 VIEWS = 8
 
 
-def seen(count: int = VIEWS) -> Material:
+THERE = truth(3, VIEWS, tilt=(15.0, 35.0))
+
+
+def seen() -> Material:
     """Corners and lines with noise, of boards that no photograph shows."""
-    exact = views_of(truth(3, count, tilt=(15.0, 35.0)), laser_step=64)
-    return Material(tuple(noisy(exact, np.random.default_rng(3))), SIZE, 1)
+    return Material(tuple(noisy(views_of(THERE, laser_step=64), np.random.default_rng(3))), SIZE, 1)
 
 
 class Desk:
@@ -74,8 +77,10 @@ def settled(qtbot: QtBot, desk: Desk) -> None:
 
 
 @pytest.fixture
-def solved(qtbot: QtBot, desk: Desk) -> Desk:
-    desk.work._take(seen())
+def solved(qtbot: QtBot, desk: Desk, monkeypatch: pytest.MonkeyPatch) -> Desk:
+    """With a calibration of virtual boards, fewer than a person gets."""
+    monkeypatch.setattr(material, "virtual", lambda project, board: (seen(), THERE))
+    qtbot.mouseClick(desk.panel.simulate, Qt.MouseButton.LeftButton)
     settled(qtbot, desk)
     assert desk.work.problem == ""
     return desk
@@ -144,7 +149,7 @@ class TestPictures:
         assert x.min() < middle[0] < x.max() and y.min() < middle[1] < y.max()
         assert f"{1e6 * advice.before:.1f} -> {1e6 * advice.after:.1f} µm" in boards.caption.text()
         solved.panel.target.setValue(1e5)
-        assert boards.caption.text().startswith("Enough")
+        assert boards.caption.text().startswith("Enough") and len(boards.items.edge.getData()[0]) == 0
 
     def test_coverage_counts_the_parts_of_the_image_that_have_corners(self, solved: Desk) -> None:
         solved.boards.tabs.setCurrentIndex(COVERAGE)
@@ -185,11 +190,33 @@ class TestKeeping:
         kept = document.project.calibration
         assert kept.camera is not None and kept.camera.fx == fx and kept.covariance(0) is not None
         assert document.undo_label == "use the calibration"
+        assert solved.panel.project.text() == "The project has a calibration"
         document.undo()
         assert document.project.calibration.camera is None
+        assert solved.panel.project.text() == "The project has no calibration"
         save(work, tmp_path / "calibration.json")
         use_file(work, tmp_path / "calibration.json")
         assert document.project.calibration == kept
+
+    def test_lasers_alone_hold_the_camera_of_a_file(self, qtbot: QtBot, solved: Desk, tmp_path: Path) -> None:
+        work, file = solved.work, tmp_path / "camera.json"
+        save(work, file)
+        assert work.solved is not None
+        before, sigma = work.solved.result, work.solved.result.adjusted.solution.covariance[0, 0] ** 0.5
+        work.choose_what("laser", file)
+        settled(qtbot, solved)
+        now = work.solved.result
+        assert solved.panel.what.currentText() == "Lasers, camera.json" and not solved.panel.lens.isEnabled()
+        # the same views beside the camera that they gave: it stays, and is known by half of its variance
+        assert now.estimate.intrinsics[0] == pytest.approx(before.estimate.intrinsics[0], abs=0.5 * sigma)
+        assert now.adjusted.solution.covariance[0, 0] ** 0.5 == pytest.approx(sigma / np.sqrt(2.0), rel=0.05)
+        work.choose_what("laser", None)
+        assert "need a camera" in solved.panel.problem.text()
+        work.choose_what("camera")
+        settled(qtbot, solved)
+        assert work.solved is not None and len(work.solved.result.estimate.planes) == 0
+        solved.boards.tabs.setCurrentIndex(NEXT)
+        assert "where a laser is calibrated" in solved.boards.caption.text()
 
     def test_a_project_of_another_camera_does_not_take_it(self, solved: Desk) -> None:
         project = solved.session.project
