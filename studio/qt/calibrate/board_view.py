@@ -7,7 +7,17 @@ from pathlib import Path
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QCloseEvent, QShowEvent
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QStackedLayout, QTabBar, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QHBoxLayout,
+    QLabel,
+    QStackedLayout,
+    QTabBar,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from render.base.errors import InputError
 from render.base.threads import Cancel
@@ -59,6 +69,8 @@ class BoardView(QWidget):
         self.laser.setToolTip("Whose depth error is shown")
         self.view, self.plot = PictureView(), DepthPlot()
         self.items = BoardItems(self.view.box)
+        self.lit = QCheckBox("Laser on")
+        self.lit.setToolTip("The photograph with the laser's line, in place of the board's own")
         self.fit = QToolButton()
         self.fit.setText("Fit")
         self.fit.setToolTip("The whole image")
@@ -74,6 +86,7 @@ class BoardView(QWidget):
         self._lay_out()
         self.tabs.currentChanged.connect(self.refresh)
         self.laser.activated.connect(self.refresh)
+        self.lit.toggled.connect(self.refresh)
         for changed in (self.work.material_changed, self.work.solved_changed, self.work.shown_changed):
             changed.connect(self.refresh)
         theme.notice.changed.connect(self._colour)
@@ -96,6 +109,9 @@ class BoardView(QWidget):
         self._fill_lasers([one.volume.laser for one in depths])
         self.laser.setVisible(tab == DEPTH and len(depths) > 1)
         self.fit.setVisible(tab != DEPTH)
+        shot = self.work.shot()
+        pair = shot is not None and shot.board is not None and bool(shot.lasers)
+        self.lit.setVisible(pair and tab in (RESIDUALS, NEXT))
         self.stack.setCurrentIndex(1 if tab == DEPTH and depths else 0)
         self.items.clear()
         if tab == DEPTH and depths:
@@ -115,7 +131,10 @@ class BoardView(QWidget):
             self.view.item.set_levels([], (1, 1))
             return
         size, shot = work.material.size, work.shot()
-        file = None if shot is None or not photograph else shot.board or next(iter(shot.lasers.values()))
+        file = None
+        if shot is not None and photograph:
+            lit = next(iter(shot.lasers.values()), None)
+            file = (lit if self.lit.isChecked() else shot.board) or shot.board or lit
         if self._size != size:
             self._size = size
             self.view.item.set_levels([], size)
@@ -221,6 +240,7 @@ class BoardView(QWidget):
         bar.setContentsMargins(0, 0, 6, 0)
         bar.addWidget(self.tabs, 1)
         bar.addWidget(self.laser)
+        bar.addWidget(self.lit)
         bar.addWidget(self.fit)
         holder = QWidget()
         self.stack = QStackedLayout(holder)

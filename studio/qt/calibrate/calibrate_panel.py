@@ -89,7 +89,6 @@ class CalibratePanel(QWidget):
         self._lay_out()
         self._connect()
         self.refresh()
-        self._tell_project()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.work.close()
@@ -187,6 +186,7 @@ class CalibratePanel(QWidget):
             changed.connect(self.refresh)
         self.runner.progress.connect(self._tell_progress)
         self.session.project_changed.connect(self._tell_project)
+        self._tell_project()
 
     def _lay_out(self) -> None:
         column = QVBoxLayout(self)

@@ -103,7 +103,7 @@ class CalibrationWork(QObject):
 
         try:
             taken = shots(folder)
-        except InputError as error:
+        except (InputError, OSError) as error:
             self.tell(str(error))
             return
         self._forget()
@@ -120,11 +120,11 @@ class CalibrationWork(QObject):
             for folder in dict.fromkeys(file.parent for file in files):
                 wanted = {file for file in files if file.parent == folder} - known
                 new += [shot for shot in shots(folder) if wanted & _files(shot)]
-        except InputError as error:
+        except (InputError, OSError) as error:
             self.tell(str(error))
             return
         if not new:
-            self.tell("These photographs are there already")
+            self.tell("These photographs are there already" if known.issuperset(files) else "There is no photograph")
             return
         if self.virtual or not self.shots:
             self._forget()
