@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from studio.project.calibration import Calibration
 from studio.qt.calibrate.calibration_work import BOARD, CalibrationWork
-from studio.qt.calibrate.keeping import save, use, use_file
+from studio.qt.calibrate.keeping import FORMS, save, use, use_file
 from studio.qt.calibrate.view_table import ViewTable
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
@@ -82,7 +82,9 @@ class CalibratePanel(QWidget):
         self.stage = QLabel()
         self.stage.setObjectName("muted")
         self.stop = text_button("Stop", "What was found before stays")
-        self.save = text_button("Save…", "The calibration file, which projects and later calibrations load")
+        self.save = text_button(
+            "Save…", "The calibration file, for projects and later calibrations; or the camera for others"
+        )
         self.use = text_button("Use in project", "Points of the open project are made with what was found", "primary")
         self.project = QLabel()
         self.project.setObjectName("muted")
@@ -132,10 +134,10 @@ class CalibratePanel(QWidget):
         if self.work.solved is None:
             return
         suggestion = str(Path(self._place()) / "calibration.json")
-        chosen, _ = QFileDialog.getSaveFileName(self, "Save the calibration", suggestion, FILES)
+        chosen, kind = QFileDialog.getSaveFileName(self, "Save the calibration", suggestion, ";;".join(FORMS))
         if chosen:
-            path = Path(chosen)
-            save(self.work, path if path.suffix else path.with_suffix(".json"))
+            path, ending = Path(chosen), kind.rpartition("*")[2].rstrip(")")
+            save(self.work, path if path.suffix else path.with_suffix(ending or ".json"), FORMS.get(kind, ""))
 
     def ask_and_use(self) -> None:
         """For a calibration file that the project is to be measured with."""

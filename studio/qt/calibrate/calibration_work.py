@@ -67,7 +67,7 @@ class CalibrationWork(QObject):
         self.problem = ""
         self.job: Job[Any] | None = None
         self._with_lines = False
-        """Lines were looked for."""
+        """Lines were looked for in the photographs."""
         self._unread: list[Shot] = []
         self._turn = 0
         """Counts what was begun: the result of all but the last is no longer wanted."""
@@ -154,7 +154,7 @@ class CalibrationWork(QObject):
             if isinstance(made, str):
                 self._fail(made)
                 return
-            self.truth, self._with_lines = made[1], True
+            self.truth = made[1]
             self._take(made[0])
 
         self._forget()
@@ -169,7 +169,7 @@ class CalibrationWork(QObject):
     def choose_what(self, what: What, camera_file: Path | None = None) -> None:
         """What is calibrated; camera_file: of the camera that is held, for lasers alone."""
         self.what, self.camera_file = what, camera_file
-        if self.material is not None and what != "camera" and not self._with_lines:
+        if self.shots and what != "camera" and not self._with_lines:
             self._anew()
         else:
             self.solve()
@@ -286,10 +286,9 @@ class CalibrationWork(QObject):
                 else:
                     self._fail(found)
             else:
-                self._with_lines = lasers
                 self._take(found)
 
-        self._unread = list(taken)
+        self._unread, self._with_lines = list(taken), lasers
         self._start("look for boards", work, then)
 
     def _task(self, board: Board) -> Callable[[Progress, Cancel], Solved | str]:
@@ -368,6 +367,7 @@ class CalibrationWork(QObject):
         if job is not None and job is self.job:
             self.shots = [shot for shot in self.shots if shot not in self._unread]
             self.job, self._unread = None, []
+            self.source = self.source if self.shots or self.virtual else ""
             self.state_changed.emit()
 
     def _fail(self, problem: str) -> None:

@@ -11,20 +11,36 @@ from typing import Any
 from render.base.errors import InputError
 from studio.qt.calibrate.calibration_work import CalibrationWork
 
+FORMS = {
+    "Calibration (*.json)": "",
+    "Camera for OpenCV (*.yaml)": "opencv",
+    "Camera for ROS (*.yaml)": "ros",
+    "Camera for Kalibr (*.yaml)": "kalibr",
+    "Camera for mrcal (*.cameramodel)": "mrcal",
+}
+"""As a file dialog offers them, and which of `exchange.WRITERS` writes it; "": the calibration file."""
 
-def save(work: CalibrationWork, file: Path) -> None:
-    """Write the calibration file, whole or not at all."""
+
+def save(work: CalibrationWork, file: Path, form: str = "") -> None:
+    """Write the calibration file, or the camera in a format of others, whole or not at all."""
     from studio.calibration.calibration_file import write_calibration
-    from studio.calibration.solving import in_window
+    from studio.calibration.exchange import write_camera
+    from studio.calibration.solving import in_window, of_project
 
     if work.solved is None:
         return
+    data = _data(work)
     try:
-        write_calibration(file, _data(work))
+        if form:
+            camera = of_project(data).camera
+            assert camera is not None
+            write_camera(file, camera, form)
+        else:
+            write_calibration(file, data)
     except InputError as error:
         work.tell(in_window(error))
         return
-    work.session.message.emit("info", f"Saved the calibration: {file}")
+    work.session.message.emit("info", f"Saved the {'camera' if form else 'calibration'}: {file}")
     work.tell("")
 
 

@@ -124,7 +124,7 @@ COMMANDS: tuple[Command | str, ...] = (
     "Calibrate/-",
     Command("drop_view", "Calibrate", "&Drop or restore the view", "", "", "And adjust the rest again"),
     "Calibrate/-",
-    Command("save_calibration", "Calibrate", "Sa&ve the calibration…", "", "", "A file that projects load"),
+    Command("save_calibration", "Calibrate", "Sa&ve the calibration…", "", "", "For projects to load; or for others"),
     Command("use_calibration", "Calibrate", "&Use it in the project", "", "", "Points are made with what was found"),
     Command("use_calibration_file", "Calibrate", "Use a calibration &file in the project…"),
     Command("remove_calibration", "Calibrate", "&Remove it from the project", "", "", "Points are made by the scene"),

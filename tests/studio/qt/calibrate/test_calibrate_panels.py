@@ -9,10 +9,12 @@ import cv2
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from analysis.calibration.virtual import noisy
 from studio.calibration import material
+from studio.calibration.exchange import read_camera
 from studio.calibration.material import Material
 from studio.project.document import Document
 from studio.project.project import Project
@@ -20,7 +22,7 @@ from studio.project.templates import template_folder
 from studio.qt.calibrate.board_view import COVERAGE, DEPTH, NEXT, RESIDUALS, BoardView
 from studio.qt.calibrate.calibrate_panel import CalibratePanel
 from studio.qt.calibrate.calibration_work import CalibrationWork
-from studio.qt.calibrate.keeping import save, use, use_file
+from studio.qt.calibrate.keeping import FORMS, save, use, use_file
 from studio.qt.calibrate.result_panel import CalibrationPanel
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, one_of
@@ -225,6 +227,19 @@ class TestKeeping:
         use(solved.work)
         assert "2448 x 2048" in solved.panel.problem.text() and solved.session.project.calibration.camera is None
 
+    def test_the_camera_is_written_for_others_as_the_dialog_says(
+        self, solved: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        for kind, name in ((kind, f"camera {number}") for number, kind in enumerate(FORMS)):
+            monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, n=name, k=kind: (str(tmp_path / n), k))
+            solved.panel.ask_and_save()
+        assert solved.work.problem == ""
+        files = sorted(tmp_path.iterdir())
+        assert [file.suffix for file in files] == [".json", ".yaml", ".yaml", ".yaml", ".cameramodel"]
+        assert solved.work.solved is not None
+        fx = float(solved.work.solved.result.estimate.intrinsics[0])
+        assert [read_camera(file).fx for file in files[1:]] == 4 * [pytest.approx(fx, rel=1e-12)]
+
     def test_no_other_file_is_written_over(self, solved: Desk, tmp_path: Path) -> None:
         other = tmp_path / "notes.json"
         other.write_text("{}")
@@ -251,25 +266,23 @@ class TestSources:
         assert text.startswith("Board: not a board") and "chess:3" in text and "--" not in text
 
     def test_photographs_are_read_joined_and_a_bad_one_is_named(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
-        there = scanner(6)
-        write_folder(tmp_path, there, pairs=False)
+        write_folder(tmp_path, scanner(4), pairs=False)
         late = tmp_path / "late"
         late.mkdir()
-        for name in ("pose_05.png", "pose_04.png"):
-            (tmp_path / name).rename(late / name)
+        (tmp_path / "pose_03.png").rename(late / "pose_03.png")
         (tmp_path / "broken.png").write_bytes(b"no image")
-        desk.work.board_text = BOARD
+        desk.work.board_text, desk.work.what = BOARD, "camera"
         desk.work.open_folder(tmp_path)
         settled(qtbot, desk)
         table = desk.panel.views
-        assert table.rowCount() == 5 and table.item(4, 0).text() == "broken.png"
-        assert "not an image" in table.item(4, 2).text()
+        assert table.rowCount() == 4 and table.item(3, 0).text() == "broken.png"
+        assert "not an image" in table.item(3, 2).text()
         assert desk.work.solved is not None, desk.work.problem
         before = desk.work.solved.result.estimate
-        (late / "again.png").write_bytes((tmp_path / "pose_03.png").read_bytes())
-        desk.work.add([late / "pose_04.png", late / "again.png"])
+        (late / "again.png").write_bytes((tmp_path / "pose_02.png").read_bytes())
+        desk.work.add([late / "pose_03.png", late / "again.png"])
         settled(qtbot, desk)
-        assert desk.work.solved.views == 5 and before is not desk.work.solved.result.estimate
+        assert desk.work.solved.views == 4 and before is not desk.work.solved.result.estimate
         assert any("there already" in text for text in desk.work.material.errors)  # type: ignore[union-attr]
         qtbot.waitUntil(lambda: not desk.boards.runner.busy)
         assert desk.boards.view.item.size == (640, 512)
@@ -299,6 +312,31 @@ class TestSources:
         desk.work.open_folder(tmp_path)
         settled(qtbot, desk)
         assert len(read) == 3 and desk.work.material is None and not desk.panel.stop.isVisible()
+        assert desk.panel.source.text() == "nothing yet"
+
+    def test_lines_are_looked_for_as_soon_as_lasers_are_asked_for(
+        self, qtbot: QtBot, desk: Desk, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked: list[bool] = []
+
+        def photographed(taken: object, board: object, settings: object, *, lasers: bool, progress: object) -> Material:
+            asked.append(lasers)
+            return seen() if lasers else seen().without_lasers()
+
+        monkeypatch.setattr(material, "photographed", photographed)
+        (tmp_path / "a.png").write_bytes(b"")
+        desk.work.choose_what("camera")
+        desk.work.open_folder(tmp_path)
+        desk.work.choose_what("scanner")  # in the middle of it
+        settled(qtbot, desk)
+        assert asked[-1] and desk.work.solved is not None and len(desk.work.solved.result.depth) == 1
+        desk.work.choose_what("camera")
+        settled(qtbot, desk)
+        assert not desk.work.solved.result.depth
+        count = len(asked)
+        desk.work.choose_what("scanner")
+        settled(qtbot, desk)
+        assert len(asked) == count and desk.work.solved.result.depth, "what was read before is there still"
 
 
 def test_a_folder_dropped_where_one_calibrates_holds_photographs(
