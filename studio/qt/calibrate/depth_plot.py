@@ -10,6 +10,8 @@ from studio.calibration.drawings import DepthMap
 from studio.qt.core import theme
 
 COLOURS = "viridis"
+AXIS_PX = 64
+"""Of the colours' scale, with its numbers and its name."""
 
 
 class DepthPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
@@ -27,6 +29,7 @@ class DepthPlot(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.scale = pg.ColorBarItem(colorMap=pg.colormap.get(COLOURS), interactive=False, width=14)
         self.scale.setImageItem(self.picture, insert_in=self.plot)
         self.scale.getAxis("right").setLabel("sigma of depth / µm")
+        self.scale.getAxis("right").setWidth(AXIS_PX)
         for axis in self._axes():
             axis.enableAutoSIPrefix(False)
         self.ci.layout.setContentsMargins(4, 8, 8, 4)

@@ -51,6 +51,8 @@ def page(solved: Solved, target_um: float | None) -> str:
     parts = []
     for fault in result.faults:
         parts.append(f"<p style='color: {c.warning}'><b>Caution</b> {escape(fault)}</p>")
+    if result.faults:
+        parts.append("<p></p>")
     if result.depth:
         header = ["Depth error / µm", "rms", "worst", "line", *(["true"] if solved.true else [])]
         rows = depth_rows(result, None if solved.true is None else list(solved.true))

@@ -24,11 +24,13 @@ from studio.qt.calibrate.calibrate_panel import CalibratePanel
 from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.calibrate.keeping import FORMS, save, use, use_file
 from studio.qt.calibrate.result_panel import CalibrationPanel
+from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, one_of
 from studio.qt.shell.window import MainWindow
 from tests.analysis.calibration.boards import SIZE, truth, views_of
 from tests.studio.calibration.photographed_boards import BOARD, scanner, write_folder
+from tests.studio.qt.shell.window_hands import contrast
 from tests.studio.qt.shell.window_hands import drop as drop_on
 
 VIEWS = 8
@@ -136,6 +138,18 @@ class TestViews:
             solved.work.drop(f"view {row}", dropped=False)
         settled(qtbot, solved)
         assert solved.panel.problem.isHidden() and solved.panel.use.isEnabled()
+
+    @pytest.mark.parametrize("choice", ["dark", "light"])
+    def test_a_box_that_is_not_ticked_can_be_seen(self, solved: Desk, choice: theme.Choice) -> None:
+        """WCAG 2.1 asks for 3 to 1."""
+        theme.apply(choice)
+        solved.work.drop("view 1", dropped=True)
+        table = solved.panel.views
+        row = table.visualItemRect(table.item(1, 0))
+        picture = table.viewport().grab(row).toImage()
+        seen = [picture.pixelColor(x, picture.height() // 2).name() for x in range(20)]
+        assert max(contrast(colour, seen[0]) for colour in seen) > 3.0
+        theme.apply("light")
 
 
 class TestPictures:
