@@ -47,14 +47,13 @@ class ViewTable(QTableWidget):
         for column, kind in enumerate((mode.ResizeToContents, mode.ResizeToContents, mode.Stretch)):
             header.setSectionResizeMode(column, kind)
         header.setMinimumSectionSize(48)
-        for changed in (work.material_changed, work.solved_changed):
+        for changed in (work.material_changed, work.solved_changed, theme.notice.changed):
             changed.connect(self.refresh)
-        theme.notice.changed.connect(self._paint_anew)
         work.counted_changed.connect(self._show_ticks)
         work.shown_changed.connect(self._mark)
         self.itemChanged.connect(self._tick)
         self.currentCellChanged.connect(self._choose)
-        self._paint_anew()
+        self.refresh()
 
     def refresh(self) -> None:
         """Every view, then the files that are not used."""
@@ -74,10 +73,6 @@ class ViewTable(QTableWidget):
                 self._add_fault(fault)
         self.blockSignals(False)
         self._mark()
-
-    def _paint_anew(self) -> None:
-        self.setPalette(theme.outlined(theme.colours()))  # a box that is not ticked is its outline alone
-        self.refresh()
 
     def _add(self, name: str, rms: str, remark: str, dropped: bool, *, faint: bool) -> None:
         row = self.rowCount()
