@@ -32,6 +32,7 @@ README = {
     "render_dark": "render.png",
     "measure_light": "measure.png",
     "study_light": "study_window.png",
+    "calibrate_light": "calibrate_window.png",
 }
 README_WIDTH = 1120
 LASER, OBJECT = ("scene", "rig", "lasers", 0), ("scene", "objects", 0)
@@ -41,7 +42,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--readme", action="store_true")
-    parser.add_argument("--only-study", action="store_true", help="of the Study workspace alone")
+    parser.add_argument("--only", choices=["study", "calibrate"], help="of one workspace alone")
     parser.add_argument("--scale", type=float, default=0.5, help="image scale of the render")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
@@ -49,11 +50,11 @@ def main() -> int:
         os.environ.update(XDG_CONFIG_HOME=f"{home}/config", XDG_STATE_HOME=f"{home}/state")
         folder = options.folder.resolve()
         os.chdir(home)  # the picture shows no more of the study's folder than its name
-        take(folder, options.scale, options.readme, Path("read noise"), only_study=options.only_study)
+        take(folder, options.scale, options.readme, Path("read noise"), only=options.only)
     return 0
 
 
-def take(folder: Path, scale: float, readme: bool, results: Path, *, only_study: bool) -> None:
+def take(folder: Path, scale: float, readme: bool, results: Path, *, only: str | None) -> None:
     """results: a folder for those of a study."""
     from studio.qt.shell import app as desktop
     from studio.qt.shell.app import application, start
@@ -90,6 +91,13 @@ def take(folder: Path, scale: float, readme: bool, results: Path, *, only_study:
     if window.tour is not None:
         window.tour.end()
     session = window.session
+    if only != "study":
+        shoot_calibration(window, wait, shoot)
+    if only == "calibrate":
+        window.files.count_as_saved(session.project)
+        window.close()
+        app.processEvents()
+        return
     window.switch_to("study")
     shoot("study_empty")
     study = ask_a_question(window, results)
@@ -101,7 +109,7 @@ def take(folder: Path, scale: float, readme: bool, results: Path, *, only_study:
     for theme in ("dark", "light"):
         window.choose_theme(theme)
         shoot(f"study_{theme}")
-    if only_study:
+    if only == "study":
         window.files.count_as_saved(window.session.project)
         window.close()
         app.processEvents()
@@ -145,6 +153,25 @@ def take(folder: Path, scale: float, readme: bool, results: Path, *, only_study:
     window.files.count_as_saved(window.session.project)
     window.close()
     app.processEvents()
+
+
+def shoot_calibration(
+    window: MainWindow, wait: Callable[[Callable[[], bool]], None], shoot: Callable[[str], None]
+) -> None:
+    """Virtual boards, and each way to look at them."""
+    from studio.qt.calibrate.calibration_work import CalibrationWork
+    from studio.qt.core.session import one_of
+
+    window.switch_to("calibrate")
+    shoot("calibrate_empty")
+    work = one_of(CalibrationWork, window.session)
+    work.simulate()
+    wait(lambda: not work.running)
+    for number, what in enumerate(("", "_next", "_coverage", "_depth")):
+        window.panels["boards"].tabs.setCurrentIndex(number)  # type: ignore[attr-defined]
+        for theme in ("dark", "light"):
+            window.choose_theme(theme)
+            shoot(f"calibrate{what}_{theme}")
 
 
 def ask_a_question(window: MainWindow, results: Path) -> StudyWork:

@@ -15,8 +15,7 @@ from studio.runtime.streams import print_json
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibrated, Known
-    from analysis.calibration.observations import View
-    from studio.project.project import Project
+    from studio.calibration.material import Material
 
 PARTS = ("camera", "laser", "scanner")
 
@@ -43,17 +42,6 @@ class CalibrateOptions:
     export: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Material:
-    """What is calibrated from."""
-
-    views: list[View]
-    size: tuple[int, int]
-    lasers: int
-    errors: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
 def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: bool, **given: Any) -> int:
     """`calibrate camera|laser|scanner FOLDER`, or `calibrate PROJECT`; returns how many files had faults.
 
@@ -63,6 +51,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     from studio.calibration.board_text import board_text, parse_board
     from studio.calibration.calibration_file import file_data, write_calibration
     from studio.calibration.in_silico import true_depth_error, virtual_views
+    from studio.calibration.material import Material, board_distances, with_faults
     from studio.commands.commands import load_project
 
     options = CalibrateOptions(**given)
@@ -75,7 +64,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
             out = options.out or folder / "calibration.json"
         elif folder is None and what not in PARTS:
             project, _ = load_project(Path(what))
-            depth = _depths(project, options)
+            depth = board_distances(project, options.nearest, options.farthest)
             views, truth = virtual_views(
                 project,
                 board,
@@ -86,7 +75,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
                 sigmas=(options.corner_sigma, options.line_sigma),
             )
             camera = project.scene.camera
-            material = Material(views, (camera.width, camera.height), len(project.scene.lasers))
+            material = Material(tuple(views), (camera.width, camera.height), len(project.scene.lasers))
             out = options.out or Path("scan-output") / "calibration.json"
         else:
             allowed = "camera FOLDER, laser FOLDER, scanner FOLDER, or a project alone"
@@ -105,7 +94,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
         try:
             result = calibrate(material.views, board.target, request)
         except InputError as error:
-            raise _with_faults(error, material) from None
+            raise with_faults(error, material) from None
         progress("adjustment", 1.0)
     data = file_data(result, material.size, board_text(board))
     write_calibration(out, data)
@@ -133,31 +122,21 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
 
 def _photographed(what: str, folder: Path, options: CalibrateOptions, progress: Any) -> Material:
     from analysis.line.extract import settings_of
-    from studio.calibration.image_views import shots, views_of
+    from studio.calibration.image_views import shots
+    from studio.calibration.material import need_a_line, photographed
 
     settings = settings_of(None, axis=options.axis, channel=options.channel)
-    taken = shots(folder)
     with_lasers = what != "camera"
-    found = views_of(
-        taken, _board(options), settings, lasers=with_lasers, progress=lambda done: progress("photographs", done)
+    found = photographed(
+        shots(folder),
+        _board(options),
+        settings,
+        lasers=with_lasers,
+        progress=lambda done: progress("photographs", done),
     )
-    lasers = 1 + max((stripe.laser for view in found.views for stripe in view.stripes), default=-1)
-    if with_lasers and lasers == 0:
-        raise InputError(
-            "no photograph shows a laser's line on the board",
-            where=str(folder),
-            cure="name pairs NAME_on and NAME_off, or hold the board where the line crosses it",
-        )
-    return Material(list(found.views), found.size, lasers if with_lasers else 0, found.errors, found.notes)
-
-
-def _with_faults(error: InputError, material: Material) -> InputError:
-    """The same with the files that were left aside: they may be why there is too little."""
-    if not material.errors:
-        return error
-    files = "\n".join(("photographs that were not used:", *material.errors))
-    cure = f"{error.cure}\n{files}" if error.cure else files
-    return InputError(error.what, where=error.where, found=error.found, allowed=error.allowed, cure=cure)
+    if with_lasers:
+        need_a_line(found, str(folder))
+    return found
 
 
 def _check_options(what: str, options: CalibrateOptions) -> None:
@@ -200,17 +179,6 @@ def _check_size(material: Material, options: CalibrateOptions) -> None:
     if (camera.width, camera.height) != material.size:
         found, allowed = "{} x {} px".format(*material.size), f"{camera.width} x {camera.height} px"
         raise InputError("the photographs are not of that camera", where="--camera", found=found, allowed=allowed)
-
-
-def _depths(project: Project, options: CalibrateOptions) -> tuple[float, float]:
-    """m, nearest and farthest board: as asked, else 0.8 to 1.2 of where the first laser meets the camera's axis."""
-    plane = project.scene.laser_plane(0) if project.scene.lasers else np.array([0.0, 0.0, 1.0, -1.0])
-    middle = -plane[3] / plane[2] if abs(plane[2]) > 1e-6 and -plane[3] / plane[2] > 0.0 else 1.0
-    nearest = options.nearest or 0.8 * float(middle)
-    farthest = options.farthest or max(1.2 * float(middle), 1.2 * nearest)
-    if farthest <= nearest:
-        raise InputError("the farthest distance is not beyond the nearest", where="--farthest", found=farthest)
-    return nearest, farthest
 
 
 def _exported(out: Path, data: dict[str, Any], forms: tuple[str, ...]) -> list[str]:

@@ -295,7 +295,7 @@ def _developing(frame: RenderedFrame, now: Project) -> Project:
             "the project has other light than the frame",
             where="develop: project",
             found="a change that sensor, power and lens cannot show",
-            allowed="other sensor, power of a laser that was on, lens of a pinhole, extraction, seed",
+            allowed="other sensor, power of a laser that was on, lens of a pinhole, extraction, calibration, seed",
             cure="render it: frame = blazer.render(project)",
         )
     return development(frame.project, now, frame.image_scale).powered

@@ -25,7 +25,7 @@ class Development:
     """How to develop a frame: the project as it is now, as far as the frame allows."""
 
     project: Project
-    """The render's scene with the present sensor, lens and extraction."""
+    """The render's scene with the present sensor, lens, extraction and calibration."""
     laser_power: tuple[float, ...]
     """W, of each laser."""
 
@@ -83,13 +83,15 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
     scene = scene.model_copy(update={"rig": scene.rig.model_copy(update={"camera": camera})})
     # the frame's exact line is along its own axis
     extraction = now.extraction.model_copy(update={"axis": rendered.extraction.axis})
-    update = {
+    update: dict[str, object] = {
         "scene": scene,
         "sensor": now.sensor,
         "extraction": extraction,
         "seed": now.seed,
         "measures": tuple(one for one in now.measures if one.laser < len(scene.lasers)),
     }
+    if len(now.scene.lasers) == len(scene.lasers) and _size(now.scene) == _size(scene):
+        update["calibration"] = now.calibration
     powers = [laser.power for laser in now.scene.lasers]
     if len(powers) != len(scene.lasers):
         powers = [laser.power for laser in scene.lasers]
@@ -97,6 +99,10 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
         power if laser.power > 0.0 else 0.0 for power, laser in zip(powers, scene.lasers, strict=True)
     ]  # a laser that was off left no light
     return Development(rendered.model_copy(update=update), tuple(allowed))
+
+
+def _size(scene: Scene) -> tuple[int, int]:
+    return scene.camera.width, scene.camera.height
 
 
 def is_developed_otherwise(rendered: Project, now: Project, image_scale: float = 1.0) -> bool:

@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QApplication, QStyleFactory
 
 Choice = Literal["system", "dark", "light"]
-OUTLINED = ("QCheckBox", "QRadioButton", "QLineEdit", "QAbstractSpinBox", "QComboBox", "QPushButton")
+OUTLINED = ("QCheckBox", "QRadioButton", "QLineEdit", "QAbstractSpinBox", "QComboBox", "QPushButton", "QTableView")
 FUSION_DARKER = 140
 """Percent, as Qt's `QColor.darker` has it."""
 CHOICES: tuple[Choice, ...] = ("system", "dark", "light")
@@ -156,8 +156,9 @@ def style_sheet(c: Colours) -> str:
     QToolButton#workspace:checked {{ background: {c.accent}; color: {c.on_accent}; border-color: {c.accent}; }}
     QToolButton[popupMode="2"] {{ padding-right: 17px; }}
     QToolButton::menu-indicator {{ subcontrol-origin: padding; subcontrol-position: center right; right: 3px; }}
-    QPushButton#primary:enabled {{ background: {c.accent}; color: {c.on_accent}; border: 1px solid {c.accent};
-        border-radius: 3px; padding: 3px 14px; font-weight: 600; }}
+    QPushButton#primary {{ background: {c.window}; color: {mixed(c.text, c.window, 0.45)};
+        border: 1px solid {c.line}; border-radius: 3px; padding: 3px 14px; font-weight: 600; }}
+    QPushButton#primary:enabled {{ background: {c.accent}; color: {c.on_accent}; border-color: {c.accent}; }}
     QPushButton#primary:enabled:hover {{ background: {mixed(c.accent, c.text, 0.85)}; }}
     QToolButton#fix {{ color: {c.accent}; border-color: {c.accent}; padding: 0 9px; font-weight: 600; }}
     QPushButton#choice {{ text-align: left; padding-left: 4px; }}

@@ -35,6 +35,9 @@ PANELS = (
     Panel("results", "Results", "studio.qt.results.results_panel", "ResultsPanel"),
     Panel("study", "Study", "studio.qt.study.study_panel", "StudyPanel", True),
     Panel("charts", "Charts", "studio.qt.study.charts_panel", "ChartsPanel", True),
+    Panel("calibrate", "Views", "studio.qt.calibrate.calibrate_panel", "CalibratePanel", True),
+    Panel("boards", "Camera image", "studio.qt.calibrate.board_view", "BoardView"),
+    Panel("calibration", "Calibration", "studio.qt.calibrate.result_panel", "CalibrationPanel"),
     Panel("motion", "Motion", "studio.qt.render.motion_panel", "MotionPanel", True),
     Panel("log", "Messages", "studio.qt.shell.log_panel", "LogPanel"),
 )

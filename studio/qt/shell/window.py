@@ -1,4 +1,4 @@
-"""The main window: panels in docks, four workspaces, menus, toolbar and status bar over one session."""
+"""The main window: panels in docks, five workspaces, menus, toolbar and status bar over one session."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QToolBar, QToolBu
 
 from studio.project.autosave import Autosave
 from studio.project.mesh_import import is_mesh
+from studio.qt.calibrate.calibrate_actions import CalibrateActions, is_photograph
 from studio.qt.core import theme
 from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import about, show_trouble
@@ -48,7 +49,7 @@ TRIM_MS = 1000
 """From opening another project until the memory of the former one is given back."""
 SMALL = 0.25
 """Image scale of the first look."""
-SWITCH = {"setup": "setup", "render": "render_workspace", "measure": "measure", "study": "study"}
+SWITCH = {each.key: "render_workspace" if each.key == "render" else each.key for each in WORKSPACES}
 """Workspace -> command."""
 
 
@@ -82,6 +83,7 @@ class MainWindow(QMainWindow):
         self.files = FileActions(self, session, self.preferences, autosave)
         self.exports = ExportActions(self, session, self.runner, self.preferences, self.commands)
         self.measuring = MeasureActions(self, session, self.commands)
+        self.calibrating = CalibrateActions(self, session, self.commands, self.panels["calibrate"])
         self.help = Help(self)
         self.tour: Tour | None = None
         self.cloud = self._make_cloud()
@@ -166,7 +168,7 @@ class MainWindow(QMainWindow):
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         paths = dragged_files(event)
-        if any(is_mesh(path) or path.suffix.lower() == ".json" or path.is_dir() for path in paths):
+        if any(is_mesh(path) or is_photograph(path) or may_be_project(path) for path in paths):
             accept_copy(event)
 
     def dropEvent(self, event: QDropEvent) -> None:
@@ -176,12 +178,13 @@ class MainWindow(QMainWindow):
         QTimer.singleShot(0, self, lambda: self.take(paths))
 
     def take(self, paths: list[Path]) -> None:
-        """Files dropped on the window: meshes join the scene, a project is opened."""
+        """Files dropped on the window: meshes join the scene, photographs are calibrated from, a project is opened."""
         meshes = [path for path in paths if is_mesh(path)]
         if meshes:
             import_meshes(self.session, meshes, self)
+        taken = self.calibrating.take(paths, folders=self.workspace == "calibrate")
         for path in paths:
-            if path not in meshes:
+            if path not in meshes and path not in taken:
                 self.files.open(path)
 
     def _make_docks(self) -> dict[str, QDockWidget]:
@@ -305,6 +308,7 @@ class MainWindow(QMainWindow):
             menus[key].aboutToShow.connect(lambda menu=menus[key], fill=fill: (menu.clear(), fill(menu)))
         QShortcut(Qt.Key.Key_Escape, self).activated.connect(self._escape)
         self.status.log_asked.connect(lambda: self.show_panel("log"))
+        self.calibrating.began.connect(lambda: self.switch_to("calibrate"))
         files.results_opened.connect(lambda: self.switch_to("measure"))
         one_of(CellOpener, session).opened.connect(lambda: self.switch_to("measure"))
         session.project_changed.connect(self._tell_document)
@@ -377,6 +381,11 @@ class MainWindow(QMainWindow):
         for key, label in (("undo", document.undo_label), ("redo", document.redo_label)):
             self.commands[key].setEnabled(label is not None)
             self.commands[key].setText(f"&{key.capitalize()} {label or ''}".rstrip())
+
+
+def may_be_project(path: Path) -> bool:
+    """By its name; a folder may hold one."""
+    return path.suffix.lower() == ".json" or path.is_dir()
 
 
 def version() -> str:

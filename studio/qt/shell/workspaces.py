@@ -16,7 +16,7 @@ Area = Qt.DockWidgetArea
 LEFT, RIGHT, BOTTOM = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
 WIDE = ("motion", "log")
 """Panels of no workspace that share a place below when they are called for."""
-VERSION = 2
+VERSION = 3
 """Of the arrangement; a remembered one of another version is dropped."""
 
 
@@ -54,12 +54,14 @@ RENDERING = (
 )
 MEASURING = (Column(LEFT, 0.42, (("camera", 1.0),)), Column(BOTTOM, 0.5, (("results", 1.0),)))
 STUDYING = (Column(LEFT, 0.32, (("study", 1.0),)), Column(RIGHT, 0.68, (("charts", 1.0),)))
+CALIBRATING = (Column(BOTTOM, 1.0, (("calibrate", 0.25), ("boards", 0.46), ("calibration", 0.29))),)
 QUESTION = "Many runs with one question: what a value changes, and where methods break"
 WORKSPACES = (
     Workspace("setup", "Set up", "Place and design: camera, lasers, objects", True, SETTING_UP, True),
     Workspace("render", "Render", "The image and its light", False, RENDERING, True),
     Workspace("measure", "Measure", "Line, points and their error", True, MEASURING, False),
     Workspace("study", "Study", QUESTION, False, STUDYING, True),
+    Workspace("calibrate", "Calibrate", "Camera and lasers from photographs of a board", False, CALIBRATING, True),
 )
 """In the order of the switch; the 3D view takes what the columns leave."""
 

@@ -10,6 +10,7 @@ import pytest
 from render.frame import Frame
 from render.render import render_world
 from render.world.world import World, build_world
+from studio.project.calibration import Calibration
 from studio.project.document import replaced
 from studio.project.project import Project
 from studio.project.templates import template_folder
@@ -109,6 +110,27 @@ def test_a_stale_render_is_developed_with_its_own_geometry(project, rendered):
     )
     images = develop_again(frame, development(small, now, SCALE))
     assert len(images) == 1 and images[0].pixels.shape == frame.shape
+
+
+def test_points_of_a_render_are_made_with_the_present_calibration(project, rendered):
+    """A plane 1 mm farther off than it is moves every point by the same share of its distance."""
+    small, world, frame = rendered
+    a, b, c, d = project.scene.laser_plane(0).tolist()
+    now = replaced(project, ("calibration",), Calibration(planes=((a, b, c, d - 1e-3),)))
+    assert not is_stale(project, now)
+    depth = []
+    for which in (project, now):
+        how = development(small, which, SCALE)
+        found = measure_again(
+            frame, world, how, develop_again(frame, how, noise=False), ("likelihood",), cancelled=lambda: False
+        )
+        depth.append(found["likelihood"][0].points.depth_z)
+    both = np.isfinite(depth[0]) & np.isfinite(depth[1])
+    assert both.sum() > 20
+    assert depth[1][both] / depth[0][both] == pytest.approx(1.0 + 1e-3 / abs(d), rel=1e-9)
+    other = project.scene.lasers[0].model_copy(update={"name": "b"})
+    more = replaced(project, ("scene", "rig", "lasers"), (*project.scene.lasers, other))
+    assert development(small, more, SCALE).project.calibration == small.calibration
 
 
 def test_every_method_measures_every_laser(project, rendered):

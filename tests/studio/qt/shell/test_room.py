@@ -8,9 +8,11 @@ import pytest
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, QToolButton, QWidget
+from pytestqt.qtbot import QtBot
 
 from studio.project.document import FieldPath
-from studio.qt.core.session import Render
+from studio.qt.calibrate.calibration_work import CalibrationWork
+from studio.qt.core.session import Render, one_of
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.window import MainWindow
 from studio.qt.shell.workspaces import WORKSPACES
@@ -75,13 +77,24 @@ def cut_off(window: MainWindow) -> list[str]:
     return found
 
 
+def calibrate_virtual_boards(window: MainWindow, qtbot: QtBot) -> None:
+    """The workspace Calibrate with all that it can show; another project takes it away again."""
+    work = one_of(CalibrationWork, window.session)
+    work.terms = 0
+    work.simulate()
+    qtbot.waitUntil(lambda: not work.running)
+    assert work.solved is not None
+    work.tell("What cannot be done is told in as many lines as it takes: " + "a long reason, " * 5)
+
+
 @pytest.mark.parametrize("screen", SCREENS.values(), ids=list(SCREENS))
-def test_no_text_of_any_panel_is_cut_off(window: MainWindow, screen: tuple[int, int]) -> None:
+def test_no_text_of_any_panel_is_cut_off(window: MainWindow, qtbot: QtBot, screen: tuple[int, int]) -> None:
     width, height = screen
     before = window.size()
     found: dict[object, list[str]] = {}
     world, frame = small_render()
     window.session.add_render(Render(1, small_project(), world, frame))
+    calibrate_virtual_boards(window, qtbot)
     for each in WORKSPACES:
         window.switch_to(each.key)
         window.rearrange()
@@ -109,7 +122,7 @@ def test_no_workspace_makes_the_window_larger_than_a_small_screen_at_1_5(window:
     window.session.add_render(Render(1, small_project(), world, frame))
     grown = []
     window.resize(size)
-    for key in ("setup", "render", "measure", "study", "setup", "measure", "render", "setup"):
+    for key in ("setup", "render", "measure", "study", "calibrate", "setup", "measure", "render", "setup"):
         window.switch_to(key)
         for item in ITEMS if key == "setup" else ():
             window.session.select(item)

@@ -38,7 +38,13 @@ from tests.studio.qt.small_session import small_project as sphere
 from tests.studio.qt.small_session import small_render
 
 POWER = ("scene", "rig", "lasers", 0, "power")
-KEYS = {"setup": Qt.Key.Key_F6, "render": Qt.Key.Key_F7, "measure": Qt.Key.Key_F8, "study": Qt.Key.Key_F12}
+KEYS = {
+    "setup": Qt.Key.Key_F6,
+    "render": Qt.Key.Key_F7,
+    "measure": Qt.Key.Key_F8,
+    "study": Qt.Key.Key_F12,
+    "calibrate": Qt.Key.Key_F3,
+}
 
 
 class TestWorkspaces:

@@ -1,0 +1,125 @@
+"""What a calibration is made from: views of photographs or virtual ones, and what was wrong with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.calibration.board import Board
+from analysis.calibration.estimate import Estimate
+from analysis.calibration.observations import View
+from analysis.line.settings import ExtractionSettings
+from render.base.errors import InputError
+from studio.calibration.image_views import Shot, views_of
+from studio.calibration.in_silico import virtual_views
+from studio.project.project import Project
+
+VIEWS, SEED, SIGMA, MOST_TILT = 20, 0, 0.05, float(np.radians(45.0))
+"""Of virtual boards: how many, of which draw, px of corners and lines, rad."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """Views with what was told of them."""
+
+    views: tuple[View, ...]
+    size: tuple[int, int]
+    """px, width and height."""
+    lasers: int
+    """That are to be calibrated."""
+    errors: tuple[str, ...] = ()
+    """Of files that are not used, each with its path."""
+    notes: tuple[str, ...] = ()
+    """Of views, each with its name."""
+
+    def without(self, names: Collection[str]) -> Material:
+        """The same without some views."""
+        return replace(self, views=tuple(view for view in self.views if view.name not in names))
+
+    def without_lasers(self) -> Material:
+        """The same for the camera alone."""
+        return replace(self, views=tuple(replace(view, stripes=()) for view in self.views), lasers=0)
+
+    def joined(self, more: Material) -> Material:
+        """Both together; what is there already is told. InputError: images of another size."""
+        if more.size != self.size:
+            raise InputError(
+                "the photographs are of another size than those before",
+                found="{} x {} px".format(*more.size),
+                allowed="{} x {} px".format(*self.size),
+                cure="do not crop, turn or resize photographs",
+            )
+        new, errors = [], []
+        for view in more.views:
+            if any(view.name == other.name for other in self.views):
+                errors.append(f"{view.name}: a view of that name is there already")
+            elif any(np.array_equal(view.pixel, other.pixel) for other in self.views):
+                errors.append(f"{view.name}: a photograph that is there already; every pose counts once")
+            else:
+                new.append(view)
+        notes = (*self.notes, *more.notes)
+        errors = [*self.errors, *more.errors, *errors]
+        return Material((*self.views, *new), self.size, max(self.lasers, more.lasers), tuple(errors), notes)
+
+
+def photographed(
+    taken: Sequence[Shot],
+    board: Board,
+    settings: ExtractionSettings,
+    *,
+    lasers: bool,
+    progress: Callable[[float], None] = lambda done: None,
+) -> Material:
+    """From photographs; lasers: with the lines on their boards. InputError: no photograph is usable."""
+    found = views_of(taken, board, settings, lasers=lasers, progress=progress)
+    count = 1 + max((stripe.laser for view in found.views for stripe in view.stripes), default=-1)
+    return Material(found.views, found.size, count, found.errors, found.notes)
+
+
+def virtual(project: Project, board: Board) -> tuple[Material, Estimate]:
+    """Virtual boards before the project's camera, as many and as good as `main.py calibrate PROJECT` has them, and the
+    truth. InputError: the camera sees no such board.
+    """
+    views, truth = virtual_views(
+        project,
+        board,
+        VIEWS,
+        seed=SEED,
+        depth=board_distances(project, None, None),
+        most_tilt=MOST_TILT,
+        sigmas=(SIGMA, SIGMA),
+    )
+    camera = project.scene.camera
+    return Material(tuple(views), (camera.width, camera.height), len(project.scene.lasers)), truth
+
+
+def need_a_line(material: Material, where: str) -> None:
+    """InputError: there is no laser to calibrate."""
+    if material.lasers == 0:
+        cure = "name pairs NAME_on and NAME_off, hold the board where the line crosses it, or find the camera alone"
+        raise InputError("no photograph shows a laser's line on the board", where=where, cure=cure)
+
+
+def with_faults(error: InputError, material: Material) -> InputError:
+    """The same with the files that were left aside: they may be why there is too little."""
+    if not material.errors:
+        return error
+    files = "\n".join(("photographs that were not used:", *material.errors))
+    cure = f"{error.cure}\n{files}" if error.cure else files
+    return InputError(error.what, where=error.where, found=error.found, allowed=error.allowed, cure=cure)
+
+
+def board_distances(project: Project, nearest: float | None, farthest: float | None) -> tuple[float, float]:
+    """m, of virtual boards: as asked, else 0.8 to 1.2 of where the first laser meets the camera's axis.
+
+    InputError: the farthest is not beyond the nearest.
+    """
+    plane = project.scene.laser_plane(0) if project.scene.lasers else np.array([0.0, 0.0, 1.0, -1.0])
+    middle = -plane[3] / plane[2] if abs(plane[2]) > 1e-6 and -plane[3] / plane[2] > 0.0 else 1.0
+    first = nearest or 0.8 * float(middle)
+    last = farthest or max(1.2 * float(middle), 1.2 * first)
+    if last <= first:
+        raise InputError("the farthest distance is not beyond the nearest", where="--farthest", found=last)
+    return first, last

@@ -1,0 +1,71 @@
+"""The calibrate menu, and photographs that are dropped on the window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+
+from studio.project.calibration import Calibration
+from studio.qt.calibrate.calibrate_panel import CalibratePanel
+from studio.qt.calibrate.calibration_work import CalibrationWork
+from studio.qt.calibrate.keeping import remove, use
+from studio.qt.core.actions import Actions
+from studio.qt.core.session import Session, one_of
+
+
+def is_photograph(path: Path) -> bool:
+    """By its name."""
+    from studio.calibration.image_views import SUFFIXES
+
+    return path.suffix.lower() in SUFFIXES
+
+
+class CalibrateActions(QObject):
+    """What the menus ask of the panel and of the work."""
+
+    began = Signal()
+    """Something is to be calibrated: its workspace is wanted."""
+
+    def __init__(self, parent: QObject, session: Session, actions: Actions, panel: QWidget) -> None:
+        """panel: the `CalibratePanel`, which asks for files."""
+        super().__init__(parent)
+        assert isinstance(panel, CalibratePanel)
+        self.work, self.actions = one_of(CalibrationWork, session), actions
+        for key, begin in (("calibrate_photographs", panel.ask_folder), ("calibrate_project", self.work.simulate)):
+            actions.connect(key, self.began.emit)
+            actions.connect(key, begin)
+        actions.connect("drop_view", self.toggle_view)
+        actions.connect("save_calibration", panel.ask_and_save)
+        actions.connect("use_calibration", lambda: use(self.work))
+        actions.connect("use_calibration_file", panel.ask_and_use)
+        actions.connect("remove_calibration", lambda: remove(self.work))
+        session.project_changed.connect(self.refresh)
+        self.work.solved_changed.connect(self.refresh)
+        self.work.material_changed.connect(self.refresh)
+        self.refresh()
+
+    def refresh(self) -> None:
+        for key in ("save_calibration", "use_calibration"):
+            self.actions[key].setEnabled(self.work.solved is not None)
+        self.actions["remove_calibration"].setEnabled(self.work.session.project.calibration != Calibration())
+        self.actions["drop_view"].setEnabled(self.work.material is not None)
+
+    def toggle_view(self) -> None:
+        """The view that is looked at counts no longer, or again."""
+        name = self.work.shown
+        if name:
+            self.work.drop(name, dropped=name not in self.work.dropped)
+
+    def take(self, paths: list[Path], *, folders: bool) -> list[Path]:
+        """Photographs among what was dropped, and folders of them if they are such; returns what was taken."""
+        opened = [path for path in paths if folders and path.is_dir()]
+        files = [path for path in paths if is_photograph(path) and not path.is_dir()]
+        if opened or files:
+            self.began.emit()
+        for folder in opened:
+            self.work.open_folder(folder)
+        if files:
+            self.work.add(files)
+        return [*opened, *files]

@@ -1,0 +1,223 @@
+"""What is calibrated, from which photographs or virtual boards, and what is done with the result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QSignalBlocker, Qt
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from studio.project.calibration import Calibration
+from studio.qt.calibrate.calibration_work import BOARD, CalibrationWork
+from studio.qt.calibrate.keeping import FORMS, save, use, use_file
+from studio.qt.calibrate.view_table import ViewTable
+from studio.qt.core.jobs import JobRunner, time_left
+from studio.qt.core.session import Session, one_of
+from studio.qt.core.widgets import ElidedLabel, text_button, thin_bar
+from studio.runtime.jobs import Job, State
+
+EMPTY = (
+    "Drop photographs of a board here, or their folder. Pairs are put together by name: a_off.png and a_on.png, or "
+    "a_laser0.png, a_laser1.png; a plain a.png shows board and line in one. In silico takes virtual boards before the "
+    "open project's camera."
+)
+PARTS = (("Camera and lasers", "scanner"), ("Camera alone", "camera"), ("Lasers, camera known…", "laser"))
+LENSES = (("Lens by held-out views", None), *((f"{terms} distortion terms", terms) for terms in (0, 4, 5, 8, 12, 14)))
+FILES = "Calibrations (*.json);;All files (*)"
+NARROWEST = 250
+"""px."""
+
+
+class CalibratePanel(QWidget):
+    """What a person does about a calibration; picture and result have panels of their own."""
+
+    def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setMinimumWidth(NARROWEST)
+        self.session, self.runner, self.work = session, runner, one_of(CalibrationWork, session)
+        self.work.attach(runner)
+        self.photographs = text_button("Photographs…", "A folder of photographs of a board; or drop it here")
+        self.simulate = text_button("In silico", "Virtual boards before the open project's camera, beside the truth")
+        self.source = ElidedLabel(Qt.TextElideMode.ElideMiddle)
+        self.source.setObjectName("muted")
+        self.source.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.board = QLineEdit(BOARD, maxLength=100)
+        self.board.setToolTip(
+            "<p>Kind, counts and side: checkerboard:13x9:25mm counts the corners where four squares meet; "
+            "charuco:14x10:25mm:18mm counts squares and has markers of 18 mm</p>"
+        )
+        self.what, self.lens = QComboBox(), QComboBox()
+        for text, part in PARTS:
+            self.what.addItem(text, part)
+        for text, terms in LENSES:
+            self.lens.addItem(text, terms)
+        self.what.setToolTip("What is found; lasers alone need the calibration file of a camera")
+        self.lens.setToolTip("How many terms the lens has; by held-out views: the fewest that are not worse")
+        for box in (self.what, self.lens):
+            box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.target = QDoubleSpinBox(minimum=0.0, maximum=1e6, decimals=1, singleStep=5.0, suffix=" µm")
+        self.target.setSpecialValueText("not said")
+        self.target.setToolTip("Depth error that is enough: the next pose is not asked for below it")
+        self.target.setKeyboardTracking(False)
+        self.views = ViewTable(self.work)
+        self.empty = QLabel(EMPTY, wordWrap=True)
+        self.empty.setObjectName("muted")
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.problem = QLabel(wordWrap=True)
+        self.problem.setObjectName("error")
+        self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.bar = thin_bar()
+        self.stage = QLabel()
+        self.stage.setObjectName("muted")
+        self.stop = text_button("Stop", "What was found before stays")
+        self.save = text_button(
+            "Save…", "The calibration file, for projects and later calibrations; or the camera for others"
+        )
+        self.use = text_button("Use in project", "Points of the open project are made with what was found", "primary")
+        self.project = QLabel()
+        self.project.setObjectName("muted")
+        self._lay_out()
+        self._connect()
+        self.refresh()
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        self.work.close()
+        super().closeEvent(event)
+
+    def refresh(self) -> None:
+        """Follow what is there, what is asked for and what runs."""
+        work, there = self.work, self.work.material is not None
+        self.source.setText(work.source or "nothing yet")
+        self.views.setVisible(there)
+        self.empty.setVisible(not there)
+        self.problem.setText(work.problem)
+        self.problem.setVisible(bool(work.problem))
+        for widget in (self.bar, self.stage, self.stop):
+            widget.setVisible(work.running)
+        if not work.running:
+            self.bar.setValue(0)
+            self.stage.clear()
+        self.save.setEnabled(work.solved is not None)
+        self.use.setEnabled(work.solved is not None)
+        if not self.board.hasFocus():
+            self.board.setText(work.board_text)
+        self.lens.setEnabled(work.what != "laser")  # the known camera has its own
+        file = work.camera_file
+        self.what.setItemText(len(PARTS) - 1, f"Lasers, {file.name}" if file is not None else PARTS[-1][0])
+        with QSignalBlocker(self.what):
+            self.what.setCurrentIndex(next(i for i, (_, part) in enumerate(PARTS) if part == work.what))
+
+    def _tell_project(self) -> None:
+        calibrated = self.session.project.calibration != Calibration()
+        self.project.setText("The project has a calibration" if calibrated else "The project has no calibration")
+
+    def ask_folder(self) -> None:
+        """For the folder of photographs."""
+        chosen = QFileDialog.getExistingDirectory(self, "Folder of the photographs", self._place())
+        if chosen:
+            self.work.open_folder(Path(chosen))
+
+    def ask_and_save(self) -> None:
+        """For the calibration file."""
+        if self.work.solved is None:
+            return
+        suggestion = str(Path(self._place()) / "calibration.json")
+        chosen, kind = QFileDialog.getSaveFileName(self, "Save the calibration", suggestion, ";;".join(FORMS))
+        if chosen:
+            path, ending = Path(chosen), kind.rpartition("*")[2].rstrip(")")
+            save(self.work, path if path.suffix else path.with_suffix(ending or ".json"), FORMS.get(kind, ""))
+
+    def ask_and_use(self) -> None:
+        """For a calibration file that the project is to be measured with."""
+        chosen = self._calibration_file("Use a calibration in the project")
+        if chosen is not None:
+            use_file(self.work, chosen)
+
+    def _calibration_file(self, title: str) -> Path | None:
+        chosen, _ = QFileDialog.getOpenFileName(self, title, self._place(), FILES)
+        return Path(chosen) if chosen else None
+
+    def _place(self) -> str:
+        work, path = self.work, self.session.document.path
+        if work.shots:
+            return work.source
+        return str(path.parent if path is not None else Path.home())
+
+    def _choose_what(self, index: int) -> None:
+        part = self.what.itemData(index)
+        if part == "laser":
+            file = self._calibration_file("Calibration file of the camera")
+            if file is None:
+                self.refresh()
+                return
+            self.work.choose_what("laser", file)
+        else:
+            self.work.choose_what(part)
+
+    def _tell_progress(self, job: Job[object]) -> None:
+        if job is self.work.job:
+            self.bar.setMaximum(1000 if job.done > 0.0 else 0)  # without a share that is known it runs to and fro
+            self.bar.setValue(round(1000 * job.done))
+            left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
+            self.stage.setText("stopping" if job.cancel_asked else f"{job.stage or job.name}   {left}")
+
+    def _connect(self) -> None:
+        work = self.work
+        self.photographs.clicked.connect(self.ask_folder)
+        self.simulate.clicked.connect(work.simulate)
+        self.board.editingFinished.connect(lambda: work.choose_board(self.board.text()))
+        self.what.activated.connect(self._choose_what)
+        self.lens.activated.connect(lambda index: work.choose_terms(self.lens.itemData(index)))
+        self.target.valueChanged.connect(lambda value: work.choose_target(value or None))
+        self.stop.clicked.connect(work.stop)
+        self.save.clicked.connect(self.ask_and_save)
+        self.use.clicked.connect(lambda: use(work))
+        for changed in (work.state_changed, work.material_changed, work.solved_changed):
+            changed.connect(self.refresh)
+        self.runner.progress.connect(self._tell_progress)
+        self.session.project_changed.connect(self._tell_project)
+        self._tell_project()
+
+    def _lay_out(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(8, 8, 8, 8)
+        column.setSpacing(6)
+        sources = QHBoxLayout()
+        sources.addWidget(self.photographs)
+        sources.addWidget(self.simulate)
+        sources.addStretch(1)
+        form = QFormLayout()
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        form.addRow("Board", self.board)
+        form.addRow("Find", self.what)
+        form.addRow("Lens", self.lens)
+        form.addRow("Enough", self.target)
+        running = QHBoxLayout()
+        running.addWidget(self.stage, 1)
+        running.addWidget(self.stop)
+        buttons = QHBoxLayout()
+        for button in (self.use, self.save):
+            buttons.addWidget(button)
+        buttons.addStretch(1)
+        column.addLayout(sources)
+        column.addWidget(self.source)
+        column.addLayout(form)
+        column.addWidget(self.empty, 1)
+        column.addWidget(self.views, 1)
+        for widget in (self.problem, self.bar):
+            column.addWidget(widget)
+        column.addLayout(running)
+        column.addWidget(self.project)
+        column.addLayout(buttons)
