@@ -2,7 +2,7 @@
 
 A view adds information I to the shared parameters; with covariance C before, it is (C^-1 + I)^-1 after. The variance of
 depth, averaged over the volume, is the trace of that with the depth's derivatives, so that hundreds of poses are tried
-in a tenth of a second.
+in a tenth of a second: first some everywhere, then ever closer about the best one.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ CORNERS = 5
 """Corners a side of the board that stand for all of them in a trial."""
 POINTS = 24
 """Laser points a line that stand for all of them."""
+ROUNDS, ABOUT = 3, 48
+"""Searches about the best pose so far, each over so many poses half as far away as the one before."""
 
 
 @dataclass(frozen=True)
@@ -63,16 +65,26 @@ def advise(
     Distances are those of the volumes.
     """
     depth = np.concatenate([volume.depth for volume in volumes])
-    poses = _candidates(estimate, target, (float(depth.min()), float(depth.max())), most_tilt)
-    told = _information(poses, target, size, sigmas)
+    ends = (float(depth.min()), float(depth.max()))
+    middle = np.append(0.5 * (target.min(axis=0) + target.max(axis=0)), 0.0)
     used = np.nonzero(free)[0]
-    weight = _depth_weight(estimate, volumes)[np.ix_(used, used)]
     inner = information[np.ix_(used, used)]
     scale = 1.0 / np.sqrt(np.diag(inner))
     both = np.outer(scale, scale)
-    trials = (inner + told[:, used][:, :, used]) * both
-    after = np.einsum("kij,ji->k", np.linalg.inv(trials), weight * both)
-    before = float(np.sum(np.linalg.inv(inner * both) * weight * both))
+    weight = _depth_weight(estimate, volumes)[np.ix_(used, used)] * both
+    before = float(np.sum(np.linalg.inv(inner * both) * weight))
+
+    def left(poses: Estimate) -> Float:
+        told = _information(poses, target, size, sigmas)[:, used][:, :, used]
+        return np.asarray(np.einsum("kij,ji->k", np.linalg.inv((inner + told) * both), weight))
+
+    poses, rng = _candidates(estimate, middle, ends, most_tilt), np.random.default_rng(0)
+    after = left(poses)
+    for share in 0.5 ** np.arange(ROUNDS):
+        near = _about(_one(poses, int(np.argmin(after))), middle, ends, most_tilt, float(share), rng)
+        found = left(near)
+        if found.min() < after.min():
+            poses, after = near, found
     best = int(np.argmin(after))
     centre = poses.rotation[best] @ np.append(target.mean(axis=0), 0.0) + poses.translation[best]
     return Advice(poses.rotation[best], centre, float(np.sqrt(before)), float(np.sqrt(max(after[best], 0.0))))
@@ -89,9 +101,8 @@ def _depth_weight(estimate: Estimate, volumes: list[Volume]) -> Float:
     return total / max(count, 1)
 
 
-def _candidates(estimate: Estimate, target: Float, depth: tuple[float, float], most_tilt: float) -> Estimate:
+def _candidates(estimate: Estimate, middle: Float, depth: tuple[float, float], most_tilt: float) -> Estimate:
     """Poses at three distances, tilted to eight sides, with the board's middle on the laser planes or on the axis."""
-    middle = np.append(0.5 * (target.min(axis=0) + target.max(axis=0)), 0.0)
     rotation, translation = [], []
     for z in np.linspace(depth[0], depth[1], 3):
         on_plane = [np.array([(1.0 - m[2] * z) / m[0], 0.0, z]) for m in estimate.planes if abs(m[0]) > 1e-9]
@@ -103,6 +114,27 @@ def _candidates(estimate: Estimate, target: Float, depth: tuple[float, float], m
                     rotation.append(turn)
                     translation.append(place - turn @ middle)
     return replace(estimate, rotation=np.array(rotation), translation=np.array(translation))
+
+
+def _one(poses: Estimate, number: int) -> Estimate:
+    return replace(
+        poses, rotation=poses.rotation[number : number + 1], translation=poses.translation[number : number + 1]
+    )
+
+
+def _about(
+    pose: Estimate, middle: Float, depth: tuple[float, float], most_tilt: float, share: float, rng: np.random.Generator
+) -> Estimate:
+    """Poses about the only one, within the depths and the limit of tilt; share 1 is 20 deg and a tenth of the depth."""
+    turned = Rotation.from_rotvec(share * np.radians(20.0) * rng.normal(size=(ABOUT, 3))).as_matrix() @ pose.rotation
+    over = np.maximum(np.arccos(np.clip(turned[:, 2, 2], -1.0, 1.0)) - most_tilt, 0.0)
+    axis = np.cross(turned[:, :, 2], [0.0, 0.0, 1.0])
+    axis /= np.maximum(np.linalg.norm(axis, axis=1), 1e-12)[:, None]
+    turned = Rotation.from_rotvec(over[:, None] * axis).as_matrix() @ turned
+    place = pose.rotation[0] @ middle + pose.translation[0]
+    place = place + 0.1 * share * place[2] * rng.normal(size=(ABOUT, 3))
+    place[:, 2] = np.clip(place[:, 2], *depth)
+    return replace(pose, rotation=turned, translation=place - turned @ middle)
 
 
 def _information(poses: Estimate, target: Float, size: tuple[int, int], sigmas: tuple[float, float]) -> Float:
