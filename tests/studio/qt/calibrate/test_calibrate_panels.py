@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -386,8 +387,24 @@ def test_a_folder_dropped_where_one_calibrates_holds_photographs(
     monkeypatch.setattr(work, "add", lambda files: taken.extend(files))
     folder, photograph = tmp_path / "photographs", tmp_path / "a.png"
     folder.mkdir()
+    (folder / "b.png").write_bytes(b"")
     drop_on(window, photograph)
     qtbot.waitUntil(lambda: taken == [photograph])
     assert window.workspace == "calibrate", "an image has no other meaning"
     drop_on(window, folder)
     qtbot.waitUntil(lambda: taken == [photograph, folder])
+
+
+def test_a_calibration_file_dropped_on_the_window_is_the_projects(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path
+) -> None:
+    camera = window.session.project.scene.camera
+    found = {"width": camera.width, "height": camera.height, "fx": 250.0, "fy": 250.0, "cx": 120.0, "cy": 100.0}
+    file = tmp_path / "calibration.json"
+    file.write_text(json.dumps({"kind": "blazer-calibration", "version": 1, "camera": found}))
+    drop_on(window, file)
+    qtbot.waitUntil(lambda: window.session.project.calibration.camera is not None)
+    assert window.workspace == "calibrate" and window.commands["remove_calibration"].isEnabled()
+    window.commands["remove_calibration"].trigger()
+    assert window.session.project.calibration.camera is None
+    assert window.commands["undo"].text() == "&Undo remove the calibration"
