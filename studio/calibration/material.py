@@ -8,16 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.calibration.board import Board
+from analysis.calibration.detect import FEWEST
 from analysis.calibration.estimate import Estimate
+from analysis.calibration.next_pose import Advice
 from analysis.calibration.observations import View
+from analysis.calibration.virtual import exact_view, noisy
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
+from studio.calibration.drawings import advised_pose
 from studio.calibration.image_views import Shot, views_of
 from studio.calibration.in_silico import virtual_views
 from studio.project.project import Project
 
 VIEWS, SEED, SIGMA, MOST_TILT = 20, 0, 0.05, float(np.radians(45.0))
 """Of virtual boards: how many, of which draw, px of corners and lines, rad."""
+LASER_STEP = 8
+"""Rows from a virtual line's point to the next."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +99,28 @@ def virtual(project: Project, board: Board) -> tuple[Material, Estimate]:
     )
     camera = project.scene.camera
     return Material(tuple(views), (camera.width, camera.height), len(project.scene.lasers)), truth
+
+
+def as_advised(material: Material, truth: Estimate, advice: Advice, board: Board) -> Material:
+    """The same and a virtual view of the board held where it was advised. InputError: too little of it is seen."""
+    number = len(material.views)
+    rotation, translation = advised_pose(advice, board)
+    there = replace(truth, rotation=rotation[None], translation=translation[None])
+    view = exact_view(
+        f"view {number}",
+        there,
+        0,
+        board.target,
+        material.size,
+        corner_sigma=SIGMA,
+        laser_sigma=SIGMA,
+        laser_step=LASER_STEP,
+    )
+    if len(view.pixel) < FEWEST:
+        found, allowed = f"{len(view.pixel)} corners", f"{FEWEST} or more"
+        raise InputError("the camera sees too little of the board there", found=found, allowed=allowed)
+    drawn = noisy([view], np.random.default_rng([SEED, number]))
+    return replace(material, views=(*material.views, *drawn))
 
 
 def need_a_line(material: Material, where: str) -> None:

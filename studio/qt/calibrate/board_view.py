@@ -38,7 +38,7 @@ from studio.qt.calibrate.depth_plot import DepthPlot
 from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import flush
+from studio.qt.core.widgets import flush, text_button
 from studio.qt.image.image_item import PictureView
 from studio.runtime.jobs import Progress
 
@@ -71,6 +71,7 @@ class BoardView(QWidget):
         self.items = BoardItems(self.view.box)
         self.lit = QCheckBox("Laser on")
         self.lit.setToolTip("The photograph with the laser's line, in place of the board's own")
+        self.follow = text_button("Take this view", "One more virtual board, held there")
         self.fit = QToolButton()
         self.fit.setText("Fit")
         self.fit.setToolTip("The whole image")
@@ -87,6 +88,8 @@ class BoardView(QWidget):
         self.tabs.currentChanged.connect(self.refresh)
         self.laser.activated.connect(self.refresh)
         self.lit.toggled.connect(self.refresh)
+        self.follow.clicked.connect(self.work.follow_advice)
+        self.work.state_changed.connect(self._offer)
         for changed in (self.work.material_changed, self.work.solved_changed, self.work.shown_changed):
             changed.connect(self.refresh)
         theme.notice.changed.connect(self._colour)
@@ -112,6 +115,7 @@ class BoardView(QWidget):
         shot = self.work.shot()
         pair = shot is not None and shot.board is not None and bool(shot.lasers)
         self.lit.setVisible(pair and tab in (RESIDUALS, NEXT))
+        self._offer()
         self.stack.setCurrentIndex(1 if tab == DEPTH and depths else 0)
         self.items.clear()
         if tab == DEPTH and depths:
@@ -120,6 +124,13 @@ class BoardView(QWidget):
         self._draw_image(photograph=tab != COVERAGE)
         draw = (self._draw_residuals, self._draw_next, self._draw_coverage, self._draw_nothing)[tab]
         self.caption.setText(draw().replace(" um", " µm") if self.work.material is not None else EMPTY)
+
+    def _offer(self) -> None:
+        """Virtual boards are held where they are advised at a click."""
+        solved = self.work.solved
+        advised = self.work.virtual and solved is not None and solved.result.advice is not None
+        self.follow.setVisible(advised and self.tabs.currentIndex() == NEXT)
+        self.follow.setEnabled(not self.work.running)
 
     # the image under all
 
@@ -241,6 +252,7 @@ class BoardView(QWidget):
         bar.addWidget(self.tabs, 1)
         bar.addWidget(self.laser)
         bar.addWidget(self.lit)
+        bar.addWidget(self.follow)
         bar.addWidget(self.fit)
         holder = QWidget()
         self.stack = QStackedLayout(holder)

@@ -7,10 +7,11 @@ from pathlib import Path
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
+from render.base.errors import InputError
 from studio.project.calibration import Calibration
 from studio.qt.calibrate.calibrate_panel import CalibratePanel
 from studio.qt.calibrate.calibration_work import CalibrationWork
-from studio.qt.calibrate.keeping import remove, use
+from studio.qt.calibrate.keeping import remove, use, use_file
 from studio.qt.core.actions import Actions
 from studio.qt.core.session import Session, one_of
 
@@ -20,6 +21,24 @@ def is_photograph(path: Path) -> bool:
     from studio.calibration.image_views import SUFFIXES
 
     return path.suffix.lower() in SUFFIXES
+
+
+def holds_photographs(path: Path) -> bool:
+    """A folder with one or more."""
+    try:
+        return any(is_photograph(file) for file in path.iterdir())
+    except OSError:
+        return False
+
+
+def is_calibration(path: Path) -> bool:
+    """A calibration file, not a project."""
+    from studio.project.calibration import read_calibration_file
+
+    try:
+        return path.suffix.lower() == ".json" and bool(read_calibration_file(path, str(path)))
+    except InputError:
+        return False
 
 
 class CalibrateActions(QObject):
@@ -59,13 +78,18 @@ class CalibrateActions(QObject):
             self.work.drop(name, dropped=name not in self.work.dropped)
 
     def take(self, paths: list[Path], *, folders: bool) -> list[Path]:
-        """Photographs among what was dropped, and folders of them if they are such; returns what was taken."""
-        opened = [path for path in paths if folders and path.is_dir()]
+        """Photographs among what was dropped, calibration files, and folders of photographs where they are such;
+        returns what was taken.
+        """
+        opened = [path for path in paths if folders and holds_photographs(path)]
         files = [path for path in paths if is_photograph(path) and not path.is_dir()]
-        if opened or files:
+        calibrations = [path for path in paths if is_calibration(path)]
+        if opened or files or calibrations:
             self.began.emit()
         for folder in opened:
             self.work.open_folder(folder)
         if files:
             self.work.add(files)
-        return [*opened, *files]
+        for calibration in calibrations:
+            use_file(self.work, calibration)
+        return [*opened, *files, *calibrations]

@@ -161,6 +161,18 @@ class CalibrationWork(QObject):
         self.virtual, self.source = True, f"{project.name}, virtual boards"
         self._start("virtual boards", work, then)
 
+    def follow_advice(self) -> None:
+        """One more virtual board, where the next pose is advised."""
+        from studio.calibration.material import as_advised
+
+        solved = self.solved
+        if self.material is None or self.truth is None or solved is None or solved.result.advice is None:
+            return
+        try:
+            self._take(as_advised(self.material, self.truth, solved.result.advice, solved.board))
+        except InputError as error:
+            self.tell(str(error))
+
     def choose_board(self, text: str) -> None:
         if text.strip() != self.board_text:
             self.board_text = text.strip()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -36,12 +38,15 @@ from tests.studio.qt.shell.window_hands import drop as drop_on
 VIEWS = 8
 
 
+CORNER = np.array([0.15, 0.1])
 THERE = truth(3, VIEWS, tilt=(15.0, 35.0))
 
 
 def seen() -> Material:
     """Corners and lines with noise, of boards that no photograph shows."""
-    return Material(tuple(noisy(views_of(THERE, laser_step=64), np.random.default_rng(3))), SIZE, 1)
+    drawn = noisy(views_of(THERE, laser_step=64), np.random.default_rng(3))
+    # from the first corner, as a board has them, not from its middle
+    return Material(tuple(replace(view, target=view.target + CORNER) for view in drawn), SIZE, 1)
 
 
 class Desk:
@@ -169,6 +174,23 @@ class TestPictures:
         assert f"{1e6 * advice.before:.1f} -> {1e6 * advice.after:.1f} µm" in boards.caption.text()
         solved.panel.target.setValue(1e5)
         assert boards.caption.text().startswith("Enough") and len(boards.items.edge.getData()[0]) == 0
+
+    def test_a_virtual_board_is_held_where_it_is_advised_and_depth_is_known_better(
+        self, qtbot: QtBot, solved: Desk
+    ) -> None:
+        work = solved.work
+        assert work.solved is not None
+        before = work.solved.result
+        advice = before.advice
+        assert advice is not None
+        solved.boards.tabs.setCurrentIndex(NEXT)
+        qtbot.mouseClick(solved.boards.follow, Qt.MouseButton.LeftButton)
+        settled(qtbot, solved)
+        now = work.solved.result
+        assert solved.panel.views.rowCount() == VIEWS + 1 and now.adjusted.seen.count == VIEWS + 1
+        assert now.estimate.rotation[-1] == pytest.approx(advice.rotation, abs=2e-3)
+        # a line of a virtual board has a point on every eighth row, and the advice counts on one on each
+        assert 0.6 < (before.depth[0].rms - now.depth[0].rms) / advice.gain < 1.1
 
     def test_coverage_counts_the_parts_of_the_image_that_have_corners(self, solved: Desk) -> None:
         solved.boards.tabs.setCurrentIndex(COVERAGE)
@@ -365,8 +387,24 @@ def test_a_folder_dropped_where_one_calibrates_holds_photographs(
     monkeypatch.setattr(work, "add", lambda files: taken.extend(files))
     folder, photograph = tmp_path / "photographs", tmp_path / "a.png"
     folder.mkdir()
+    (folder / "b.png").write_bytes(b"")
     drop_on(window, photograph)
     qtbot.waitUntil(lambda: taken == [photograph])
     assert window.workspace == "calibrate", "an image has no other meaning"
     drop_on(window, folder)
     qtbot.waitUntil(lambda: taken == [photograph, folder])
+
+
+def test_a_calibration_file_dropped_on_the_window_is_the_projects(
+    window: MainWindow, qtbot: QtBot, tmp_path: Path
+) -> None:
+    camera = window.session.project.scene.camera
+    found = {"width": camera.width, "height": camera.height, "fx": 250.0, "fy": 250.0, "cx": 120.0, "cy": 100.0}
+    file = tmp_path / "calibration.json"
+    file.write_text(json.dumps({"kind": "blazer-calibration", "version": 1, "camera": found}))
+    drop_on(window, file)
+    qtbot.waitUntil(lambda: window.session.project.calibration.camera is not None)
+    assert window.workspace == "calibrate" and window.commands["remove_calibration"].isEnabled()
+    window.commands["remove_calibration"].trigger()
+    assert window.session.project.calibration.camera is None
+    assert window.commands["undo"].text() == "&Undo remove the calibration"
