@@ -7,13 +7,17 @@ INSTALLED := $(VENV)/.installed
 INSTALLED_VALIDATION := $(VENV)/.installed-validation
 WORKERS ?= 2
 
-.PHONY: run test lint validate benchmark peers format clean system system-tests system-validation
+.PHONY: run test kernels lint validate benchmark peers format clean system system-tests system-validation
 
 run: $(INSTALLED)
 	$(BIN)/python main.py
 
-test: system-tests lint
+test: system-tests lint kernels
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal
+
+# Compiled once by all processors: each of the test's processes would compile them again for itself.
+kernels: $(INSTALLED)
+	@$(BIN)/python -m studio.scan.kernel_warm_up all
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

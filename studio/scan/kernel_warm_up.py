@@ -322,5 +322,8 @@ STEPS: dict[str, Callable[[Cancel], None]] = {
 
 
 if __name__ == "__main__":
-    gc.set_threshold(*COLLECTED)
-    beside()
+    if sys.argv[1:] == ["all"]:
+        warm_up(STEPS, lambda stage, done: None, never)
+    else:
+        gc.set_threshold(*COLLECTED)
+        beside()

@@ -64,11 +64,20 @@ def _wait(child: int) -> None:
     ended = os.pidfd_open(child)
     spent: list[str] = []
     while not select.select([ended], [], [], PATIENCE)[0]:
-        # in user and system mode, after the name in brackets
-        before, spent = spent, Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()[11:13]
+        before, spent = spent, _spent(child)
         if spent == before:
             os.kill(child, signal.SIGALRM)
     os.close(ended)
+
+
+def _spent(process: int) -> list[str]:
+    """Processor time, in user and system mode, of a process and of the programs it waits for."""
+    try:
+        told = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[11:13]
+        others = Path(f"/proc/{process}/task/{process}/children").read_text().split()
+    except OSError:  # it has ended meanwhile
+        return []
+    return sum((_spent(int(other)) for other in others), told)
 
 
 def exit_code(run: Callable[[], Any]) -> int:
@@ -138,7 +147,8 @@ def _import(*argv: str) -> None:
     try:
         with warnings.catch_warnings(record=True):  # the window shows them
             file = Path(argv[-1])
-            step_file.PATIENCE = PATIENCE / 2  # OpenCASCADE may facet for ever what is a kilometre wide
+            # OpenCASCADE may facet for ever what is a kilometre wide: the limit of processor time ends it, no clock
+            step_file.PATIENCE = 1e6
             import_step(file, root, 1e-5) if is_step(file) else import_mesh(file, root, 0.2)
     except InputError as error:
         if "--debug" in argv:
