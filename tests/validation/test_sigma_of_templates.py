@@ -1,7 +1,7 @@
 """How often two sigma hold in rendered templates with all of the sensor's trouble switched on: noise, uneven gain and
 speckle. Reduced to a quarter, where lines are 0.13 to 0.3 px wide.
 
-Left out: the weld seams and the glass ball, whose reflections and caustics lie beside the line (92 to 98 % seen there).
+Left out: the shiny weld seam, whose reflections lie upon the line (88 % of the rows that are no outliers).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.validation
 SCALE = 0.25
 
 
-@pytest.mark.parametrize("template", ["plane", "sphere", "step_block", "v_groove", "scan"])
+@pytest.mark.parametrize("template", ["plane", "sphere", "step_block", "v_groove", "scan", "weld_seam", "glass_ball"])
 def test_two_sigma_hold_where_everything_is_switched_on(template):
     folder = template_folder(template)
     project = scaled(Project.load(folder / "project.json"), SCALE)
