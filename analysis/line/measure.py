@@ -19,7 +19,7 @@ from analysis.line.methods.derivative import STEGER, ZERO_CROSSING, measure_deri
 from analysis.line.methods.fisher_scoring import LEAST_SQUARES, LIKELIHOOD
 from analysis.line.methods.gaussian_fit import measure_gaussian
 from analysis.line.methods.half_energy import measure_half_energy
-from analysis.line.methods.leaning import keep_sure, leans_as_neighbours_do, parts_alone
+from analysis.line.methods.leaning import keep_doubtful, keep_sure, leans_as_neighbours_do, parts_alone
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.misfit import UNLIKELY
 from analysis.line.methods.phase import measure_phase
@@ -200,13 +200,24 @@ def measure_with_neighbours(
         map_chunks(lambda start, stop: work(start, stop, double, priors, leaning), lines.count, CHUNK, threads)
         keep_sure(out, flags, leaning, single, farthest)
     parted = parts_alone(flags, out[..., LEAN]) if told is None else told.parted
-    flags[parted & (flags == Flag.OK)] = Flag.BLENDED
+    alone = parted & (flags == Flag.OK)
+    if alone.any():
+        plain, double = options._replace(judge=math.inf), out[alone]
+        map_chunks(lambda start, stop: work(start, stop, plain, priors, alone), lines.count, CHUNK, threads)
+        keep_doubtful(out, flags, alone, double)
     lost = out[..., 1] > farthest
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
+    return _line_of(out, flags, settings, together), Neighbours(priors, leaning, parted)
+
+
+def _line_of(
+    out: NDArray[np.float64], flags: NDArray[np.uint8], settings: ExtractionSettings, together: NDArray[np.float64]
+) -> Line:
+    """What kernels wrote of peaks (n, k, columns), their flags, and what makes of their column SHARED the error (n, k)
+    that neighbours have in common."""
     u, sigma_u, width, amplitude, background, chi2, length = (
         np.ascontiguousarray(out[..., j]) for j in range(CORRELATION_LENGTH + 1)
     )
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
     common = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
-    line = replace(line, length_apart=length, shared_u=common if common.any() else None)
-    return line, Neighbours(priors, leaning, parted)
+    return replace(line, length_apart=length, shared_u=common if common.any() else None)

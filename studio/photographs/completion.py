@@ -26,6 +26,9 @@ AGREED = 0.25
 """Share of a chain of centres that is beside fits, from which all of it is the line."""
 BEND = 1.0
 """Widths from one scan line to the next at which a chain of centres ends."""
+SURELY = 1.5
+"""Times what centres scatter everywhere that a few of them do not scatter by chance: on a curved, clipped stretch they
+lie to one side, by 5 times the scatter on a sphere."""
 FILLED = (
     Flag.REJECTED,
     Flag.NOT_CONVERGED,
@@ -63,7 +66,8 @@ def completed(line: Line, centres: Line) -> Line:
     """A line (n, 1) by a fit, and the same by its centre of mass -> the line, with centres (flag MISFIT) where it has
     none.
 
-    Their sigma is how far centres scatter about the fits where there are both, beside the centre's own.
+    Their sigma is how far centres lie from the fits where there are both, all along the line or, where that is surely
+    more, on the nearest such scan lines to either side, beside the centre's own.
     """
     fitted = np.flatnonzero(line.valid[:, 0])
     both = np.flatnonzero(line.valid[:, 0] & centres.valid[:, 0])
@@ -83,6 +87,8 @@ def completed(line: Line, centres: Line) -> Line:
     past = line.flag[rows, 0] == Flag.PAST_END  # blur has a centre as well
     rows = np.union1d(rows[~past], _like_fits(line, centres, rows[past]))
     own = np.nan_to_num(centres.sigma_u[rows, 0])
+    here = _scatter_about(rows, both, apart)
+    scattered = np.where(here > SURELY * scatter, here, scatter)
 
     def with_values(values: NDArray[np.float64], found: Any) -> NDArray[np.float64]:
         out = values.copy()
@@ -95,7 +101,7 @@ def completed(line: Line, centres: Line) -> Line:
     return replace(
         line,
         u=with_values(line.u, centres.u[rows, 0]),
-        sigma_u=with_values(line.sigma_u, np.hypot(scatter, own)),
+        sigma_u=with_values(line.sigma_u, np.hypot(scattered, own)),
         width=with_values(line.width, width),
         amplitude=with_values(line.amplitude, centres.amplitude[rows, 0]),
         background=with_values(line.background, centres.background[rows, 0]),
@@ -104,6 +110,13 @@ def completed(line: Line, centres: Line) -> Line:
         shared_u=None if shared is None else with_values(shared, 0.0),
         flag=flag,
     )
+
+
+def _scatter_about(rows: NDArray[np.intp], known: NDArray[np.intp], apart: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) for scan lines: how far centres lie from fits on the nearest NEXT known ones to either side, the larger."""
+    at = np.searchsorted(known, rows)
+    sides = [[apart[max(0, i - NEXT) : i], apart[i : i + NEXT]] for i in at]
+    return np.array([1.4826 * max(float(np.median(side)) for side in pair if len(side)) for pair in sides])
 
 
 def _on_chain(line: Line, centres: Line, width: float) -> NDArray[np.intp]:

@@ -54,11 +54,27 @@ def _among_others(odd: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[n
 def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], single: Float, farthest: float) -> None:
     """Flag lines (n, k) that were measured as two since they lean; without a sure position they get the single back.
 
-    out (n, k, columns), sigma_u the second of them; single (m, columns), as before; farthest: px, the largest sigma.
+    out (n, k, columns), u and sigma_u its first; single (m, columns), as before; farthest: px, the largest sigma.
     """
-    unsure = ~(out[leaning][:, 1] < farthest)
-    out[leaning] = np.where(unsure[:, None], single, out[leaning])
-    flags[leaning] = np.where(unsure | (flags[leaning] == Flag.OK), Flag.BLENDED, flags[leaning])
+    double, parted = out[leaning], flags[leaning] == Flag.OK
+    double[parted, 1] = _with_distance(double[parted], single[parted])
+    unsure = ~(double[:, 1] < farthest)
+    out[leaning] = np.where(unsure[:, None], single, double)
+    flags[leaning] = np.where(unsure | parted, Flag.BLENDED, flags[leaning])
+
+
+def keep_doubtful(out: Float, flags: NDArray[np.uint8], alone: NDArray[np.bool_], double: Float) -> None:
+    """Flag lines (n, k) that part by noise alone: where the brighter of the two is, double (m, columns), with how far
+    that is from the single line, which out (n, k, columns) holds.
+    """
+    double[:, 1] = _with_distance(double, out[alone])
+    out[alone], flags[alone] = double, Flag.BLENDED
+
+
+def _with_distance(double: Float, single: Float) -> Float:
+    """(m,) sigma of the brighter of two lines (m, columns) that holds its distance from the single line."""
+    distance = np.nan_to_num(double[:, 0] - single[:, 0])
+    return np.asarray(np.hypot(double[:, 1], distance))
 
 
 def parts_alone(flag: NDArray[np.uint8], lean: Float) -> NDArray[np.bool_]:

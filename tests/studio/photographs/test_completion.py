@@ -47,6 +47,17 @@ def test_what_a_fit_leaves_out_is_filled_with_a_sigma_that_holds() -> None:
     assert np.array_equal(found.u[kept], fits.u[kept]) and np.array_equal(found.sigma_u[kept], fits.sigma_u[kept])
 
 
+def test_where_the_centres_about_a_gap_lie_to_one_side_sigma_holds_that() -> None:
+    fits, centres, truth = lines()
+    aside = np.arange(100, 180)
+    u = centres.u.copy()
+    u[aside] += 5.0 * SCATTER
+    gone = np.arange(120, 160)
+    found = completed(without(fits, gone, Flag.NOT_CONVERGED), replace(centres, u=u))
+    ratio = np.abs(found.u[gone, 0] - truth[gone]) / found.sigma_u[gone, 0]
+    assert found.valid[gone].all() and (ratio < 2.0).mean() > 0.9
+
+
 def test_what_lies_off_the_line_or_is_scattered_beyond_its_ends_or_in_a_long_gap_is_not_taken() -> None:
     fits, centres, _ = lines()
     stray, gap = np.array([50, 60]), np.arange(200, 202 + GAP)
