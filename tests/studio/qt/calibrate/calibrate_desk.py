@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from pytestqt.qtbot import QtBot
@@ -27,6 +28,7 @@ CORNER = np.array([0.15, 0.1])
 THERE = truth(3, VIEWS, tilt=(15.0, 35.0))
 
 
+@cache
 def seen() -> Material:
     """Corners and lines with noise, of boards that no photograph shows."""
     drawn = noisy(views_of(THERE, laser_step=64), np.random.default_rng(3))
