@@ -28,7 +28,7 @@ def desk(qtbot: QtBot) -> Iterator[Desk]:
 @pytest.fixture
 def solved(qtbot: QtBot, desk: Desk, monkeypatch: pytest.MonkeyPatch) -> Desk:
     """With a calibration of virtual boards, fewer than a person gets."""
-    monkeypatch.setattr(material, "virtual", lambda project, board: (seen(), THERE))
+    monkeypatch.setattr(material, "virtual", lambda *_: (seen(), THERE))
     qtbot.mouseClick(desk.panel.simulate, Qt.MouseButton.LeftButton)
     settled(qtbot, desk)
     assert desk.work.problem == ""

@@ -116,6 +116,18 @@ class TestPictures:
         # a line of a virtual board has a point on every eighth row, and the advice counts on one on each
         assert 0.6 < (before.depth[0].rms - now.depth[0].rms) / advice.gain < 1.1
 
+    def test_depth_is_told_over_the_range_that_is_asked_for(self, qtbot: QtBot, solved: Desk) -> None:
+        solved.panel.nearest.setValue(600)
+        solved.panel.farthest.setValue(1400)
+        settled(qtbot, solved)
+        assert solved.work.solved is not None
+        depth = solved.work.solved.result.depth[0].volume.depth
+        assert (depth.min(), depth.max()) == pytest.approx((0.6, 1.4))
+        solved.panel.farthest.setValue(500)
+        settled(qtbot, solved)
+        assert "farthest distance is not beyond the nearest" in solved.panel.problem.text()
+        assert "--" not in solved.panel.problem.text()
+
     def test_coverage_counts_the_parts_of_the_image_that_have_corners(self, solved: Desk) -> None:
         solved.boards.tabs.setCurrentIndex(COVERAGE)
         pixel = np.concatenate([view.pixel for view in seen().views])
