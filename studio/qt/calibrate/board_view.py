@@ -253,10 +253,12 @@ class BoardView(QWidget):
         bar = QHBoxLayout()
         bar.setContentsMargins(0, 0, 6, 0)
         bar.addWidget(self.tabs, 1)
-        bar.addWidget(self.laser)
-        bar.addWidget(self.lit)
-        bar.addWidget(self.follow)
         bar.addWidget(self.fit)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(0, 0, 6, 0)
+        foot.addWidget(self.caption, 1)
+        for choice in (self.laser, self.lit, self.follow):
+            foot.addWidget(choice, 0, Qt.AlignmentFlag.AlignTop)
         holder = QWidget()
         self.stack = QStackedLayout(holder)
         self.stack.addWidget(self.view)
@@ -264,7 +266,7 @@ class BoardView(QWidget):
         column = flush(QVBoxLayout(self))
         column.addLayout(bar)
         column.addWidget(holder, 1)
-        column.addWidget(self.caption)
+        column.addLayout(foot)
 
 
 def residuals_text(found: Residuals, scale: float) -> str:
