@@ -6,18 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.calibration.board import Board
-from analysis.calibration.depth import DepthError
-from analysis.calibration.estimate import Estimate
 from analysis.calibration.lens import normalise, project
-from analysis.calibration.next_pose import Advice
-from analysis.calibration.observations import View
 from render.base.arrays import Float
 from render.output.tone_mapping import Picture, colour, grey, pyramid
 from studio.photographs.image_files import load_photograph
+
+if TYPE_CHECKING:
+    from analysis.calibration.board import Board
+    from analysis.calibration.depth import DepthError
+    from analysis.calibration.estimate import Estimate
+    from analysis.calibration.next_pose import Advice
+    from analysis.calibration.observations import View
 
 TENTHS = 10
 """Cells a side in which coverage is counted, as the check of the set does."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from analysis.calibration.virtual import exact_view, noisy
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
 from studio.calibration.drawings import advised_pose
-from studio.calibration.image_views import Shot, views_of
+from studio.calibration.image_views import Shot, shots, views_of
 from studio.calibration.in_silico import virtual_views
 from studio.project.project import Project
 
@@ -70,6 +71,25 @@ class Material:
         return Material((*self.views, *new), self.size, max(self.lasers, more.lasers), tuple(errors), notes)
 
 
+def new_shots(files: Collection[Path], before: Sequence[Shot]) -> list[Shot]:
+    """The poses that files are of, each with its other photographs in the same folder.
+
+    InputError: none is new; two files of one name.
+    """
+    known = {file for shot in before for file in _files(shot)}
+    found = []
+    for folder in dict.fromkeys(file.parent for file in files):
+        wanted = {file for file in files if file.parent == folder} - known
+        found += [shot for shot in shots(folder) if wanted & _files(shot)]
+    if not found:
+        raise InputError("no photograph that is new", found=", ".join(sorted(file.name for file in files)))
+    return found
+
+
+def _files(shot: Shot) -> set[Path]:
+    return {file for file in (shot.board, *shot.lasers.values()) if file is not None}
+
+
 def photographed(
     taken: Sequence[Shot],
     board: Board,
@@ -84,16 +104,18 @@ def photographed(
     return Material(found.views, found.size, count, found.errors, found.notes)
 
 
-def virtual(project: Project, board: Board) -> tuple[Material, Estimate]:
+def virtual(
+    project: Project, board: Board, nearest: float | None = None, farthest: float | None = None
+) -> tuple[Material, Estimate]:
     """Virtual boards before the project's camera, as many and as good as `main.py calibrate PROJECT` has them, and the
-    truth. InputError: the camera sees no such board.
+    truth. nearest, farthest: of them, m. InputError: the camera sees no such board, or the distances are none.
     """
     views, truth = virtual_views(
         project,
         board,
         VIEWS,
         seed=SEED,
-        depth=board_distances(project, None, None),
+        depth=board_distances(project, nearest, farthest),
         most_tilt=MOST_TILT,
         sigmas=(SIGMA, SIGMA),
     )

@@ -73,7 +73,12 @@ def of_project(data: dict[str, Any]) -> Calibration:
 
 def in_window(error: InputError) -> str:
     """An error as the window tells it, which has no options."""
-    named = (("other --nearest and --farthest", "other distances"), ("--board", "Board"), ("--out", "name"))
+    named = (
+        ("other --nearest and --farthest", "other distances"),
+        ("--farthest", "Range"),
+        ("--board", "Board"),
+        ("--out", "name"),
+    )
     text = str(error)
     for option, name in named:
         text = text.replace(option, name)

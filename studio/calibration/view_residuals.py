@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from analysis.calibration.adjust import adjust
-from analysis.calibration.calibrate import Calibrated
-from analysis.calibration.estimate import Estimate
 from analysis.calibration.observations import View, gather
 from analysis.calibration.residuals import corners, laser_points
 from analysis.calibration.start import start
 from render.base.arrays import Bool, Float
 from render.base.errors import InputError
+
+if TYPE_CHECKING:
+    from analysis.calibration.calibrate import Calibrated
 
 Part = Literal["used", "left out", "dropped"]
 
@@ -117,8 +118,3 @@ def view_rows(
         rms = None if found is None else found.rms
         out.append((ViewRow(view.name, part, len(view.pixel), len(view.stripes), rms, remarks), found))
     return out
-
-
-def posed(result: Calibrated, rotation: Float, translation: Float) -> Estimate:
-    """The calibration with one pose of the board: (3, 3) and (3,) m."""
-    return replace(result.estimate, rotation=rotation[None], translation=translation[None])

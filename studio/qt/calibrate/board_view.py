@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import Qt
@@ -30,8 +31,6 @@ from studio.calibration.drawings import (
     levels_of,
     outline,
 )
-from studio.calibration.view_residuals import Residuals, posed
-from studio.calibration.words import next_sentence
 from studio.qt.calibrate.board_items import BoardItems
 from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.calibrate.depth_plot import DepthPlot
@@ -41,6 +40,9 @@ from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import flush, text_button
 from studio.qt.image.image_item import PictureView
 from studio.runtime.jobs import Progress
+
+if TYPE_CHECKING:
+    from studio.calibration.view_residuals import Residuals
 
 TABS = (
     ("Residuals", "Corners of the view, and how far off the calibration sees them"),
@@ -158,7 +160,7 @@ class BoardView(QWidget):
         self.items.show_sensor(size)
         found = work.residuals()
         if photograph and found is not None and work.solved is not None:
-            pose = posed(work.solved.result, found.rotation, found.translation), found.rotation, found.translation
+            pose = work.solved.result.estimate, found.rotation, found.translation
             self.items.show_virtual(size, outline(work.solved.board, *pose), dark_squares(work.solved.board, *pose))
 
     def _load(self, file: Path) -> None:
@@ -197,6 +199,8 @@ class BoardView(QWidget):
         return residuals_text(found, scale)
 
     def _draw_next(self) -> str:
+        from studio.calibration.words import next_sentence
+
         solved = self.work.solved
         if solved is None:
             return NOT_YET
@@ -205,8 +209,7 @@ class BoardView(QWidget):
             return NO_LASER
         told = next_sentence(advice, self.work.target_um)
         if not told.startswith("enough"):
-            rotation, translation = advised_pose(advice, solved.board)
-            pose = posed(solved.result, rotation, translation), rotation, translation
+            pose = (solved.result.estimate, *advised_pose(advice, solved.board))
             self.items.show_ghost(outline(solved.board, *pose), dark_squares(solved.board, *pose))
         return f"{told[0].upper()}{told[1:]}"
 
@@ -250,10 +253,12 @@ class BoardView(QWidget):
         bar = QHBoxLayout()
         bar.setContentsMargins(0, 0, 6, 0)
         bar.addWidget(self.tabs, 1)
-        bar.addWidget(self.laser)
-        bar.addWidget(self.lit)
-        bar.addWidget(self.follow)
         bar.addWidget(self.fit)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(0, 0, 6, 0)
+        foot.addWidget(self.caption, 1)
+        for choice in (self.laser, self.lit, self.follow):
+            foot.addWidget(choice, 0, Qt.AlignmentFlag.AlignTop)
         holder = QWidget()
         self.stack = QStackedLayout(holder)
         self.stack.addWidget(self.view)
@@ -261,7 +266,7 @@ class BoardView(QWidget):
         column = flush(QVBoxLayout(self))
         column.addLayout(bar)
         column.addWidget(holder, 1)
-        column.addWidget(self.caption)
+        column.addLayout(foot)
 
 
 def residuals_text(found: Residuals, scale: float) -> str:

@@ -71,6 +71,14 @@ class CalibratePanel(QWidget):
         self.target.setSpecialValueText("not said")
         self.target.setToolTip("Depth error that is enough: the next pose is not asked for below it")
         self.target.setKeyboardTracking(False)
+        self.nearest, self.farthest = (
+            QDoubleSpinBox(minimum=0.0, maximum=1e5, decimals=0, singleStep=10.0, suffix=" mm") for _ in range(2)
+        )
+        for side in (self.nearest, self.farthest):
+            side.setSpecialValueText("boards")
+            side.setToolTip("Between which distances depth is measured; boards: as near and as far as they are")
+            side.setKeyboardTracking(False)
+            side.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.views = ViewTable(self.work)
         self.empty = QLabel(EMPTY, wordWrap=True)
         self.empty.setObjectName("muted")
@@ -166,6 +174,10 @@ class CalibratePanel(QWidget):
         else:
             self.work.choose_what(part)
 
+    def _choose_range(self) -> None:
+        nearest, farthest = (1e-3 * side.value() or None for side in (self.nearest, self.farthest))
+        self.work.choose_range(nearest, farthest)
+
     def _tell_progress(self, job: Job[object]) -> None:
         if job is self.work.job:
             self.bar.setMaximum(1000 if job.done > 0.0 else 0)  # without a share that is known it runs to and fro
@@ -181,6 +193,8 @@ class CalibratePanel(QWidget):
         self.what.activated.connect(self._choose_what)
         self.lens.activated.connect(lambda index: work.choose_terms(self.lens.itemData(index)))
         self.target.valueChanged.connect(lambda value: work.choose_target(value or None))
+        for side in (self.nearest, self.farthest):
+            side.valueChanged.connect(self._choose_range)
         self.stop.clicked.connect(work.stop)
         self.save.clicked.connect(self.ask_and_save)
         self.use.clicked.connect(lambda: use(work))
@@ -203,6 +217,11 @@ class CalibratePanel(QWidget):
         form.addRow("Board", self.board)
         form.addRow("Find", self.what)
         form.addRow("Lens", self.lens)
+        between = QHBoxLayout()
+        between.addWidget(self.nearest, 1)
+        between.addWidget(QLabel("to"))
+        between.addWidget(self.farthest, 1)
+        form.addRow("Range", between)
         form.addRow("Enough", self.target)
         running = QHBoxLayout()
         running.addWidget(self.stage, 1)

@@ -51,6 +51,9 @@ class CalibrationWork(QObject):
         """Distortion terms; None: chosen by views that are held out."""
         self.target_um: float | None = None
         """Depth error that is enough."""
+        self.nearest: float | None = None
+        self.farthest: float | None = None
+        """m, between which depth is measured; None: as far as the boards are."""
         self.camera_file: Path | None = None
         """Of the camera that is held, for lasers alone."""
         self.shots: list[Shot] = []
@@ -85,15 +88,16 @@ class CalibrationWork(QObject):
     def running(self) -> bool:
         return self.job is not None
 
-    def board(self) -> Board:
-        """InputError: what was typed is none."""
+    def board(self) -> Board | None:
+        """None: what was typed is none, which is told."""
         from studio.calibration.board_text import parse_board
         from studio.calibration.solving import in_window
 
         try:
             return parse_board(self.board_text.strip())
         except InputError as error:
-            raise InputError(in_window(error)) from None
+            self._fail(in_window(error))
+            return None
 
     # where the views come from
 
@@ -112,19 +116,12 @@ class CalibrationWork(QObject):
 
     def add(self, files: Sequence[Path]) -> None:
         """Single photographs join those that are there, each with the others of its pose beside it."""
-        from studio.calibration.image_views import shots
+        from studio.calibration.material import new_shots
 
-        new: list[Shot] = []
-        known = {file for shot in self.shots for file in _files(shot)}
         try:
-            for folder in dict.fromkeys(file.parent for file in files):
-                wanted = {file for file in files if file.parent == folder} - known
-                new += [shot for shot in shots(folder) if wanted & _files(shot)]
+            new = new_shots(files, self.shots)
         except (InputError, OSError) as error:
             self.tell(str(error))
-            return
-        if not new:
-            self.tell("These photographs are there already" if known.issuperset(files) else "There is no photograph")
             return
         if self.virtual or not self.shots:
             self._forget()
@@ -137,16 +134,14 @@ class CalibrationWork(QObject):
         from studio.calibration.material import virtual
         from studio.calibration.solving import in_window
 
-        project = self.session.project
-        try:
-            board = self.board()
-        except InputError as error:
-            self.tell(str(error))
+        project, nearest, farthest = self.session.project, self.nearest, self.farthest
+        board = self.board()
+        if board is None:
             return
 
         def work(progress: Progress, cancelled: Cancel) -> tuple[Material, Estimate] | str:
             try:
-                return virtual(project, board)
+                return virtual(project, board, nearest, farthest)
             except InputError as error:
                 return in_window(error)
 
@@ -190,6 +185,11 @@ class CalibrationWork(QObject):
         self.terms = terms
         self.solve()
 
+    def choose_range(self, nearest: float | None, farthest: float | None) -> None:
+        """m, between which depth is measured, and virtual boards are held."""
+        self.nearest, self.farthest = nearest, farthest
+        self._anew() if self.virtual else self.solve()
+
     def choose_target(self, target_um: float | None) -> None:
         self.target_um = target_um
         self.solved_changed.emit()
@@ -224,12 +224,13 @@ class CalibrationWork(QObject):
 
     def solve(self) -> None:
         """Adjust what counts."""
-        if self.material is None or self.jobs is None:
-            return
-        if self._unread:
+        if self.material is None or self._unread:
             return  # it follows when they are read
+        board = self.board()
+        if board is None:
+            return
         try:
-            task = self._task(self.board())
+            task = self._task(board)
         except InputError as error:
             self._fail(str(error))
             return
@@ -271,10 +272,8 @@ class CalibrationWork(QObject):
 
         lasers, before = self.what != "camera", self.material
         settings = settings_of(None, axis=self.session.project.extraction.axis, channel="auto")
-        try:
-            board = self.board()
-        except InputError as error:
-            self._fail(str(error))
+        board = self.board()
+        if board is None:
             return
 
         def work(progress: Progress, cancelled: Cancel) -> Material | str:
@@ -316,7 +315,14 @@ class CalibrationWork(QObject):
         elif not self.virtual:
             need_a_line(material, self.source)
         known = held_camera(self.camera_file, material.size) if self.what == "laser" else None
-        request = Request(material.size, material.lasers, self.terms if known is None else None, known=known)
+        request = Request(
+            material.size,
+            material.lasers,
+            self.terms if known is None else None,
+            nearest=self.nearest,
+            farthest=self.farthest,
+            known=known,
+        )
 
         def work(progress: Progress, cancelled: Cancel) -> Solved | str:
             progress("adjustment", 0.0)
@@ -392,7 +398,3 @@ class CalibrationWork(QObject):
         """Photographs stay; virtual boards were of the project that was open."""
         if self.virtual:
             self._forget()
-
-
-def _files(shot: Shot) -> set[Path]:
-    return {file for file in (shot.board, *shot.lasers.values()) if file is not None}

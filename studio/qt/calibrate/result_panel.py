@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QTextBrowser, QVBoxLayout, QWidget
 
-from studio.calibration.solving import Solved
-from studio.calibration.words import check_rows, depth_rows, next_sentence, parameter_rows
 from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.core import theme
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import flush
+
+if TYPE_CHECKING:
+    from studio.calibration.solving import Solved
 
 EMPTY = "What is found is told here: parameters with their sigmas, the depth error that they make together, and checks."
 
@@ -47,6 +49,8 @@ class CalibrationPanel(QWidget):
 
 def page(solved: Solved, target_um: float | None) -> str:
     """The result as rich text, in the order in which it matters."""
+    from studio.calibration.words import check_rows, depth_rows, next_sentence, parameter_rows
+
     result, c = solved.result, theme.colours()
     parts = []
     for fault in result.faults:
