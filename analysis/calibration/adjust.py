@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.calibration.estimate import Estimate
-from analysis.calibration.observations import Observations
+from analysis.calibration.observations import Index, Observations
 from analysis.calibration.residuals import Linear, corners, laser_points
 from render.base.arrays import Bool, Float
 from render.base.errors import InputError
@@ -116,6 +116,21 @@ def view_information(seen: Observations, estimate: Estimate, start: Float | None
     normal, at_corners, at_lasers, _ = _normal(seen, estimate, everything, None, start)
     own = np.stack([a.T @ a + b.T @ b for a, b in _by_view(seen, at_corners, at_lasers, "by_shared")])
     return own - normal.mixed.transpose(0, 2, 1) @ np.linalg.solve(normal.pose + 1e-9 * np.eye(6), normal.mixed)
+
+
+def leverage(seen: Observations, solution: Solution, first: Index, second: Index) -> Float:
+    """(k,) how much the fits at two corners of a view, numbers first (k,) and second (k,), have in common, u plus v.
+
+    Of whitened residuals r the covariance is I - J C J^T, J their derivatives by all parameters and C the covariance of
+    these; returned is the entry of J C J^T.
+    """
+    normal, at_corners, _, _ = _normal(seen, solution.estimate, solution.free, None, None)
+    by_pose = at_corners.by_pose.reshape(-1, 2, 6)
+    follow = np.linalg.solve(normal.pose, normal.mixed)[seen.view]
+    by_shared = at_corners.by_shared.reshape(len(by_pose), 2, -1) - by_pose @ follow
+    common = np.sum((by_shared[first] @ solution.covariance) * by_shared[second], axis=(1, 2))
+    pose = np.linalg.inv(normal.pose)[seen.view[first]]
+    return np.asarray(common + np.sum((by_pose[first] @ pose) * by_pose[second], axis=(1, 2)))
 
 
 def _by_view(seen: Observations, at_corners: Linear, at_lasers: Linear, name: str) -> list[tuple[Float, Float]]:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
+from scipy.spatial import cKDTree
 
-from analysis.calibration.adjust import Prior, Solution, adjust, without_views
+from analysis.calibration.adjust import Prior, Solution, adjust, leverage, without_views
 from analysis.calibration.depth import Volume, depth_jacobian
 from analysis.calibration.estimate import Estimate, free_parameters
 from analysis.calibration.lens import LENGTHS, normalise
@@ -18,8 +19,8 @@ from analysis.calibration.robust import Adjusted
 from render.base.arrays import Float
 from render.base.errors import InputError
 
-ALARM = 0.05
-"""p-value at which a check speaks."""
+ALARM = 0.02
+"""p-value at which a check speaks: the two of a good calibration do so together less than once in twenty times."""
 LEAST_TOLD = 1e-6
 """Share of a variance below which rounding decides what the views tell beside a prior."""
 
@@ -108,17 +109,20 @@ class Whiteness:
 
 
 def whiteness(adjusted: Adjusted) -> Whiteness:
-    """Of corners one square apart on the board, along rows, in the same view."""
-    seen, residual = adjusted.seen, adjusted.solution.corner_residual
-    used = seen.whitening[:, 0, 0] > 0.0
-    step = seen.target[1:] - seen.target[:-1]
-    distance = np.linalg.norm(step, axis=1)
-    near = distance < 1.5 * np.median(distance)
-    pair = (seen.view[1:] == seen.view[:-1]) & near & used[1:] & used[:-1]
-    products = np.sum(residual[1:][pair] * residual[:-1][pair], axis=1)
+    """Of corners one square apart on the board, in the same view."""
+    seen, solution = adjusted.seen, adjusted.solution
+    used = np.nonzero(seen.whitening[:, 0, 0] > 0.0)[0]
+    # views far apart, so that only corners of the same one are neighbours
+    place = np.column_stack([seen.target[used], 10.0 * seen.half.max() * seen.view[used]])
+    tree = cKDTree(place)
+    square = float(np.median(tree.query(place, k=2)[0][:, 1]))
+    pairs = used[tree.query_pairs(1.2 * square, output_type="ndarray")]
+    first, second = pairs[:, 0], pairs[:, 1]
+    residual = solution.corner_residual
+    products = np.sum(residual[first] * residual[second], axis=1)
     variance = float(np.mean(residual[used] ** 2))
-    correlation = float(products.mean() / (2.0 * variance))
-    # six of a pose's and some of the shared parameters are fitted to the residuals, which makes them go apart a little
+    # what is fitted to residuals makes neighbours go apart, by as much as the fit has them in common
+    correlation = float(np.mean(products + variance * leverage(seen, solution, first, second)) / (2.0 * variance))
     error = np.sqrt(1.0 / (2.0 * len(products)))
     return Whiteness(correlation, float(stats.norm.sf(correlation / error)))
 

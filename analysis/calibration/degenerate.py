@@ -45,18 +45,19 @@ def _of_poses(estimate: Estimate, middle: Float) -> list[str]:
     angles = np.arcsin(np.clip(normal[:, :2], -1.0, 1.0))
     about_axis = float(np.quantile(np.linalg.norm(angles, axis=1), 0.9))
     spread = np.linalg.svd(angles - angles.mean(axis=0), compute_uv=False) / np.sqrt(len(angles))
-    found = []
-    if about_axis < LEAST_TILT:
+    found, facing = [], about_axis < LEAST_TILT
+    if facing:
         found.append(
             f"all boards face the camera, within {np.degrees(about_axis):.0f} deg: focal length and distance cannot be "
             "told apart; photograph the board tilted by 20 to 40 deg to several sides"
         )
-    elif spread[0] < LEAST_SECOND_TILT:
+    # parallel boards do not tell the focal length either, so that their tilt may have come out as none
+    if spread[0] < LEAST_SECOND_TILT:
         found.append(
             "all boards are parallel: they tell no more than one of them; "
             "photograph the board tilted to other sides as well"
         )
-    elif spread[1] < LEAST_SECOND_TILT:
+    elif spread[1] < LEAST_SECOND_TILT and not facing:
         found.append(
             "the board is tilted about one axis only: the principal point across it cannot be told from the tilt; "
             "photograph it tilted about the other axis as well"

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -51,3 +54,57 @@ def views_of(estimate: Estimate, laser_step: int = 16, **given: float) -> list[V
     """Exact views of all poses."""
     count = len(estimate.rotation)
     return [exact_view(f"view {i}", estimate, i, target(), SIZE, laser_step=laser_step, **given) for i in range(count)]
+
+
+def coinciding(there: Estimate) -> Estimate:
+    """All boards at one place, so that the line is always the same."""
+    return replace(
+        there,
+        rotation=np.repeat(there.rotation[:1], 20, axis=0),
+        translation=np.repeat([[0.0, 0.0, 0.86]], 20, axis=0),
+    )
+
+
+def pencil(there: Estimate) -> Estimate:
+    """Boards that turn about one line of the laser plane, vertical at 0.86 m."""
+    m = there.planes[0]
+    x = (1.0 - m[2] * 0.86) / m[0]
+    turns = [
+        np.array([[np.cos(a), 0, np.sin(a)], [0, 1.0, 0], [-np.sin(a), 0, np.cos(a)]])
+        for a in np.linspace(-0.6, 0.6, 20)
+    ]
+    return replace(there, rotation=np.array(turns), translation=np.repeat([[x, 0.0, 0.86]], 20, axis=0))
+
+
+def one_axis(there: Estimate) -> Estimate:
+    return replace(there, rotation=pencil(there).rotation)
+
+
+def parallel(there: Estimate) -> Estimate:
+    return replace(there, rotation=np.repeat(pencil(there).rotation[:1], 20, axis=0))
+
+
+def central(there: Estimate) -> Estimate:
+    return replace(there, translation=np.array([0.0, 0.0, 4.0]) + 0.5 * there.translation)
+
+
+def aside(there: Estimate) -> Estimate:
+    return replace(there, translation=there.translation + np.array([-0.25, 0.0, 0.25]))
+
+
+DEGENERATE: tuple[tuple[dict[str, Any], str], ...] = (
+    ({"tilt": (0.0, 3.0)}, "all boards face the camera"),
+    ({"change": parallel}, "all boards are parallel"),
+    ({"change": one_axis}, "tilted about one axis only"),
+    ({"depth": (0.85, 0.86)}, "at one distance"),
+    ({"change": central, "lasers": 0}, "corners cover"),
+    ({"change": aside}, "hardly meet"),
+    ({"change": coinciding}, "coincide"),
+    ({"change": pencil}, "turn about the line"),
+)
+"""What `degenerate` is given, and what is said of that set."""
+
+
+def degenerate(seed: int, change: Callable[[Estimate], Estimate] = lambda there: there, **given: Any) -> Estimate:
+    """20 poses that cannot do."""
+    return change(truth(seed, 20, **given))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from analysis.calibration.observations import View, gather
 from analysis.calibration.robust import Adjusted, adjust_robustly
 from analysis.calibration.virtual import exact_view, noisy
 from render.base.errors import InputError
-from tests.analysis.calibration.boards import SIZE, target, truth, views_of
+from tests.analysis.calibration.boards import DEGENERATE, SIZE, degenerate, target, truth, views_of
 
 EXTENT = target()
 
@@ -88,19 +89,21 @@ def bent(there: Estimate, views: list[View], pixels: float) -> list[View]:
 
 
 def test_a_lens_that_is_not_as_modelled_is_told_and_a_good_one_is_not() -> None:
-    alarms, missed, p_halves = 0, 0, []
+    alarms, missed, p_halves, p_white = 0, 0, [], []
     for seed in range(12):
         there = truth(seed, 20)
         exact = [exact_view(f"view {i}", there, i, target(), SIZE, laser_step=128) for i in range(20)]
         rng = np.random.default_rng(100 + seed)
         good = adjusted(there, noisy(exact, rng))
-        alarms += whiteness(good).p < 0.05
+        p_white.append(whiteness(good).p)
+        alarms += p_white[-1] < 0.05
         pair = halves(good, [working_volume(there, 0, SIZE, 0.7, 1.0)])
         assert pair is not None
         p_halves.append(pair.p)
         missed += whiteness(adjusted(there, noisy(bent(there, exact, 0.1), rng))).p >= 0.05
     assert alarms <= 3 and missed == 0  # of 12 at 5 %: four or more come once in 500
-    assert np.min(p_halves) > 1e-3 and 0.2 < np.mean(p_halves) < 0.8
+    for p in (p_halves, p_white):  # uniform: the mean of 12 has a standard deviation of 0.083
+        assert np.min(p) > 1e-3 and 0.25 < np.mean(p) < 0.75
 
 
 def test_the_fewest_terms_that_do_are_chosen() -> None:
@@ -113,64 +116,10 @@ def test_the_fewest_terms_that_do_are_chosen() -> None:
     assert trials[0].terms == 0 and trials[0].worse_by > 3.0
 
 
-def of_set(**given: object) -> list[str]:
-    seed = int(given.pop("seed", 0))
-    change = given.pop("change", lambda there: there)
-    there = change(truth(seed, 20, **given))
-    return complaints(views_of(there, laser_step=32), there, SIZE)
-
-
-def coinciding(there: Estimate) -> Estimate:
-    """All boards at one place, so that the line is always the same."""
-    return replace(
-        there,
-        rotation=np.repeat(there.rotation[:1], 20, axis=0),
-        translation=np.repeat([[0.0, 0.0, 0.86]], 20, axis=0),
-    )
-
-
-def pencil(there: Estimate) -> Estimate:
-    """Boards that turn about one line of the laser plane, vertical at 0.86 m."""
-    m = there.planes[0]
-    x = (1.0 - m[2] * 0.86) / m[0]
-    turns = [
-        np.array([[np.cos(a), 0, np.sin(a)], [0, 1.0, 0], [-np.sin(a), 0, np.cos(a)]])
-        for a in np.linspace(-0.6, 0.6, 20)
-    ]
-    return replace(there, rotation=np.array(turns), translation=np.repeat([[x, 0.0, 0.86]], 20, axis=0))
-
-
-def one_axis(there: Estimate) -> Estimate:
-    return replace(there, rotation=pencil(there).rotation)
-
-
-def parallel(there: Estimate) -> Estimate:
-    return replace(there, rotation=np.repeat(pencil(there).rotation[:1], 20, axis=0))
-
-
-def central(there: Estimate) -> Estimate:
-    return replace(there, translation=np.array([0.0, 0.0, 4.0]) + 0.5 * there.translation)
-
-
-def aside(there: Estimate) -> Estimate:
-    return replace(there, translation=there.translation + np.array([-0.25, 0.0, 0.25]))
-
-
-@pytest.mark.parametrize(
-    ("given", "sentence"),
-    [
-        ({"tilt": (0.0, 3.0)}, "all boards face the camera"),
-        ({"change": parallel}, "all boards are parallel"),
-        ({"change": one_axis}, "tilted about one axis only"),
-        ({"depth": (0.85, 0.86)}, "at one distance"),
-        ({"change": central}, "corners cover"),
-        ({"change": aside}, "hardly meet"),
-        ({"change": coinciding}, "coincide"),
-        ({"change": pencil}, "turn about the line"),
-    ],
-)
-def test_each_degenerate_set_has_its_sentence(given: dict[str, object], sentence: str) -> None:
-    assert any(sentence in one for one in of_set(**given))
+@pytest.mark.parametrize(("given", "sentence"), DEGENERATE)
+def test_each_degenerate_set_has_its_sentence(given: dict[str, Any], sentence: str) -> None:
+    there = degenerate(0, **given)
+    assert any(sentence in one for one in complaints(views_of(there, laser_step=32), there, SIZE))
 
 
 def test_of_200_good_sets_none_is_blamed() -> None:

@@ -1,0 +1,38 @@
+"""Noisy views, judged as a calibration judges them: sets that cannot do are named, good ones are not blamed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.calibration.calibrate import DEFAULT_TERMS
+from analysis.calibration.degenerate import complaints
+from analysis.calibration.estimate import Estimate
+from analysis.calibration.start import start
+from analysis.calibration.virtual import noisy
+from render.base.errors import InputError
+from tests.analysis.calibration.boards import DEGENERATE, SIZE, degenerate, truth, views_of
+
+pytestmark = pytest.mark.validation
+
+
+def said(there: Estimate, seed: int) -> list[str]:
+    """From the estimate with which the adjustment begins, or what is said where there is none."""
+    views = noisy(views_of(there, laser_step=32), np.random.default_rng(1000 + seed))
+    try:
+        return complaints(views, start(views, SIZE, DEFAULT_TERMS, len(there.planes)), SIZE)
+    except InputError as error:
+        return [str(error)]
+
+
+@pytest.mark.parametrize(("given", "sentence"), DEGENERATE)
+def test_each_degenerate_set_is_named_by_its_estimate(given: dict[str, Any], sentence: str) -> None:
+    silent = [seed for seed in range(20) if not any(sentence in one for one in said(degenerate(seed, **given), seed))]
+    assert silent == []
+
+
+def test_of_200_good_sets_none_is_blamed_by_its_estimate() -> None:
+    blamed = {seed: found for seed in range(200) if (found := said(truth(seed, 12, terms=5), seed))}
+    assert blamed == {}
