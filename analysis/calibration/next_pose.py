@@ -19,12 +19,12 @@ from analysis.calibration.lens import normalise, project
 from analysis.calibration.observations import Index, Observations
 from render.base.arrays import Bool, Float
 
+ROUNDS, ABOUT = 3, 48
+"""Searches about the best pose so far, each over so many poses half as far away as the one before."""
 CORNERS = 5
 """Corners a side of the board that stand for all of them in a trial."""
 POINTS = 24
 """Laser points a line that stand for all of them."""
-ROUNDS, ABOUT = 3, 48
-"""Searches about the best pose so far, each over so many poses half as far away as the one before."""
 
 
 @dataclass(frozen=True)

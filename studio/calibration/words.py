@@ -69,7 +69,10 @@ def check_rows(result: Calibrated, views: int) -> list[tuple[str, str]]:
         rows.append(("halves", result.halves.sentence))
     rows.append(("residuals", result.whiteness.sentence))
     if result.lens_trials:
-        tried = ", ".join(f"{one.terms}: {one.held_out:.3g}" for one in result.lens_trials)
+        tried = ", ".join(
+            f"{one.terms}: {one.held_out:.3g}" + (f" and {1e6 * one.depth:.0f} um" if one.depth else "")
+            for one in result.lens_trials
+        )
         terms = len(result.estimate.distortion)
         rows.append(("lens", f"{terms} distortion terms, the fewest that are not worse on held-out views ({tried})"))
     return rows
