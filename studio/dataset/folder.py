@@ -20,7 +20,7 @@ from typing import Any
 
 from render.base.errors import InputError
 from render.base.files import atomic_write, read_bytes, sha256
-from studio.dataset.images import IMAGES, LABELS, images_of, name_of
+from studio.dataset.images import IMAGES, LABELS, MAPS, OBJECTS, images_of, name_of
 from studio.dataset.recipe import Recipe
 from studio.project.project import Project
 from studio.project.strict_json import read_object
@@ -59,12 +59,33 @@ def label_record(folder: Path, image: int) -> dict[str, Any]:
     data = read_bytes(path, MOST_LABEL_BYTES, "image's labels")
     try:
         found = json.loads(data)
-        if found["image"] != image or not isinstance(found["files"], dict):
+        if not _is_whole(found, image):
             raise ValueError
-    except (ValueError, KeyError, TypeError, UnicodeDecodeError):
+    except (ValueError, KeyError, TypeError, AttributeError, UnicodeDecodeError, RecursionError):
         cure = "remove it, and run the same command again: it is made anew"
         raise InputError("the image's labels are damaged", where=str(path), cure=cure) from None
     return dict(found)
+
+
+def _is_whole(found: dict[str, Any], image: int) -> bool:
+    """Labels of this image that name no files but its own, wherever another folder's would lead.
+
+    KeyError, TypeError, AttributeError: something is missing, or of another kind.
+    """
+    name = name_of(image)
+    own = {f"{IMAGES}/{name}.png", f"{OBJECTS}/{name}.png", f"{MAPS}/{name}.exr"}
+    files, rejected = found["files"], found["rejected"]
+    return (
+        found["image"] == image
+        and isinstance(found["scene"], int)
+        and isinstance(found["split"], str)
+        and (found["fired"] is None or isinstance(found["fired"], int))
+        and isinstance(rejected, list)
+        and all(isinstance(reason, str) for reason in rejected)
+        and f"{IMAGES}/{name}.png" in files
+        and files.keys() <= own
+        and all(isinstance(digest, str) for digest in files.values())
+    )
 
 
 def begun(folder: Path, recipe: Recipe, base: Project) -> Dataset:

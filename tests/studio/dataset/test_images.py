@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
 import tarfile
 from pathlib import Path
 
@@ -64,6 +65,23 @@ def test_three_shards_put_together_are_the_same_bytes(whole: Path, tmp_path: Pat
         make_dataset(RECIPE, Path(), Wanted(SCENES, Shard(k + 1, 3)), folder, engine=HERE)
     result = make_dataset(RECIPE, Path(), Wanted(SCENES, sources=shards), tmp_path / "all", engine=HERE)
     assert result.made == 0 and contents(tmp_path / "all") == contents(whole)
+
+
+@pytest.mark.parametrize("change", [{"files": {"../../stolen.png": "0"}}, {"rejected": None}, {"scene": "first"}, {}])
+def test_labels_of_another_folder_lead_nowhere_and_are_whole(whole: Path, tmp_path: Path, change: dict) -> None:
+    shard = tmp_path / "shard"
+    shutil.copytree(whole, shard)
+    (tmp_path / "stolen.png").write_bytes(b"not of the dataset")
+    labels = next((shard / "labels").rglob("*.json"))
+    record = json.loads(labels.read_text())
+    for name, value in change.items():
+        record[name] = record[name] | value if isinstance(value, dict) else value
+    if not change:
+        del record["split"]
+    labels.write_text(json.dumps(record))
+    with pytest.raises(InputError, match="labels are damaged"):
+        make_dataset(RECIPE, Path(), Wanted(SCENES, sources=[shard]), tmp_path / "all" / "of" / "it", engine=HERE)
+    assert not list((tmp_path / "all").rglob("stolen.png"))
 
 
 def test_what_a_stop_left_out_is_made_and_the_rest_stays(whole: Path, tmp_path: Path) -> None:
