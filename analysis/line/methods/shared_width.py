@@ -97,7 +97,8 @@ def _deviance(log: Float, width: Float) -> Float:
     left = np.clip(np.searchsorted(PRIOR_WIDTHS, width) - 1, 0, len(PRIOR_WIDTHS) - 2)
     along = (width - PRIOR_WIDTHS[left]) / (PRIOR_WIDTHS[left + 1] - PRIOR_WIDTHS[left])
     rows = np.arange(len(log))
-    return 2.0 * (log.max(axis=1) - (1.0 - along) * log[rows, left] - along * log[rows, left + 1])
+    there = (1.0 - along) * log[rows, left] + along * log[rows, left + 1]
+    return np.asarray(2.0 * np.maximum(log.max(axis=1) - there, 0.0))  # rounding may put it above the largest
 
 
 def _moments(log: Float, widths: Float) -> tuple[Float, Float]:

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from analysis.line.detection.detect import PRIOR_WIDTHS
 from analysis.line.extract import extract
+from analysis.line.methods.shared_width import width_priors
 from analysis.line.result import Line
 from analysis.measures import means
 from tests.analysis.line.line_images import electrons, expected, exposed
@@ -63,3 +65,33 @@ def test_the_correlation_length_holds_both_parts():
     )
     assert half.correlation_length is not None
     assert half.correlation_length[150, 0] == pytest.approx(0.5 * 2.0 + 0.5 * 65.0)
+
+
+def told_of(width: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """(n, 2 m) what lines would tell of widths that their pixels show (n,) so well (n,), px."""
+    log = -0.5 * ((PRIOR_WIDTHS - width[:, None]) / sigma[:, None]) ** 2
+    return np.hstack((log, log))
+
+
+def test_a_line_of_another_width_does_not_draw_that_of_its_neighbours():
+    """Two lines that meet in a corner, as one of 0.25 px known to 0.03, drew 64 others by 0.02 px."""
+    count = 60
+    places, sigma = 50.0 + np.random.default_rng(5).uniform(size=count), np.full(count, 0.01)
+    alone = width_priors(told_of(np.full(count, 0.15), np.full(count, 0.05)), places, sigma)
+    width, known = np.full(count, 0.15), np.full(count, 0.05)
+    width[30], known[30] = 0.3, 0.02
+    beside = width_priors(told_of(width, known), places, sigma)
+    assert alone is not None and beside is not None
+    others = np.arange(count) != 30
+    best = [PRIOR_WIDTHS[np.argmax(prior[0][others], axis=1)] for prior in (alone, beside)]
+    np.testing.assert_array_equal(*best)
+    assert not beside[0][30].any()  # it keeps its own
+
+
+def test_lines_that_tell_nothing_share_nothing_that_is_not_finite():
+    """Rounding put what lies between two equal numbers above both, and a root of it spoiled all neighbours."""
+    rng = np.random.default_rng(6)
+    told = np.repeat(-rng.uniform(size=(400, 1)), 2 * len(PRIOR_WIDTHS), axis=1)
+    with np.errstate(invalid="raise"):
+        found = width_priors(told, 50.0 + rng.uniform(size=400), np.full(400, 0.1))
+    assert found is None or all(np.isfinite(one).all() for one in found)
