@@ -51,8 +51,6 @@ class CoarseImage:
     """Pixels between two that were sampled; 1: all were."""
     samples: int
     """That it took."""
-    deviation: float
-    """Of a single sample over the radiance, RMS over the points of the grid."""
     dropped: int
     clamped: int
     cut: float
@@ -83,9 +81,7 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
         count, block = (2 * count, block) if noisy else (count, block // 2)
     radiance = _image(film, paths, height, grid, block, run.between(0.5, 1.0))
     dropped, clamped = film.invalid_counts.astype(int).tolist()
-    power = float(np.mean(film.means(grid).astype(np.float64) ** 2))
-    deviation = math.sqrt(float(np.mean(film.spread[grid], dtype=np.float64)) / power) if power > 0.0 else 0.0
-    return CoarseImage(radiance, error, block, film.total, deviation, dropped, clamped, film.cut / film.total)
+    return CoarseImage(radiance, error, block, film.total, dropped, clamped, film.cut / film.total)
 
 
 def _held_out(pixels: int, run: Run) -> Int:

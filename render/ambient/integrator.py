@@ -118,7 +118,7 @@ def _passes(film: Film, paths: CameraPaths, target: float, most: int, run: Run) 
     share = film.shares()
     while error > target and 2.0 * wanted < most:
         spent = 2.0 * wanted / most
-        needed = 1.1 * wanted * (error / target) ** (1.0 / CONVERGENCE)
+        needed = 1.1 * wanted * (error / target) ** (1.0 / CONVERGENCE) if target > 0.0 else math.inf
         wanted = min(max(needed, 1.25 * wanted), GROWTH * wanted, most / 2)
         done = next(known, None)
         if done is None:

@@ -12,7 +12,6 @@ the values that are averaged there. How many samples a line gets follows, like i
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numba
@@ -23,7 +22,7 @@ from render.ambient.integrator import CONVERGENCE
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
 from render.base.arrays import Float, Int
-from render.importance import LINES_KNOWN, Importance
+from render.importance import Importance
 from render.run import Run
 
 MARGIN = 1.3
@@ -35,8 +34,6 @@ AROUND = 3
 interpolation."""
 REACH = 2
 """Pixels on each side over which variances are averaged."""
-FAR = 4.0
-"""Times the samples that are allowed: with as many foreseen, lines are still known to about twice the goal."""
 PILOT, GROWTH, PASSES = 2, 4.0, 12
 """Samples of each half on every pixel at first; most by which a pass multiplies those of a scan line; most passes."""
 
@@ -73,14 +70,6 @@ def band_of(importance: Importance, coarse: CoarseImage) -> Band:
     width = weight.shape[1]
     line = pixels // width if importance.axis == "rows" else pixels % width
     return Band(pixels, weight.ravel()[pixels].astype(np.float64), line, place)
-
-
-def foreseen_samples(band: Band, coarse: CoarseImage) -> float:
-    """About how many samples it takes until most scan lines are known, before any of them is sampled."""
-    deviation = coarse.deviation * coarse.radiance.max(axis=2).ravel()[band.pixels]
-    needed = _line_sums(band, band.weight * deviation.astype(np.float64)) ** 2
-    needed = np.sort(needed[needed > 0.0])
-    return float(needed[: math.ceil(LINES_KNOWN * len(needed))].sum())
 
 
 def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, run: Run) -> None:

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from render.ambient.coarse_image import CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
-from render.ambient.line_samples import (
-    FAR,
-    PILOT,
-    Band,
-    band_of,
-    foreseen_samples,
-    line_deviations,
-    sample_band,
-)
+from render.ambient.line_samples import PILOT, Band, band_of, line_deviations, sample_band
 from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
@@ -44,17 +35,17 @@ def measured_images(
 ) -> Iterator[AmbientImage]:
     """The coarse image, then the one whose scan lines are known, or on which `most` samples a pixel are spent.
 
-    Where the lines' goal is far out of reach, the image is rendered in its place, to the relative error `target` where
-    that is given: it takes less time. So it is where `most` leaves no room for a first look at the lines. As
-    `ambient_images`; the error of the second is the deviation of its scan lines over the allowed one, which most of
-    them are below. Raises Cancelled. ValueError: the importance is of another image.
+    Where the goal is out of reach, all that is allowed goes to where the lines are; where `most` leaves no room for a
+    first look at them, the image is rendered in its place, to the relative error `target`. As `ambient_images`; the
+    error of the second is the deviation of its scan lines over the allowed one, which most of them are below. Raises
+    Cancelled. ValueError: the importance is of another image.
     """
     camera, view = placed.camera, placed.camera.view(placed.T_world_camera)
     if importance.ambient.shape != (camera.height, camera.width):
         raise ValueError(f"weights {importance.ambient.shape} of an image of {camera.height} x {camera.width}")
-    instead: dict[str, Any] = {"most": most, "surfaces": surfaces, "clamp": clamp}
     if most < LEAST_SAMPLES:
-        yield from ambient_images(placed, target=0.0 if target is None else target, **instead, run=run)
+        least = 0.0 if target is None else target
+        yield from ambient_images(placed, target=least, most=most, surfaces=surfaces, clamp=clamp, run=run)
         return
     paths = camera_paths(placed.world, placed.scene, view, surfaces=surfaces, clamp=clamp, seed=run.seed)
     budget = most * camera.width * camera.height
@@ -67,11 +58,7 @@ def measured_images(
     film, band = PixelSamples(camera.width, camera.height), band_of(importance, coarse)
     yield _image(coarse, film, band, begun=False)
     if len(band.pixels):
-        part, left = run.between(0.5, 1.0), budget - coarse.samples
-        if target is not None and foreseen_samples(band, coarse) > FAR * left:
-            yield from ambient_images(placed, target=target, **instead, run=part)
-            return
-        sample_band(film, paths, band, left, part)
+        sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
     yield _image(coarse, film, band)
 
 
