@@ -52,6 +52,12 @@ JUDGED = 0.01
 """Relative variance of the light from which no fit is judged: what scintillates strongly keeps to no profile."""
 BESIDE = (1.5, 3.5)
 """px from a narrow line; its own light does not reach so far."""
+UNEXPLAINED = 6.0
+"""Standard normal deviate from which no narrow line explains its pixels: a chi-square of 50 at three degrees of
+freedom, of which the deviate is known less well than of many."""
+GROUND = 5.0
+"""Widths of the line, and half a pixel more, beside which pixels hold none of its light, by which it is judged where
+it scintillates."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -113,7 +119,10 @@ def _is_coarse(pixel: Array, n: int, p: Array, options: Options, hessian: Array)
 def _measure_narrow(
     pixels: Pixels, pixel: Array, n: int, p: Array, seed: Array, options: Options, shape: Array, out: Array
 ) -> int:
-    """The posterior of a line that may be too narrow for its pixels (4, n) -> out; returns UNRESOLVED if it is."""
+    """The posterior of a line that may be too narrow for its pixels (4, n) -> out; returns UNRESOLVED if it is.
+
+    MISFIT where no narrow line explains the pixels: sigma is that of the posterior times the root of chi-square.
+    """
     x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
     told = np.empty((2, PRIOR_WIDTHS.shape[0]))
     told[:] = np.nan
@@ -146,7 +155,30 @@ def _measure_narrow(
         count = out[1] * out[1]
         out[1] = math.sqrt(count + shared)
         out[CORRELATION_LENGTH] = (count + mean) / max(count + shared, 1e-300)
+    unexplained = _unexplained(pixels, pixel, n, p, light, chi2) if options.judge < math.inf else 1.0
+    if unexplained > 1.0:
+        out[1] *= math.sqrt(unexplained)
+        return Flag.MISFIT.value
     return Flag.UNRESOLVED.value if p[2] < FINE else Flag.OK.value
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _unexplained(pixels: Pixels, pixel: Array, n: int, p: Array, light: Array, chi2: float) -> float:
+    """Reduced chi-square of a narrow line p whose pixels (4, n) it does not explain, with its light (n,); else 1.
+
+    Where the light scintillates, as grains of speckle smaller than a pixel do, only the ground beside it is judged.
+    """
+    freedom = n - 4
+    if pixels.covariances.shape[1] > 0 and pixels.covariances[0, 0] >= JUDGED:
+        chi2, freedom = 0.0, -1
+        for i in range(n):
+            if abs(pixel[POSITION, i] - p[1]) > GROUND * p[2] + 0.5:
+                mu, floor = light[i] + p[3], pixel[FLOOR, i]
+                chi2 += (pixel[ELECTRONS, i] - mu) ** 2 / max(mu + floor, 0.1 * abs(floor))
+                freedom += 1
+    if freedom < 1 or deviate(chi2, freedom) < UNEXPLAINED:
+        return 1.0
+    return max(chi2 / freedom, 1.0)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
