@@ -98,8 +98,10 @@ def estimate_noise(
         return numbers.model_copy(update={"gain": gain, "read_noise": read_noise})
 
     def raised(gain: float) -> NoiseModel:
-        """What a count of the background would scatter more than it does is black level: the line alone is a count."""
-        return model(gain).model_copy(update={"black_level": max(level - still / gain, 0.0)})
+        """Where a count of the background would scatter more than it does, the line alone is a count."""
+        if gain * level <= still:
+            return model(gain)
+        return numbers.model_copy(update={"gain": gain, "black_level": level, "read_noise": math.sqrt(still) / gain})
 
     def fitted(noise: NoiseModel) -> Line:
         return measure(replace(lines, noise=noise), settings, threads)

@@ -43,6 +43,9 @@ EDGE, JUMP = 3.0, 1.0
 FINEST = 1.1
 """px; a narrower line of colours that are filled in, which widens it by 0.7 px, is narrower than the pixels that saw
 it are apart: where between them it is, nothing tells."""
+SINGLE, MOST = (Flag.OK, Flag.UNRESOLVED, Flag.SPECKLED), 0.6
+"""Flags of a line that is no other's neighbour, and the share of them from which they alone are asked: where a line
+that is two or none is taken to be, jumps."""
 SURE, KNOWN = 3.0, 0.2
 """Standard errors from which a variance is believed to be above the one told, and how well that is known at best."""
 
@@ -67,11 +70,15 @@ class SharedNoise:
 
 def with_shared_noise(line: Line) -> Line:
     """A line (n, k) whose pixels share noise -> the same with what its first peaks scatter beyond their sigma_u, in
-    all peaks; as it is where they scatter as they tell, or are too few. Where it is narrow it is flagged `UNRESOLVED`.
+    all peaks; as it is where they scatter as they tell, or are too few. Where it is narrow, its single lines are
+    flagged `UNRESOLVED`.
     """
-    coarse = (line.flag == Flag.OK) & (line.width < FINEST)
+    valid, single = line.valid[:, 0], np.isin(line.flag[:, 0], SINGLE)
+    narrow = valid.any() and float(np.median(line.width[valid, 0])) < FINEST
+    coarse = (line.flag == Flag.OK) & ((line.width < FINEST) | narrow)
     line = replace(line, flag=np.where(coarse, Flag.UNRESOLVED, line.flag).astype(line.flag.dtype))
-    noise = shared_noise(line.u[:, 0], line.sigma_u[:, 0], line.width[:, 0])
+    asked = single if single.sum() >= MOST * valid.sum() else valid
+    noise = shared_noise(np.where(asked, line.u[:, 0], np.nan), line.sigma_u[:, 0], line.width[:, 0])
     if noise is None:
         return line
     candidates = None if line.candidates is None else noise.added_to(line.candidates)
