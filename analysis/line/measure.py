@@ -38,7 +38,7 @@ from analysis.line.methods.shared_width import width_priors
 from analysis.line.methods.steger_2d import HALO, NORMAL_CENTROID, RIDGE, fill_gaps, measure_ridge
 from analysis.line.methods.three_point import GAUSS, LINEAR, MAXIMUM, PARABOLA, measure_three_pixels
 from analysis.line.methods.threshold import SUBTRACTED, WHOLE, measure_above_threshold
-from analysis.line.result import Flag, Line
+from analysis.line.result import SYSTEMATIC, Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.threads import map_chunks
 
@@ -219,5 +219,6 @@ def _line_of(
         np.ascontiguousarray(out[..., j]) for j in range(CORRELATION_LENGTH + 1)
     )
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
-    common = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
+    by_width = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
+    common = np.where(np.isin(flags, SYSTEMATIC), np.nan_to_num(out[..., SHARED]), by_width)
     return replace(line, length_apart=length, shared_u=common if common.any() else None)

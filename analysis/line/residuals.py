@@ -181,20 +181,22 @@ class _Rows:
             rise = np.sum(weighed * self.residual, axis=(1, 2)) / np.sum(weighed * rising, axis=(1, 2))
             self.residual = self.residual - rise[:, None, None] * rising
         z = along / np.where(usable, width[:, :, None], 1.0)
+        self._take_out_shape(z, np.where(usable, amplitude, 0.0), typical)
+
+    def _take_out_shape(self, z: Float, amplitude: Float, width: float) -> None:
+        """What all residuals, z sigmas from lines of an amplitude (runs, RUN, n), hold alike is the line's shape."""
         lean = np.stack([(z**2 - 3.0) * z, (z**4 - 10.0 * z**2 + 15.0) * z], axis=-1) * self.light[..., None]
-        lean = self.left @ lean
-        self.leans = self._is_common(lean)
         even = np.stack([z**4 - 6.0 * z**2 + 3.0, z**6 - 15.0 * z**4 + 45.0 * z**2 - 15.0], axis=-1)
-        even = self.left @ (even * self.light[..., None])
-        flat = typical >= SHAPED and self._is_common(even)
-        if narrow:
-            shapes = [one for one, common in ((lean, self.leans), (even, flat)) if common]
-        elif self.leans or flat:
-            shapes = [self.left @ (np.where(usable, amplitude, 0.0)[..., None] * _splines(z / KNOTS))]
+        lean, even = self.left @ lean, self.left @ (even * self.light[..., None])
+        self.leans = self._is_common(lean)
+        flat = width >= SHAPED and self._is_common(even)
+        if not (self.leans or flat):
+            return
+        if width < RESOLVED:
+            shapes = [shape for shape, common in ((lean, self.leans), (even, flat)) if common]
         else:
-            shapes = []
-        if shapes:
-            self.residual = self.residual - self._common(np.concatenate(shapes, axis=-1))
+            shapes = [self.left @ (amplitude[..., None] * _splines(z / KNOTS))]
+        self.residual = self.residual - self._common(np.concatenate(shapes, axis=-1))
 
     def _is_common(self, lean: Float) -> bool:
         """Whether all residuals hold alike what shapes (runs, RUN, n, m) are: Hotelling's T^2 over the runs.

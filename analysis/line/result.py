@@ -58,6 +58,8 @@ NEIGHBOURS = 32
 
 CAUTIOUS = (Flag.SATURATED, Flag.UNRESOLVED, Flag.BLENDED, Flag.MISFIT, Flag.SPECKLED)
 """Flags of positions that the model of a line on level ground does not hold for; sigma_u says what that costs."""
+SYSTEMATIC = (Flag.BLENDED, Flag.MISFIT)
+"""Those whose errors neighbours have in common by what is there, not by chance."""
 
 
 def overlap(distance: NDArray[np.int64] | int) -> Float:
@@ -79,9 +81,10 @@ class Line:
     px; `amplitude` and `background` in electrons (DN / gain); `chi2` the reduced chi-square of the fit, NaN for methods
     without one. Neighbouring scan lines may err alike, by speckle or smoothing: the variance of a mean over many, n, is
     sigma_u^2 `correlation_length` / n; 1 where they do not, None where it is not known. It is made of two parts:
-    `shared_u`, px, is how far, and to which side, one standard deviation of the width that narrow lines share moves the
-    position, None where none do; `length_apart` is the correlation length of what is left of sigma_u. `note` tells what
-    "auto" picked and why; `candidates` are the peaks that one was selected from.
+    `shared_u`, px, is how far, and to which side, one standard deviation of what neighbours share moves the position,
+    the width of narrow lines and what the model of `SYSTEMATIC` ones does not hold, None where they share nothing;
+    `length_apart` is the correlation length of what is left of sigma_u. `note` tells what "auto" picked and why;
+    `candidates` are the peaks that one was selected from.
     """
 
     axis: Axis

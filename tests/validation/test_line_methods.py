@@ -24,6 +24,8 @@ BETTER = {
     "likelihood": "its efficiency is 1 within the noise",
     "gaussian": "narrow lines keep their width from below",
 }
+FITTED = ("gaussian", "likelihood")
+"""Published with a width of their own; where it is held, least squares lose more of the light's noise."""
 
 
 def published():
@@ -40,7 +42,8 @@ def published():
 def test_efficiency_is_the_published_one(name, monkeypatch):
     method, _, scale = name.partition(" one step ")
     if scale:
-        monkeypatch.setattr(measure, "NEWTON_STEPS", 1)
+        one_step = measure.METHODS["steger"]._replace(variant=1)
+        monkeypatch.setitem(measure.METHODS, "steger", one_step)
     rng = np.random.default_rng(5)
     worst, far = 0.0, []
     for amplitude, sigma, read_noise, printed in published()[name]:
@@ -48,7 +51,8 @@ def test_efficiency_is_the_published_one(name, monkeypatch):
             continue
         centre = 80 + rng.uniform(-0.5, 0.5, ROWS)
         image = exposed(expected(160, centre, amplitude, sigma, 10.0), read_noise, rng).astype(np.float32)
-        settings = ExtractionSettings(width=sigma, filter_scale=float(scale or 1.0))
+        width = None if method in FITTED else sigma
+        settings = ExtractionSettings(width=width, filter_scale=float(scale or 1.0))
         line = extract(image, method=method, settings=settings, noise=electrons(read_noise))
         error = (line.u[:, 0] - centre)[line.valid[:, 0]]
         found = cramer_rao(amplitude, sigma, read_noise, 10.0) ** 2 / np.mean(error**2)

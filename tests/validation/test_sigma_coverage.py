@@ -13,7 +13,16 @@ import numpy as np
 import pytest
 
 from analysis.line.result import Flag
-from tests.analysis.line.troubles import PLAIN, SIGNALS, TROUBLES, WIDTHS, Coverage, coverage, measured
+from tests.analysis.line.troubles import (
+    PLAIN,
+    SIGNALS,
+    TROUBLES,
+    WIDTHS,
+    Coverage,
+    coverage,
+    measured,
+    variance_of_means,
+)
 
 pytestmark = pytest.mark.validation
 
@@ -22,6 +31,22 @@ FEWEST = 100
 """Points without a flag that make a share."""
 MOST = 3.5
 """Standard deviations of a share: 560 cells of two shares, one run in three fails by chance at 3.5."""
+KNOWN, ESTIMATED = "noise known", "noise estimated"
+EXCEPTIONS = {
+    *(("slanted edge to 30 %", 100.0, sigma, noise) for sigma in (2.0, 8.0) for noise in (KNOWN, ESTIMATED)),
+    ("partly occluded", 10000.0, 8.0, ESTIMATED),
+    ("defocus of 2 sigma", 100.0, 8.0, KNOWN),
+    ("reflection of 10 %", 100.0, 0.2, KNOWN),
+    ("reflection of 10 %", 100.0, 0.2, ESTIMATED),
+    ("reflection of 10 %", 100.0, 8.0, ESTIMATED),
+    ("reflection of 10 %", 10000.0, 0.2, KNOWN),
+    *(("mosaic", signal, 2.0, ESTIMATED) for signal in (1000.0, 3000.0, 10000.0)),
+}
+"""Cells where sigma does not hold, as `analysis/line/README.md` says."""
+FEW = 0.01
+"""Share of flagged points from which what is told of them may outweigh that of the others."""
+MEANS = 8000
+"""Scan lines whose means are compared."""
 CELLS = [(name, signal, sigma) for name in TROUBLES for signal in SIGNALS for sigma in WIDTHS]
 
 
@@ -38,9 +63,14 @@ def share_is(share: float, low: float, high: float, count: int) -> bool:
     )
 
 
-@pytest.mark.parametrize("known", [True, False], ids=["noise known", "noise estimated"])
+@pytest.mark.parametrize("noise", [KNOWN, ESTIMATED])
 @pytest.mark.parametrize(("name", "signal", "sigma"), CELLS)
-def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: float, known: bool) -> None:
+def test_sigma_holds_or_the_point_is_flagged(
+    name: str, signal: float, sigma: float, noise: str, request: pytest.FixtureRequest
+) -> None:
+    if (name, signal, sigma, noise) in EXCEPTIONS:
+        request.applymarker(pytest.mark.xfail(strict=True))
+    known = noise == KNOWN
     trouble = TROUBLES[name]
     line, centre = measured(trouble, signal, sigma, ROWS, seed=2024, known=known)
     every = found = coverage(line, centre)
@@ -57,3 +87,25 @@ def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: fl
         assert every.flagged <= 0.02
     if trouble == PLAIN and sigma < 0.3 and signal >= 300:
         assert np.mean(line.flag[line.valid] == Flag.UNRESOLVED) > 0.5
+
+
+@pytest.mark.parametrize("sigma", [0.6, 2.0, 8.0])
+@pytest.mark.parametrize("signal", [300.0, 1000.0, 10000.0])
+@pytest.mark.parametrize("name", ["plain", "defocus of 2 sigma", "reflection of 10 %"])
+def test_means_over_10_and_100_scan_lines_are_told_or_flagged(
+    name: str, signal: float, sigma: float, request: pytest.FixtureRequest
+) -> None:
+    """Of flagged points no larger than told."""
+    if (name, signal, sigma) == ("reflection of 10 %", 10000.0, 8.0):
+        request.applymarker(pytest.mark.xfail(strict=True, reason="a light as wide is taken for the background"))
+    line, centre = measured(TROUBLES[name], signal, sigma, MEANS, seed=77)
+    ten, hundred = (variance_of_means(line, centre, rows) for rows in (10, 100))
+    flagged = np.mean(line.flag != Flag.OK)
+    print(
+        f"\n{name:28} A {signal:6g} s {sigma:3}: over 10 {ten:.2f}, over 100 {hundred:.2f}, flagged {flagged:.2f}",
+        end="",
+    )
+    for ratio, count in ((ten, MEANS / 10), (hundred, MEANS / 100)):
+        chance = 3 * np.sqrt(2 / count)
+        assert ratio < 1.15 + chance
+        assert flagged > FEW or ratio > 0.85 - chance

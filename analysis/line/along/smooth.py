@@ -15,13 +15,11 @@ from numpy.typing import NDArray
 
 from analysis.line.along.curve import Kind, Stretch
 from analysis.line.along.shocks import curve_with_shocks
-from analysis.line.result import Flag, Line
+from analysis.line.result import SYSTEMATIC, Line
 from render.base.arrays import Float
 
 GAP, FEWEST = 12, 16
 """Scan lines without a position beyond which a line is another one, and positions that make a line."""
-SYSTEMATIC = (Flag.MISFIT, Flag.BLENDED)
-"""Flags of positions whose errors neighbours have in common by what is there, not by chance."""
 SURE, MOVED = 0.5, 1.0
 """Times the line's width that sigma_u is at most where a position tells of its neighbours, and that it is moved by."""
 APART, FINEST = 1e-3, 0.01

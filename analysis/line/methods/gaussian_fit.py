@@ -24,7 +24,7 @@ from analysis.line.detection.detect import (
 )
 from analysis.line.methods.fisher_scoring import LIKELIHOOD, optimise, solve
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE
-from analysis.line.methods.misfit import deviate, measure_misfit
+from analysis.line.methods.misfit import centroid, deviate, measure_misfit
 from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width
 from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, measure_with_glow, widen_saturated
 from analysis.line.methods.scintillation import position_variance, shared_variance
@@ -157,6 +157,7 @@ def _measure_narrow(
         out[CORRELATION_LENGTH] = (count + mean) / max(count + shared, 1e-300)
     unexplained = _unexplained(pixels, pixel, n, p, light, chi2) if options.judge < math.inf else 1.0
     if unexplained > 1.0:
+        out[SHARED] = math.copysign(out[1] * math.sqrt(unexplained - 1.0), centroid(pixel, n, p) - p[1])
         out[1] *= math.sqrt(unexplained)
         return Flag.MISFIT.value
     return Flag.UNRESOLVED.value if p[2] < FINE else Flag.OK.value

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.line.methods.misfit import UNLIKELY
+from analysis.line.methods.seed_loop import SHARED
 from analysis.line.result import NEIGHBOURS, Flag
 from render.base.arrays import Float
 
@@ -57,7 +58,7 @@ def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], 
     out (n, k, columns), u and sigma_u its first; single (m, columns), as before; farthest: px, the largest sigma.
     """
     double, parted = out[leaning], flags[leaning] == Flag.OK
-    double[parted, 1] = _with_distance(double[parted], single[parted])
+    double[parted] = _with_distance(double[parted], single[parted])
     unsure = ~(double[:, 1] < farthest)
     out[leaning] = np.where(unsure[:, None], single, double)
     flags[leaning] = np.where(unsure | parted, Flag.BLENDED, flags[leaning])
@@ -67,14 +68,15 @@ def keep_doubtful(out: Float, flags: NDArray[np.uint8], alone: NDArray[np.bool_]
     """Flag lines (n, k) that part by noise alone: where the brighter of the two is, double (m, columns), with how far
     that is from the single line, which out (n, k, columns) holds.
     """
-    double[:, 1] = _with_distance(double, out[alone])
-    out[alone], flags[alone] = double, Flag.BLENDED
+    out[alone], flags[alone] = _with_distance(double, out[alone]), Flag.BLENDED
 
 
 def _with_distance(double: Float, single: Float) -> Float:
-    """(m,) sigma of the brighter of two lines (m, columns) that holds its distance from the single line."""
-    distance = np.nan_to_num(double[:, 0] - single[:, 0])
-    return np.asarray(np.hypot(double[:, 1], distance))
+    """The brighter of two lines (m, columns) with a sigma that holds its distance from the single line."""
+    found = double.copy()
+    found[:, SHARED] = np.nan_to_num(single[:, 0] - double[:, 0])
+    found[:, 1] = np.hypot(double[:, 1], found[:, SHARED])
+    return found
 
 
 def parts_alone(flag: NDArray[np.uint8], lean: Float) -> NDArray[np.bool_]:

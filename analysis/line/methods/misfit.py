@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from analysis.line.methods.line_profile import ELECTRONS, POSITION, VARIANCE, linear_variance
-from analysis.line.methods.seed_loop import Array, Options, Pixels
+from analysis.line.methods.seed_loop import LEAN, SHARED, Array, Options, Pixels
 from analysis.line.methods.two_lines import UNKNOWNS, fit_two_lines
 from analysis.line.methods.window import slope_variance
 from analysis.line.result import Flag
@@ -35,7 +35,7 @@ def deviate(chi2: float, freedom: int) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _centroid(pixel: Array, n: int, p: Array) -> float:
+def centroid(pixel: Array, n: int, p: Array) -> float:
     """Centre of mass of pixels (4, n) above the background of a fit p (4,), within 3 sigmas of its centre."""
     mass = moment = 0.0
     for i in range(n):
@@ -53,10 +53,11 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
     pixels.room: what the fit of p (4,) left there. Returns OK for two lines that part. BLENDED for two that do not:
     sigma holds how far the brighter one is from the single line. MISFIT for neither, or one with a flat top: sigma is
     that of the fit times the root of chi-square (Birge, Phys. Rev. 40, 1932), and holds the distance to the centre of
-    mass of the same pixels, by which another estimator differs.
+    mass of the same pixels, by which another estimator differs. What neighbours have in common is to the side of the
+    other light.
     """
     pixel, weight, both = pixels.room[:4], pixels.room[4], np.empty(UNKNOWNS)
-    shift = abs(_centroid(pixel, n, p) - p[1])
+    shift = centroid(pixel, n, p) - p[1]
     chi2 = fit_two_lines(pixel, n, p, options.known_width, options.integrated, pixels.room[5:11], both, weight)
     flat = both[4] > EQUAL * both[0] and abs(both[5] - both[1]) < DIP * both[2]
     if not flat and deviate(chi2, n - UNKNOWNS) < UNLIKELY:
@@ -66,7 +67,13 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
         parted = sigma < PARTED * distance and distance > APART * both[2]
         parted = parted and (options.known_width or both[2] > FINEST)
         out[0], out[2], out[3], out[4], out[5] = both[1], both[2], both[0], both[3], chi2 / max(n - UNKNOWNS, 1)
-        out[1] = sigma if parted else math.hypot(sigma, both[1] - p[1])
-        return Flag.OK.value if parted else Flag.BLENDED.value
-    out[1] = math.sqrt(out[1] * out[1] * max(out[5], 1.0) + shift * shift)
+        if parted:
+            out[1] = sigma
+            return Flag.OK.value
+        out[SHARED] = p[1] - both[1]
+        out[1] = math.hypot(sigma, out[SHARED])
+        return Flag.BLENDED.value
+    side = shift if math.isnan(out[LEAN]) else out[LEAN]
+    out[SHARED] = math.copysign(math.sqrt(out[1] * out[1] * max(out[5] - 1.0, 0.0) + shift * shift), side)
+    out[1] = math.hypot(out[1], out[SHARED])
     return Flag.MISFIT.value

@@ -48,8 +48,9 @@ def test_variance_of_a_mean_over_ten_rows_is_foretold(kind):
 
 
 def test_rows_of_coarse_speckle_err_alike_and_those_of_a_plain_image_do_not():
-    image, _ = scintillating(COARSE, 256, 1.5, seed=7)
-    rough, plain = (extract(image, noise=known_noise(kind)) for kind in (COARSE, 0.0))
+    rough, plain = (
+        extract(scintillating(kind, 256, 1.5, seed=7)[0], noise=known_noise(kind)) for kind in (COARSE, 0.0)
+    )
     field = speckle(NM, COARSE[0], PITCH)
     middle = len(field.correlation) // 2
     # a wide line's rows are as correlated as the light of a column of pixels, or more by the diagonals

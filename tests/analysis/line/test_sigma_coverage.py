@@ -23,6 +23,7 @@ from tests.analysis.line.troubles import (
     coverage,
     measured,
     photographed,
+    variance_of_means,
 )
 
 ROWS = 400
@@ -142,7 +143,7 @@ def test_the_shape_of_a_line_out_of_focus_is_not_taken_for_noise():
 
 def test_scan_lines_that_an_edge_crosses_are_not_taken_for_noise():
     """A tenth of the scan lines made of a gain of 1 one of 1.5."""
-    image, centre, _ = photographed(TROUBLES["slanted edge to 30 %"], 10000.0, 8.0, 1000, seed=19)
+    image, _, _ = photographed(TROUBLES["slanted edge to 30 %"], 10000.0, 8.0, 1000, seed=19)
     assert estimate_noise(image, ExtractionSettings()).gain == pytest.approx(1.0, abs=0.1)
 
 
@@ -251,6 +252,22 @@ def test_a_profile_that_is_no_line_widens_sigma_and_is_flagged():
     assert np.median(line.chi2) > 10
     found = coverage(line, centre)
     assert found.two > 0.75 and found.sigma > 10 * 0.003
+
+
+@pytest.mark.parametrize(("signal", "sigma"), [(1000.0, 0.6), (1000.0, 2.0), (10000.0, 2.0)])
+def test_what_a_reflection_does_to_all_scan_lines_is_not_lost_in_their_mean(signal, sigma):
+    """Told as if each erred for itself, means over 100 scan lines scattered by 23 times the variance told."""
+    line, centre = measured(TROUBLES["reflection of 10 %"], signal, sigma, 1000, seed=77)
+    assert np.mean(np.isin(line.flag, (Flag.BLENDED, Flag.MISFIT))) > 0.98
+    assert variance_of_means(line, centre, 10) < 1.15
+    assert variance_of_means(line, centre, 100) < 1.15
+
+
+def test_of_a_flat_line_no_scan_line_errs_as_its_neighbours_do():
+    """Each to a side of its own: a mean over 100 is told to be as sure as of 100."""
+    line, _ = measured(TROUBLES["defocus of 2 sigma"], 10000.0, 2.0, 1000, seed=77)
+    assert np.mean(line.flag == Flag.MISFIT) > 0.9
+    assert np.median(line.correlation_length) < 3.0
 
 
 def test_who_asks_how_well_a_line_fits_gets_the_single_line():

@@ -11,6 +11,7 @@ from scipy.ndimage import convolve1d
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
 from analysis.line.result import Flag, Line
+from analysis.measures import means
 from tests.analysis.line.line_images import electrons, expected
 
 Array = NDArray[np.float64]
@@ -164,6 +165,17 @@ def coverage(line: Line, centre: Array) -> Coverage:
         rms,
         float(np.median(sigma)),
     )
+
+
+def variance_of_means(line: Line, centre: Array, rows: int) -> float:
+    """Mean square of the errors' means over neighbouring scan lines, over what is told of them."""
+    index = np.flatnonzero(line.valid[:, 0] & np.isfinite(centre))
+    shared = np.zeros(len(line.u)) if line.shared_u is None else line.shared_u[:, 0]
+    assert line.length_apart is not None
+    error, sigma, length = line.u[:, 0] - centre, line.sigma_u[:, 0], line.length_apart[:, 0]
+    of_rows = (one[index] for one in (error, sigma, length, shared))
+    found, told = means(*of_rows, index, np.zeros_like(index), rows)
+    return float(np.mean(found**2) / np.mean(told**2))
 
 
 def measured(
