@@ -20,6 +20,7 @@ from scipy.special import gammaincinv
 from render.base.arrays import Float, Float32
 from render.importance import CELL, LINES_KNOWN, Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
+from render.laser_indirect.line_sums import run_sums, spread
 
 Int = NDArray[np.int64]
 Weigh = Callable[[Float32], Importance]
@@ -92,9 +93,7 @@ class Projection:
 
     def rises(self, image: Float, blocks: Int) -> Float:
         """(n, BLOCK / CELL) what (pixels,) adds to each run of pixels of some blocks, over the allowed deviation."""
-        places = blocks[:, None] * BLOCK + np.arange(BLOCK)
-        light = image[np.minimum(places, len(image) - 1)] * self.peaks[blocks]
-        return np.asarray(light.reshape(len(blocks), BLOCK // CELL, CELL).sum(axis=2))
+        return run_sums(image, self.peaks, blocks)
 
 
 @dataclass
@@ -211,11 +210,7 @@ class LineErrors:
         """The same from the passes of a first look, in all of so many paths, which count for nothing else."""
         look = LineErrors(self.projection, self.shape, np.zeros_like(self.moved), self.alone, self.risen.copy())
         look.add(buffers, 1.0, 1.0)
-        images = np.stack([buffer.image for buffer in buffers])
-        variance, square = (
-            float(images.var(axis=0, ddof=1).sum()) / len(images),
-            float((images.mean(axis=0) ** 2).sum()),
-        )
+        variance, square = spread([buffer.image for buffer in buffers])
         error = math.sqrt(variance / max(square - variance, 1e-3 * square)) if square > 0.0 else 0.0
         self.judge(look.error(float(len(buffers))), error / target, paths, most)
 

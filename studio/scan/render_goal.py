@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -45,7 +46,7 @@ light with the power 0.5, and it takes a hundredth of the time: a tenth costs it
 PAIRS, JUMP = 2, 3.0
 """Pairs of images with opposite noise, and times the goal by which they must not differ from a straight line."""
 ROWS = 64
-"""Scan lines at a time, which a processor's cache holds."""
+"""Scan lines at a time, which a processor's cache holds; an even number."""
 
 
 def goal_of(project: Project, threads: int | None = None) -> Callable[[Frame], Importance] | None:
@@ -71,26 +72,25 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     """Of a frame as far as it is known. InputError: as `develop` and `extract`."""
     project = _as_far_as_known(project, frame)
     scene, sensor = project.scene, project.sensor
-    axis = project.extraction.axis
+    rows = project.extraction.axis == "rows"
     illumination = relative_illumination(scene.camera, threads)
     joule = joules_per_radiance(scene.camera, sensor)
-    bands = _tiled(joule * band_response(sensor).sum(axis=2), illumination)
+    bands = joule * band_response(sensor).sum(axis=2)
     reflected = any(step.computed is not False for step in frame.plan.of("indirect"))
     direct, allowed = shares(goal, reflected=reflected, ambient=frame.ambient is not None)
     lasers, peaks = [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
     for i, laser in enumerate(scene.lasers):
-        moved, risen, decided = _weights(project, frame, i, allowed, threads)
-        response = _tiled(joule * laser_response(sensor, laser.wavelength_nm), illumination)
-        lasers.append(moved * response)
-        peaks.append(risen * response)
-        # a whole row counts as one sum there, of which a quarter of its pixels may come near
-        even = risen / math.sqrt(max(0.25 * illumination.shape[1 if axis == "rows" else 0] / CELL, 1.0))
-        used = np.count_nonzero(decided, axis=1 if axis == "rows" else 0).clip(1)
-        share = DECISION * goal.depth * np.expand_dims(np.sqrt(used), 1 if axis == "rows" else 0)
-        even = np.maximum(even, decided / share)
-        ambient = np.maximum(ambient, np.maximum(np.abs(moved), even) * bands)
-    return Importance(tuple(lasers), ambient, axis, tuple(peaks), allowed, direct)
+        weight, peak = np.empty_like(ambient), np.empty_like(ambient)
+        response = joule * laser_response(sensor, laser.wavelength_nm)
+        if rows:
+            out = Weights(weight, peak, ambient, illumination, response, bands)
+        else:
+            out = Weights(weight.T, peak.T, ambient.T, illumination.T, response.T, bands.T)
+        _weigh(project, frame, i, (allowed, DECISION * goal.depth), out, threads)
+        lasers.append(weight)
+        peaks.append(peak)
+    return Importance(tuple(lasers), ambient, project.extraction.axis, tuple(peaks), allowed, direct)
 
 
 def _as_far_as_known(project: Project, frame: Frame) -> Project:
@@ -132,11 +132,35 @@ def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, 
     return int(found.sum())
 
 
-def _weights(
-    project: Project, frame: Frame, laser: int, allowed: float, threads: int | None
-) -> tuple[Float32, Float32, Float32]:
-    """(h, w) how far an electron moves the line over what is allowed, how far it goes to make or hide a peak, and
-    1 over the noise of each pixel that a narrow line is measured on, 0 of others."""
+@dataclass(frozen=True)
+class Weights:
+    """What becomes of one laser's weights, by scan line: arrays (n, w), those of columns turned."""
+
+    laser: Float32
+    peaks: Float32
+    ambient: Float32
+    """Of all lasers so far."""
+    illumination: Float32
+    response: Float
+    """(2, 2) electrons by the laser's radiance, by parity of scan line and place."""
+    bands: Float
+    """(2, 2) by ambient radiance."""
+
+    def put(self, lines: slice, moved: Float, risen: Float32, even: Float) -> None:
+        """Of some scan lines, the first of them even, how far an electron moves the line over what is allowed, how far
+        it goes to make or hide a peak, and how far any light that is spread evenly."""
+        lit = self.illumination[lines]
+        response, bands = (_tiled(one, lit) for one in (self.response, self.bands))
+        self.laser[lines] = moved * response
+        self.peaks[lines] = risen * response
+        self.ambient[lines] = np.maximum(self.ambient[lines], np.maximum(np.abs(moved), even) * bands)
+
+
+def _weigh(
+    project: Project, frame: Frame, laser: int, allowed: tuple[float, float], out: Weights, threads: int | None
+) -> None:
+    """The weights of one laser -> out; allowed: shares of a scan line's sigma, of what moves the line, and of the noise
+    of each pixel that a narrow line is measured on."""
     electrons = _electrons(project, frame, laser, threads)
     image = _expected_image(project, electrons)
     noise = noise_model(image, project, laser)
@@ -146,15 +170,25 @@ def _weights(
         settings = settings.model_copy(update={"pattern": image.pattern})
     # of a selection the candidates' method is the one that measured them
     derivative = influence(image.pixels, line, settings, noise, threads, shared=True)
-    axis = 1 if line.axis == "rows" else 0
-    sigma = _sigma(line, derivative, electrons, noise, axis)
-    moved = derivative / np.expand_dims(allowed * sigma, axis)
-    risen = _peaks(electrons if axis == 1 else electrons.T, line, noise, settings, threads)
-    # one more on either side, as windows begin with the pixel
-    narrow = np.any(line.valid & (line.width < COARSE), axis=1)
-    near = maximum_filter1d((derivative != 0.0) & np.expand_dims(narrow, axis), 3, axis=axis)
-    decided = near / np.sqrt(np.maximum(electrons + noise.floor, 1e-2))
-    return moved.astype(np.float32), np.ascontiguousarray(risen if axis == 1 else risen.T), decided.astype(np.float32)
+    narrow = np.any(line.valid & (line.width < COARSE), axis=1)[:, None]
+    if line.axis == "columns":
+        electrons, derivative = electrons.T, derivative.T
+    # a whole row counts as one sum there, of which a quarter of its pixels may come near
+    evenly = 1.0 / math.sqrt(max(0.25 * electrons.shape[1] / CELL, 1.0))
+
+    def work(start: int, stop: int) -> None:
+        some = slice(start, stop)
+        light, moves = np.ascontiguousarray(electrons[some]), np.ascontiguousarray(derivative[some])
+        risen = _row_peaks(light, line, some, noise, settings)
+        counted = np.maximum(light + np.float32(noise.floor), np.float32(1e-2))
+        # one more on either side, as windows begin with the pixel
+        decided = maximum_filter1d((moves != 0.0) & narrow[some], 3, axis=1)
+        share = allowed[1] * np.sqrt(np.count_nonzero(decided, axis=1).clip(1))
+        even = np.maximum(risen * np.float32(evenly), decided / (share[:, None] * np.sqrt(counted)))
+        moved = moves / (allowed[0] * _sigma(line, some, moves, light + noise.floor))[:, None]
+        out.put(some, moved, risen, even)
+
+    map_chunks(work, len(electrons), ROWS, threads)
 
 
 def _electrons(project: Project, frame: Frame, laser: int, threads: int | None) -> Float32:
@@ -175,30 +209,17 @@ def _expected_image(project: Project, electrons: Float32) -> Image:
     )
 
 
-def _sigma(line: Line, derivative: Float32, electrons: Float32, noise: NoiseModel, axis: int) -> Float:
+def _sigma(line: Line, rows: slice, derivative: Float32, variance: Float32) -> Float:
     """(n,) standard deviation of each scan line's position, px; infinite where there is none.
 
     At least what the noise of its own pixels makes of it: a line that is moved by more than it tells asks of no light
     to be known better than the goal's share of that noise.
     """
-    told = np.min(np.where(line.valid & np.isfinite(line.sigma_u), line.sigma_u, np.inf), axis=1)
-    counted = np.sqrt(np.sum(derivative.astype(np.float64) ** 2 * (electrons + noise.floor), axis=axis))
+    valid, sigma_u = line.valid[rows], line.sigma_u[rows]
+    told = np.min(np.where(valid & np.isfinite(sigma_u), sigma_u, np.inf), axis=1)
+    counted = np.sqrt(np.einsum("ij,ij,ij->i", derivative, derivative, variance, dtype=np.float64))
     sigma = np.maximum(np.where(np.isfinite(told), told, 0.0), counted)
-    return np.where(line.valid.any(axis=1) & (sigma > 0.0), sigma, np.inf)
-
-
-def _peaks(
-    electrons: Float32, line: Line, noise: NoiseModel, extraction: ExtractionSettings, threads: int | None
-) -> Float32:
-    """(n, w) what an electron adds to the matched filter's response, over what may be added without a change."""
-    out: Float32 = np.empty(electrons.shape, np.float32)
-
-    def work(start: int, stop: int) -> None:
-        rows = slice(start, stop)
-        out[rows] = _row_peaks(np.asarray(electrons[rows], np.float32), line, rows, noise, extraction)
-
-    map_chunks(work, len(out), ROWS, threads)
-    return out
+    return np.where(valid.any(axis=1) & (sigma > 0.0), sigma, np.inf)
 
 
 def _row_peaks(light: Float32, line: Line, rows: slice, noise: NoiseModel, extraction: ExtractionSettings) -> Float32:
@@ -238,6 +259,8 @@ def _row_peaks(light: Float32, line: Line, rows: slice, noise: NoiseModel, extra
 
 def _tiled(response: Float, illumination: Float32) -> Float32:
     """(h, w) of a (2, 2) response by parity of row and column, times the illumination."""
-    height, width = illumination.shape
-    tiles = np.tile(response, (height // 2 + 1, width // 2 + 1))[:height, :width]
-    return np.asarray(tiles * illumination, np.float32)
+    out = np.empty(illumination.shape, np.float32)
+    for i in range(2):
+        for j in range(2):
+            np.multiply(illumination[i::2, j::2], np.float32(response[i, j]), out=out[i::2, j::2])
+    return out

@@ -1,0 +1,48 @@
+"""Sums over the images of passes: what a goal in depth asks of them, a pixel at a time."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from render.base.arrays import Float, Float32, Long
+from render.importance import CELL
+from render.laser_indirect.connection_buffer import BLOCK
+
+
+def run_sums(image: Float, weight: Float32, blocks: Long) -> Float:
+    """An image (pixels,), weights (all blocks, BLOCK) and some blocks (n,) -> (n, BLOCK / CELL) weighted sums of each
+    run of pixels."""
+    out = np.empty((len(blocks), BLOCK // CELL))
+    _run_sums(image, weight, blocks, out)
+    return out
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _run_sums(image: Float, weight: Float32, blocks: Long, out: Float) -> None:
+    for i in range(blocks.shape[0]):
+        block = blocks[i]
+        for j in range(BLOCK // CELL):
+            total = 0.0
+            for k in range(j * CELL, (j + 1) * CELL):
+                pixel = block * BLOCK + k
+                if pixel < image.shape[0]:
+                    total += image[pixel] * weight[block, k]
+            out[i, j] = total
+
+
+def spread(images: list[Float]) -> tuple[float, float]:
+    """Images (pixels,) of passes -> the sum over pixels of the variance of their mean, and of its square."""
+    total, squares = np.zeros_like(images[0]), np.zeros_like(images[0])
+    for image in images:
+        _add_moments(image, total, squares)
+    count = len(images)
+    square = float(np.dot(total, total)) / count**2
+    return max(float(squares.sum()) - count * square, 0.0) / (count * (count - 1)), square
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _add_moments(image: Float, total: Float, squares: Float) -> None:
+    for i in range(image.shape[0]):
+        total[i] += image[i]
+        squares[i] += image[i] * image[i]
