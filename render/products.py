@@ -68,4 +68,4 @@ def ambient_look(placed: PlacedScene, settings: RenderSettings, run: Run) -> NDA
     image = np.asarray(last.value, np.float32)
     rows = np.arange(camera.height) * image.shape[0] // camera.height
     columns = np.arange(camera.width) * image.shape[1] // camera.width
-    return np.ascontiguousarray(image[rows[:, None], columns])
+    return np.ascontiguousarray(image[:, columns][rows])

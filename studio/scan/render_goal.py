@@ -202,7 +202,7 @@ def _expected_image(project: Project, electrons: Float32) -> Image:
     sensor = project.sensor
     top, gain = float(2**sensor.bits - 1), sensor.dn_per_electron
     saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
-    numbers: Any = np.minimum(gain * electrons.astype(np.float64) + sensor.black_level, saturation)
+    numbers: Any = np.minimum(np.float32(gain) * electrons + np.float32(sensor.black_level), np.float32(saturation))
     pattern = sensor.pattern if sensor.colour == "bayer" else None
     return Image(
         numbers, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time
