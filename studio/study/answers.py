@@ -11,7 +11,7 @@ import numpy as np
 from analysis.study.breakdown import Breakdown, breakdown
 from analysis.study.budget import Budget, budget
 from analysis.study.cause import cause
-from analysis.study.intervals import Interval, mean_interval
+from analysis.study.intervals import Interval, mean_interval, positive_interval
 from analysis.study.pareto import Front, bootstrapped_front
 from studio.project.project import Project
 from studio.scan.stages import scaled
@@ -19,6 +19,7 @@ from studio.study.bounds import Bound, bounds
 from studio.study.cells import Point, along, methods_of, search_of, searched
 from studio.study.edges import Edge, edges_of
 from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
+from studio.study.measures import MEASURES
 from studio.study.ray_units import RAY_SPEED, Throughput, throughput
 from studio.study.store import Row
 from studio.study.study import Study, Sweep, with_fields
@@ -90,8 +91,9 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
     errors = [values_of(found, sweep.measure) for found in groups.values()]
     times = [seconds_of(found, sweep.time) for found in groups.values()]
     units = [rays_of(found, sweep.time) for found in groups.values()]
+    interval = mean_interval if MEASURES[sweep.measure].signed else positive_interval
     spots = tuple(
-        Spot(point, method, mean_interval(error), _median(time[np.isfinite(error)]), _median(unit[np.isfinite(error)]))
+        Spot(point, method, interval(error), _median(time[np.isfinite(error)]), _median(unit[np.isfinite(error)]))
         for (point, method), error, time, unit in zip(groups, errors, times, units, strict=True)
     )
     front = bootstrapped_front(times, errors) if sweep.chart == "speed" and spots else None

@@ -14,29 +14,30 @@ from render.frame import LaserCurve
 
 @dataclass(frozen=True)
 class Measure:
-    """label: on an axis; scale: from the stored number to the unit shown."""
+    """label: on an axis; scale: from the stored number to the unit shown; signed: it may be negative."""
 
     label: str
     unit: str = ""
     scale: float = 1.0
+    signed: bool = False
 
 
 MEASURES: dict[str, Measure] = {
     "depth_rmse": Measure("depth error, RMS", "µm", 1e6),
-    "depth_bias": Measure("depth bias", "µm", 1e6),
+    "depth_bias": Measure("depth bias", "µm", 1e6, signed=True),
     "depth_sigma": Measure("depth sigma", "µm", 1e6),
     "depth_robust_sigma": Measure("depth sigma, robust", "µm", 1e6),
     "depth_p95": Measure("depth error, 95 % below", "µm", 1e6),
     "depth_predicted_sigma": Measure("predicted depth sigma, median", "µm", 1e6),
     "depth_coverage": Measure("depth errors within 2 predicted sigma", "%", 100.0),
     "position_rmse": Measure("line error, RMS", "px"),
-    "position_bias": Measure("line bias", "px"),
+    "position_bias": Measure("line bias", "px", signed=True),
     "position_robust_sigma": Measure("line sigma, robust", "px"),
     "position_p95": Measure("line error, 95 % below", "px"),
     "completeness": Measure("rows measured, of those to be seen", "%", 100.0),
     "wrong_rows": Measure("rows measured wrong, of those to be seen", "%", 100.0),
     "false_rows": Measure("rows found without a line", "%", 100.0),
-    "autocorrelation": Measure("correlation of neighbouring rows", ""),
+    "autocorrelation": Measure("correlation of neighbouring rows", signed=True),
     "no_peak_rows": Measure("rows without a peak", "%", 100.0),
     "saturated_rows": Measure("rows saturated", "%", 100.0),
     "unmeasured_rows": Measure("rows with a peak that could not be measured", "%", 100.0),
