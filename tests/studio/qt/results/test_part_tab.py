@@ -22,6 +22,8 @@ from tests.studio.qt.small_session import small_project, small_render, small_ses
 
 SIDES = ((-0.25, -0.15), (0.15, 0.25))
 """m, of the ground beside the sphere."""
+SELDOM_MS = 20
+"""Between two moves of the mouse: a scene leaves out those that follow within 10 ms."""
 
 
 @lru_cache(maxsize=1)
@@ -44,8 +46,15 @@ def panel(qtbot: QtBot) -> ResultsPanel:
     made.resize(1366, 420)
     made.show()
     qtbot.waitExposed(made)
-    qtbot.waitUntil(lambda: made.profile.plot.vb.width() > 100)
+    # axes are fitted to the profile as they are painted, which a busy machine does late
+    qtbot.waitUntil(lambda: made.profile.plot.vb.width() > 100 and shows(made.profile, *(1e3 * np.ravel(SIDES))))
     return made
+
+
+def shows(plots: PointedPlots, *places: float) -> bool:
+    """Whether all places of the x axis are in view."""
+    low, high = plots.plots[0].vb.viewRange()[0]
+    return all(low < place < high for place in places)
 
 
 def drag(qtbot: QtBot, plots: PointedPlots, low: float, high: float, k: int = 0) -> None:
@@ -54,11 +63,13 @@ def drag(qtbot: QtBot, plots: PointedPlots, low: float, high: float, k: int = 0)
     height = 0.5 * sum(box.viewRange()[1])
     ends = [plots.mapFromScene(box.mapViewToScene(QPointF(x, height))) for x in (low, high)]
     qtbot.mouseMove(view, ends[0] - QPoint(9, 0))  # what is under the mouse is known by where it moved
+    qtbot.wait(SELDOM_MS)
     qtbot.mouseMove(view, ends[0])
-    qtbot.wait(20)  # the scene hears of few moves in a short time
+    qtbot.wait(SELDOM_MS)
     qtbot.mousePress(view, Qt.MouseButton.LeftButton, pos=ends[0])
     for share in (0.3, 0.7, 1.0):
         qtbot.mouseMove(view, QPoint(*(round(a + share * (b - a)) for a, b in zip(*map(_pair, ends), strict=True))))
+        qtbot.wait(SELDOM_MS)
     qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, pos=ends[1])
 
 
