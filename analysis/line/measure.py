@@ -19,13 +19,14 @@ from analysis.line.methods.derivative import STEGER, ZERO_CROSSING, measure_deri
 from analysis.line.methods.fisher_scoring import LEAST_SQUARES, LIKELIHOOD
 from analysis.line.methods.gaussian_fit import measure_gaussian
 from analysis.line.methods.half_energy import measure_half_energy
-from analysis.line.methods.leaning import keep_doubtful, keep_sure, leans_as_neighbours_do, parts_alone
+from analysis.line.methods.leaning import keep_doubtful, keep_sure, no_gaussian_by_neighbours, parts_alone
 from analysis.line.methods.log_fit import CARUANA, GUO, measure_log_parabola
 from analysis.line.methods.misfit import UNLIKELY
 from analysis.line.methods.phase import measure_phase
 from analysis.line.methods.seed_loop import (
     COLUMNS,
     CORRELATION_LENGTH,
+    FIT,
     LEAN,
     ROOM,
     SHARED,
@@ -193,7 +194,8 @@ def measure_with_neighbours(
             again: NDArray[np.bool_] = np.any(priors, axis=(1, 2))
             map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, CHUNK, threads)
     farthest = lines.image.shape[1] / np.sqrt(12.0)  # a position that says less than a guess is none
-    every = leans_as_neighbours_do(out[..., LEAN], out[..., CORRELATION_LENGTH]) if told is None else told.leaning
+    by_neighbours = out[..., LEAN], out[..., FIT], out[..., CORRELATION_LENGTH]
+    every = no_gaussian_by_neighbours(*by_neighbours) if told is None else told.leaning
     leaning = every & (flags == Flag.OK)
     if leaning.any():
         double, single = options._replace(judge=0.0), out[leaning]

@@ -105,11 +105,13 @@ def _usual(moments: Float, design: Float) -> tuple[Float, Float]:
     """Those of the runs that leave no more over, for their light, than the others."""
     if len(moments) < FEWEST:
         return moments, design
-    left = moments[:, 0] / np.where(design[:, 0, 0] > 0.0, design[:, 0, 0], 1.0)
-    ordered, half = np.sort(left), len(left) // 2 + 1
+    weight = np.where(design[:, 0, 0] > 0.0, design[:, 0, 0], 1.0)
+    left = moments[:, 0] / weight
+    ordered, half = np.sort(left), (len(left) + 1) // 2
     spans = ordered[half - 1 :] - ordered[: len(left) - half + 1]
     first = int(np.argmin(spans))
-    usual = left <= ordered[first + half - 1] + FAR_ABOVE * spans[first]
+    by_chance = 2.0 * np.sqrt(2.0 / np.median(weight))  # of normal residuals, between one run and another
+    usual = left <= ordered[first + half - 1] + FAR_ABOVE * max(spans[first], float(by_chance))
     return moments[usual], design[usual]
 
 

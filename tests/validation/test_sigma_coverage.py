@@ -33,12 +33,8 @@ MOST = 3.5
 """Standard deviations of a share: 560 cells of two shares, one run in three fails by chance at 3.5."""
 KNOWN, ESTIMATED = "noise known", "noise estimated"
 EXCEPTIONS = {
-    *(("slanted edge to 30 %", 100.0, sigma, noise) for sigma in (2.0, 8.0) for noise in (KNOWN, ESTIMATED)),
-    ("partly occluded", 10000.0, 8.0, ESTIMATED),
-    ("defocus of 2 sigma", 100.0, 8.0, KNOWN),
     ("reflection of 10 %", 100.0, 0.2, KNOWN),
     ("reflection of 10 %", 100.0, 0.2, ESTIMATED),
-    ("reflection of 10 %", 100.0, 8.0, ESTIMATED),
     ("reflection of 10 %", 10000.0, 0.2, KNOWN),
     *(("mosaic", signal, 2.0, ESTIMATED) for signal in (1000.0, 3000.0, 10000.0)),
 }

@@ -30,6 +30,7 @@ from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, me
 from analysis.line.methods.scintillation import position_variance, shared_variance
 from analysis.line.methods.seed_loop import (
     CORRELATION_LENGTH,
+    FIT,
     LEAN,
     SHARED,
     TOLD,
@@ -245,9 +246,8 @@ def _light_beside(pixel: Array, n: int, p: Array) -> float:
 @peak_kernel
 def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
     """Peak kernel (`seed_loop`). options.variant: LEAST_SQUARES or LIKELIHOOD. chi2 only for independent pixels."""
-    w, likelihood = pixels.signal.shape[1], options.variant == LIKELIHOOD
+    w, likelihood, p, hessian = pixels.signal.shape[1], options.variant == LIKELIHOOD, np.empty(4), np.empty((4, 4))
     pixel, weight, shape, trial_shape = pixels.room[:4], pixels.room[4], pixels.room[5:8], pixels.room[8:11]
-    p, hessian = np.empty(4), np.empty((4, 4))
     p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
     narrowest = NARROWEST if flag == Flag.OK.value else NARROWEST_SATURATED
     half, count, converged = 0.0, 0, False
@@ -320,7 +320,8 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         return flag
     for i in range(count):
         pixel[VARIANCE, i] += scattered * light[i] * light[i]
+    out[FIT] = deviate(chi2, count - 4)
     asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian, factor, row)
-    odd = judged and max(deviate(chi2, count - 4), abs(asymmetry)) >= options.judge
+    odd = judged and max(out[FIT], abs(asymmetry)) >= options.judge
     out[LEAN] = math.copysign(math.inf, asymmetry) if odd else asymmetry
     return measure_misfit(pixels, seed, count, p, options, out) if odd else flag

@@ -1,15 +1,21 @@
-"""A second line that is too faint for one scan line to tell, but not for many neighbours, all of which it leans.
+"""What is too faint for one scan line to tell, but not for many neighbours: a second line, all of which it leans to
+one side, and an edge that crosses the line slantwise, by which they lean or fit less well than others do.
 
     S = sum z / (sum L z^2)^(1/2)         over the neighbours; z lean, L how many of them err alike
 
 By the scatter of z itself (Student's t in Fisher's form), so that it holds where the noise is not known: of one
-Gaussian line S is a normal deviate but for its tails, of lines that all lean alike the root of their number.
+Gaussian line S is a normal deviate but for its tails, of lines that all lean alike the root of their number. More is
+seen by the scatter from line to line (von Neumann, Annals of Mathematical Statistics 12, 367, 1941), which what they
+have in common leaves as it is; along an edge, where z changes its sign, by half as many neighbours:
+
+    S = sum z / (s^2 sum L)^(1/2)         s^2 = sum (z_i - z_i-1)^2 / 2 n, at least 1
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_propagation
 
 from analysis.line.methods.misfit import UNLIKELY
 from analysis.line.methods.seed_loop import SHARED
@@ -25,22 +31,78 @@ UNIT = 2.0**-20
 BESIDE, MANY = 16, 0.25
 """Scan lines on either side, and the share of them, on both sides, that are measured as something else from which a
 line that looks like a Gaussian by itself is taken to be as they are."""
+CLOSE, SURE, LIKELY = 16, 5.0, 3.0
+"""Scan lines on either side of which an edge makes something else; the second S, by chance once in a million; and that
+of the lines beside such a one."""
+ALONG = np.array([[False, True, False]] * 3)
+"""Of (n, k), the scan lines beside one."""
+FAR, FEWEST, ALIKE = 8, 256, 0.1
+"""Scan lines apart that no smoothing makes alike; pairs of them, and the correlation, from which it is believed."""
 MOST_PART = 0.9
 """Share of the doubled neighbours that part; of fewer, those that do are the ones that noise has drawn apart."""
 
 
-def leans_as_neighbours_do(lean: Float, length: Float) -> NDArray[np.bool_]:
-    """Leans of lines (n, k), normal deviates where each is a Gaussian, infinite of those measured as something else,
-    NaN where nothing is known, and correlation lengths (n, k) -> (n, k): which were taken for a Gaussian and are none.
+def no_gaussian_by_neighbours(lean: Float, fit: Float, length: Float) -> NDArray[np.bool_]:
+    """Leans and what is left over (n, k), normal deviates where each line is a Gaussian, leans infinite of those
+    measured as something else, NaN where nothing is known, and correlation lengths (n, k) -> (n, k): which were taken
+    for a Gaussian and are none.
     """
     known = np.isfinite(length) & ~np.isnan(lean)
     if not known.any():
         return known
     deviate = np.where(known, np.clip(lean, -UNLIKELY, UNLIKELY), 0.0)
     square = np.where(known, np.maximum(length, 1.0) * deviate**2, 0.0)
-    total, spread, count = np.split(_of_neighbours(np.hstack((deviate, square, known.astype(np.float64)))), 3, axis=1)
+    total, spread, count = _of_neighbours(deviate, square, known.astype(np.float64))
     together = np.abs(total) > np.maximum(TOGETHER * np.sqrt(spread), LEAST * count)
-    return np.asarray((together | _among_others(np.isinf(lean), known)) & np.isfinite(lean))
+    leaning = _nearby(np.where(known, deviate, np.nan), length)
+    left = np.where(np.isfinite(fit) & known, np.clip(fit - _usual(fit), -UNLIKELY, UNLIKELY), np.nan)
+    nearby = _above(np.abs(leaning[0])) & (np.abs(total) > LEAST * count)
+    nearby |= _above(np.abs(leaning[1])) | _above(_nearby(left, length)[1])
+    return np.asarray((together | nearby | _among_others(np.isinf(lean), known)) & np.isfinite(lean))
+
+
+def _usual(fit: Float) -> float:
+    """What lines leave over for the most part, where noise is known less well than residuals are many."""
+    there = np.isfinite(fit)
+    return float(np.median(fit[there])) if there.any() else 0.0
+
+
+def _above(together: Float) -> NDArray[np.bool_]:
+    """(n, k) -> (n, k): above SURE, or with nothing below LIKELY between it and such a line."""
+    sure = together > SURE
+    return np.asarray(binary_propagation(sure, structure=ALONG, mask=together > LIKELY)) if sure.any() else sure
+
+
+def _nearby(deviate: Float, length: Float) -> tuple[Float, Float]:
+    """Deviates (n, k), NaN where not known, and correlation lengths (n, k) -> (n, k) each: their sum over all
+    neighbours and over those CLOSE by, itself left out, in its standard deviations by what one line differs from the
+    next."""
+    known = np.isfinite(deviate)
+    step = np.diff(deviate, axis=0, prepend=np.nan, append=np.nan) ** 2
+    steps, squares = np.isfinite(step).astype(np.float64), np.nan_to_num(step)
+    more, smoothed = _smoothed(deviate)
+    deviate, alike = np.nan_to_num(deviate), np.where(known, np.maximum(length, smoothed), 0.0)
+    squares, steps, total, wide = _of_neighbours(squares[:-1] + squares[1:], steps[:-1] + steps[1:], deviate, alike)
+    scatter = np.maximum(more * 0.5 * squares / np.maximum(steps, 1.0), 1.0)
+    close, narrow = _of_neighbours(deviate, alike, reach=CLOSE)
+    return total / np.sqrt(scatter * np.maximum(wide, 1.0)), close / np.sqrt(scatter * np.maximum(narrow, 1.0))
+
+
+def _smoothed(deviate: Float) -> tuple[float, float]:
+    """Deviates (n, k) of an image that a camera has smoothed -> what their variance is over that of neighbours'
+    differences, and how many are alike: 1 and 1 where neighbours differ as much as those FAR apart."""
+    far, near = (_mean_square(deviate[lag:] - deviate[:-lag]) for lag in (FAR, 1))
+    if not near < (1.0 - ALIKE) * far:  # NaN: too few tell
+        return 1.0, 1.0
+    correlation = [1.0 - _mean_square(deviate[lag:] - deviate[:-lag]) / far for lag in range(1, FAR)]
+    sure = np.cumprod(np.array(correlation) > ALIKE)
+    return far / max(near, UNIT), 1.0 + 2.0 * float(np.sum(sure * correlation))
+
+
+def _mean_square(values: Float) -> float:
+    """Of those that are known, NaN where too few are; of whole numbers, so that either end is alike."""
+    there = values[np.isfinite(values)]
+    return UNIT * int(np.rint(there**2 / UNIT).astype(np.int64).sum()) / len(there) if len(there) >= FEWEST else np.nan
 
 
 def _among_others(odd: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -85,12 +147,14 @@ def parts_alone(flag: NDArray[np.uint8], lean: Float) -> NDArray[np.bool_]:
     if not parted.any():
         return parted
     doubled = parted | (flag == Flag.BLENDED) | (flag == Flag.MISFIT)
-    some, every = (_of_neighbours(one.astype(np.float64)) for one in (parted, doubled))
+    some, every = _of_neighbours(parted.astype(np.float64), doubled.astype(np.float64))
     return np.asarray(parted & (some < MOST_PART * every))
 
 
-def _of_neighbours(values: Float) -> Float:
-    """(n, m) -> sums over the neighbours of each, itself left out: of whole numbers, so that either end is alike."""
-    whole = np.rint(values / UNIT).astype(np.int64)
-    sums = np.cumsum(np.pad(whole, ((NEIGHBOURS + 1, NEIGHBOURS), (0, 0))), axis=0)
-    return np.asarray(UNIT * (sums[2 * NEIGHBOURS + 1 :] - sums[: -2 * NEIGHBOURS - 1] - whole))
+def _of_neighbours(*values: Float, reach: int = NEIGHBOURS) -> list[Float]:
+    """(n, k) each -> sums over the neighbours of each, itself left out: of whole numbers, so that either end is
+    alike."""
+    whole = np.rint(np.hstack(values) / UNIT).astype(np.int64)
+    sums = np.cumsum(np.pad(whole, ((reach + 1, reach), (0, 0))), axis=0)
+    found = UNIT * (sums[2 * reach + 1 :] - sums[: -2 * reach - 1] - whole)
+    return np.split(found, len(values), axis=1)

@@ -4,9 +4,9 @@
 
 pixels holds the scan line y and those around it, seed where `detect` saw a peak and how wide and high it is, flag
 what it said of it (OK or SATURATED). The kernel writes out (COLUMNS,): u, sigma_u, width, amplitude, background,
-chi2, correlation length, of a narrow line how its place and width vary together, how far the line leans to one side
-(`leaning`), and what its pixels say of its width (`shared_width`), NaN where it has none, and returns the flag that the
-peak keeps. An out without a position stays NaN.
+chi2, correlation length, of a narrow line how its place and width vary together, how far the line leans to one side and
+how much it leaves over (`leaning`), and what its pixels say of its width (`shared_width`), NaN where it has none, and
+returns the flag that the peak keeps. An out without a position stays NaN.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from render.base.arrays import Float32
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
-CORRELATION_LENGTH, SHARED, LEAN, TOLD = 6, 7, 8, 9
+CORRELATION_LENGTH, SHARED, LEAN, FIT, TOLD = 6, 7, 8, 9, 10
 """Columns of out: scan lines; covariance of place and width, px^2, of a narrow line; a normal deviate where the line is
-as one Gaussian, +-infinity where it is measured as something else; from TOLD on the logarithm of the
-likelihood of each of PRIOR_WIDTHS at the place that is likeliest, and then that over all places; by methods that fit a
-width alone, and the first NaN where there is nothing to tell."""
+as one Gaussian, +-infinity where it is measured as something else; that of what the single line leaves over; from TOLD
+on the logarithm of the likelihood of each of PRIOR_WIDTHS at the likeliest place, and then that over all places; by
+methods that fit a width alone, and the first NaN where there is nothing to tell."""
 COLUMNS = TOLD + 2 * len(PRIOR_WIDTHS)
 """Of out."""
 ROOM = 11

@@ -134,6 +134,19 @@ def test_a_line_out_of_focus_is_measured_at_its_middle_and_not_as_two(sigma):
     assert (line.flag == Flag.MISFIT).all() and found.two > 0.95
 
 
+def test_a_wide_faint_line_is_not_taken_for_a_bump_of_its_own_noise():
+    """Of 100 e- and 8 px one in twenty was fitted where its noise stood out, as a line of half a pixel on a glow."""
+    line, centre = measured(TROUBLES["defocus of 2 sigma"], 100.0, 8.0, ROWS, seed=23)
+    assert (line.width[line.valid] > 5.0).mean() > 0.98 and line.valid.mean() > 0.95
+    assert holds(coverage(line, centre))
+
+
+def test_noise_is_that_of_the_scan_lines_that_an_edge_leaves_whole():
+    """Half of a line of 8 px is hidden on most of them; the gain came out at twice what it is."""
+    image, _, _ = photographed(TROUBLES["partly occluded"], 10000.0, 8.0, 1000, seed=24)
+    assert estimate_noise(image, ExtractionSettings()).gain == pytest.approx(1.0, abs=0.15)
+
+
 def test_the_shape_of_a_line_out_of_focus_is_not_taken_for_noise():
     """Of a sensor that is not known sigma was 1.8 times too large, at 10,000 e- 9 times, and a sixth of it lost."""
     image, centre, _ = photographed(TROUBLES["defocus of 2 sigma"], 3000.0, 2.0, ROWS, seed=18)
