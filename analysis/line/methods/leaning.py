@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_propagation
 
 from analysis.line.methods.misfit import UNLIKELY
-from analysis.line.methods.seed_loop import SHARED
+from analysis.line.methods.seed_loop import LEAN, SHARED, WIDTH
 from analysis.line.result import NEIGHBOURS, Flag
 from render.base.arrays import Float
 
@@ -38,6 +38,8 @@ ALONG = np.array([[False, True, False]] * 3)
 """Of (n, k), the scan lines beside one."""
 FAR, FEWEST, ALIKE = 8, 256, 0.1
 """Scan lines apart that no smoothing makes alike; pairs of them, and the correlation, from which it is believed."""
+RESOLVED = 1.1
+"""px; of narrower lines that are two the noise, where it is not known, comes out a third too large."""
 MOST_PART = 0.9
 """Share of the doubled neighbours that part; of fewer, those that do are the ones that noise has drawn apart."""
 
@@ -115,15 +117,18 @@ def _among_others(odd: NDArray[np.bool_], known: NDArray[np.bool_]) -> NDArray[n
 
 
 def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], single: Float, farthest: float) -> None:
-    """Flag lines (n, k) that were measured as two since they lean; without a sure position they get the single back.
+    """Flag lines (n, k) that were measured as two since they lean, but for RESOLVED ones that part as most of their
+    neighbours do; without a sure position they get the single back.
 
     out (n, k, columns), u and sigma_u its first; single (m, columns), as before; farthest: px, the largest sigma.
     """
     double, parted = out[leaning], flags[leaning] == Flag.OK
-    double[parted] = _with_distance(double[parted], single[parted])
+    sure = _most_part(flags, np.isinf(out[..., LEAN])) & (out[..., WIDTH] > RESOLVED)
+    doubtful = parted & ~sure[leaning]
+    double[doubtful] = _with_distance(double[doubtful], single[doubtful])
     unsure = ~(double[:, 1] < farthest)
     out[leaning] = np.where(unsure[:, None], single, double)
-    flags[leaning] = np.where(unsure | parted, Flag.BLENDED, flags[leaning])
+    flags[leaning] = np.where(unsure | doubtful, Flag.BLENDED, flags[leaning])
 
 
 def keep_doubtful(out: Float, flags: NDArray[np.uint8], alone: NDArray[np.bool_], double: Float) -> None:
@@ -144,11 +149,16 @@ def _with_distance(double: Float, single: Float) -> Float:
 def parts_alone(flag: NDArray[np.uint8], lean: Float) -> NDArray[np.bool_]:
     """Flags and leans as above (n, k) -> (n, k): of lines that were parted, those whose neighbours mostly do not."""
     parted = np.isinf(lean) & (flag == Flag.OK)
-    if not parted.any():
-        return parted
-    doubled = parted | (flag == Flag.BLENDED) | (flag == Flag.MISFIT)
-    some, every = _of_neighbours(parted.astype(np.float64), doubled.astype(np.float64))
-    return np.asarray(parted & (some < MOST_PART * every))
+    return parted & ~_most_part(flag, np.isinf(lean)) if parted.any() else parted
+
+
+def _most_part(flag: NDArray[np.uint8], doubled: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Flags of lines (n, k), and which were measured as two -> whether most of the neighbours that were do part."""
+    parted = doubled & (flag == Flag.OK)
+    some, every = _of_neighbours(
+        parted.astype(np.float64), (parted | (flag == Flag.BLENDED) | (flag == Flag.MISFIT)).astype(np.float64)
+    )
+    return np.asarray(some >= MOST_PART * every)
 
 
 def _of_neighbours(*values: Float, reach: int = NEIGHBOURS) -> list[Float]:
