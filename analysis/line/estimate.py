@@ -18,14 +18,13 @@ from analysis.line.detection.channel import COLOURS, MISSING, Lines, scan_lines
 from analysis.line.detection.noise import FULL_SCALES, NoiseModel, image_saturation
 from analysis.line.ground_noise import ground_noise
 from analysis.line.measure import measure
+from analysis.line.mosaic import seen_only, seen_rows, some_runs
 from analysis.line.residuals import RUN, scatter
 from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float
 from render.base.errors import InputError
 
-RUNS = 16
-"""Runs of neighbouring scan lines looked at."""
 ROUNDS, SPLITS = 6, 6
 CHANCE = 32
 """Fewer pixels may share one number, with no other but the dark's, by chance."""
@@ -71,7 +70,8 @@ def estimate_noise(
     InputError: the image has two numbers only, which say nothing of noise or of the line's profile.
     """
     _check_levels(image)
-    sample = _runs(image if settings.axis == "rows" else image.swapaxes(0, 1))
+    along = image if settings.axis == "rows" else image.swapaxes(0, 1)
+    sample = some_runs(along)
     if settings.axis == "columns":
         sample = sample.swapaxes(0, 1)
     settings = settings.model_copy(update={"method": "likelihood", "peaks": 1, "smoothing": 0.0})
@@ -83,12 +83,15 @@ def estimate_noise(
         saturation=image_saturation(image) if saturation is None else saturation,
     )
     lines = scan_lines(sample, settings, numbers)
-    signal, mask, _ = lines.read(0, lines.count)
-    colours = 1.5 if lines.channel in COLOURS and image.ndim == 3 else 1.0  # variance of a colour difference
-    known = np.where(mask & MISSING, np.nan, signal)
-    dark_variance = _difference_variance(known, numbers.step, (1, 2)) / colours
+    start = _full_scale(image) / FULL_WELL
+    if not processed:
+        read_noise = math.sqrt(_dark_variance(lines, (1, 2))) / start
+        rough = numbers.model_copy(update={"gain": start, "read_noise": read_noise})
+        lines = seen_only(replace(lines, noise=rough), along, settings, threads)
+        lines = replace(seen_rows(lines, along), noise=numbers)
+    dark_variance = _dark_variance(lines, (1, 2))
     if processed:
-        dark_variance = max(dark_variance, _difference_variance(known, numbers.step, (APART,)) / colours)
+        dark_variance = max(dark_variance, _dark_variance(lines, (APART,)))
     level = max(float(np.median(sample[np.isfinite(sample)])), 0.0)
 
     still = max(dark_variance - numbers.step**2 / 12.0, 0.0)
@@ -106,7 +109,6 @@ def estimate_noise(
     def fitted(noise: NoiseModel) -> Line:
         return measure(replace(lines, noise=noise), settings, threads)
 
-    start = _full_scale(image) / FULL_WELL
     # of a processed image neighbouring pixels tell too little
     told = None if processed or image.ndim == 3 else _told_by_ground(lines, numbers, raised(start), fitted)
     # numbers that are not whole have no full scale, and the line's peak may be far below it
@@ -115,7 +117,8 @@ def estimate_noise(
     noise = model(_balanced(model, start, fitted)) if split is None else split
     noise, line = _told_by_neighbours(lines, noise, fitted)
     # a photograph in colour is demosaiced, whatever its background tells
-    return noise.model_copy(update={"alike": True}) if image.ndim == 3 or _alike(lines, noise, line) else noise
+    alike = image.ndim == 3 or lines.seen is not None or _alike(lines, noise, line)
+    return noise.model_copy(update={"alike": alike, "filled_in": lines.seen is not None})
 
 
 def _told_by_ground(
@@ -136,11 +139,16 @@ def _told_by_ground(
 
 
 def _ground(lines: Lines, line: Line) -> NDArray[np.float32]:
-    """Pixels (n, w) beside the line, and of scan lines that none rises on, NaN elsewhere."""
+    """Pixels (n, m) beside the line, and of scan lines that none rises on, NaN elsewhere; of a mosaic those seen."""
     signal, mask, _ = lines.read(0, lines.count)
     far = np.abs(np.arange(signal.shape[1]) - line.u[:, :1]) > BESIDE * line.width[:, :1] + 2.0
     far |= line.flag[:, :1] == Flag.NO_PEAK
-    return np.where(far & (mask == 0), signal, np.nan)
+    ground = np.where(far & (mask == 0), signal, np.nan)
+    if lines.seen is None:
+        return ground
+    rows, pairs = np.arange(lines.count), signal.shape[1] // 2
+    columns = np.argmax(lines.seen, axis=1)[rows % 2][:, None] + 2 * np.arange(pairs)
+    return np.take_along_axis(ground, columns, axis=1)
 
 
 def _alike(lines: Lines, noise: NoiseModel, line: Line) -> bool:
@@ -275,14 +283,6 @@ def _rows_of(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in table.tolist())
 
 
-def _runs(image: NDArray[Any]) -> NDArray[Any]:
-    """(h, ...) -> runs of neighbouring rows, evenly spread; each begins on an even row, as Bayer patterns do."""
-    if len(image) <= RUNS * RUN:
-        return image
-    starts = np.linspace(0, (len(image) - RUN) // 2, RUNS).astype(np.intp) * 2
-    return image[(starts[:, None] + np.arange(RUN)).ravel()]
-
-
 def residual_ratio(line: Line) -> float | None:
     """Typical residual variance over the one assumed: median reduced chi-square over that of its distribution."""
     valid = np.isfinite(line.chi2)
@@ -323,6 +323,13 @@ def _mean_square_step(values: NDArray[np.float32], lag: int, step: float) -> flo
     steps = np.abs(steps - np.median(steps))  # a slope is no noise
     sigma = 1.4826 * (float(np.median(steps)) + 0.5 * step)
     return float(np.mean(steps[steps <= STRAY * sigma] ** 2))
+
+
+def _dark_variance(lines: Lines, lags: tuple[int, ...]) -> float:
+    """DN^2, of a pixel without light, of lines in DN: from the first of some lags at which pixels are known."""
+    signal, mask, _ = lines.read(0, lines.count)
+    colours = 1.5 if lines.channel in COLOURS and lines.image.ndim == 3 else 1.0  # variance of a colour difference
+    return _difference_variance(np.where(mask & MISSING, np.nan, signal), lines.noise.step, lags) / colours
 
 
 def _difference_variance(values: NDArray[np.float32], step: float, lags: tuple[int, ...]) -> float:

@@ -16,6 +16,7 @@ from analysis.line.detection.channel import check_image, scan_lines
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.estimate import estimate_noise
 from analysis.line.measure import measure
+from analysis.line.mosaic import seen_only
 from analysis.line.result import Line
 from analysis.line.selection.continuity import pick, select_chain
 from analysis.line.selection.geometry import WorkingVolume, consistent
@@ -63,6 +64,8 @@ def extract(
     if chosen.method == "likelihood":
         chosen = chosen.model_copy(update={"smoothing": 0.0})
     lines = replace(lines, smoothing=chosen.smoothing)
+    if (noise.alike or noise.filled_in) and chosen.method == "likelihood":
+        lines = seen_only(lines, lines.image, chosen, threads)
     alone = chosen.select == "strongest" and volume is None
     wanted = chosen if alone else chosen.model_copy(update={"peaks": max(chosen.peaks, CANDIDATES)})
     # fused exposures hold so many electrons that no lens draws a line which is a Gaussian to their noise

@@ -25,6 +25,7 @@ from analysis.line.detection.detect import REACH as SEED_REACH
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.measure import METHODS, limits_of, measure, measure_with_neighbours
 from analysis.line.methods.narrow_line import COARSE, NARROWEST
+from analysis.line.mosaic import seen_only
 from analysis.line.posterior_influence import posterior_influence
 from analysis.line.result import NEIGHBOURS, Flag, Line
 from analysis.line.settings import ExtractionSettings
@@ -67,6 +68,8 @@ def influence(
     if line.method == "likelihood":
         chosen = chosen.model_copy(update={"smoothing": 0.0})
     lines = scan_lines(np.asarray(image, np.float64), chosen, noise)
+    if (noise.alike or noise.filled_in) and line.method == "likelihood":
+        lines = seen_only(lines, lines.image, chosen, threads)
     found = np.zeros(lines.image.shape, np.float32)
     for k in range(line.u.shape[1]):
         rows = np.flatnonzero(line.valid[:, k])
@@ -91,6 +94,8 @@ def likelihood_influence(
     u, width, height = line.u[rows, peak], line.width[rows, peak], line.amplitude[rows, peak]
     narrow = line.flag[rows, peak] == Flag.UNRESOLVED
     electrons, mask, floor = lines.read(0, lines.count)
+    times = lines.summed(0, lines.count)[:, None]
+    electrons, floor = electrons / times, floor / times
     middle, half = _fit_windows((electrons[rows], mask[rows], floor[rows]), limits_of(lines, settings), u, width)
     m = 2 * (int(half.max()) + 1) + 1
     first = np.rint(u).astype(np.int64) - m // 2

@@ -194,8 +194,8 @@ def measure_with_neighbours(
             again: NDArray[np.bool_] = np.any(priors, axis=(1, 2))
             map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, CHUNK, threads)
     farthest = lines.image.shape[1] / np.sqrt(12.0)  # a position that says less than a guess is none
-    by_neighbours = out[..., LEAN], out[..., FIT], out[..., CORRELATION_LENGTH]
-    every = no_gaussian_by_neighbours(*by_neighbours) if told is None else told.leaning
+    length = np.maximum(out[..., CORRELATION_LENGTH], lines.alike)
+    every = no_gaussian_by_neighbours(out[..., LEAN], out[..., FIT], length) if told is None else told.leaning
     leaning = every & (flags == Flag.OK)
     if leaning.any():
         double, single = options._replace(judge=0.0), out[leaning]
@@ -209,17 +209,24 @@ def measure_with_neighbours(
         keep_doubtful(out, flags, alone, double)
     lost = out[..., 1] > farthest
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
-    return _line_of(out, flags, settings, together), Neighbours(priors, leaning, parted)
+    return _line_of(out, flags, settings, together, lines), Neighbours(priors, leaning, parted)
 
 
 def _line_of(
-    out: NDArray[np.float64], flags: NDArray[np.uint8], settings: ExtractionSettings, together: NDArray[np.float64]
+    out: NDArray[np.float64],
+    flags: NDArray[np.uint8],
+    settings: ExtractionSettings,
+    together: NDArray[np.float64],
+    lines: Lines,
 ) -> Line:
     """What kernels wrote of peaks (n, k, columns), their flags, and what makes of their column SHARED the error (n, k)
     that neighbours have in common."""
     u, sigma_u, width, amplitude, background, chi2, length = (
         np.ascontiguousarray(out[..., j]) for j in range(CORRELATION_LENGTH + 1)
     )
+    if lines.seen is not None:
+        times = lines.summed(0, lines.count)[:, None]
+        amplitude, background, length = amplitude / times, background / times, np.maximum(length, lines.alike)
     line = Line(settings.axis, settings.method, u, sigma_u, width, amplitude, background, chi2, flags)
     by_width = np.where(together > 0.0, np.nan_to_num(out[..., SHARED]) * together, 0.0)
     common = np.where(np.isin(flags, SYSTEMATIC), np.nan_to_num(out[..., SHARED]), by_width)

@@ -117,7 +117,7 @@ def _usual(moments: Float, design: Float) -> tuple[Float, Float]:
 
 def _solve(moments: Float, design: Float) -> Float:
     """Least squares with unknowns in units of their own, as counts are 10,000 times what scintillates."""
-    unit = np.sqrt(np.diagonal(design))
+    unit = np.sqrt(np.maximum(np.diagonal(design), 0.0))
     unit = np.where(unit > 0.0, unit, 1.0)
     return np.asarray(np.linalg.lstsq(design / np.outer(unit, unit), moments / unit, rcond=1e-9)[0] / unit, np.float64)
 

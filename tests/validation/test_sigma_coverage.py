@@ -36,7 +36,6 @@ EXCEPTIONS = {
     ("reflection of 10 %", 100.0, 0.2, KNOWN),
     ("reflection of 10 %", 100.0, 0.2, ESTIMATED),
     ("reflection of 10 %", 10000.0, 0.2, KNOWN),
-    *(("mosaic", signal, 2.0, ESTIMATED) for signal in (1000.0, 3000.0, 10000.0)),
 }
 """Cells where sigma does not hold, as `analysis/line/README.md` says."""
 FEW = 0.01

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from analysis.line.detection.filled_in import Seen
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float32
@@ -18,6 +19,9 @@ from render.base.errors import InputError
 Mask = NDArray[np.uint8]
 
 COLOURS = ("red", "green", "blue")
+BETWEEN_SEEN = 8.0 / 3.0
+"""Scan lines that err alike where every other one is the mean of its neighbours: of variances v and v / 2, whose sum
+over two is that of v twice."""
 SATURATED, MISSING = 1, 2
 """Bits of a mask: the pixel only says "at least this much"; the pixel is of another colour or not a number."""
 DTYPES = ("uint8", "uint16", "float32", "float64")
@@ -37,6 +41,8 @@ class Lines:
     smoothing: float = 0.0
     variance: NDArray[Any] | None = None
     """(h, w) e-^2, scan axis last, in place of the noise model's: for images combined from several."""
+    seen: Seen | None = None
+    """(2, 2) as `seen_pixels` says: of a mosaic that is filled in, other pixels count as missing."""
 
     @property
     def count(self) -> int:
@@ -63,6 +69,29 @@ class Lines:
         return smooth[keep].copy(), mask[keep].copy(), variance[keep] - smooth[keep]
 
     def _read(self, start: int, stop: int) -> tuple[Float32, Mask, Float32]:
+        signal, mask, floor = self._read_all(start, stop)
+        if self.seen is not None:
+            rows, columns = np.arange(start, stop) % 2, np.arange(signal.shape[1]) % 2
+            between = ~self.seen.any(axis=1, keepdims=True)
+            told = self.seen | (between & self.seen.any(axis=0))
+            mask[~told[rows[:, None], columns]] |= MISSING
+            times = self.summed(start, stop)[:, None]
+            signal, floor = signal * times, floor * times
+        return signal, mask, floor
+
+    @property
+    def alike(self) -> float:
+        """Scan lines that err alike, as they are filled in from one another."""
+        return 1.0 if self.seen is None or self.seen.any(axis=1).all() else BETWEEN_SEEN
+
+    def summed(self, start: int, stop: int) -> Float32:
+        """(n,) scan lines that each stands for: 2 where it is filled in as the mean of those above and below, whose
+        sum is a count."""
+        if self.seen is None:
+            return np.ones(stop - start, np.float32)
+        return np.where(self.seen.any(axis=1), np.float32(1), np.float32(2))[np.arange(start, stop) % 2]
+
+    def _read_all(self, start: int, stop: int) -> tuple[Float32, Mask, Float32]:
         chunk = self.image[start:stop]
         if chunk.ndim == 2:
             signal, mask = self._electrons(chunk)

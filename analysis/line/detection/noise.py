@@ -56,6 +56,13 @@ class NoiseModel(Model):
         "line is asked of the positions.",
     )
 
+    filled_in: bool = quantity(
+        False,
+        label="Filled in",
+        help="The colours of a mosaic are filled in: where it can be told which pixels were seen, the likelihood is of "
+        "these alone. Asked of the pixels as well where neighbours are alike.",
+    )
+
     @field_validator("scintillation")
     @classmethod
     def _is_a_covariance(cls, table: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:

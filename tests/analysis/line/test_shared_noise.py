@@ -82,7 +82,7 @@ def test_sigma_holds_what_processing_makes_alike(process) -> None:
 
 
 def test_single_pixels_alone_would_not_know() -> None:
-    image = mosaicked(counted(1))
+    image = blurred(counted(3), 1.0)
     alone = estimate_noise(image, ExtractionSettings()).model_copy(update={"alike": False})
     before, after = (normalised(line) for line in (extract(image, noise=alone), extract(image)))
     assert before[0] > 1.1 and abs(after[0] - 1.0) < 0.08

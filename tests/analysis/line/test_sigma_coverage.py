@@ -182,7 +182,7 @@ def test_where_a_mosaic_saw_a_narrow_line_every_position_is_flagged():
 
 def test_the_noise_told_of_the_ground_is_that_of_the_ground():
     """Where the line scatters by more than a count, a count of the level beneath it was given as noise all the same."""
-    image, _, _ = photographed(TROUBLES["mosaic"], 10000.0, 2.0, ROWS, seed=22)
+    image, _, _ = photographed(TROUBLES["mosaic"], 10000.0, 0.6, ROWS, seed=22)
     noise, ground = estimate_noise(image, ExtractionSettings()), image[:, :50]
     assert noise.black_level == pytest.approx(np.median(ground), abs=0.5)
     assert (noise.gain * noise.read_noise) ** 2 == pytest.approx(np.var(np.diff(ground, axis=1)) / 2.0, rel=0.2)
