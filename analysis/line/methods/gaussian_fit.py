@@ -243,6 +243,13 @@ def _light_beside(pixel: Array, n: int, p: Array) -> float:
     return light / math.sqrt(variance) if variance > 0.0 else 0.0
 
 
+@njit(nogil=True, cache=True, error_model="numpy")
+def _tell_enough(pixel: Array, n: int) -> bool:
+    """Whether pixels (4, n) are enough for two lines, or tell that one does not fit: those of a mosaic, few before the
+    next peak, are wide apart."""
+    return bool(n > UNKNOWNS or pixel[POSITION, n - 1] - pixel[POSITION, 0] >= n)
+
+
 @peak_kernel
 def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Options, out: Array) -> int:
     """Peak kernel (`seed_loop`). options.variant: LEAST_SQUARES or LIKELIHOOD. chi2 only for independent pixels."""
@@ -276,7 +283,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
     # of a line below half a pixel three pixels hold all the light, which two lines would explain as well; and what
     # least squares leave over is more than chi-square expects, since they do not weigh
-    leans = asked and independent and flag == Flag.OK.value and count > UNKNOWNS and p[2] >= COARSE
+    leans = asked and independent and flag == Flag.OK.value and _tell_enough(pixel, count) and p[2] >= COARSE
     judged = leans and (scattered < JUDGED or options.judge == 0.0)
     if not converged and judged:
         p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]

@@ -56,9 +56,10 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
     mass of the same pixels, by which another estimator differs. What neighbours have in common is to the side of the
     other light.
     """
-    pixel, weight, both = pixels.room[:4], pixels.room[4], np.empty(UNKNOWNS)
+    pixel, weight, both, chi2 = pixels.room[:4], pixels.room[4], np.zeros(UNKNOWNS), math.inf
     shift = centroid(pixel, n, p) - p[1]
-    chi2 = fit_two_lines(pixel, n, p, options.known_width, options.integrated, pixels.room[5:11], both, weight)
+    if n > UNKNOWNS:
+        chi2 = fit_two_lines(pixel, n, p, options.known_width, options.integrated, pixels.room[5:11], both, weight)
     flat = both[4] > EQUAL * both[0] and abs(both[5] - both[1]) < DIP * both[2]
     if not flat and deviate(chi2, n - UNKNOWNS) < UNLIKELY:
         noise = linear_variance(weight, pixel[VARIANCE], pixel[POSITION], n, pixels.correlation)
