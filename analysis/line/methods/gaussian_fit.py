@@ -27,7 +27,7 @@ from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIA
 from analysis.line.methods.misfit import centroid, deviate, measure_misfit
 from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width
 from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, measure_with_glow, widen_saturated
-from analysis.line.methods.scintillation import position_variance, shared_variance
+from analysis.line.methods.scintillation import position_variance, second_order, shared_variance
 from analysis.line.methods.seed_loop import (
     CORRELATION_LENGTH,
     FIT,
@@ -153,7 +153,8 @@ def _measure_narrow(
         shared, mean = shared_variance(weight, light, x, n, pixels.covariances, pixels.fineness, p[2], False)
         if own < shared:
             shared, mean = own, all_lines
-        count = out[1] * out[1]
+        grown, count = second_order(shared, p[2], False), out[1] * out[1]
+        shared, mean = shared * grown, mean * grown
         out[1] = math.sqrt(count + shared)
         out[CORRELATION_LENGTH] = (count + mean) / max(count + shared, 1e-300)
     unexplained = _unexplained(pixels, pixel, n, p, light, chi2) if options.judge < math.inf else 1.0

@@ -67,6 +67,12 @@ def shared_variance(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def second_order(shared: float, width: float, measured: bool) -> float:
+    """What makes of px^2 by scintillation, to first order, that to second order."""
+    return 1.0 + (SECOND_ORDER_MEASURED if measured else SECOND_ORDER) * shared / (width * width + PIXEL)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def position_variance(
     pixels: Pixels, weight: Array, variance: Array, light: Array, x: Array, n: int, width: float, measured: bool
 ) -> tuple[float, float, float]:
@@ -78,8 +84,8 @@ def position_variance(
     if pixels.covariances.shape[1] == 0:
         return count, pixels.alike, 0.0
     shared, all_lines = shared_variance(weight, light, x, n, pixels.covariances, pixels.fineness, width, measured)
-    grown = (SECOND_ORDER_MEASURED if measured else SECOND_ORDER) * shared / (width * width + PIXEL)
-    shared, all_lines = shared * (1.0 + grown), all_lines * (1.0 + grown)
+    grown = second_order(shared, width, measured)
+    shared, all_lines = shared * grown, all_lines * grown
     return count + shared, (count * pixels.alike + all_lines) / max(count + shared, 1e-300), shared
 
 
