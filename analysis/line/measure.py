@@ -196,7 +196,7 @@ def measure_with_neighbours(
     farthest = lines.image.shape[1] / np.sqrt(12.0)  # a position that says less than a guess is none
     length = np.maximum(out[..., CORRELATION_LENGTH], lines.alike)
     every = no_gaussian_by_neighbours(out[..., LEAN], out[..., FIT], length) if told is None else told.leaning
-    leaning = every & (flags == Flag.OK)
+    leaning = every & np.isin(flags, (Flag.OK, Flag.UNRESOLVED))
     if leaning.any():
         double, single = options._replace(judge=0.0), out[leaning]
         map_chunks(lambda start, stop: work(start, stop, double, priors, leaning), lines.count, CHUNK, threads)

@@ -32,12 +32,6 @@ FEWEST = 100
 MOST = 3.5
 """Standard deviations of a share: 560 cells of two shares, one run in three fails by chance at 3.5."""
 KNOWN, ESTIMATED = "noise known", "noise estimated"
-EXCEPTIONS = {
-    ("reflection of 10 %", 100.0, 0.2, KNOWN),
-    ("reflection of 10 %", 100.0, 0.2, ESTIMATED),
-    ("reflection of 10 %", 10000.0, 0.2, KNOWN),
-}
-"""Cells where sigma does not hold, as `analysis/line/README.md` says."""
 FEW = 0.01
 """Share of flagged points from which what is told of them may outweigh that of the others."""
 MEANS = 8000
@@ -60,11 +54,7 @@ def share_is(share: float, low: float, high: float, count: int) -> bool:
 
 @pytest.mark.parametrize("noise", [KNOWN, ESTIMATED])
 @pytest.mark.parametrize(("name", "signal", "sigma"), CELLS)
-def test_sigma_holds_or_the_point_is_flagged(
-    name: str, signal: float, sigma: float, noise: str, request: pytest.FixtureRequest
-) -> None:
-    if (name, signal, sigma, noise) in EXCEPTIONS:
-        request.applymarker(pytest.mark.xfail(strict=True))
+def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: float, noise: str) -> None:
     known = noise == KNOWN
     trouble = TROUBLES[name]
     line, centre = measured(trouble, signal, sigma, ROWS, seed=2024, known=known)

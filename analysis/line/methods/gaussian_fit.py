@@ -25,7 +25,8 @@ from analysis.line.detection.detect import (
 from analysis.line.methods.fisher_scoring import LIKELIHOOD, optimise, solve
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, VARIANCE
 from analysis.line.methods.misfit import centroid, deviate, measure_misfit
-from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width
+from analysis.line.methods.narrow_line import COARSE, NARROWEST, WIDEST, posterior, weigh_of_known_width, width_spread
+from analysis.line.methods.narrow_misfit import JUDGED, fill_variances, light_beside, unexplained
 from analysis.line.methods.saturated_line import AROUND, NARROWEST_SATURATED, measure_with_glow, widen_saturated
 from analysis.line.methods.scintillation import position_variance, second_order, shared_variance
 from analysis.line.methods.seed_loop import (
@@ -45,20 +46,12 @@ from analysis.line.result import Flag
 
 RESOLVED, FINE = 0.3, 0.35
 """px; a line that is narrower than COARSE, and whose width may as well be below the first (4 sigma), is not a matter of
-a fit; if it is also narrower than the second on average over what its width may be, it is flagged."""
+a fit; if it is also narrower than the second on average over what its width may be, it is flagged, and so it is where
+that is what its neighbours say, and by itself it may be below the first (1 sigma): what light beside it they have in
+common looks like width."""
 SPECKLED = 0.06
 """px; variance by scintillation over the line's width from which few grains make up a line: an expansion in their
 contrast no longer holds. By seeded trials of f/5.6 to f/11 on lines of 0.8 to 4 px."""
-JUDGED = 0.01
-"""Relative variance of the light from which no fit is judged: what scintillates strongly keeps to no profile."""
-BESIDE = (1.5, 3.5)
-"""px from a narrow line; its own light does not reach so far."""
-UNEXPLAINED = 6.0
-"""Standard normal deviate from which no narrow line explains its pixels: a chi-square of 50 at three degrees of
-freedom, of which the deviate is known less well than of many."""
-GROUND = 5.0
-"""Widths of the line, and half a pixel more, beside which pixels hold none of its light, by which it is judged where
-it scintillates."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -124,8 +117,7 @@ def _measure_narrow(
 
     MISFIT where no narrow line explains the pixels: sigma is that of the posterior times the root of chi-square.
     """
-    x, y, floor = pixel[POSITION], pixel[ELECTRONS], pixel[FLOOR]
-    told = np.empty((2, PRIOR_WIDTHS.shape[0]))
+    x, told = pixel[POSITION], np.empty((2, PRIOR_WIDTHS.shape[0]))
     told[:] = np.nan
     out[1], out[SHARED] = posterior(pixel, n, p, options.known_width, options.integrated, shape, seed[PRIOR:], told)
     if not math.isfinite(p[1]) or not math.isfinite(out[1]):
@@ -134,16 +126,12 @@ def _measure_narrow(
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
     if out.shape[0] > TOLD:
         out[TOLD:] = told.ravel()
-    chi2 = mass = 0.0
-    light, weight = np.empty(n), np.empty(n)
+    mass, light, weight = 0.0, np.empty(n), np.empty(n)
     for i in range(n):
         light[i] = p[0] * shape[0, i]
-        mu = light[i] + p[3]
-        chi2 += (y[i] - mu) ** 2 / max(mu + floor[i], 0.1 * abs(floor[i]))
         mass += light[i]
+    chi2 = fill_variances(pixel, n, p, light, 0.0)
     out[5], out[CORRELATION_LENGTH] = chi2 / (n - 4), 1.0
-    if options.judge < math.inf:
-        out[LEAN] = _light_beside(pixel, n, p)
     if pixels.covariances.shape[1] > 0 and mass > 0.0:
         # the position takes the centre of mass of so few pixels as their width lets it, or better
         weigh_of_known_width(pixel, n, p, shape, weight)
@@ -157,31 +145,36 @@ def _measure_narrow(
         shared, mean = shared * grown, mean * grown
         out[1] = math.sqrt(count + shared)
         out[CORRELATION_LENGTH] = (count + mean) / max(count + shared, 1e-300)
-    unexplained = _unexplained(pixels, pixel, n, p, light, chi2) if options.judge < math.inf else 1.0
-    if unexplained > 1.0:
-        out[SHARED] = math.copysign(out[1] * math.sqrt(unexplained - 1.0), centroid(pixel, n, p) - p[1])
-        out[1] *= math.sqrt(unexplained)
-        return Flag.MISFIT.value
-    return Flag.UNRESOLVED.value if p[2] < FINE else Flag.OK.value
+    by_others = options.judge < math.inf and seed[PRIOR] != 0.0
+    fine = p[2] < FINE or (by_others and p[2] - width_spread(told[1]) < RESOLVED)
+    flag = Flag.UNRESOLVED.value if fine else Flag.OK.value
+    return _judge_narrow(pixels, n, p, seed, options, shape, flag, out)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _unexplained(pixels: Pixels, pixel: Array, n: int, p: Array, light: Array, chi2: float) -> float:
-    """Reduced chi-square of a narrow line p whose pixels (4, n) it does not explain, with its light (n,); else 1.
+def _judge_narrow(
+    pixels: Pixels, n: int, p: Array, seed: Array, options: Options, shape: Array, flag: int, out: Array
+) -> int:
+    """Whether a narrow line (`narrow_misfit`) is all that n pixels of pixels.room hold -> flag, or what it is instead.
 
-    Where the light scintillates, as grains of speckle smaller than a pixel do, only the ground beside it is judged.
+    Measured as two where it is not, or where its neighbours say so; light that scintillates fits no two lines either:
+    sigma is told larger by the root of chi-square. out holds the line; its column LEAN is written. shape (3, n).
     """
-    freedom = n - 4
-    if pixels.covariances.shape[1] > 0 and pixels.covariances[0, 0] >= JUDGED:
-        chi2, freedom = 0.0, -1
-        for i in range(n):
-            if abs(pixel[POSITION, i] - p[1]) > GROUND * p[2] + 0.5:
-                mu, floor = light[i] + p[3], pixel[FLOOR, i]
-                chi2 += (pixel[ELECTRONS, i] - mu) ** 2 / max(mu + floor, 0.1 * abs(floor))
-                freedom += 1
-    if freedom < 1 or deviate(chi2, freedom) < UNEXPLAINED:
-        return 1.0
-    return max(chi2 / freedom, 1.0)
+    if options.judge == math.inf:
+        return flag
+    pixel, light = pixels.room[:4], p[0] * shape[0, :n]
+    scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
+    odd = unexplained(pixels, pixel, n, p, light, fill_variances(pixel, n, p, light, 0.0))
+    fill_variances(pixel, n, p, light, scattered)
+    out[LEAN] = light_beside(pixel, n, p, options.known_width, shape)
+    if odd == 1.0 and options.judge > 0.0:
+        return flag
+    out[LEAN] = math.copysign(math.inf, out[LEAN])
+    if scattered < JUDGED and pixels.correlation.shape[0] == 1 and n > UNKNOWNS:
+        return measure_misfit(pixels, seed, n, p, options, out)
+    out[SHARED] = math.copysign(out[1] * math.sqrt(odd - 1.0), centroid(pixel, n, p) - p[1])
+    out[1] *= math.sqrt(odd)
+    return Flag.MISFIT.value
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -197,11 +190,14 @@ def _measure_saturated(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _tell_width(width: float, variance: float, out: Array) -> None:
-    """What a fit says of a line's width, for its neighbours."""
-    count = PRIOR_WIDTHS.shape[0]
+def _tell_width(p: Array, hessian: Array, out: Array) -> None:
+    """What a fit p (4,) says of its line's width, for its neighbours; hessian (4, 4)."""
+    unit, row, count = np.zeros(4), np.empty(4), PRIOR_WIDTHS.shape[0]
+    unit[2] = 1.0
+    if not solve(hessian, 0.0, unit, np.zeros((4, 4)), row):
+        return
     for j in range(count):
-        out[TOLD + j] = out[TOLD + count + j] = -0.5 * (PRIOR_WIDTHS[j] - width) ** 2 / variance
+        out[TOLD + j] = out[TOLD + count + j] = -0.5 * (PRIOR_WIDTHS[j] - p[2]) ** 2 / row[2]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -230,18 +226,6 @@ def _asymmetry(
     for j in range(4):
         square -= cross[j] * projected[j]
     return float(moment / math.sqrt(square)) if square > 0.0 else 0.0
-
-
-@njit(nogil=True, cache=True, error_model="numpy")
-def _light_beside(pixel: Array, n: int, p: Array) -> float:
-    """Light to the right of a narrow line less that to the left, in its standard deviations: 0 where it is alone."""
-    light = variance = 0.0
-    for i in range(n):
-        x = pixel[POSITION, i] - p[1]
-        if BESIDE[0] < abs(x) < BESIDE[1]:
-            light += math.copysign(pixel[ELECTRONS, i] - p[3], x)
-            variance += max(pixel[ELECTRONS, i] + pixel[FLOOR, i], 0.1 * abs(pixel[FLOOR, i]))
-    return light / math.sqrt(variance) if variance > 0.0 else 0.0
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -275,15 +259,16 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
             break
     if min(p[1], seed[CENTRE]) < 0.5 or max(p[1], seed[CENTRE]) > w - 1.5:
         return Flag.AT_BORDER.value  # less than half of it is seen: any slope would fit
-    if flag == Flag.OK.value and min(p[2], seed[WIDTH]) < COARSE:
+    scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
+    # who asks how well lines fit (`estimate.py`) wants those that noise has widened as they are
+    alike = seed[PRIOR] != 0.0 and options.judge < math.inf and scattered < JUDGED
+    if flag == Flag.OK.value and (min(p[2], seed[WIDTH]) < COARSE or alike):
         if not converged:
             p[0], p[1], p[2], p[3] = seed[AMPLITUDE], seed[CENTRE], seed[WIDTH], seed[BACKGROUND]
         if not converged or seed[PRIOR] != 0.0 or _is_coarse(pixel, count, p, options, hessian):
             return _measure_narrow(pixels, pixel, count, p, seed, options, shape, out)
     independent, asked = pixels.correlation.shape[0] == 1, options.judge < math.inf and likelihood
-    scattered = pixels.covariances[0, 0] if pixels.covariances.shape[1] > 0 else 0.0
-    # of a line below half a pixel three pixels hold all the light, which two lines would explain as well; and what
-    # least squares leave over is more than chi-square expects, since they do not weigh
+    # what least squares leave over is more than chi-square expects, since they do not weigh
     leans = asked and independent and flag == Flag.OK.value and _tell_enough(pixel, count) and p[2] >= COARSE
     judged = leans and (scattered < JUDGED or options.judge == 0.0)
     if not converged and judged:
@@ -319,11 +304,11 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
     if flag == Flag.SATURATED.value:
         _measure_saturated(pixels, y, seed, count, p, chi2, options, out)
     elif likelihood and not options.known_width and p[2] < WIDEST:
-        unit[1], unit[2] = 0.0, 1.0
-        if solve(hessian, 0.0, unit, factor, row):
-            _tell_width(p[2], row[2], out)
+        _tell_width(p, hessian, out)
     if flag == Flag.OK.value and speckled > SPECKLED * p[2]:
         return Flag.SPECKLED.value
+    if p[2] < COARSE and flag == Flag.OK.value and asked and independent:
+        return _judge_narrow(pixels, count, p, seed, options, shape, flag, out)
     if not leans:
         return flag
     for i in range(count):

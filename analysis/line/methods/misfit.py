@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 
 from analysis.line.methods.line_profile import ELECTRONS, POSITION, VARIANCE, linear_variance
+from analysis.line.methods.narrow_line import COARSE
 from analysis.line.methods.seed_loop import LEAN, SHARED, Array, Options, Pixels
 from analysis.line.methods.two_lines import UNKNOWNS, fit_two_lines
 from analysis.line.methods.window import slope_variance
@@ -54,27 +55,31 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
     sigma holds how far the brighter one is from the single line. MISFIT for neither, or one with a flat top: sigma is
     that of the fit times the root of chi-square (Birge, Phys. Rev. 40, 1932), and holds the distance to the centre of
     mass of the same pixels, by which another estimator differs. What neighbours have in common is to the side of the
-    other light.
+    other light. A line below COARSE parts from none, is no other line where the pixels do not tell that one to the
+    distance between both, and as a MISFIT holds how far the brighter of two lines is.
     """
     pixel, weight, both, chi2 = pixels.room[:4], pixels.room[4], np.zeros(UNKNOWNS), math.inf
     shift = centroid(pixel, n, p) - p[1]
     if n > UNKNOWNS:
         chi2 = fit_two_lines(pixel, n, p, options.known_width, options.integrated, pixels.room[5:11], both, weight)
-    flat = both[4] > EQUAL * both[0] and abs(both[5] - both[1]) < DIP * both[2]
+    distance, narrow = abs(both[5] - both[1]), p[2] < COARSE
+    flat = both[4] > EQUAL * both[0] and distance < DIP * both[2]
     if not flat and deviate(chi2, n - UNKNOWNS) < UNLIKELY:
         noise = linear_variance(weight, pixel[VARIANCE], pixel[POSITION], n, pixels.correlation)
         sigma = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], n))
-        distance = abs(both[5] - both[1])
         parted = sigma < PARTED * distance and distance > APART * both[2]
-        parted = parted and (options.known_width or both[2] > FINEST)
-        out[0], out[2], out[3], out[4], out[5] = both[1], both[2], both[0], both[3], chi2 / max(n - UNKNOWNS, 1)
-        if parted:
-            out[1] = sigma
-            return Flag.OK.value
-        out[SHARED] = p[1] - both[1]
-        out[1] = math.hypot(sigma, out[SHARED])
-        return Flag.BLENDED.value
+        parted = parted and not narrow and (options.known_width or both[2] > FINEST)
+        if not narrow or sigma < distance:
+            out[0], out[2], out[3], out[4], out[5] = both[1], both[2], both[0], both[3], chi2 / max(n - UNKNOWNS, 1)
+            if parted:
+                out[1] = sigma
+                return Flag.OK.value
+            out[SHARED] = p[1] - both[1]
+            out[1] = math.hypot(sigma, out[SHARED])
+            return Flag.BLENDED.value
     side = shift if math.isnan(out[LEAN]) else out[LEAN]
+    if narrow and chi2 < math.inf:
+        shift = math.hypot(shift, both[1] - p[1])
     out[SHARED] = math.copysign(math.sqrt(out[1] * out[1] * max(out[5] - 1.0, 0.0) + shift * shift), side)
     out[1] = math.hypot(out[1], out[SHARED])
     return Flag.MISFIT.value

@@ -205,6 +205,18 @@ def posterior(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def width_spread(told: Array) -> float:
+    """Standard deviation, px, of a width whose likelihood at PRIOR_WIDTHS has the logarithm told (m,)."""
+    m, total, mean, square = told.shape[0], 0.0, 0.0, 0.0
+    for j in range(m):
+        weight = math.exp(told[j]) * (PRIOR_WIDTHS[min(j + 1, m - 1)] - PRIOR_WIDTHS[max(j - 1, 0)])
+        total += weight
+        mean += weight * PRIOR_WIDTHS[j]
+        square += weight * PRIOR_WIDTHS[j] ** 2
+    return math.sqrt(max(square / total - (mean / total) ** 2, 0.0))
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def weigh_of_known_width(pixel: Array, n: int, p: Array, shape: Array, weight: Array) -> None:
     """How far the centre of a line p (4,) of known width moves for one electron more in each pixel -> weight (n,)."""
     height, cross, place = 0.0, 0.0, 0.0
