@@ -286,15 +286,13 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         return Flag.TOO_WIDE.value
     if abs(p[1] - seed[CENTRE]) > max(half, 1.0):
         return Flag.OUT_OF_WINDOW.value
-    factor, row, unit = np.zeros((4, 4)), np.empty(4), np.zeros(4)
-    unit[1] = 1.0
+    factor, row, unit = np.zeros((4, 4)), np.empty(4), np.array([0.0, 1.0, 0.0, 0.0])
     if not solve(hessian, 0.0, unit, factor, row):
         return Flag.NOT_CONVERGED.value
     chi2 = _chi2_and_influence(pixel, count, p, likelihood, shape, row, scattered, weight)
     out[0], out[2], out[3], out[4] = p[1], p[2], p[0], p[3]
     light = trial_shape[0]
-    for i in range(count):
-        light[i] = p[0] * shape[0, i]
+    light[:count] = p[0] * shape[0, :count]
     noise, out[CORRELATION_LENGTH], speckled = position_variance(
         pixels, weight, pixel[VARIANCE], light, pixel[POSITION], count, p[2], False
     )
@@ -311,8 +309,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         return _judge_narrow(pixels, count, p, seed, options, shape, flag, out)
     if not leans:
         return flag
-    for i in range(count):
-        pixel[VARIANCE, i] += scattered * light[i] * light[i]
+    pixel[VARIANCE, :count] += scattered * light[:count] * light[:count]
     out[FIT] = deviate(chi2, count - 4)
     asymmetry = _asymmetry(pixel, count, p, options.known_width, shape, hessian, factor, row)
     odd = judged and max(out[FIT], abs(asymmetry)) >= options.judge

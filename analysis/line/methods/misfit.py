@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numba import njit
 
-from analysis.line.methods.line_profile import ELECTRONS, POSITION, VARIANCE, linear_variance
+from analysis.line.methods.line_profile import ELECTRONS, POSITION, VARIANCE, linear_variance, profile
 from analysis.line.methods.narrow_line import COARSE
-from analysis.line.methods.seed_loop import LEAN, SHARED, Array, Options, Pixels
+from analysis.line.methods.seed_loop import CORRELATION_LENGTH, LEAN, SHARED, Array, Options, Pixels
 from analysis.line.methods.two_lines import UNKNOWNS, fit_two_lines
 from analysis.line.methods.window import slope_variance
 from analysis.line.result import Flag
@@ -48,18 +48,53 @@ def centroid(pixel: Array, n: int, p: Array) -> float:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def _distortion(residual: Array, n: int) -> float:
+    """Sum of squares of residuals (n,) as far as they run smoothly over the pixels; about 0 where each is on its own.
+
+    Less what second differences say of independent ones, of whose square their mean square is six times.
+    """
+    square = rough = 0.0
+    for i in range(n):
+        square += residual[i] * residual[i]
+        if 0 < i < n - 1:
+            rough += (residual[i - 1] - 2.0 * residual[i] + residual[i + 1]) ** 2
+    return max(square - rough / 6.0 * n / max(n - 2, 1), 0.0)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def distortions(pixel: Array, n: int, p: Array, integrated: bool, shape: Array) -> tuple[float, float]:
+    """Chi-square of what a fit p (4,) leaves over in pixels (4, n) that runs smoothly, and of its odd part, which is
+    more on one side and less on the other. shape (3, n): scratch.
+
+    By Cauchy and Schwarz a distortion of chi-square q moves the centre by up to sigma q^(1/2), an even one by nothing.
+    """
+    profile(pixel[POSITION], n, p[1], p[2], integrated, shape)
+    residual, odd = shape[1], shape[2]
+    pitch = (pixel[POSITION, n - 1] - pixel[POSITION, 0]) / (n - 1)  # of a mosaic, two pixels
+    for i in range(n):
+        residual[i] = (pixel[ELECTRONS, i] - p[0] * shape[0, i] - p[3]) / math.sqrt(pixel[VARIANCE, i])
+    for i in range(n):
+        mirrored = min(max((2.0 * p[1] - pixel[POSITION, i] - pixel[POSITION, 0]) / pitch, 0.0), n - 1.0)
+        left = min(int(mirrored), n - 2)
+        odd[i] = residual[i] - residual[left] - (mirrored - left) * (residual[left + 1] - residual[left])
+    return _distortion(residual, n), 0.25 * _distortion(odd, n)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Options, out: Array) -> int:
     """A line that is no single Gaussian -> out (7,): as two, or as it is with a sigma that holds the misfit.
 
     pixels.room: what the fit of p (4,) left there. Returns OK for two lines that part. BLENDED for two that do not:
     sigma holds how far the brighter one is from the single line. MISFIT for neither, or one with a flat top: sigma is
-    that of the fit times the root of chi-square (Birge, Phys. Rev. 40, 1932), and holds the distance to the centre of
+    that of the fit times the root of chi-square (Birge, Phys. Rev. 40, 1932), of what runs smoothly over the pixels the
+    whole and not the reduced one (`distortions`; of a flat top its odd part), and holds the distance to the centre of
     mass of the same pixels, by which another estimator differs. What neighbours have in common is to the side of the
     other light. A line below COARSE parts from none, is no other line where the pixels do not tell that one to the
     distance between both, and as a MISFIT holds how far the brighter of two lines is.
     """
     pixel, weight, both, chi2 = pixels.room[:4], pixels.room[4], np.zeros(UNKNOWNS), math.inf
     shift = centroid(pixel, n, p) - p[1]
+    every, odd = distortions(pixel, n, p, options.integrated, pixels.room[5:8])
     if n > UNKNOWNS:
         chi2 = fit_two_lines(pixel, n, p, options.known_width, options.integrated, pixels.room[5:11], both, weight)
     distance, narrow = abs(both[5] - both[1]), p[2] < COARSE
@@ -69,6 +104,8 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
         sigma = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], n))
         parted = sigma < PARTED * distance and distance > APART * both[2]
         parted = parted and not narrow and (options.known_width or both[2] > FINEST)
+        if math.isnan(out[CORRELATION_LENGTH]):  # no single line converged
+            out[CORRELATION_LENGTH] = pixels.alike
         if not narrow or sigma < distance:
             out[0], out[2], out[3], out[4], out[5] = both[1], both[2], both[0], both[3], chi2 / max(n - UNKNOWNS, 1)
             if parted:
@@ -77,9 +114,10 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
             out[SHARED] = p[1] - both[1]
             out[1] = math.hypot(sigma, out[SHARED])
             return Flag.BLENDED.value
+    distorted = odd if flat else every
     side = shift if math.isnan(out[LEAN]) else out[LEAN]
     if narrow and chi2 < math.inf:
         shift = math.hypot(shift, both[1] - p[1])
-    out[SHARED] = math.copysign(math.sqrt(out[1] * out[1] * max(out[5] - 1.0, 0.0) + shift * shift), side)
+    out[SHARED] = math.copysign(math.sqrt(out[1] * out[1] * (max(out[5] - 1.0, 0.0) + distorted) + shift * shift), side)
     out[1] = math.hypot(out[1], out[SHARED])
     return Flag.MISFIT.value

@@ -21,6 +21,7 @@ from tests.analysis.line.troubles import (
     TROUBLES,
     Trouble,
     coverage,
+    edges,
     measured,
     photographed,
     variance_of_means,
@@ -274,6 +275,22 @@ def test_what_a_reflection_does_to_all_scan_lines_is_not_lost_in_their_mean(sign
     assert np.mean(np.isin(line.flag, (Flag.BLENDED, Flag.MISFIT))) > 0.98
     assert variance_of_means(line, centre, 10) < 1.15
     assert variance_of_means(line, centre, 100) < 1.15
+
+
+def test_lines_that_only_two_lines_explain_tell_how_many_scan_lines_err_alike():
+    """Where the single line did not converge, the correlation length was no number, and so was no mean told."""
+    line, _ = measured(TROUBLES["neighbour at 3 sigma"], 10000.0, 2.0, 1000, seed=77)
+    assert line.valid.all() and np.isfinite(line.length_apart).all()
+
+
+@pytest.mark.parametrize("name", ["slanted edge to 30 %", "partly occluded"])
+def test_sigma_of_a_line_that_an_edge_cuts_holds_what_the_fit_may_have_taken_up(name):
+    """Half a width and more beside the middle of 8 px: told 0.1 to 0.25 px, it was off by 0.2 to 3 px."""
+    line, centre = measured(TROUBLES[name], 10000.0, 8.0, 1000, seed=77)
+    edge = edges(1000)
+    cut = (edge > 4.0) & (edge < 20.0)
+    assert (line.flag[cut] == Flag.MISFIT).mean() > 0.9
+    assert np.mean(np.abs(line.u[:, 0] - centre)[cut] < 2 * line.sigma_u[cut, 0]) > 0.93
 
 
 def test_of_a_flat_line_no_scan_line_errs_as_its_neighbours_do():
