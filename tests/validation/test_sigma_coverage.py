@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.error import MATCH_SIGMAS
 from analysis.line.result import Flag
 from tests.analysis.line.troubles import (
     PLAIN,
@@ -32,10 +33,28 @@ FEWEST = 100
 MOST = 3.5
 """Standard deviations of a share: 560 cells of two shares, one run in three fails by chance at 3.5."""
 KNOWN, ESTIMATED = "noise known", "noise estimated"
-FEW = 0.01
-"""Share of flagged points from which what is told of them may outweigh that of the others."""
+EXCEPTIONS_OF_MEANS = {
+    *((f"neighbour at {sigmas} sigma", 10000.0, 0.6, ESTIMATED) for sigmas in ("1.4", "2", "3")),  # all are 2 px away
+    *(
+        ("slanted edge to 30 %", signal, sigma, noise)
+        for signal in (300.0, 1000.0, 10000.0)
+        for sigma in (0.6, 2.0, 8.0)
+        for noise in (KNOWN, ESTIMATED)
+        if (signal, sigma, noise) != (300.0, 0.6, ESTIMATED)
+    ),
+    *(("partly occluded", signal, 8.0, noise) for signal in (300.0, 1000.0, 10000.0) for noise in (KNOWN, ESTIMATED)),
+    *(("partly occluded", 1000.0, 2.0, noise) for noise in (KNOWN, ESTIMATED)),
+    ("defocus of 2 sigma", 300.0, 8.0, KNOWN),
+    ("mosaic", 1000.0, 2.0, ESTIMATED),
+    ("mosaic", 10000.0, 0.6, KNOWN),
+}
+"""Cells where what is told of means does not hold, as `analysis/line/README.md` says."""
+RUNS = 20
+"""Means that make a variance."""
 MEANS = 8000
 """Scan lines whose means are compared."""
+OTHERS = 0.002
+"""Share of the scan lines whose peak may be another one than the line: of 300 e- on ground of 2,500 e- one in 1,000."""
 CELLS = [(name, signal, sigma) for name in TROUBLES for signal in SIGNALS for sigma in WIDTHS]
 
 
@@ -74,23 +93,31 @@ def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: fl
         assert np.mean(line.flag[line.valid] == Flag.UNRESOLVED) > 0.5
 
 
+@pytest.mark.parametrize("noise", [KNOWN, ESTIMATED])
 @pytest.mark.parametrize("sigma", [0.6, 2.0, 8.0])
 @pytest.mark.parametrize("signal", [300.0, 1000.0, 10000.0])
-@pytest.mark.parametrize("name", ["plain", "defocus of 2 sigma", "reflection of 10 %"])
+@pytest.mark.parametrize("name", [name for name in TROUBLES if "saturated" not in name])
 def test_means_over_10_and_100_scan_lines_are_told_or_flagged(
-    name: str, signal: float, sigma: float, request: pytest.FixtureRequest
+    name: str, signal: float, sigma: float, noise: str, request: pytest.FixtureRequest
 ) -> None:
-    """Of flagged points no larger than told."""
-    if (name, signal, sigma) == ("reflection of 10 %", 10000.0, 8.0):
-        request.applymarker(pytest.mark.xfail(strict=True, reason="a light as wide is taken for the background"))
-    line, centre = measured(TROUBLES[name], signal, sigma, MEANS, seed=77)
-    ten, hundred = (variance_of_means(line, centre, rows) for rows in (10, 100))
-    flagged = np.mean(line.flag != Flag.OK)
-    print(
-        f"\n{name:28} A {signal:6g} s {sigma:3}: over 10 {ten:.2f}, over 100 {hundred:.2f}, flagged {flagged:.2f}",
-        end="",
-    )
-    for ratio, count in ((ten, MEANS / 10), (hundred, MEANS / 100)):
-        chance = 3 * np.sqrt(2 / count)
-        assert ratio < 1.15 + chance
-        assert flagged > FEW or ratio > 0.85 - chance
+    """Of all points no larger than told, and of runs without a flagged one no smaller either."""
+    if (name, signal, sigma, noise) in EXCEPTIONS_OF_MEANS:
+        request.applymarker(pytest.mark.xfail(strict=True))
+    line, centre = measured(TROUBLES[name], signal, sigma, MEANS, seed=77, known=noise == KNOWN)
+    other = np.abs(line.u[:, 0] - centre) > MATCH_SIGMAS * sigma + 1.0
+    flagged = line.flag[:, 0] != Flag.OK
+    of_all, of_unflagged = np.where(other, np.nan, centre), np.where(other | flagged, np.nan, centre)
+    print(f"\n{name:28} A {signal:6g} s {sigma:3} {noise:15} flagged {flagged.mean():.3f}", end="")
+    assert np.mean(other) < OTHERS
+    for rows in (10, 100):
+        every, unflagged = (whole_runs(one, line.valid[:, 0], rows) for one in (of_all, of_unflagged))
+        largest = variance_of_means(line, of_all, rows) if every >= RUNS else 1.0
+        smallest = variance_of_means(line, of_unflagged, rows) if unflagged >= RUNS else 1.0
+        print(f", over {rows}: {largest:.2f} of {every}, unflagged {smallest:.2f} of {unflagged}", end="")
+        assert largest < 1.15 + 3 * np.sqrt(2 / max(every, RUNS))
+        assert smallest > 0.85 - 3 * np.sqrt(2 / max(unflagged, RUNS))
+
+
+def whole_runs(centre: np.ndarray, valid: np.ndarray, rows: int) -> int:
+    """How many means over so many scan lines there are."""
+    return int((np.isfinite(centre) & valid)[: len(centre) // rows * rows].reshape(-1, rows).all(axis=1).sum())
