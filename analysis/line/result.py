@@ -28,7 +28,7 @@ class Flag(IntEnum):
     """Fewer usable pixels than unknowns."""
     NOT_CONVERGED = 5
     OUT_OF_WINDOW = 6
-    """The fit left the window around the peak."""
+    """The fit left the window around the peak, or is wider."""
     TOO_WIDE = 7
     """Wider than a line can be."""
     NO_PIXELS = 8

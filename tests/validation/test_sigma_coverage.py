@@ -32,23 +32,29 @@ FEWEST = 100
 """Points without a flag that make a share."""
 MOST = 3.5
 """Standard deviations of a share: 560 cells of two shares, one run in three fails by chance at 3.5."""
-KNOWN, ESTIMATED = "noise known", "noise estimated"
-EXCEPTIONS_OF_MEANS = {
+NOISES = KNOWN, ESTIMATED = "noise known", "noise estimated"
+MEANS_OF = (300.0, 1000.0, 10000.0)
+"""Electrons of the peaks that means are taken of."""
+EXCEPTION = ("neighbour at 3 sigma", 300.0, 8.0, ESTIMATED)
+"""The cell where sigma does not hold, as `analysis/line/README.md` says: it is a quarter too large."""
+EDGES_OF_MEANS = {
+    ("slanted edge to 30 %", 300.0, 0.6, KNOWN),
+    *(("slanted edge to 30 %", 1000.0, 0.6, noise) for noise in (KNOWN, ESTIMATED)),
+}
+"""Cells where what is told of means does not hold, as there: half a line of 0.6 px looks like a narrower one."""
+ALL_ALIKE = {
     *((f"neighbour at {sigmas} sigma", 10000.0, 0.6, ESTIMATED) for sigmas in ("1.4", "2", "3")),  # all are 2 px away
     *(
         ("slanted edge to 30 %", signal, sigma, noise)
-        for signal in (300.0, 1000.0, 10000.0)
-        for sigma in (0.6, 2.0, 8.0)
-        for noise in (KNOWN, ESTIMATED)
-        if (signal, sigma, noise) != (300.0, 0.6, ESTIMATED)
+        for signal in MEANS_OF
+        for sigma in (2.0, 8.0)
+        for noise in NOISES
     ),
-    *(("partly occluded", signal, 8.0, noise) for signal in (300.0, 1000.0, 10000.0) for noise in (KNOWN, ESTIMATED)),
-    *(("partly occluded", 1000.0, 2.0, noise) for noise in (KNOWN, ESTIMATED)),
-    ("defocus of 2 sigma", 300.0, 8.0, KNOWN),
-    ("mosaic", 1000.0, 2.0, ESTIMATED),
+    *(("partly occluded", signal, 8.0, noise) for signal in MEANS_OF for noise in NOISES),
+    *(("partly occluded", 1000.0, 2.0, noise) for noise in NOISES),
     ("mosaic", 10000.0, 0.6, KNOWN),
 }
-"""Cells where what is told of means does not hold, as `analysis/line/README.md` says."""
+"""Cells where means with flagged points err by more than told, as all of these are moved alike."""
 RUNS = 20
 """Means that make a variance."""
 MEANS = 8000
@@ -71,9 +77,13 @@ def share_is(share: float, low: float, high: float, count: int) -> bool:
     )
 
 
-@pytest.mark.parametrize("noise", [KNOWN, ESTIMATED])
+@pytest.mark.parametrize("noise", NOISES)
 @pytest.mark.parametrize(("name", "signal", "sigma"), CELLS)
-def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: float, noise: str) -> None:
+def test_sigma_holds_or_the_point_is_flagged(
+    name: str, signal: float, sigma: float, noise: str, request: pytest.FixtureRequest
+) -> None:
+    if (name, signal, sigma, noise) == EXCEPTION:
+        request.applymarker(pytest.mark.xfail(strict=True))
     known = noise == KNOWN
     trouble = TROUBLES[name]
     line, centre = measured(trouble, signal, sigma, ROWS, seed=2024, known=known)
@@ -93,15 +103,16 @@ def test_sigma_holds_or_the_point_is_flagged(name: str, signal: float, sigma: fl
         assert np.mean(line.flag[line.valid] == Flag.UNRESOLVED) > 0.5
 
 
-@pytest.mark.parametrize("noise", [KNOWN, ESTIMATED])
+@pytest.mark.parametrize("noise", NOISES)
 @pytest.mark.parametrize("sigma", [0.6, 2.0, 8.0])
-@pytest.mark.parametrize("signal", [300.0, 1000.0, 10000.0])
+@pytest.mark.parametrize("signal", MEANS_OF)
 @pytest.mark.parametrize("name", [name for name in TROUBLES if "saturated" not in name])
 def test_means_over_10_and_100_scan_lines_are_told_or_flagged(
     name: str, signal: float, sigma: float, noise: str, request: pytest.FixtureRequest
 ) -> None:
-    """Of all points no larger than told, and of runs without a flagged one no smaller either."""
-    if (name, signal, sigma, noise) in EXCEPTIONS_OF_MEANS:
+    """Of runs without a flagged point within 15 %; of all points no larger than told, but where they are named."""
+    cell = (name, signal, sigma, noise)
+    if cell in EDGES_OF_MEANS:
         request.applymarker(pytest.mark.xfail(strict=True))
     line, centre = measured(TROUBLES[name], signal, sigma, MEANS, seed=77, known=noise == KNOWN)
     other = np.abs(line.u[:, 0] - centre) > MATCH_SIGMAS * sigma + 1.0
@@ -109,13 +120,15 @@ def test_means_over_10_and_100_scan_lines_are_told_or_flagged(
     of_all, of_unflagged = np.where(other, np.nan, centre), np.where(other | flagged, np.nan, centre)
     print(f"\n{name:28} A {signal:6g} s {sigma:3} {noise:15} flagged {flagged.mean():.3f}", end="")
     assert np.mean(other) < OTHERS
+    told_too_small = False
     for rows in (10, 100):
         every, unflagged = (whole_runs(one, line.valid[:, 0], rows) for one in (of_all, of_unflagged))
-        largest = variance_of_means(line, of_all, rows) if every >= RUNS else 1.0
-        smallest = variance_of_means(line, of_unflagged, rows) if unflagged >= RUNS else 1.0
-        print(f", over {rows}: {largest:.2f} of {every}, unflagged {smallest:.2f} of {unflagged}", end="")
-        assert largest < 1.15 + 3 * np.sqrt(2 / max(every, RUNS))
-        assert smallest > 0.85 - 3 * np.sqrt(2 / max(unflagged, RUNS))
+        all_ratio = variance_of_means(line, of_all, rows) if every >= RUNS else 1.0
+        ratio = variance_of_means(line, of_unflagged, rows) if unflagged >= RUNS else 1.0
+        print(f", over {rows}: {all_ratio:.2f} of {every}, unflagged {ratio:.2f} of {unflagged}", end="")
+        assert abs(ratio - 1.0) < 0.15 + 3 * np.sqrt(2 / max(unflagged, RUNS))
+        told_too_small |= bool(all_ratio >= 1.15 + 3 * np.sqrt(2 / max(every, RUNS)))
+    assert told_too_small == (cell in ALL_ALIKE)
 
 
 def whole_runs(centre: np.ndarray, valid: np.ndarray, rows: int) -> int:

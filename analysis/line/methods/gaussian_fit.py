@@ -277,6 +277,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
             floor, light = pixel[FLOOR, i], pixel[ELECTRONS, i] - p[3]
             pixel[VARIANCE, i] = max(pixel[ELECTRONS, i] + floor, 0.1 * abs(floor)) + scattered * light * light
         reason = measure_misfit(pixels, seed, count, p, options, out)
+        out[LEAN] = math.copysign(math.inf, centroid(pixel, count, p) - p[1])
         if reason != Flag.MISFIT.value:
             return reason
         out[:] = np.nan
@@ -284,7 +285,7 @@ def measure_gaussian(pixels: Pixels, y: int, seed: Array, flag: int, options: Op
         return Flag.NOT_CONVERGED.value
     if p[2] > options.max_width:
         return Flag.TOO_WIDE.value
-    if abs(p[1] - seed[CENTRE]) > max(half, 1.0):
+    if max(abs(p[1] - seed[CENTRE]), p[2]) > max(half, 1.0):  # wider than the window, a line may be anything
         return Flag.OUT_OF_WINDOW.value
     factor, row, unit = np.zeros((4, 4)), np.empty(4), np.array([0.0, 1.0, 0.0, 0.0])
     if not solve(hessian, 0.0, unit, factor, row):

@@ -40,6 +40,8 @@ FAR, FEWEST, ALIKE = 8, 256, 0.1
 """Scan lines apart that no smoothing makes alike; pairs of them, and the correlation, from which it is believed."""
 RESOLVED = 1.1
 """px; of narrower lines that are two the noise, where it is not known, comes out a third too large."""
+AS_WIDE = 0.2
+"""Of the neighbours' width, by which one of two lines that part may differ: another is no such pair."""
 MOST_PART = 0.9
 """Share of the doubled neighbours that part; of fewer, those that do are the ones that noise has drawn apart."""
 
@@ -123,12 +125,18 @@ def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], 
     out (n, k, columns), u and sigma_u its first; single (m, columns), as before; farthest: px, the largest sigma.
     """
     double, parted = out[leaning], flags[leaning] == Flag.OK
-    sure = _most_part(flags, np.isinf(out[..., LEAN])) & (out[..., WIDTH] > RESOLVED)
+    sure = _most_part(flags, np.isinf(out[..., LEAN])) & _as_wide(out[..., WIDTH], flags == Flag.OK)
     doubtful = parted & ~sure[leaning]
     double[doubtful] = _with_distance(double[doubtful], single[doubtful])
     unsure = ~(double[:, 1] < farthest)
     out[leaning] = np.where(unsure[:, None], single, double)
     flags[leaning] = np.where(unsure | doubtful, Flag.BLENDED, flags[leaning])
+
+
+def _as_wide(width: Float, among: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(n, k) px and which count among a line's neighbours -> RESOLVED, and as wide as these."""
+    total, count = _of_neighbours(np.where(among, width, 0.0), among.astype(np.float64))
+    return np.asarray((width > RESOLVED) & (np.abs(width * count - total) < AS_WIDE * total))
 
 
 def keep_doubtful(out: Float, flags: NDArray[np.uint8], alone: NDArray[np.bool_], double: Float) -> None:
