@@ -23,6 +23,9 @@ Mask = NDArray[np.uint8]
 
 FEWEST = 3
 """Pixels on either side."""
+BENT = 4.0
+"""Standard deviations by which the slopes of both sides differ from which they are of no straight background: the tail
+of a second line, which would be taken off the first, and is none of the slope's own uncertainty."""
 SURE = 2.0
 """Standard deviations from which a slope is taken off: left in, it moves a fit by a third of its sigma at most."""
 
@@ -37,26 +40,36 @@ def background_slope(
     floor (w,) or (1,): variance of a pixel without signal, e-^2. The slope is 0 where it is not sure, and so is its
     sigma where a side has no pixels. What scatters more than a count does makes it less sure.
     """
-    count, right, n = 0, 0, signal.shape[0]
-    sx = sy = sxx = sxy = syy = dark = 0.0
+    count, n = 0, signal.shape[0]
+    sx = sy = sxx = sxy = syy = dark = left_slope = left_spread = 0.0
     for side in range(2):
         low, high = (centre - outer, centre - inner) if side == 0 else (centre + inner, centre + outer)
+        ax = ay = axx = axy = 0.0
+        before = count
         for i in range(max(0, math.ceil(low)), min(n - 1, math.floor(high)) + 1):
             if mask[i] == 0:
                 x, y = i - centre, float(signal[i])
                 dark += floor[min(i, floor.shape[0] - 1)]
-                sx += x
-                sy += y
-                sxx += x * x
-                sxy += x * y
+                ax += x
+                ay += y
+                axx += x * x
+                axy += x * y
                 syy += y * y
                 count += 1
-                right += side
-    if right < FEWEST or count - right < FEWEST:
-        return 0.0, 0.0, 0.0
+        own = count - before
+        if own < FEWEST:
+            return 0.0, 0.0, 0.0
+        own_spread = axx - ax * ax / own
+        own_slope = (axy - ax * ay / own) / own_spread
+        if side == 0:
+            left_slope, left_spread = own_slope, own_spread
+        sx, sy, sxx, sxy = sx + ax, sy + ay, sxx + axx, sxy + axy
     spread = sxx - sx * sx / count
     slope = (sxy - sx * sy / count) / spread
     left_over = syy - sy * sy / count - slope * slope * spread
-    variance = max((sy + dark) / count, 0.1 * abs(dark) / count, left_over / (count - 2))
-    sigma = math.sqrt(variance / spread)
+    counted = max((sy + dark) / count, 0.1 * abs(dark) / count)
+    bend = abs(own_slope - left_slope) / math.sqrt(counted / own_spread + counted / left_spread)
+    if bend > BENT:
+        return (sy - slope * sx) / count, 0.0, math.sqrt(counted / spread)
+    sigma = math.sqrt(max(counted, left_over / (count - 2)) / spread)
     return (sy - slope * sx) / count, slope if abs(slope) > SURE * sigma else 0.0, sigma

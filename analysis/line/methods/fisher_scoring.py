@@ -27,11 +27,24 @@ def _cost(y: Array, floor: Array, g: Array, n: int, p: Array, likelihood: bool) 
     for i in range(n):
         mu = p[0] * g[i] + p[3]
         if likelihood:
-            m = max(mu + floor[i], 0.1 * floor[i])
-            total += 2.0 * (m - (y[i] + floor[i]) * math.log(m))
+            total += deviance(y[i], mu, floor[i], 0.1 * floor[i])
         else:
             total += (y[i] - mu) ** 2
     return total
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def deviance(y: float, mu: float, floor: float, least: float) -> float:
+    """Twice the negative log likelihood of y where mu is expected, up to a constant.
+
+    Where the variance mu + floor would fall below the `least` it is held there, as in the score: a sum of squares,
+    without which a background far below 0, beside a second line, stops the descent.
+    """
+    m = mu + floor
+    if m >= least:
+        return 2.0 * (m - (y + floor) * math.log(m))
+    held = 2.0 * (least - (y + floor) * math.log(least))
+    return held + ((y - mu) ** 2 - (y + floor - least) ** 2) / least
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

@@ -8,11 +8,10 @@ brighter one is returned.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 
+from analysis.line.methods.fisher_scoring import deviance
 from analysis.line.methods.line_profile import ELECTRONS, FLOOR, POSITION, profile
 from analysis.line.methods.narrow_line import NARROWEST
 from analysis.line.methods.seed_loop import Array
@@ -33,9 +32,8 @@ def _cost(pixel: Array, n: int, p: Array, integrated: bool, one: Array, other: A
     profile(pixel[POSITION], n, p[5], p[2], integrated, other)
     total = 0.0
     for i in range(n):
-        floor = pixel[FLOOR, i]
-        m = max(p[0] * one[0, i] + p[4] * other[0, i] + p[3] + floor, 0.1 * abs(floor), 1e-9)
-        total += 2.0 * (m - (pixel[ELECTRONS, i] + floor) * math.log(m))
+        floor, mu = pixel[FLOOR, i], p[0] * one[0, i] + p[4] * other[0, i] + p[3]
+        total += deviance(pixel[ELECTRONS, i], mu, floor, max(0.1 * abs(floor), 1e-9))
     return total
 
 
