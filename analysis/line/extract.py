@@ -23,6 +23,7 @@ from analysis.line.selection.geometry import WorkingVolume, consistent
 from analysis.line.selection.learned import READY_MADE, choose_learned, load_chooser
 from analysis.line.settings import ExtractionSettings, Select
 from analysis.line.shared_noise import with_shared_noise
+from analysis.line.texture import with_texture
 from render.base.errors import InputError
 from render.base.finite import check_finite
 
@@ -38,17 +39,19 @@ def extract(
     variance: NDArray[Any] | None = None,
     volume: WorkingVolume | None = None,
     threads: int | None = None,
+    shared: bool = True,
     **changes: Any,
 ) -> Line:
     """Image (h, w) or (h, w, 3), uint8, uint16, float32 or float64 -> Line with arrays (n, peaks).
 
     changes: single settings by their name, such as method="phase", in place of those in `settings`. noise turns DN into
     electrons; without it, it is estimated from the image (`estimate_noise`), and what neighbouring pixels have in
-    common from the positions (`shared_noise`). variance (h, w) e-^2 replaces that of the noise model, for images that
-    were combined from others. With a selection other than "strongest", or a working volume, one peak of several
-    candidates is taken: arrays (n, 1), `candidates` holds the rest. Smoothed along the line, where the settings ask for
-    it, are the positions that were selected. Scan lines without a position carry a flag that
-    says why.
+    common from the positions (`shared_noise`); what a texture does, from the light along the line (`texture`). variance
+    (h, w) e-^2 replaces that of the noise model, for images that were combined from others. With a selection other than
+    "strongest", or a working volume, one peak of several candidates is taken: arrays (n, 1), `candidates` holds the
+    rest. Smoothed along the line, where the settings ask for it, are the positions that were selected. Scan lines
+    without a position carry a flag that says why. shared: False where somebody selects among the peaks first, and then
+    asks what neighbouring pixels share.
     Raises InputError: an image of the wrong type, shape or size, without a finite pixel, a channel it does not have,
     settings out of range.
     """
@@ -72,7 +75,10 @@ def extract(
     line = replace(measure(lines, wanted, threads, judge=variance is None), note=note)
     check_finite("line", positions=line.u[line.valid])
     line = line if alone else select(line, chosen.select, volume, chosen.chooser)
-    line = with_shared_noise(line) if noise.alike else line
+    if noise.alike:
+        line = with_shared_noise(line) if shared else line
+    elif chosen.smoothing == 0.0:  # which would make the light of neighbours alike
+        line = with_texture(line, noise)
     return smooth_along(line) if chosen.smooth_along else line
 
 

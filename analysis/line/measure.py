@@ -194,8 +194,8 @@ def measure_with_neighbours(
             again: NDArray[np.bool_] = np.any(priors, axis=(1, 2))
             map_chunks(lambda start, stop: work(start, stop, options, priors, again), lines.count, CHUNK, threads)
     farthest = lines.image.shape[1] / np.sqrt(12.0)  # a position that says less than a guess is none
-    length = np.maximum(out[..., CORRELATION_LENGTH], lines.alike)
-    every = no_gaussian_by_neighbours(out[..., LEAN], out[..., FIT], length) if told is None else told.leaning
+    length, alike = np.maximum(out[..., CORRELATION_LENGTH], lines.alike), lines.noise.alike and lines.seen is None
+    every = no_gaussian_by_neighbours(out[..., LEAN], out[..., FIT], length, alike) if told is None else told.leaning
     leaning = every & np.isin(flags, (Flag.OK, Flag.UNRESOLVED))
     if leaning.any():
         double, single = options._replace(judge=0.0), out[leaning]

@@ -137,7 +137,8 @@ def scatter_of(
     dark = 1.05 * float(np.median(steps)) + 0.3  # half a DN of rounding in each of two neighbours
     gain = max(float(np.nanmax(light.image)), 1.0) / 1e4
     noise = NoiseModel(gain=gain, read_noise=dark / gain, saturation=light.saturation)
-    line = extract(light.image, settings=ExtractionSettings(), noise=noise, threads=1)
+    noise = noise.model_copy(update={"alike": True})  # of a photograph's colours
+    line = extract(light.image, settings=ExtractionSettings(), noise=noise, threads=1, shared=False)
     u = np.where(line.valid, line.u, np.nan)[:, 0].reshape(-1, RUN)
     bends = u[:, : -2 * LAG] - 2.0 * u[:, LAG:-LAG] + u[:, 2 * LAG :]
     bends = np.abs(bends[np.isfinite(bends)])

@@ -98,16 +98,16 @@ def extract_photograph(
         # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
         half = TONED if taken.lossy else HALF
         shared = noise.alike or whole.ndim == 3 or taken.lossy
-        plain = noise.model_copy(update={"alike": False})
+        noise = noise.model_copy(update={"alike": shared})
         if alone:
-            line = extract(light.image, settings=settings, noise=plain, threads=threads)
+            line = extract(light.image, settings=settings, noise=noise, threads=threads, shared=False)
         else:
-            line = peaks_to_choose_from(light.image, settings, plain, threads, every=volume is not None)
+            line = peaks_to_choose_from(light.image, settings, noise, threads, every=volume is not None)
         line = placed(unsure_dropped(line), whole.shape, corner)
         fits = settings.select == "continuous" and settings.method in FITS
         if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
             plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
-            centres = extract(light.image, settings=plainly, noise=plain, threads=threads)
+            centres = extract(light.image, settings=plainly, noise=noise, threads=threads, shared=False)
             line = carried_on(line, placed(centres, whole.shape, corner), settings, volume, half)
         elif not alone:
             line = selected(line, settings, volume)

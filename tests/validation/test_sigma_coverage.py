@@ -14,9 +14,11 @@ import pytest
 
 from analysis.error import MATCH_SIGMAS
 from analysis.line.result import Flag
+from analysis.line.texture import Texture
 from tests.analysis.line.troubles import (
     PLAIN,
     SIGNALS,
+    TEXTURE_GRAIN,
     TROUBLES,
     WIDTHS,
     Coverage,
@@ -31,17 +33,20 @@ ROWS = 1000
 FEWEST = 100
 """Points without a flag that make a share."""
 MOST = 3.5
-"""Standard deviations of a share: 560 cells of two shares, one run in three fails by chance at 3.5."""
+"""Standard deviations of a share: 600 cells of two shares, one run in three fails by chance at 3.5."""
 NOISES = KNOWN, ESTIMATED = "noise known", "noise estimated"
 MEANS_OF = (300.0, 1000.0, 10000.0)
 """Electrons of the peaks that means are taken of."""
 EXCEPTION = ("neighbour at 3 sigma", 10000.0, 8.0, ESTIMATED)
 """The cell where sigma does not hold, as `analysis/line/README.md` says: it is a sixth too large."""
-EDGES_OF_MEANS = {
+EXCEPTIONS_OF_MEANS = {
     ("slanted edge to 30 %", 300.0, 0.6, KNOWN),
-    *(("slanted edge to 30 %", 1000.0, 0.6, noise) for noise in (KNOWN, ESTIMATED)),
+    *(("slanted edge to 30 %", 1000.0, 0.6, noise) for noise in NOISES),
+    *(("texture of 5 %", 300.0, 8.0, noise) for noise in NOISES),
+    ("texture of 5 %", 1000.0, 8.0, ESTIMATED),
 }
-"""Cells where what is told of means does not hold, as there: half a line of 0.6 px looks like a narrower one."""
+"""Cells where what is told of means does not hold, as there: half a line of 0.6 px looks like a narrower one, and of a
+texture four times as fine as the line is wide little is seen."""
 ALL_ALIKE = {
     *((f"neighbour at {sigmas} sigma", 10000.0, 0.6, ESTIMATED) for sigmas in ("1.4", "2", "3")),  # all are 2 px away
     *(
@@ -64,14 +69,14 @@ OTHERS = 0.002
 CELLS = [(name, signal, sigma) for name in TROUBLES for signal in SIGNALS for sigma in WIDTHS]
 
 
-def holds(found: Coverage, sigma: float) -> bool:
-    """Whether the bars are met; of lines below 0.6 px, a mean over a pixel and no normal deviate, that of two sigma."""
-    return share_is(found.two, 0.93, 0.97, found.count) and (
-        sigma < 0.6 or share_is(found.one, 0.65, 0.71, found.count)
-    )
+def holds(found: Coverage, sigma: float, alike: float) -> bool:
+    """Whether the bars are met, where so many scan lines err alike; of lines below 0.6 px, a mean over a pixel and no
+    normal deviate, that of two sigma."""
+    count = found.count / alike
+    return share_is(found.two, 0.93, 0.97, count) and (sigma < 0.6 or share_is(found.one, 0.65, 0.71, count))
 
 
-def share_is(share: float, low: float, high: float, count: int) -> bool:
+def share_is(share: float, low: float, high: float, count: float) -> bool:
     return bool(
         low - MOST * np.sqrt(low * (1 - low) / count) < share < high + MOST * np.sqrt(high * (1 - high) / count)
     )
@@ -93,10 +98,11 @@ def test_sigma_holds_or_the_point_is_flagged(
         f"rms {found.rms:.4f} sigma {found.sigma:.4f} lost {found.lost:.3f} flagged {found.flagged:.3f}",
         end="",
     )
-    if found.count == 0 or not holds(found, sigma):  # or those that do not are flagged
+    alike = Texture(1.0, TEXTURE_GRAIN).length if trouble.texture else 1.0
+    if found.count == 0 or not holds(found, sigma, alike):  # or those that do not are flagged
         alone = line.flag[:, 0] == Flag.OK
         found = coverage(replace(line, flag=np.where(alone[:, None], line.flag, Flag.NO_PEAK)), centre)
-        assert found.count < FEWEST or holds(found, sigma)
+        assert found.count < FEWEST or holds(found, sigma, alike)
     if trouble == PLAIN and sigma >= 0.6:
         assert every.flagged <= 0.02
     if trouble == PLAIN and sigma < 0.3 and signal >= 300:
@@ -112,7 +118,7 @@ def test_means_over_10_and_100_scan_lines_are_told_or_flagged(
 ) -> None:
     """Of runs without a flagged point within 15 %; of all points no larger than told, but where they are named."""
     cell = (name, signal, sigma, noise)
-    if cell in EDGES_OF_MEANS:
+    if cell in EXCEPTIONS_OF_MEANS:
         request.applymarker(pytest.mark.xfail(strict=True))
     line, centre = measured(TROUBLES[name], signal, sigma, MEANS, seed=77, known=noise == KNOWN)
     other = np.abs(line.u[:, 0] - centre) > MATCH_SIGMAS * sigma + 1.0

@@ -46,10 +46,11 @@ MOST_PART = 0.9
 """Share of the doubled neighbours that part; of fewer, those that do are the ones that noise has drawn apart."""
 
 
-def no_gaussian_by_neighbours(lean: Float, fit: Float, length: Float) -> NDArray[np.bool_]:
+def no_gaussian_by_neighbours(lean: Float, fit: Float, length: Float, alike: bool = False) -> NDArray[np.bool_]:
     """Leans and what is left over (n, k), normal deviates where each line is a Gaussian, leans infinite of those
     measured as something else, NaN where nothing is known, and correlation lengths (n, k) -> (n, k): which were taken
-    for a Gaussian and are none.
+    for a Gaussian and are none. alike: a camera has made the noise of neighbouring pixels alike, block by block, so
+    that what differs from line to line says little.
     """
     known = np.isfinite(length) & ~np.isnan(lean)
     if not known.any():
@@ -58,11 +59,14 @@ def no_gaussian_by_neighbours(lean: Float, fit: Float, length: Float) -> NDArray
     square = np.where(known, np.maximum(length, 1.0) * deviate**2, 0.0)
     total, spread, count = _of_neighbours(deviate, square, known.astype(np.float64))
     together = np.abs(total) > np.maximum(TOGETHER * np.sqrt(spread), LEAST * count)
+    together |= _among_others(np.isinf(lean), known)
+    if alike:
+        return np.asarray(together & np.isfinite(lean))
     leaning = _nearby(np.where(known, deviate, np.nan), length)
     left = np.where(np.isfinite(fit) & known, np.clip(fit - _usual(fit), -UNLIKELY, UNLIKELY), np.nan)
     nearby = _above(np.abs(leaning[0])) & (np.abs(total) > LEAST * count)
     nearby |= _above(np.abs(leaning[1])) | _above(_nearby(left, length)[1])
-    return np.asarray((together | nearby | _among_others(np.isinf(lean), known)) & np.isfinite(lean))
+    return np.asarray((together | nearby) & np.isfinite(lean))
 
 
 def _usual(fit: Float) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
+from scipy.ndimage import convolve1d, gaussian_filter
 
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
@@ -42,6 +42,8 @@ class Trouble:
     """Radius of the circle of confusion in sigmas."""
     reflection: float = 0.0
     """Height, of the peak, of a light 3 sigmas wide that lies 5 sigmas beside, as a groove's other wall throws it."""
+    texture: float = 0.0
+    """Relative standard deviation of what reflects the line, alike over `TEXTURE_GRAIN` pixels and scan lines."""
     mosaic: bool = False
     """Every other pixel of every other scan line is seen, the rest filled in from them."""
 
@@ -61,9 +63,12 @@ TROUBLES = {
     "partly occluded": Trouble(edge=0.0),
     "defocus of 2 sigma": Trouble(defocus=2.0),
     "reflection of 10 %": Trouble(reflection=0.1),
+    "texture of 5 %": Trouble(texture=0.05),
     "mosaic": Trouble(mosaic=True),
 }
 EDGE_ROWS = 10.0
+TEXTURE_GRAIN = 2.0
+"""px, standard deviation of the filter that makes a texture of white noise."""
 SLANT = 0.0137
 """px a scan line, of a line that a mosaic sees."""
 FINEST_PARTS = 5
@@ -80,7 +85,7 @@ def photographed(
     if trouble.mosaic:  # what is filled in is of other scan lines, and right where the line is straight
         centre = width / 2 + SLANT * (np.arange(rows) - 0.5 * rows)
     peak = signal * max(trouble.overexposure, 1.0)
-    mean = _spoiled(trouble, width, centre, peak, sigma)
+    mean = _spoiled(trouble, width, centre, peak, sigma, rng)
     if trouble.neighbour:
         mean += expected(width, centre + max(trouble.neighbour * sigma, 2.0), 0.3 * peak, sigma, 0.0)
     if trouble.halo:
@@ -101,9 +106,9 @@ def photographed(
     return np.minimum(image, signal).astype(np.float32), centre, electrons(READ_NOISE, saturation=signal)
 
 
-def _spoiled(trouble: Trouble, width: int, centre: Array, peak: float, sigma: float) -> Array:
+def _spoiled(trouble: Trouble, width: int, centre: Array, peak: float, sigma: float, rng: np.random.Generator) -> Array:
     """(rows, width) mean light of the line itself, in parts of a pixel where its shape is not that of a Gaussian."""
-    if trouble.defocus == 0.0 and trouble.edge == 1.0:
+    if trouble.defocus == 0.0 and trouble.edge == 1.0 and trouble.texture == 0.0:
         return expected(width, centre, peak, sigma, 0.0)
     parts = max(FINEST_PARTS, int(np.ceil(FINEST_PARTS / sigma)) // 2 * 2 + 1)
     light = expected(width * parts, (centre + 0.5) * parts - 0.5, peak / parts, sigma * parts, 0.0)
@@ -115,7 +120,15 @@ def _spoiled(trouble: Trouble, width: int, centre: Array, peak: float, sigma: fl
         light = convolve1d(light, chord / chord.sum(), axis=1)
     if trouble.edge != 1.0:
         light *= np.where(x > edges(len(centre))[:, None], trouble.edge, 1.0)
+    if trouble.texture:
+        light *= 1.0 + trouble.texture * textured(light.shape, rng, parts)
     return np.asarray(light.reshape(len(centre), width, parts).sum(axis=2))
+
+
+def textured(shape: tuple[int, int], rng: np.random.Generator, parts: int = 1) -> Array:
+    """(rows, columns) of unit variance, so many columns to a pixel."""
+    field = gaussian_filter(rng.normal(size=shape), (TEXTURE_GRAIN, TEXTURE_GRAIN * parts), mode="wrap")
+    return np.asarray(field / field.std())
 
 
 def edges(rows: int) -> Array:
