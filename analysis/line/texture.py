@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from scipy.optimize import nnls
 
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.result import Flag, Line
@@ -73,15 +72,13 @@ def texture(line: Line, noise: NoiseModel) -> Texture | None:
     """What the light of a line (n, k) says of its surface; None: nothing that is sure and counts."""
     alone = (line.flag[:, 0] == Flag.OK) & (line.amplitude[:, 0] > 0.0) & (line.width[:, 0] > 0.0)
     light = np.log(np.where(alone, line.amplitude[:, 0] * line.width[:, 0], np.nan))
-    runs = [_structure(light[i : i + RUN]) for i in range(0, len(light) - RUN + 1, RUN)]
-    kept = np.array([run for run in runs if run is not None])
-    if len(kept) < FEWEST:
+    runs = _structure(light[: len(light) // RUN * RUN].reshape(-1, RUN))
+    if len(runs) < FEWEST:
         return None
-    total = kept.sum(axis=0)
-    grain = min(range(len(GRAINS)), key=lambda one: _fit(total, one)[1])
-    variance = _fit(total, grain)[0]
-    others = np.array([_fit(total - run, grain)[0] for run in kept])
-    error = math.sqrt((len(kept) - 1.0) * float(np.mean((others - others.mean()) ** 2)))
+    total = runs.sum(axis=0, keepdims=True)
+    grain = min(range(len(GRAINS)), key=lambda one: float(_fit(total, one)[1][0]))
+    variance, others = float(_fit(total, grain)[0][0]), _fit(total - runs, grain)[0]
+    error = math.sqrt((len(runs) - 1.0) * float(np.mean((others - others.mean()) ** 2)))
     if not variance > SURE * error:
         return None
     width, sigma = (float(np.median(values[alone, 0])) for values in (line.width, line.sigma_u))
@@ -91,32 +88,45 @@ def texture(line: Line, noise: NoiseModel) -> Texture | None:
     return found if float(found.moves(np.array(width))) > MATTERS * sigma**2 else None
 
 
-def _structure(light: Float) -> Float | None:
-    """Logarithms (RUN,), NaN where unknown -> (2, FARTHEST) sums of half their squared differences, and how many, at
-    distances from 1; None of a run with too few."""
+def _structure(light: Float) -> Float:
+    """Logarithms (runs, RUN), NaN where unknown -> (m, 2, FARTHEST) sums of half their squared differences, and how
+    many, at distances from 1; of the runs that are filled."""
     there = np.isfinite(light)
-    if there.sum() < FILLED * RUN:
-        return None
-    at = np.arange(RUN) / RUN - 0.5
-    rest = np.full(RUN, np.nan)
+    light = light[there.sum(axis=1) >= FILLED * RUN]
     for _ in range(2):  # the second time without strays
-        rest = light - np.polynomial.Polynomial(np.polynomial.polynomial.polyfit(at[there], light[there], DEGREE))(at)
-        near = np.abs(rest) <= STRAY * 1.4826 * float(np.median(np.abs(rest[there])))
-        if (there & near).sum() < FILLED * RUN:
-            return None
-        there = there & near
-    rest = np.where(there, rest, np.nan)
-    steps = [rest[k:] - rest[:-k] for k in range(1, FARTHEST + 1)]
-    return np.array([[0.5 * float(np.nansum(step**2)) for step in steps], [np.isfinite(step).sum() for step in steps]])
+        rest = _less_shape(light)
+        near = np.abs(rest) <= STRAY * 1.4826 * np.nanmedian(np.abs(rest), axis=1, keepdims=True)
+        light = np.where(near, light, np.nan)[near.sum(axis=1) >= FILLED * RUN]
+    rest = _less_shape(light)
+    out = np.empty((len(rest), 2, FARTHEST))
+    for k in range(1, FARTHEST + 1):
+        square = (rest[:, k:] - rest[:, :-k]) ** 2
+        out[:, 0, k - 1], out[:, 1, k - 1] = 0.5 * np.nansum(square, axis=1), np.isfinite(square).sum(axis=1)
+    return out
 
 
-def _fit(total: Float, grain: int) -> tuple[float, float]:
-    """Sums as `_structure` has them -> the light's variance at one of GRAINS, beside what scatters by itself, and what
-    both leave over of the squares."""
-    weight = np.sqrt(total[1])
-    design = weight[:, None] * np.stack([_foreseen()[0], _foreseen()[1 + grain]], axis=1)
-    found, left = nnls(design, total[0] / np.maximum(weight, 1.0))
-    return float(found[1]), float(left)
+def _less_shape(light: Float) -> Float:
+    """(runs, RUN) -> what a cubic leaves of each run."""
+    powers = np.vander(np.arange(RUN) / RUN - 0.5, DEGREE + 1)
+    there = np.isfinite(light)
+    normal = np.einsum("rk,ki,kj->rij", there, powers, powers)
+    right = np.where(there, light, 0.0) @ powers
+    return np.asarray(light - np.linalg.solve(normal, right[..., None])[..., 0] @ powers.T)
+
+
+def _fit(sums: Float, grain: int) -> tuple[Float, Float]:
+    """Sums (m, 2, FARTHEST) as `_structure` has them -> (m,) the light's variance at one of GRAINS, beside what
+    scatters by itself, neither below 0; and what both leave over of the squares."""
+    weight = sums[:, 1]
+    found = sums[:, 0] / np.maximum(weight, 1.0)
+    flat, shape = _foreseen()[0], _foreseen()[1 + grain]
+    ff, fs, ss = ((weight * one).sum(axis=1) for one in (flat * flat, flat * shape, shape * shape))
+    fd, sd = ((weight * one * found).sum(axis=1) for one in (flat, shape))
+    variance = np.maximum((ff * sd - fs * fd) / (ff * ss - fs * fs), 0.0)
+    still = (fd - fs * variance) / ff
+    variance = np.where(still < 0.0, np.maximum(sd / ss, 0.0), variance)
+    rest = found - np.maximum(still, 0.0)[:, None] * flat - variance[:, None] * shape
+    return variance, (weight * rest**2).sum(axis=1)
 
 
 @cache
