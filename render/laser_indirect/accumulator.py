@@ -17,12 +17,12 @@ from render.importance import Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
     Guide,
-    aim_camera_paths,
     allocate_camera_paths,
     reserve_for_specular,
     update_guide,
 )
 from render.laser_indirect.line_goal import LineErrors
+from render.laser_indirect.line_paths import PathDemand
 from render.laser_indirect.photon_emission import FanDistribution
 
 PASSES_A_WAVE = 4
@@ -41,6 +41,7 @@ guided, so more. Chosen, not tuned."""
 PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
 IMAGES = ("specular", "camera_paths", "guide_moments", "total", "camera_radiance")
+NO_DEMAND = PathDemand(np.zeros(0), np.zeros(0))
 NUMBERS = (
     *("kinds", "size", "growth_limit", "camera_share", "squares", "waves", "passes", "weight", "paths"),
     *("variance_sum", "error", "invalid", "clamped", "clamped_radiance"),
@@ -97,6 +98,8 @@ class Accumulator:
     """Radiance that the clamp took, weighted sum over pixels and passes."""
     line: LineErrors | None = None
     """Where errors matter, and what they come to there; None: everywhere alike."""
+    demand: PathDemand = NO_DEMAND
+    """Camera paths that the measured lines need."""
     aimed: str = ""
     """Digest of the weights that it was aimed by at first."""
     consistent: bool = True
@@ -140,7 +143,7 @@ class Accumulator:
         most, growth, passes = math.inf if clamp is None else clamp, self.growth, len(buffers)
         weight = self.next_weight
         if self.line is not None:
-            self.line.add(buffers, weight, growth)
+            self.learn(self.line.add(buffers, weight, growth), growth)
         found = sum_passes(buffers, self.total, self.camera_radiance, weight, most, threads)
         light, by_camera, squares, variance_sum, clamped, clamped_radiance = found
         self.squares += squares
@@ -164,6 +167,12 @@ class Accumulator:
         self.allocate(self.passes / growth)
         self.consistent = True
 
+    def learn(self, variance: tuple[Float, Float32], size: float) -> None:
+        """What passes of some size, whose camera paths are still known, tell of the paths that lines need; variance:
+        as for `PathDemand.learned`."""
+        if self.line is not None:
+            self.demand = self.demand.learned(self.line.projection, variance, self.camera_paths, size)
+
     def aim_at(self, importance: Importance | None, laser: int) -> None:
         """Know where errors matter from now on, if it was not known or is another; None: everywhere alike."""
         aimed = "" if importance is None else hashlib.sha256(importance.laser[laser].tobytes()).hexdigest()
@@ -171,6 +180,7 @@ class Accumulator:
             self.line = None
         elif self.line is None or self.aimed not in ("", aimed):
             self.line = LineErrors.of(importance, laser)
+            self.demand = PathDemand.none(self.line.projection)
             sizes = (min(1 << max(wave - 1, 0), self.growth_limit) for wave in range(self.waves))
             weights = ((size**WAVE_WEIGHT_EXPONENT) ** 2 / size for size in sizes)
             self.line.all_waves = PASSES_A_WAVE * sum(weights)
@@ -180,7 +190,8 @@ class Accumulator:
         """Allocate the next wave's camera paths, where each pixel has had `drawn` times its `camera_paths` so far."""
         allocate_camera_paths(self.camera_radiance, self.guide.width, self.next_camera_paths, self.camera_paths, drawn)
         if self.line is not None and not self.line.out_of_reach:
-            aim_camera_paths(self.camera_paths, self.line.aim, self.next_camera_paths)
+            projection, count = self.line.projection, self.next_camera_paths
+            self.demand.aim(self.camera_paths, projection, self.guide.width, count)
         reserve_for_specular(self.camera_paths, self.specular, self.next_camera_paths)
 
     def radiance(self, shape: tuple[int, int]) -> Float32:
@@ -203,6 +214,9 @@ class Accumulator:
             "guide_width": np.array(self.guide.width),
             "guide_row": self.guide.row,
             "guide": self.guide.cumulative,
+            "demand_lines": self.demand.lines,
+            "demand_blocks": self.demand.blocks,
+            "demand_size": np.array(self.demand.size),
             **({} if self.line is None else self.line.arrays()),
         }
 
@@ -215,7 +229,9 @@ class Accumulator:
         fan = FanDistribution(float(low), float(high), np.array(cumulative))
         guide = Guide(int(arrays["guide_width"].item()), arrays["guide_row"], arrays["guide"])
         line = LineErrors.of_arrays(arrays) if "line_weight" in arrays else None
-        return cls(**numbers, **images, fan=fan, guide=guide, line=line, aimed=str(arrays["aimed"].item()))
+        demand = PathDemand(arrays["demand_lines"], arrays["demand_blocks"], float(arrays["demand_size"].item()))
+        aimed = str(arrays["aimed"].item())
+        return cls(**numbers, **images, fan=fan, guide=guide, line=line, demand=demand, aimed=aimed)
 
 
 def sum_passes(

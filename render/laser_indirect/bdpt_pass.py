@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numba
@@ -33,7 +33,7 @@ from render.laser_indirect.connections import (
     mark_reachable,
     path_lens_point,
 )
-from render.laser_indirect.guiding import Guide, any_specular, draw_camera_paths
+from render.laser_indirect.guiding import DrawnPaths, Guide, any_specular, draw_camera_paths
 from render.laser_indirect.path_vertex import (
     ALL_KINDS,
     CAUSTIC,
@@ -67,6 +67,9 @@ CANDIDATES, LATER_CANDIDATES = 8, 2
 """Light vertices of the first surface weighed against each other, at the camera's first surface and those after it."""
 CAMERA_SEED = 0x5DEECE66D
 """Parts the random numbers of camera paths from those of light paths."""
+MOST_OF_A_KEY = 1 << 16
+"""More than the camera paths that a pixel may have in a pass."""
+NO_KEYS: Int = np.zeros(0, np.int32)
 KINDS = 5
 """Sums of a pass: of each combination of the bits CAUSTIC and SUBSURFACE_LIGHT, and of SPECULAR_CHAIN by itself."""
 
@@ -82,6 +85,9 @@ class Sampling:
     active: Int
     """The pixels that may have a camera path, in order."""
     guide: Guide
+    keys: Int = field(default_factory=lambda: NO_KEYS)
+    """Of the active pixels, the numbers that their camera paths' random numbers follow from; (0,): each path has its
+    own."""
 
 
 @dataclass(frozen=True)
@@ -144,8 +150,8 @@ class BdptPass:
         there, roughly, for the camera paths of later passes. None: it is not.
         """
         seed = wrapped(self.seed * 1_000_003 + number)
-        pixels, starts = draw_camera_paths(sampling.camera_paths, sampling.active, seed ^ CAMERA_SEED)
-        keep = len(pixels) > 0 or specular_pixels is not None
+        drawn = draw_camera_paths(sampling.camera_paths, sampling.active, sampling.keys, seed ^ CAMERA_SEED)
+        keep = len(drawn.pixels) > 0 or specular_pixels is not None
         found: list[Vertices] = []
         for first in range(0, sampling.light_paths, CHUNK_PATHS):
             count = min(CHUNK_PATHS, sampling.light_paths - first)
@@ -153,7 +159,7 @@ class BdptPass:
         for _, vertices, paths in found if specular_pixels is not None else ():
             _stop(cancelled)
             mark_reachable(vertices, paths, self._camera(sampling), specular_pixels, buffer)
-        if not len(pixels):
+        if not len(drawn.pixels):
             return
         _stop(cancelled)
         photons = self.photon_map(found, number, sampling) if self.specular and self.kinds & SPECULAR_CHAIN else None
@@ -163,10 +169,10 @@ class BdptPass:
             ),
             _light_vertices([part for part in found if part[0] > 0], False, sampling, (1, 1), 20),
         )
-        chunks = np.searchsorted(starts, np.arange(0, starts[-1] + CHUNK_PATHS, CHUNK_PATHS))
-        for a, b in pairwise(np.minimum(chunks, len(pixels))):
-            some = pixels[a:b], starts[a : b + 1]
-            self.trace_camera_paths(seed ^ CAMERA_SEED, *some, sampling, light_vertices, photons, buffer, cancelled)
+        chunks = np.searchsorted(drawn.starts, np.arange(0, drawn.starts[-1] + CHUNK_PATHS, CHUNK_PATHS))
+        for a, b in pairwise(np.minimum(chunks, len(drawn.pixels))):
+            some = DrawnPaths(drawn.pixels[a:b], drawn.keys[a:b], drawn.starts[a : b + 1])
+            self.trace_camera_paths(seed ^ CAMERA_SEED, some, sampling, light_vertices, photons, buffer, cancelled)
 
     def trace_light_paths(
         self,
@@ -220,22 +226,21 @@ class BdptPass:
     def trace_camera_paths(
         self,
         seed: int,
-        pixels: Int,
-        starts: Int,
+        drawn: DrawnPaths,
         sampling: Sampling,
         light_vertices: tuple[LightVertices, ...],
         photons: PhotonMap | None,
         buffer: PassBuffer,
         cancelled: Cancel | None,
     ) -> None:
-        """Trace camera paths of pixels numbered from `starts`; connect them to the laser and to light vertices.
+        """Trace camera paths of some pixels; connect them to the laser and to light vertices.
 
         Raises Cancelled.
         """
         context, laser, camera = self._context(seed), self._laser(sampling), self._camera(sampling)
-        count = int(starts[-1] - starts[0])
+        count = int(drawn.starts[-1] - drawn.starts[0])
         origin, direction, paths = np.empty((count, 3)), np.empty((count, 3)), _begun(count, self.interiors[1])
-        pixel_rays(camera, pixels, starts, seed, origin, direction, paths)
+        pixel_rays(camera, drawn, seed, origin, direction, paths)
         connections = empty_connections(count)
         unused = np.zeros(3)
         for depth in range(MOST_BOUNCES):
@@ -321,9 +326,10 @@ class BdptPass:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def pixel_rays(
-    sampling: CameraSampling, pixels: Int, first: Int, seed: int, origin: Float, direction: Float, paths: Records
+    sampling: CameraSampling, drawn: DrawnPaths, seed: int, origin: Float, direction: Float, paths: Records
 ) -> None:
-    """Camera paths for (n,) pixels, numbered from `first` (n + 1,), spread over each pixel's area."""
+    """Camera paths for some pixels, spread over each pixel's area, with random numbers by their number or key."""
+    pixels, keys, starts = drawn
     view = sampling.camera
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
@@ -331,21 +337,24 @@ def pixel_rays(
     for n in range(pixels.shape[0]):
         pixel = pixels[n]
         column, row = pixel % view.width, pixel // view.width
-        u0, v0 = uniform(seed, pixel, 0, 90), uniform(seed, pixel, 0, 91)
-        count, expected = first[n + 1] - first[n], sampling.camera_paths[pixel]
+        alike = keys.shape[0] > 0
+        key = keys[n] if alike else pixel
+        u0, v0 = uniform(seed, key, 0, 90), uniform(seed, key, 0, 91)
+        count, expected = starts[n + 1] - starts[n], sampling.camera_paths[pixel]
         # where every pass has one, their number need not be known beforehand
         throughput = 1.0 / count if expected >= 1.0 else 1.0 / expected
         for sample in range(count):
             u = column - 0.5 + (u0 + sample * 0.7548776662466927) % 1.0
             v = row - 0.5 + (v0 + sample * 0.5698402909980532) % 1.0
             x, y, ok = chief_ray(view, tilt, distorted, u, v)
-            a, b = path_lens_point(view, seed, first[n] + sample)
+            index = key * MOST_OF_A_KEY + sample if alike else starts[n] + sample
+            a, b = path_lens_point(view, seed, index)
             origin[r, 0], origin[r, 1], origin[r, 2] = lens_position(view, a, b)
             d0, d1, d2 = lens_direction(view, x, y, a, b)
             length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2) if ok else math.inf
             direction[r, 0], direction[r, 1], direction[r, 2] = d0 / length, d1 / length, d2 / length
             path = paths[r]
-            path.throughput, path.index, path.pixel = throughput, first[n] + sample, pixel
+            path.throughput, path.index, path.pixel = throughput, index, pixel
             r += 1
 
 

@@ -64,6 +64,17 @@ class Guide(NamedTuple):
     """(n, BINS + 1) distribution over equal parts of the list of light vertices, from 0 to 1."""
 
 
+class DrawnPaths(NamedTuple):
+    """The camera paths of a pass."""
+
+    pixels: Int
+    """(n,) that have any."""
+    keys: Int
+    """(n,) the numbers that their random numbers follow from; (0,): from those of the paths."""
+    starts: Int
+    """(n + 1,) the number of each pixel's first path."""
+
+
 def allocate_camera_paths(
     image: Float32,
     width: int,
@@ -95,16 +106,6 @@ def allocate_camera_paths(
     map_chunks(work, len(cells), CELL_ROWS, threads, cancelled)
     scale(camera_paths, active_pixels(camera_paths), count, threads)
     return camera_paths
-
-
-def aim_camera_paths(camera_paths: Float, aim: Float32, count: float, threads: int | None = None) -> None:
-    """Give (pixels,) camera paths, `count` in all, to where errors matter: in proportion to aim (pixels,) as well.
-
-    Where none matters light tracing alone remains.
-    """
-    camera_paths *= aim
-    if camera_paths.any():
-        scale(camera_paths, active_pixels(camera_paths), count, threads)
 
 
 def active_pixels(camera_paths: Float) -> Int:
@@ -284,19 +285,24 @@ def update_guide_rows(wave_moments: Float, guide_moments: Float, cumulative: Flo
 
 
 @numba.njit(nogil=True, cache=True)
-def draw_camera_paths(camera_paths: Float, active: Int, seed: int) -> tuple[Int, Int]:
-    """The pixels with camera paths in a pass, and (n + 1,) the number of each one's first path.
+def draw_camera_paths(camera_paths: Float, active: Int, keys: Int, seed: int) -> DrawnPaths:
+    """The camera paths of a pass, where some pixels, each with a key or none, may have any.
 
-    Their expected number is rounded up or down at random, so that its mean is kept.
+    Their expected number is rounded up or down at random, so that its mean is kept; alike where keys are the same.
     """
     pixels, starts = np.empty(active.shape[0], np.int32), np.empty(active.shape[0] + 1, np.int32)
+    alike = np.empty(keys.shape[0], np.int32)
     n = drawn = 0
     starts[0] = 0
-    for pixel in active:
-        count = int(camera_paths[pixel] + uniform(seed, pixel, 0, 92))
+    for i in range(active.shape[0]):
+        pixel = active[i]
+        key = keys[i] if keys.shape[0] > 0 else pixel
+        count = int(camera_paths[pixel] + uniform(seed, key, 0, 92))
         if count > 0:
             pixels[n] = pixel
+            if keys.shape[0] > 0:
+                alike[n] = key
             drawn += count
             n += 1
             starts[n] = drawn
-    return pixels[:n], starts[: n + 1]
+    return DrawnPaths(pixels[:n], alike[: n if keys.shape[0] > 0 else 0], starts[: n + 1])

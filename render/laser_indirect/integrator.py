@@ -22,13 +22,12 @@ from render.camera.camera import Camera
 from render.importance import Importance
 from render.laser.laser import LineLaser
 from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, PASSES_A_WAVE, Accumulator, sum_passes
-from render.laser_indirect.bdpt_pass import KINDS, BdptPass, Sampling
+from render.laser_indirect.bdpt_pass import KINDS, NO_KEYS, BdptPass, Sampling
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
     BINS,
     NO_PIXELS,
     active_pixels,
-    aim_camera_paths,
     allocate_camera_paths,
     find_specular_pixels,
     first_guide,
@@ -36,7 +35,8 @@ from render.laser_indirect.guiding import (
     reserve_for_specular,
     update_guide,
 )
-from render.laser_indirect.line_goal import Effect, LineErrors, Projection, Weigh
+from render.laser_indirect.line_goal import Effect, Projection, Weigh
+from render.laser_indirect.line_paths import alike_on_a_line
 from render.laser_indirect.path_vertex import ALL_KINDS, CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN
 from render.laser_indirect.photon_emission import FAN_BINS, FanDistribution, guided_fan, uniform_fan, visible_fan_range
 from render.run import Run
@@ -47,6 +47,8 @@ LEAST_PASS = 1 << 12
 """Light paths in a pass of the first wave: at least, more in a large image; and half of its camera paths."""
 LOOK_PATHS = 1 << 11
 """Light paths in a pass of a first look, which only guides. Chosen, not tuned."""
+LOOKS = 3
+"""First looks at most, before whose passes those of the waves are not numbered."""
 PILOT_PATHS = 1 << 13
 """Light paths in a pass of the pilot. Chosen, not tuned."""
 
@@ -150,7 +152,7 @@ def indirect_images(
     time_is_over = run.time_is_over(left)
     so_far = run.restore(Accumulator.of_arrays)
     if so_far is None:
-        so_far = waves.first_looks(placed, uniform_fan(low, high), kinds, aim, (target, most_paths))
+        so_far = waves.first_looks(placed, uniform_fan(low, high), kinds, aim)
     so_far.aim_at(None if aim is None else aim.importance, 0 if aim is None else aim.laser)
     wave_moments = attach_wave_moments(waves.buffers, so_far)
 
@@ -175,20 +177,17 @@ def indirect_images(
     shown = so_far.paths
     while unfinished():
         try:
-            # after the passes of the two looks
-            waves.trace(PASSES_A_WAVE * (2 + so_far.waves), sampling_of(so_far, so_far.next_paths))
+            # after the passes of the looks
+            waves.trace(PASSES_A_WAVE * (LOOKS + so_far.waves), sampling_of(so_far, so_far.next_paths))
         except Cancelled:
             if so_far.passes and run.keep_partial():
                 yield image()
             raise
-        if aim is not None and so_far.line is not None:
-            sums = so_far.total, so_far.weight
-            so_far.line = so_far.line.look(waves.buffers, sums, so_far.next_weight, aim.weigh, aim.laser)
         so_far.add(waves.buffers, wave_moments, clamp, run.threads)
         # a target of zero is never reached: the paths that there may be end the render
         off = so_far.error / target if target > 0.0 else math.inf
         if so_far.line is not None:
-            so_far.line.judge(so_far.line_error, off, so_far.paths, most_paths)
+            so_far.line.judge(so_far.line_deviation, off, so_far.paths, most_paths)
         run.keep(so_far)
         # the error falls with the root of the paths, at least
         over = min(off, math.inf if aim is None else so_far.line_error)
@@ -219,13 +218,11 @@ class Waves:
 
         map_chunks(work, PASSES_A_WAVE, 1, min(PASSES_A_WAVE, thread_count(run.threads)), run.cancelled)
 
-    def first_looks(
-        self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None, ends: tuple[float, int]
-    ) -> Accumulator:
-        """An empty accumulator that knows where laser and camera should look; the light of two looks is thrown away.
+    def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None) -> Accumulator:
+        """An empty accumulator that knows where laser and camera should look; the light of the looks is thrown away.
 
         The first finds, by light, where it arrives at all (what is behind glass only the camera finds), the second,
-        from there, which light matters, and whether the line's goal is in reach before image error or paths `ends` it.
+        from there, which light matters, and a third, where the line is the goal, how many paths each scan line needs.
         """
         task, camera = self.task, self.camera
         specular = seen_specular(task, placed.world, camera, placed.T_world_camera)
@@ -233,20 +230,26 @@ class Waves:
         camera_paths = first_camera_paths(specular, camera, 8 * LOOK_PATHS)
         first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
         self.trace(0, first_look, behind)
-        found = initialise_guiding(self.buffers, fan, camera, kinds, specular)
+        found = initialise_guiding(self.buffers, fan, camera, kinds, specular, aimed=aim is not None)
         wave_moments = attach_wave_moments(self.buffers, found)
         self.trace(PASSES_A_WAVE, sampling_of(found, LOOK_PATHS), behind)
         if aim is not None:
-            found.line = LineErrors.of(aim.importance, aim.laser)
-            found.line.look_ahead(self.buffers, PASSES_A_WAVE * LOOK_PATHS, *ends)
+            found.aim_at(aim.importance, aim.laser)
+            assert found.line is not None
+            found.learn(found.line.spread(self.buffers), LOOK_PATHS / found.size)
         refine_guiding(found, self.buffers, wave_moments, camera)
+        if aim is not None and found.line is not None:
+            self.trace(2 * PASSES_A_WAVE, sampling_of(found, found.next_paths), behind)
+            found.line = found.line.look(self.buffers, aim.weigh, aim.laser)
+            found.learn(found.line.spread(self.buffers), 1.0)
+            refine_guiding(found, self.buffers, wave_moments, camera)
         return found
 
 
 def initialise_guiding(
-    buffers: list[PassBuffer], fan: FanDistribution, camera: Camera, kinds: int, specular: Bool
+    buffers: list[PassBuffer], fan: FanDistribution, camera: Camera, kinds: int, specular: Bool, *, aimed: bool
 ) -> Accumulator:
-    """An empty accumulator, guided by a first look, whose buffers are zeroed."""
+    """An empty accumulator, guided by a first look, whose buffers are zeroed; aimed: the line is the goal."""
     pixels = camera.width * camera.height
     fan = guided_fan(fan, np.sum([buffer.fan_moments for buffer in buffers], axis=0))
     share, camera_radiance = camera_reachable_share(buffers)
@@ -256,7 +259,8 @@ def initialise_guiding(
     reserve_for_specular(camera_paths, specular, LOOK_PATHS)
     guide = first_guide(camera_paths, camera)
     guide_moments = np.zeros((len(guide.cumulative), BINS))
-    size = min(max(1 << max((pixels >> 8).bit_length() - 1, 0), LEAST_PASS), MOST_PASS)
+    # what a line needs does not grow with the image
+    size = LEAST_PASS if aimed else min(max(1 << max((pixels >> 8).bit_length() - 1, 0), LEAST_PASS), MOST_PASS)
     sums = np.zeros(pixels), np.zeros(pixels, np.float32)
     return Accumulator(kinds, fan, size, 1, share, specular, camera_paths, guide, guide_moments, *sums)
 
@@ -273,8 +277,8 @@ def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: 
     allocate_camera_paths(
         camera_radiance, camera.width, first.next_camera_paths, first.camera_paths, float(PASSES_A_WAVE)
     )
-    if first.line is not None and not first.line.out_of_reach:
-        aim_camera_paths(first.camera_paths, first.line.aim, first.next_camera_paths)
+    if first.line is not None:
+        first.demand.aim(first.camera_paths, first.line.projection, camera.width, first.next_camera_paths)
     reserve_for_specular(first.camera_paths, first.specular, first.next_camera_paths)
 
 
@@ -297,8 +301,9 @@ def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
 
 def sampling_of(so_far: Accumulator, light_paths: int) -> Sampling:
     """How the next passes sample, by what the passes so far have found."""
-    active = active_pixels(so_far.camera_paths)
-    return Sampling(light_paths, so_far.fan, so_far.camera_paths, active, so_far.guide)
+    active, line = active_pixels(so_far.camera_paths), so_far.line
+    keys = NO_KEYS if line is None or line.out_of_reach else alike_on_a_line(active, line.projection)
+    return Sampling(light_paths, so_far.fan, so_far.camera_paths, active, so_far.guide, keys)
 
 
 def attach_wave_moments(buffers: list[PassBuffer], so_far: Accumulator) -> Float:

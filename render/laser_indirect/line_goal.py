@@ -20,7 +20,7 @@ from scipy.special import gammaincinv
 from render.base.arrays import Float, Float32
 from render.importance import CELL, LINES_KNOWN, Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
-from render.laser_indirect.line_sums import run_sums, spread
+from render.laser_indirect.line_sums import run_sums
 
 Int = NDArray[np.int64]
 Weigh = Callable[[Float32], Importance]
@@ -37,12 +37,8 @@ UNMET = 1.0 - LINES_KNOWN
 FAR = 8.0
 """Times the light paths after which the render ends in any case: more of them put the goal out of reach. Guided by it
 the variance falls sooner than the first passes say, as much as tenfold where rows glitter."""
-LEAST_NEED = 0.02
-"""Of the camera paths of a scan line that needs most: what every line gets beside it."""
 LOOK_SIGMA = 2.0
 """px; the light of a few passes is smoothed so far before a line is looked for in it."""
-LOOKS = (0, 2)
-"""Waves with whose light it is found anew where errors matter."""
 
 
 @dataclass(frozen=True)
@@ -80,11 +76,10 @@ class Projection:
             pixel, weight.ravel()[pixel].astype(np.float64), line, lit, peaks, np.arange(blocks) * BLOCK // width
         )
 
-    def aim(self, pixels: int, need: Float) -> Float32:
-        """(pixels,) how much errors matter, where lines (lines,) need light more or less."""
-        aim = self.peaks.ravel()[:pixels].copy() if len(self.peaks) else np.zeros(pixels, np.float32)
-        aim[self.pixel] = np.maximum(aim[self.pixel], np.abs(self.weight) * need[self.line])
-        return aim
+    def line_means(self, image: Float) -> Float:
+        """(pixels,) -> (lines,) mean over the pixels that each line is measured on; 0: there are none."""
+        counts = np.bincount(self.line, minlength=len(self.lit))
+        return np.asarray(np.bincount(self.line, image[self.pixel], len(self.lit)) / np.maximum(counts, 1))
 
     def moves(self, image: Float) -> Float:
         """(lines,) how far the light of an image (pixels,) moves each line, over the allowed deviation."""
@@ -118,17 +113,6 @@ class LineErrors:
     out_of_reach: bool = False
     """The goal would take far more than is allowed: the errors of the image are the goal."""
 
-    @property
-    def aim(self) -> Float32:
-        """(pixels,) how much errors matter: more on scan lines that are known less well.
-
-        Lines that all had the same share of the paths need them in proportion to their variance.
-        """
-        lit = self.projection.lit
-        most = _all_but_unmet(self.moved[lit])
-        need = np.clip(self.moved / most, LEAST_NEED, 1.0) if most > 0.0 else np.ones(len(lit))
-        return self.projection.aim(self.shape[0] * self.shape[1], need)
-
     @classmethod
     def of(cls, importance: Importance, laser: int) -> LineErrors:
         """Before the first wave."""
@@ -137,39 +121,35 @@ class LineErrors:
         lines, risen = len(projection.lit), np.zeros((len(projection.peaks), BLOCK // CELL), np.float32)
         return cls(projection, (height, width), np.zeros(lines), np.zeros(lines), risen)
 
-    def look(
-        self, buffers: list[PassBuffer], so_far: tuple[Float, float], weight: float, weigh: Weigh, laser: int
-    ) -> LineErrors:
-        """Projected anew, where that is due, by the light with a wave that is yet to be added.
+    def look(self, buffers: list[PassBuffer], weigh: Weigh, laser: int) -> LineErrors:
+        """Projected anew, by the light of some passes, before any wave is added."""
+        light = np.sum([buffer.image for buffer in buffers], axis=0, dtype=np.float32) / np.float32(len(buffers))
+        return LineErrors.of(weigh(gaussian_filter(light.reshape(self.shape), LOOK_SIGMA)), laser)
 
-        so_far: (pixels,) weighted sum of passes, and the sum of their weights; weight: of each of the wave's.
-        """
-        if self.waves not in LOOKS or self.out_of_reach:
-            return self
-        light = so_far[0].copy()
-        for buffer in buffers:
-            light += weight * buffer.image
-        light /= so_far[1] + weight * len(buffers)
-        seen = gaussian_filter(light.astype(np.float32).reshape(self.shape), LOOK_SIGMA)
-        found = LineErrors.of(weigh(seen), laser)
-        found.waves, found.all_waves, found.alone = self.waves, self.all_waves, self.alone
-        return found
+    def spread(self, buffers: list[PassBuffer]) -> tuple[Float, Float32]:
+        """(lines,), (blocks, BLOCK / CELL) variance of a pass, of how far its light moves lines and adds to peaks."""
+        moves = np.stack([self.projection.moves(buffer.image) for buffer in buffers])
+        rises = np.zeros_like(self.risen)
+        if len(self.projection.peaks):
+            touched = np.flatnonzero(np.any([buffer.touched for buffer in buffers], axis=0))
+            found = np.stack([self.projection.rises(buffer.image, touched) for buffer in buffers])
+            rises[touched] = np.var(found, axis=0, ddof=1)
+        return np.var(moves, axis=0, ddof=1), rises
 
-    def add(self, buffers: list[PassBuffer], weight: float, size: float) -> None:
-        """Take the spread of a wave's passes; weight: of each of them; size: of a pass, in that of the first wave."""
+    def add(self, buffers: list[PassBuffer], weight: float, size: float) -> tuple[Float, Float32]:
+        """Take the spread of a wave's passes, which is returned; weight: of each of them; size: of a pass, in that of
+        the first wave."""
         passes = len(buffers)
         share, lit = weight**2 * passes / size, self.projection.lit
-        moves = np.stack([self.projection.moves(buffer.image) for buffer in buffers])
-        moved = weight**2 * passes * np.var(moves, axis=0, ddof=1)
+        moves, rises = self.spread(buffers)
+        moved = weight**2 * passes * moves
         # which lines are alike is known without this wave, so that their mean is what it should be
         self.moved += pooled_alike(moved, self.alone, lit) if self.waves else pooled(moved, lit)
         self.alone = self.alone + moved
         self.waves, self.measured, self.all_waves = self.waves + 1, self.measured + share, self.all_waves + share
         self.squares += share**2 / (passes - 1)
-        if len(self.projection.peaks):
-            touched = np.flatnonzero(np.any([buffer.touched for buffer in buffers], axis=0))
-            rises = np.stack([self.projection.rises(buffer.image, touched) for buffer in buffers])
-            self.risen[touched] += (weight**2 * passes * np.var(rises, axis=0, ddof=1)).astype(np.float32)
+        self.risen += np.float32(weight**2 * passes) * rises
+        return moves, rises
 
     @property
     def margin(self) -> float:
@@ -190,7 +170,7 @@ class LineErrors:
         rows = np.zeros(self.shape[0])
         if len(self.risen):
             np.maximum.at(rows, self.projection.block_row, self.risen.max(axis=1))
-        worst = max(_all_but_unmet(self.moved[self.projection.lit]), _all_but_unmet(rows))
+        worst = max(all_but_unmet(self.moved[self.projection.lit]), all_but_unmet(rows))
         return math.sqrt(scale * worst)
 
     def unknown(self, weights: float) -> int:
@@ -205,14 +185,6 @@ class LineErrors:
         paths; the render ends by the image's error or after `most`."""
         end = min(most, paths * image_error**2)
         self.out_of_reach |= math.isfinite(error) and paths * error**2 > FAR * end
-
-    def look_ahead(self, buffers: list[PassBuffer], paths: int, target: float, most: int) -> None:
-        """The same from the passes of a first look, in all of so many paths, which count for nothing else."""
-        look = LineErrors(self.projection, self.shape, np.zeros_like(self.moved), self.alone, self.risen.copy())
-        look.add(buffers, 1.0, 1.0)
-        variance, square = spread([buffer.image for buffer in buffers])
-        error = math.sqrt(variance / max(square - variance, 1e-3 * square)) if square > 0.0 else 0.0
-        self.judge(look.error(float(len(buffers))), error / target, paths, most)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What a checkpoint keeps."""
@@ -275,7 +247,7 @@ class Effect:
 
 def pooled(values: Float, lit: NDArray[np.bool_]) -> Float:
     """(lines,) mean over the POOLED lines about each, of those that are lit."""
-    return np.asarray(_windows(np.where(lit, values, 0.0)) / np.maximum(_windows(lit.astype(np.float64)), 1.0))
+    return np.asarray(windows(np.where(lit, values, 0.0)) / np.maximum(windows(lit.astype(np.float64)), 1.0))
 
 
 def pooled_alike(values: Float, before: Float, lit: NDArray[np.bool_]) -> Float:
@@ -285,15 +257,15 @@ def pooled_alike(values: Float, before: Float, lit: NDArray[np.bool_]) -> Float:
     ranked = lines[np.argsort(before[lines], kind="stable")]
     others, out = ranked[: len(ranked) - int(UNMET * len(ranked))], np.where(lit, values, 0.0)
     if len(others):
-        out[others] = _windows(values[others]) / _windows(np.ones(len(others)))
+        out[others] = windows(values[others]) / windows(np.ones(len(others)))
     return out
 
 
-def _windows(values: Float) -> Float:
+def windows(values: Float) -> Float:
     """(n,) sums over the POOLED values about each; a running sum would leave the rounding of the largest."""
     return np.asarray(np.convolve(values, np.ones(POOLED))[POOLED // 2 : POOLED // 2 + len(values)])
 
 
-def _all_but_unmet(values: Float) -> float:
+def all_but_unmet(values: Float) -> float:
     """What all but the share UNMET of some values are at most; 0: there are none."""
     return float(np.quantile(values, 1.0 - UNMET, method="lower")) if len(values) else 0.0

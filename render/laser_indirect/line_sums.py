@@ -29,20 +29,3 @@ def _run_sums(image: Float, weight: Float32, blocks: Long, out: Float) -> None:
                 if pixel < image.shape[0]:
                     total += image[pixel] * weight[block, k]
             out[i, j] = total
-
-
-def spread(images: list[Float]) -> tuple[float, float]:
-    """Images (pixels,) of passes -> the sum over pixels of the variance of their mean, and of its square."""
-    total, squares = np.zeros_like(images[0]), np.zeros_like(images[0])
-    for image in images:
-        _add_moments(image, total, squares)
-    count = len(images)
-    square = float(np.dot(total, total)) / count**2
-    return max(float(squares.sum()) - count * square, 0.0) / (count * (count - 1)), square
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def _add_moments(image: Float, total: Float, squares: Float) -> None:
-    for i in range(image.shape[0]):
-        total[i] += image[i]
-        squares[i] += image[i] * image[i]

@@ -269,7 +269,6 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     from render.ambient.measured_light import LEAST_SAMPLES, measured_images
     from render.importance import Importance
     from render.laser_indirect.line_goal import Projection
-    from render.laser_indirect.line_sums import spread
     from render.render import render_world
     from render.world.placed import PlacedScene
     from render.world.world import build_world
@@ -279,7 +278,6 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     ones = np.ones((camera.height, camera.width), np.float32)
     everywhere = Importance((ones,), ones, peaks=(ones,))
     dark = np.zeros(ones.size)
-    spread([dark, dark])
     Projection.of(everywhere, 0).rises(dark, np.arange(1))
     list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
     return frame

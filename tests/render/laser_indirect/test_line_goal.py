@@ -166,7 +166,7 @@ def test_what_a_checkpoint_keeps_gives_the_same_error() -> None:
     for one in (errors, again):
         one.add(buffers, 2.0, 2.0)
     assert again.error(12.0) == errors.error(12.0) > 0.0
-    np.testing.assert_array_equal(again.aim, errors.aim)
+    np.testing.assert_array_equal(again.moved, errors.moved)
 
 
 def test_even_light_has_no_effect_on_the_line_but_a_slope_has() -> None:
