@@ -27,7 +27,8 @@ class Importance:
     """For each laser (h, w) weight of its own light, 1 / (W/(m^2 sr)), with its sign: the sum of weight and radiance
     along a scan line is how far that light moves the line. Zero where no error matters."""
     ambient: Float32
-    """(h, w) weight of ambient light, for each of its bands alike, 1 / (W/(m^2 sr))."""
+    """(h, w) weight of a pixel's own error of ambient light, for each of its bands alike, 1 / (W/(m^2 sr)): by that
+    peaks appear or vanish, or a line is told otherwise."""
     axis: Literal["rows", "columns"] = "rows"
     peaks: tuple[Float32, ...] = ()
     """For each laser (h, w) weight of its own light: of a run of CELL pixels along a row, the sum of weight and error
@@ -35,6 +36,8 @@ class Importance:
     allowed: float = 1.0
     """Deviation of a line that such a sum of 1 stands for, over the line's own sigma: the share of the goal that
     reflected light has, and ambient light."""
+    ambient_moves: tuple[Float32, ...] = ()
+    """For each laser (h, w) weight of ambient light, with its sign, as `laser`; (): it moves no line."""
     direct: float = 1.0
     """The share that direct light has, likewise over the line's own sigma."""
 

@@ -8,6 +8,9 @@ and a, b the two halves of such a pixel's samples, which know nothing of each ot
 so that the mean over them is the squared error of the image, of noise and of interpolation together, and without the
 noise of the held-out pixels themselves. Where noise is most of it the points of the grid get more samples, those of
 large deviation most, otherwise the grid gets finer; in the end every pixel is sampled.
+
+Held-out pixels are too few to tell where the error is. That is told by the points of the grid, each held out in turn
+and predicted by its neighbours, from twice as far as any pixel has to be, so that it is rather too much.
 """
 
 from __future__ import annotations
@@ -19,7 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
-from render.ambient.guided_interpolation import ON_EDGE, grid_of, interpolate, seen_at, smooth_grid
+from render.ambient.guided_interpolation import (
+    ON_EDGE,
+    grid_of,
+    interpolate,
+    predict_by_neighbours,
+    seen_at,
+    smooth_grid,
+)
 from render.ambient.integrator import EVEN_SHARE, MOST_SHARE
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
@@ -37,6 +47,8 @@ FIRST_SAMPLES, HELD_OUT_SAMPLES = 2, 4
 HELD_OUT, HELD_OUT_SHARE = 8192, 16
 """Most held-out pixels, and pixels of the image for each at least."""
 HELD_OUT_SEED = 32_452_843
+TILE = 32
+"""Pixels a side of the tiles whose error is told by itself, together with those about it: a multiple of BLOCK."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +59,8 @@ class CoarseImage:
     """(h, w, 3) W/(m^2 sr) in R, G, B."""
     error: float
     """Estimated relative RMS error, over all pixels."""
+    deviation: Float32
+    """(tiles down, tiles across) RMS error of the pixels in each tile, W/(m^2 sr), on the high side."""
     block: int
     """Pixels between two that were sampled; 1: all were."""
     samples: int
@@ -81,7 +95,8 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
         count, block = (2 * count, block) if noisy else (count, block // 2)
     radiance = _image(film, paths, height, grid, block, run.between(0.5, 1.0))
     dropped, clamped = film.invalid_counts.astype(int).tolist()
-    return CoarseImage(radiance, error, block, film.total, dropped, clamped, film.cut / film.total)
+    deviation = _deviation(film, paths, height, grid, block)
+    return CoarseImage(radiance, error, deviation, block, film.total, dropped, clamped, film.cut / film.total)
 
 
 def _held_out(pixels: int, run: Run) -> Int:
@@ -123,6 +138,37 @@ def _errors(
     square = float(np.sum((image - truth[:, 0]) * (image - truth[:, 1]))) / power
     variance = float(np.sum((halves[:, 0] - halves[:, 1]) ** 2)) / 4.0 / power
     return math.sqrt(max(square, 0.0)), math.sqrt(variance)
+
+
+def _deviation(film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int) -> Float32:
+    """(tiles down, tiles across) RMS error of the image in each tile."""
+    across = grid_of(paths.view.width, height, block)[1]
+    halves = film.means(grid).reshape(-1, across, 2, 3)
+    # the least that it may be: the noise of a mean of four
+    noise = np.square(halves[:, :, 0] - halves[:, :, 1]).mean(axis=2) / 16.0
+    if block == 1:
+        square = 4.0 * noise
+    else:
+        seen, item = seen_at(grid, paths.view, paths.surface, paths.lights, paths.rays)
+        predicted = np.empty((len(grid), 3), np.float32)
+        predict_by_neighbours(across, seen, item, halves.mean(axis=2).reshape(-1, 3), predicted)
+        off = predicted.reshape(-1, across, 1, 3) - halves
+        square = (off[:, :, 0] * off[:, :, 1]).mean(axis=2)
+    points = TILE // block
+    square, noise = (_tile_means(values, points) for values in (square, noise))
+    return np.sqrt(np.maximum(square, noise)).astype(np.float32)
+
+
+def _tile_means(values: Float32, points: int) -> Float32:
+    """(h, w) -> (tiles down, tiles across) means over tiles of points a side and the eight about each."""
+    ends = [(0, -len(values) % points), (0, -values.shape[1] % points)]
+    tiles = [-(-side // points) for side in values.shape]
+
+    def sums(of: Float32) -> Float32:
+        parts = np.pad(of, ends).reshape(tiles[0], points, tiles[1], points).sum(axis=(1, 3))
+        return np.asarray(uniform_filter(parts, 3, mode="constant"), np.float32)
+
+    return np.asarray(sums(values) / sums(np.ones_like(values)), np.float32)
 
 
 def _grid_light(

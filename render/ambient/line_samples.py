@@ -1,13 +1,19 @@
 """Samples where errors of the ambient light move a measured line, until each scan line is known well enough.
 
-With weights w (`render.importance`), the variance v of one sample of a pixel and n samples on it, a scan line is known
-once the sum of w^2 v / n over its pixels is at most 1. The fewest samples that do so are, by Lagrange's multipliers,
+What moves a line is the difference between the light on its two sides. All pixels that a line is measured on therefore
+have the same random numbers and as many samples (common random numbers; Glasserman, Monte Carlo Methods in Financial
+Engineering, 2004, section 4.2): what their errors have in common moves no line. How far that leaves a line to be moved
+is told by batches of samples (`line_moves.py`).
+
+A pixel's own error counts too, where it may make a peak. With weights w (`render.importance`), the variance v of one
+sample of a pixel and n samples on it, a scan line is known once the sum of w^2 v / n over its pixels is at most 1. The
+fewest samples that do so are, by Lagrange's multipliers,
 
     n_p = w_p sqrt(v_p)  sum over q of w_q sqrt(v_q)
 
 v is found from the samples themselves: of a half, the squared difference between its last samples and those before,
 averaged over neighbouring pixels. That of one half decides where the other is sampled, so that this does not depend on
-the values that are averaged there. How many samples a line gets follows, like its error, from the difference of both.
+the values that are averaged there.
 """
 
 from __future__ import annotations
@@ -17,12 +23,13 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from render.ambient.coarse_image import CoarseImage
+from render.ambient.coarse_image import TILE, CoarseImage
 from render.ambient.integrator import CONVERGENCE
+from render.ambient.line_moves import LineMoves
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
-from render.base.arrays import Float, Int
-from render.importance import Importance
+from render.base.arrays import Bool, Float, Int
+from render.importance import Importance, known_below
 from render.run import Run
 
 MARGIN = 1.3
@@ -45,53 +52,80 @@ class Band:
     pixels: Int
     """(m,), in the order of the image."""
     weight: Float
-    """(m,) 1 / (W/(m^2 sr)), 0 beside those that matter."""
+    """(m,) of a pixel's own error, 1 / (W/(m^2 sr)), 0 beside those that matter."""
+    moves: tuple[Float, ...]
+    """For each laser (m,) how far light moves its line, with its sign; 0 where its line is not measured."""
     line: Int
     """(m,) the scan line of each."""
+    keys: Int
+    """(m,) the numbers that random numbers follow from, in the first batch: above those of the pixels, the same for all
+    that a line is measured on."""
     place: Int
     """(h, w) of each pixel in `pixels`, -1: it is none of them."""
 
 
 def band_of(importance: Importance, coarse: CoarseImage) -> Band:
-    """Where the error of the coarse image would matter."""
+    """Where the error of the coarse image would matter, and all that a line is measured on which it matters to."""
     weight = np.abs(importance.ambient)
-    wide = weight * coarse.radiance.max(axis=2) * coarse.error > ENOUGH
+    height, width = weight.shape
+    along = 1 if importance.axis == "rows" else 0
+    off = coarse.deviation[np.arange(height) // TILE][:, np.arange(width) // TILE]
+    wide = weight * off > ENOUGH
     weight = np.where(wide, weight, np.float32(0.0))
-    for _ in range(AROUND):
-        grown = wide.copy()
-        grown[1:] |= wide[:-1]
-        grown[:-1] |= wide[1:]
-        grown[:, 1:] |= wide[:, :-1]
-        grown[:, :-1] |= wide[:, 1:]
-        wide = grown
+    near = np.zeros_like(wide)
+    moves = []
+    for move in importance.ambient_moves:
+        known = ~np.any(np.abs(move) * off > ENOUGH, axis=along, keepdims=True)
+        moves.append(np.where(known, np.float32(0.0), move))
+        near |= moves[-1] != 0.0
+    wide, near = _grown(wide | near), _grown(near)
     pixels = np.flatnonzero(wide).astype(np.int32)
     place = np.full(weight.shape, -1, np.int32)
     place.ravel()[pixels] = np.arange(len(pixels), dtype=np.int32)
-    width = weight.shape[1]
     line = pixels // width if importance.axis == "rows" else pixels % width
-    return Band(pixels, weight.ravel()[pixels].astype(np.float64), line, place)
+    keys = np.where(near.ravel()[pixels], np.int32(weight.size) + line, pixels).astype(np.int32)
+    of_band = tuple(move.ravel()[pixels].astype(np.float64) for move in moves)
+    return Band(pixels, weight.ravel()[pixels].astype(np.float64), of_band, line, keys, place)
 
 
-def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, run: Run) -> None:
-    """Samples of the band until each scan line meets the goal, or `most` are spent. Raises Cancelled."""
-    for level in range(1, PILOT + 1):
-        film.add(paths, band.pixels, np.full((len(band.pixels), 2), level, np.int32), run.between(0.0, 0.3))
-    for _ in range(PASSES):
-        count = _wanted(film, band)
+def _grown(mask: Bool) -> Bool:
+    """(h, w) with all that is within AROUND pixels, along rows and columns taken together."""
+    for _ in range(AROUND):
+        grown = mask.copy()
+        grown[1:] |= mask[:-1]
+        grown[:-1] |= mask[1:]
+        grown[:, 1:] |= mask[:, :-1]
+        grown[:, :-1] |= mask[:, 1:]
+        mask = grown
+    return mask
+
+
+def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, run: Run) -> Float:
+    """Samples of the band until each scan line meets the goal, or `most` are spent -> (n,) standard deviation of each
+    line with weight over the allowed one, in the colour that is known worst. Raises Cancelled."""
+    lines = max(band.place.shape)
+    moves = LineMoves(band.moves, band.line, lines)
+
+    def add(batch: int, count: Int, part: Run) -> None:
+        sums, done = film.sums[band.pixels], film.done[band.pixels]
+        keys = np.where(band.keys < band.place.size, band.keys, band.keys + np.int32(batch * lines))
+        film.add(paths, band.pixels, count, part, keys)
+        moves.add(film.sums[band.pixels] - sums, count - done)
+
+    for level in range(PILOT):
+        add(level, np.full((len(band.pixels), 2), level + 1, np.int32), run.between(0.0, 0.3))
+    for level in range(PILOT, PILOT + PASSES):
+        count = _wanted(film, band, moves)
         more = count - film.done[band.pixels]
         left, asked = max(most - film.total, 0), more.sum(dtype=np.int64)
         if asked > left:
             count = film.done[band.pixels] + (more * (left / asked)).astype(np.int32)
             more = count - film.done[band.pixels]
         if not more.any():
-            return
-        film.add(paths, band.pixels, count, run.between(0.3, 1.0))
-
-
-def line_deviations(film: PixelSamples, band: Band) -> Float:
-    """(n,) standard deviation of each scan line with weight over the allowed one, in the colour that is known worst."""
-    lines = np.unique(band.line[band.weight > 0.0])
-    return np.asarray(np.sqrt(_moments(film, band)[lines]))
+            break
+        add(level, count, run.between(0.3, 1.0))
+    known = np.unique(band.line[(band.weight > 0.0) | moves.measured])
+    return np.asarray(np.sqrt(np.maximum(_moments(film, band), moves.variance)[known]))
 
 
 def _moments(film: PixelSamples, band: Band) -> Float:
@@ -102,21 +136,40 @@ def _moments(film: PixelSamples, band: Band) -> Float:
     return np.max([_line_sums(band, band.weight**2 * variance[:, colour]) for colour in range(3)], axis=0)
 
 
-def _wanted(film: PixelSamples, band: Band) -> Int:
-    """(m, 2) samples of each half for the scan lines to meet the goal, shared out as the other half's variance says."""
-    done, moments = film.done[band.pixels], MARGIN * _moments(film, band)
-    wanted, heavy = done.copy(), (band.weight > 0.0).astype(np.float64)
-    for half in range(2):
-        variance = _pooled(film.spread[band.pixels, 1 - half].astype(np.float64), band).max(axis=1)
-        deviation = np.sqrt(variance) * band.weight
-        total, now = _line_sums(band, deviation), _line_sums(band, done[:, half] * heavy)
-        needed = np.minimum(MARGIN * total**2 / 2.0, now * moments ** (0.5 / CONVERGENCE))
-        # a line that is not known gets something in any case
-        needed = np.clip(needed, 1.25 * now, GROWTH * now)
-        share = deviation / np.maximum(total, 1e-300)[band.line]
-        more = np.maximum(done[:, half], np.ceil(needed[band.line] * share).astype(np.int32))
-        wanted[:, half] = np.where(moments[band.line] > 1.0, more, done[:, half])
+def _wanted(film: PixelSamples, band: Band, moves: LineMoves) -> Int:
+    """(m, 2) samples of each half for the scan lines to meet the goal: as many on all pixels that a line is measured
+    on, beside them as the other half's variance says."""
+    done, heavy, measured = film.done[band.pixels], (band.weight > 0.0).astype(np.float64), moves.measured
+    moments, moved = MARGIN * _moments(film, band), MARGIN * moves.variance
+    spread = film.spread[band.pixels].astype(np.float64)
+    deviation = np.sqrt([_pooled(spread[:, other], band).max(axis=1) for other in (1, 0)]) * band.weight
+    total, now = np.array([[_line_sums(band, half) for half in one] for one in (deviation, done.T * heavy)])
+    alone = _needed(now, moments, MARGIN * total**2 / 2.0)
+    count = np.maximum(_line_sums(band, measured.astype(np.float64)), 1.0)
+    each_now = _line_sums(band, done.mean(axis=1) * measured) / count
+    each = _needed(each_now, moved, np.inf)
+    # those that may miss the goal get as much as the others at most
+    asked = alone.sum(axis=0) + 2.0 * count * each
+    lines = _line_sums(band, heavy + measured) > 0.0
+    capped = np.minimum(1.0, known_below(asked[lines]) / np.maximum(asked, 1.0))
+    alone, each = _step(now, alone, moments, capped), _step(each_now, each, moved, capped)
+    share = deviation / np.maximum(total, 1e-300)[:, band.line]
+    wanted = np.maximum(done, np.ceil(alone[:, band.line] * share).T.astype(np.int32))
+    # as many of both halves, on all that a line is measured on
+    np.maximum.at(each, band.line[measured], wanted[measured].max(axis=1))
+    wanted[measured] = np.ceil(each)[band.line[measured], None]
     return wanted
+
+
+def _needed(now: Float, moments: Float, most: Float | float) -> Float:
+    """(..., lines) samples for the lines whose variance is `moments` by those so far to have 1."""
+    return np.minimum(most, now * np.maximum(moments, 1.0) ** (0.5 / CONVERGENCE))
+
+
+def _step(now: Float, needed: Float, moments: Float, capped: Float) -> Float:
+    """(..., lines) samples after the next pass, 0: no more are asked; a few at least, unless the line is capped."""
+    some = np.clip(needed, 1.25 * now, GROWTH * now)
+    return np.where(moments > 1.0, np.where(capped < 1.0, np.clip(capped * needed, now, some), some), 0.0)
 
 
 def _line_sums(band: Band, values: Float) -> Float:

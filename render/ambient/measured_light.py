@@ -8,10 +8,11 @@ import numpy as np
 
 from render.ambient.coarse_image import CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
-from render.ambient.line_samples import PILOT, Band, band_of, line_deviations, sample_band
+from render.ambient.line_samples import PILOT, Band, band_of, sample_band
 from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
+from render.base.arrays import Float
 from render.importance import Importance, known_below
 from render.run import Run
 from render.world.placed import PlacedScene
@@ -56,10 +57,11 @@ def measured_images(
         coarse = coarse_image(paths, camera.height, int(share * budget), run.between(0.0, 0.5))
         run.leave("coarse ambient", placed.world, made_of, coarse)
     film, band = PixelSamples(camera.width, camera.height), band_of(importance, coarse)
-    yield _image(coarse, film, band, begun=False)
+    yield _image(coarse, film, band, None)
+    deviations = np.zeros(0)
     if len(band.pixels):
-        sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
-    yield _image(coarse, film, band)
+        deviations = sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
+    yield _image(coarse, film, band, deviations)
 
 
 def seen_from(placed: PlacedScene, *settings: object) -> tuple[object, ...]:
@@ -68,16 +70,15 @@ def seen_from(placed: PlacedScene, *settings: object) -> tuple[object, ...]:
     return scene.camera, placed.T_world_camera.tobytes(), scene.lights, scene.environment, *settings
 
 
-def _image(coarse: CoarseImage, film: PixelSamples, band: Band, *, begun: bool = True) -> AmbientImage:
-    """The coarse image with the band in it, once that has been sampled."""
+def _image(coarse: CoarseImage, film: PixelSamples, band: Band, deviations: Float | None) -> AmbientImage:
+    """The coarse image with the band in it, once that has been sampled to some deviations of the lines."""
     radiance, error, total = coarse.radiance, float("nan"), coarse.samples + film.total
     lines: int | None = None
     unknown: int | None = None
-    if begun:
+    if deviations is not None:
         # whoever shows the first image still holds it
         radiance = radiance.copy()
         radiance.reshape(-1, 3)[band.pixels] = film.means(band.pixels).mean(axis=1)
-        deviations = line_deviations(film, band)
         error, lines, unknown = known_below(deviations), len(deviations), int(np.sum(deviations > 1.0))
     return AmbientImage(
         radiance,

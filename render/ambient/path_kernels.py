@@ -108,7 +108,7 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
         # taking an array out of a named tuple costs a reference count, so it is done once and not for every path
         vertices, triangles, materials = surface.vertices, surface.triangles, surface.rows
         rows, rectangles, environment = lights.rows, lights.rectangles, vector(lights.environment)
-        (table, seed, pixels), (sums, counts), lamps = samples, film, lights.rows.shape[0]
+        (table, seed, keys), (sums, counts), lamps = samples, film, lights.rows.shape[0]
         origins, directions, throughputs, pdfs, pixel_slots, numbers, media, interiors = paths
         shadow_origins, shadow_directions, lengths, radiance, shadow_slots, shadow_interiors = shadow_rays
         depth, centre, epsilon = bounce.depth, vector(bounce.centre), bounce.ray_epsilon
@@ -140,7 +140,7 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
                 continue
 
             # surface interaction
-            index = 2 * pixels[pixel_slot >> 1] + (pixel_slot & 1)
+            index = 2 * keys[pixel_slot >> 1] + (pixel_slot & 1)
             choice = mask_choice = 0.0
             if glossy or surface.second[surface.object_id[t]] >= 0:
                 choice, mask_choice = pair(table, seed, index, s, base + 2)

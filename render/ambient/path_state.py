@@ -63,23 +63,23 @@ class Samples(NamedTuple):
     table: Float32
     """`render.sampling.low_discrepancy.pair_table`."""
     seed: int
-    pixels: Int
-    """(m,) pixels of the chunk."""
+    keys: Int
+    """(m,) for each pixel of the chunk the number that its random numbers follow from."""
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def camera_rays(
-    view: View, table: Float32, seed: int, pixels: Int, first: Int, count: Int, centre: Float, paths: PathState
+    view: View, samples: Samples, pixels: Int, first: Int, count: Int, centre: Float, paths: PathState
 ) -> int:
     """Rays of samples first .. first + count of both halves, (m, 2), of pixels (m,) -> paths. Returns how many."""
-    k = view.distortion
+    table, seed, k = samples.table, samples.seed, view.distortion
     tilt, distorted = tilt_matrix(k[12], k[13]), bool(np.any(k))
     fx, fy, cx, cy, skew = view.intrinsics
     n, draw = 0, np.uint64(0)
     for i in range(pixels.shape[0]):
         column, row = pixels[i] % view.width, pixels[i] // view.width
         for half in range(2):
-            index, start = 2 * pixels[i] + half, first[i, half]
+            index, start = 2 * samples.keys[i] + half, first[i, half]
             for s in range(start, start + count[i, half]):
                 if s == start or s % LENGTH == 0:
                     draw = pair_draw(seed, index, s, ON_IMAGE)

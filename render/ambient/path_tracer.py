@@ -48,16 +48,26 @@ class CameraPaths:
     """What radiance gains where the camera is: the square of the refractive index there."""
     _scratch: threading.local = field(default_factory=threading.local, repr=False, compare=False)
 
-    def add(self, pixels: Int, first: Int, count: Int, sums: Float, counts: Float, cancelled: Cancel | None) -> None:
+    def add(
+        self,
+        pixels: Int,
+        first: Int,
+        count: Int,
+        sums: Float,
+        counts: Float,
+        cancelled: Cancel | None,
+        keys: Int | None = None,
+    ) -> None:
         """Samples first .. first + count, (m, 2) for both halves, of the pixels (m,), at most WAVEFRONT in all.
 
-        Their radiance is added to sums and counts as in `Film`. Raises Cancelled.
+        Their radiance is added to sums and counts as in `Film`. keys: the numbers (m,) that their random numbers follow
+        from, in place of those of the pixels. Raises Cancelled.
         """
         paths, shadow_rays = self._arrays()
         rays, glossy, media = self.rays, has_gloss(self.surface), has_medium(self.surface)
         shade = shade_glossy if glossy else shade_diffuse
-        samples, film = Samples(pair_table(), self.seed, pixels), Film(sums, counts)
-        n = camera_rays(self.view, samples.table, self.seed, pixels, first, count, rays.centre, paths)
+        samples, film = Samples(pair_table(), self.seed, pixels if keys is None else keys), Film(sums, counts)
+        n = camera_rays(self.view, samples, pixels, first, count, rays.centre, paths)
         nested = has_overlaps(self.surface)
         paths.interior[:n] = self.interior
         if self.immersed != 1.0:

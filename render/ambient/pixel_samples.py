@@ -36,16 +36,20 @@ class PixelSamples:
         """(m, 2, 3) radiance of both halves of some pixels; each half must have samples."""
         return np.asarray(self.sums[pixels] / self.done[pixels][..., None], dtype=np.float32)
 
-    def add(self, paths: CameraPaths, pixels: Int, count: Int | Float, run: Run) -> None:
-        """Samples until each of the pixels (m,), all different, has count (m, 2) of both halves. Raises Cancelled."""
+    def add(self, paths: CameraPaths, pixels: Int, count: Int | Float, run: Run, keys: Int | None = None) -> None:
+        """Samples until each of the pixels (m,), all different, has count (m, 2) of both halves. Raises Cancelled.
+
+        keys: as for `CameraPaths.add`.
+        """
         while True:
             more = np.clip(count - self.done[pixels], 0, ROUND).astype(np.int32)
             wanting = np.flatnonzero(more.any(axis=1))
             if not len(wanting):
                 return
-            self._add_round(paths, pixels[wanting], more[wanting], run)
+            keyed = pixels if keys is None else keys
+            self._add_round(paths, pixels[wanting], keyed[wanting], more[wanting], run)
 
-    def _add_round(self, paths: CameraPaths, pixels: Int, more: Int, run: Run) -> None:
+    def _add_round(self, paths: CameraPaths, pixels: Int, keys: Int, more: Int, run: Run) -> None:
         rays = more.sum(axis=1, dtype=np.int64)
         chunk = (np.cumsum(rays) - rays) // (WAVEFRONT - 2 * ROUND)
         edges = np.append(np.flatnonzero(np.diff(chunk, prepend=-1)), len(pixels))
@@ -54,16 +58,16 @@ class PixelSamples:
         def work(start: int, stop: int) -> None:
             for i in range(start, stop):
                 some = slice(edges[i], edges[i + 1])
-                cut[i] = self._trace(paths, pixels[some], more[some], counts[i], run)
+                cut[i] = self._trace(paths, pixels[some], keys[some], more[some], counts[i], run)
 
         run.map(work, len(edges) - 1, 1)
         # in the order of the chunks, whichever thread was first
         self.invalid_counts += counts.sum(axis=0)
         self.cut += float(cut.sum())
 
-    def _trace(self, paths: CameraPaths, pixels: Int, more: Int, invalid_counts: Float, run: Run) -> float:
+    def _trace(self, paths: CameraPaths, pixels: Int, keys: Int, more: Int, invalid_counts: Float, run: Run) -> float:
         sums, first = np.zeros((2 * len(pixels), 4)), self.done[pixels]
-        paths.add(pixels, first, more, sums, invalid_counts, run.cancelled)
+        paths.add(pixels, first, more, sums, invalid_counts, run.cancelled, keys)
         new, old = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32), self.sums[pixels]
         before, added = np.maximum(first, 1)[..., None], np.maximum(more, 1)[..., None]
         variance = (old / before - new / added) ** 2 / (1.0 / before + 1.0 / added)

@@ -38,14 +38,14 @@ def random_walk_step(
     distance (n,): to the boundary along each path's ray. Origin, direction and throughput in `paths` are moved; a path
     that is absorbed, or found no boundary, carries nothing and gets triangle -1. Returns how many stay.
     """
-    _, seed, pixels = samples
+    _, seed, keys = samples
     left = 0
     d, w, extinction, pdf = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for place in range(walking.shape[0]):
         r = walking[place]
         pixel_slot, s = paths.pixel_slot[r], paths.sample[r]
         index, first = (
-            2 * pixels[pixel_slot >> 1] + (pixel_slot & 1),
+            2 * keys[pixel_slot >> 1] + (pixel_slot & 1),
             FIRST_WALK_DIMENSION + NUMBERS * (depth * MOST_STEPS + step),
         )
         row = rows[paths.medium[r] - 1]

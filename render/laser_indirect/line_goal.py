@@ -18,22 +18,18 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import gammaincinv
 
 from render.base.arrays import Float, Float32
-from render.importance import CELL, LINES_KNOWN, Importance
+from render.importance import CELL, Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.line_sums import run_sums
+from render.line_pools import UNMET, pooled, pooled_alike
 
 Int = NDArray[np.int64]
 Weigh = Callable[[Float32], Importance]
 """Where errors matter, by the reflected light (h, w) of a laser so far."""
 
-POOLED = 25
-"""Scan lines whose variances are taken together: three degrees of freedom a wave say little of a single one. In the
-first wave neighbours, later those that were known alike before: a few bad ones would else speak for all about them."""
 CONFIDENCE = 0.95
 """That the deviation is as small as the goal asks, before the render ends. A rare bright path is in the sums of many
 lines, so that all of them together may have no more degrees of freedom than one."""
-UNMET = 1.0 - LINES_KNOWN
-"""Share of the lit scan lines that may miss the goal."""
 FAR = 8.0
 """Times the light paths after which the render ends in any case: more of them put the goal out of reach. Guided by it
 the variance falls sooner than the first passes say, as much as tenfold where rows glitter."""
@@ -143,7 +139,8 @@ class LineErrors:
         share, lit = weight**2 * passes / size, self.projection.lit
         moves, rises = self.spread(buffers)
         moved = weight**2 * passes * moves
-        # which lines are alike is known without this wave, so that their mean is what it should be
+        # three degrees of freedom a wave say little of a single line; a few bad ones are not to speak for all about
+        # them, so later waves take those together that were known alike without this one
         self.moved += pooled_alike(moved, self.alone, lit) if self.waves else pooled(moved, lit)
         self.alone = self.alone + moved
         self.waves, self.measured, self.all_waves = self.waves + 1, self.measured + share, self.all_waves + share
@@ -243,27 +240,6 @@ class Effect:
         error = moves.std(axis=0, ddof=1) / math.sqrt(len(moves))
         moved = (np.abs(moves.mean(axis=0)) + 2.0 * error)[lit]
         return max(float(moved.max(initial=0.0)), float(rises.mean(axis=0).max(initial=0.0)))
-
-
-def pooled(values: Float, lit: NDArray[np.bool_]) -> Float:
-    """(lines,) mean over the POOLED lines about each, of those that are lit."""
-    return np.asarray(windows(np.where(lit, values, 0.0)) / np.maximum(windows(lit.astype(np.float64)), 1.0))
-
-
-def pooled_alike(values: Float, before: Float, lit: NDArray[np.bool_]) -> Float:
-    """(lines,) mean over the POOLED lit lines whose variance was next to each one's before. Those that were known
-    worst, which may miss the goal, speak for themselves alone."""
-    lines = np.flatnonzero(lit)
-    ranked = lines[np.argsort(before[lines], kind="stable")]
-    others, out = ranked[: len(ranked) - int(UNMET * len(ranked))], np.where(lit, values, 0.0)
-    if len(others):
-        out[others] = windows(values[others]) / windows(np.ones(len(others)))
-    return out
-
-
-def windows(values: Float) -> Float:
-    """(n,) sums over the POOLED values about each; a running sum would leave the rounding of the largest."""
-    return np.asarray(np.convolve(values, np.ones(POOLED))[POOLED // 2 : POOLED // 2 + len(values)])
 
 
 def all_but_unmet(values: Float) -> float:

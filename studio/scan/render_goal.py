@@ -78,19 +78,21 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     bands = joule * band_response(sensor).sum(axis=2)
     reflected = any(step.computed is not False for step in frame.plan.of("indirect"))
     direct, allowed = shares(goal, reflected=reflected, ambient=frame.ambient is not None)
-    lasers, peaks = [], []
+    lasers, peaks, moves = [], [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
     for i, laser in enumerate(scene.lasers):
-        weight, peak = np.empty_like(ambient), np.empty_like(ambient)
+        weight, peak, move = (np.empty_like(ambient) for _ in range(3))
         response = joule * laser_response(sensor, laser.wavelength_nm)
         if rows:
-            out = Weights(weight, peak, ambient, illumination, response, bands)
+            out = Weights(weight, peak, ambient, move, illumination, response, bands)
         else:
-            out = Weights(weight.T, peak.T, ambient.T, illumination.T, response.T, bands.T)
+            out = Weights(weight.T, peak.T, ambient.T, move.T, illumination.T, response.T, bands.T)
         _weigh(project, frame, i, (allowed, DECISION * goal.depth), out, threads)
         lasers.append(weight)
         peaks.append(peak)
-    return Importance(tuple(lasers), ambient, project.extraction.axis, tuple(peaks), allowed, direct)
+        moves.append(move)
+    axis = project.extraction.axis
+    return Importance(tuple(lasers), ambient, axis, tuple(peaks), allowed, tuple(moves), direct)
 
 
 def _as_far_as_known(project: Project, frame: Frame) -> Project:
@@ -139,7 +141,9 @@ class Weights:
     laser: Float32
     peaks: Float32
     ambient: Float32
-    """Of all lasers so far."""
+    """Of all lasers so far, by which peaks appear or a line is told otherwise."""
+    moves: Float32
+    """Of ambient light, by which it moves this laser's line."""
     illumination: Float32
     response: Float
     """(2, 2) electrons by the laser's radiance, by parity of scan line and place."""
@@ -153,7 +157,8 @@ class Weights:
         response, bands = (_tiled(one, lit) for one in (self.response, self.bands))
         self.laser[lines] = moved * response
         self.peaks[lines] = risen * response
-        self.ambient[lines] = np.maximum(self.ambient[lines], np.maximum(np.abs(moved), even) * bands)
+        self.moves[lines] = moved * bands
+        self.ambient[lines] = np.maximum(self.ambient[lines], even * bands)
 
 
 def _weigh(
