@@ -45,10 +45,10 @@ class Importance:
         """(h, w) standard deviations of independent pixels of a laser's light -> (lines,) those of the lines that it
         moves, over their own sigma."""
         weight = self.laser[laser]
-        axis = 1 if self.axis == "rows" else 0
-        lit = np.any(weight != 0.0, axis=axis)
-        variance = np.sum(np.square(weight * deviation, dtype=np.float64), axis=axis)
-        return np.asarray(self.allowed * np.sqrt(variance[lit]))
+        row, column = np.nonzero(weight)
+        line = row if self.axis == "rows" else column
+        variance = np.bincount(line, np.square(weight[row, column] * deviation[row, column], dtype=np.float64))
+        return np.asarray(self.allowed * np.sqrt(variance[np.bincount(line) > 0]))
 
 
 LINES_KNOWN = 0.95

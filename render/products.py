@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from render.ambient.light_group import AmbientLight
 from render.base.deadline import Deadline
+from render.base.threads import map_chunks
 from render.camera.focus import lens_steps, thin_lens
 from render.frame import Frame
 from render.laser_direct.light_group import DirectLight
@@ -68,4 +69,10 @@ def ambient_look(placed: PlacedScene, settings: RenderSettings, run: Run) -> NDA
     image = np.asarray(last.value, np.float32)
     rows = np.arange(camera.height) * image.shape[0] // camera.height
     columns = np.arange(camera.width) * image.shape[1] // camera.width
-    return np.ascontiguousarray(image[:, columns][rows])
+    wide, out = image[:, columns], np.empty((camera.height, camera.width, 3), np.float32)
+
+    def work(start: int, stop: int) -> None:
+        out[start:stop] = wide[rows[start:stop]]
+
+    map_chunks(work, camera.height, LOOK_SIDE, run.threads)
+    return out

@@ -13,7 +13,7 @@ position of a posterior (`posterior_influence`). Of all other methods by central
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from analysis.line.posterior_influence import posterior_influence
 from analysis.line.result import NEIGHBOURS, Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float, Float32
+from render.base.threads import map_chunks
 
 Int = NDArray[np.int64]
 Flags = NDArray[np.uint8]
@@ -45,6 +46,8 @@ STEP = 0.01
 """Of the line's amplitude: the differences' step."""
 AT_ONCE = 1024
 """Scan lines that are held with one pixel changed: 20 MB of 2448 px."""
+ROWS = 64
+"""Scan lines that are read at a time."""
 TRIED = 64
 """Scan lines on which differences are taken; others take their nearest one's, at their own place and brightness."""
 
@@ -67,14 +70,14 @@ def influence(
     chosen = settings.model_copy(update={"method": line.method})
     if line.method == "likelihood":
         chosen = chosen.model_copy(update={"smoothing": 0.0})
-    lines = scan_lines(np.asarray(image, np.float64), chosen, noise)
+    lines = scan_lines(image, chosen, noise)
     if (noise.alike or noise.filled_in) and line.method == "likelihood":
         lines = seen_only(lines, lines.image, chosen, threads)
     found = np.zeros(lines.image.shape, np.float32)
     for k in range(line.u.shape[1]):
         rows = np.flatnonzero(line.valid[:, k])
         if len(rows) and line.method == "likelihood":
-            _scatter(found, rows, *likelihood_influence(lines, line, chosen, rows, k, shared=shared))
+            _scatter(found, rows, *likelihood_influence(lines, line, chosen, rows, k, threads, shared=shared))
         elif len(rows):
             alone = _alone(lines, chosen)
             tried = rows[np.unique(np.linspace(0, len(rows) - 1, TRIED).astype(int))] if alone else rows
@@ -87,23 +90,30 @@ def influence(
 
 
 def likelihood_influence(
-    lines: Lines, line: Line, settings: ExtractionSettings, rows: Int, peak: int, *, shared: bool = False
+    lines: Lines,
+    line: Line,
+    settings: ExtractionSettings,
+    rows: Int,
+    peak: int,
+    threads: int | None = None,
+    *,
+    shared: bool = False,
 ) -> tuple[Int, Float]:
     """Rows (n,) of a likelihood line -> first pixel (n,) and weight (n, m) px / e-; zero where a pixel is not used.
     shared: as for `influence`."""
     u, width, height = line.u[rows, peak], line.width[rows, peak], line.amplitude[rows, peak]
     narrow = line.flag[rows, peak] == Flag.UNRESOLVED
-    electrons, mask, floor = lines.read(0, lines.count)
-    times = lines.summed(0, lines.count)[:, None]
-    electrons, floor = electrons / times, floor / times
-    middle, half = _fit_windows((electrons[rows], mask[rows], floor[rows]), limits_of(lines, settings), u, width)
+    middle, half, windows = _read_windows(lines, limits_of(lines, settings), rows, u, width, threads)
     m = 2 * (int(half.max()) + 1) + 1
     first = np.rint(u).astype(np.int64) - m // 2
     x = first[:, None] + np.arange(m, dtype=np.float64)
-    inside = np.clip(x.astype(np.int64), 0, mask.shape[1] - 1)
-    used = (np.abs(x - middle[:, None]) <= half[:, None]) & (x >= 0) & (x < mask.shape[1])
-    used &= np.take_along_axis(mask[rows], inside, axis=1) == 0
-    held = np.take_along_axis(floor[rows], np.minimum(inside, floor.shape[1] - 1), axis=1).astype(np.float64)
+    # where no window was read nothing is used, and any noise but none will do
+    light, held, covered = np.zeros((len(u), m), np.float32), np.ones((len(u), m)), np.zeros((len(u), m), np.bool_)
+    for start, window in windows:
+        n, wide = window.electrons.shape
+        some = slice(start, start + n), slice((m - wide) // 2, (m + wide) // 2)
+        light[some], held[some], covered[some] = window
+    used = (np.abs(x - middle[:, None]) <= half[:, None]) & covered
     background, integrated = line.background[rows, peak][:, None], settings.profile == "integrated"
     by_centre, by_background = _fit_influence(
         (x - u[:, None], width[:, None], height[:, None], background, held), used, settings.width is None, integrated
@@ -114,8 +124,7 @@ def likelihood_influence(
         lit[np.clip(rows[narrow][:, None] + np.arange(-NEIGHBOURS, NEIGHBOURS + 1), 0, lines.count - 1)] = True
         near = np.flatnonzero(narrow | (lit[rows] & (width < COARSE)))
         seen = m // 2 + np.arange(-(reach := int(half[near].max()) + 1), reach + 1)
-        light = np.take_along_axis(electrons[rows[near]], inside[near], axis=1)
-        part = tuple(array[:, seen].astype(np.float64) for array in (x[near], light, held[near], used[near]))
+        part = tuple(array[near][:, seen].astype(np.float64) for array in (x, light, held, used))
         pixels = *part, background[near]
         told = u[near], line.sigma_u[rows[near], peak]
         moved, widened = posterior_influence(pixels, *told, by_background[near][:, seen], settings.width, integrated)
@@ -137,6 +146,40 @@ def _with_neighbours(moved: Float, widened: Float, variance: Float, shared_u: Fl
     more = np.divide(np.abs(shared_u), noise, out=np.zeros_like(noise), where=noise > 0.0)[:, None] * widened
     # of one sign with the own ones, so that together they count for no less
     return moved + np.copysign(1.0, np.sum(moved * more * variance, axis=1))[:, None] * more
+
+
+class _Window(NamedTuple):
+    """What is read about lines, (n, m): all that their fits may look at."""
+
+    electrons: Float32
+    floor: Float
+    known: NDArray[np.bool_]
+    """The pixel is within the image, and nothing is wrong with it."""
+
+
+def _read_windows(
+    lines: Lines, limits: Limits, rows: Int, u: Float, width: Float, threads: int | None
+) -> tuple[Float, Float, list[tuple[int, _Window]]]:
+    """Rows, positions and widths (n,) -> middle and half (n,) of the pixels that each fit looked at, and those pixels,
+    about u, of some rows at a time, with the number of the first."""
+    middle, half = np.empty(len(rows)), np.empty(len(rows))
+    found: list[tuple[int, _Window]] = []
+
+    def work(start: int, stop: int) -> None:
+        part, first = slice(start, stop), rows[start]
+        electrons, mask, floor = (array[rows[part] - first] for array in lines.read(first, rows[stop - 1] + 1))
+        times = lines.summed(first, rows[stop - 1] + 1)[rows[part] - first, None]
+        electrons, floor = electrons / times, floor / times
+        middle[part], half[part] = _fit_windows((electrons, mask, floor), limits, u[part], width[part])
+        reach = int(half[part].max()) + 1
+        x = np.rint(u[part]).astype(np.int64)[:, None] + np.arange(-reach, reach + 1)
+        inside = np.clip(x, 0, mask.shape[1] - 1)
+        light, wrong = (np.take_along_axis(array, inside, axis=1) for array in (electrons, mask))
+        held = np.take_along_axis(floor, np.minimum(inside, floor.shape[1] - 1), axis=1).astype(np.float64)
+        found.append((start, _Window(light, held, (x == inside) & (wrong == 0))))
+
+    map_chunks(work, len(rows), ROWS, threads)
+    return middle, half, found
 
 
 def _fit_windows(light: tuple[Float32, Flags, Float32], limits: Limits, u: Float, width: Float) -> tuple[Float, Float]:

@@ -28,7 +28,7 @@ from render.ambient.integrator import CONVERGENCE
 from render.ambient.line_moves import LineMoves
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
-from render.base.arrays import Bool, Float, Int
+from render.base.arrays import Bool, Float, Int, Long
 from render.importance import Importance, known_below
 from render.run import Run
 
@@ -130,31 +130,37 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
 
 def _moments(film: PixelSamples, band: Band) -> Float:
     """Of each scan line of the image the sum of weight^2 times variance, in the colour that is known worst."""
+    heavy = np.flatnonzero(band.weight)
+    if not len(heavy):
+        return np.zeros(max(band.place.shape))
     halves, count = film.means(band.pixels).astype(np.float64), 1.0 / film.done[band.pixels]
     single = (halves[:, 0] - halves[:, 1]) ** 2 / count.sum(axis=1)[:, None]
-    variance = _pooled(single, band) * count.sum(axis=1)[:, None] / 4.0
-    return np.max([_line_sums(band, band.weight**2 * variance[:, colour]) for colour in range(3)], axis=0)
+    variance = _pooled(single, band, heavy) * count[heavy].sum(axis=1)[:, None] / 4.0
+    weight, line = band.weight[heavy] ** 2, band.line[heavy]
+    return np.max([np.bincount(line, weight * colour, max(band.place.shape)) for colour in variance.T], axis=0)
 
 
 def _wanted(film: PixelSamples, band: Band, moves: LineMoves) -> Int:
     """(m, 2) samples of each half for the scan lines to meet the goal: as many on all pixels that a line is measured
     on, beside them as the other half's variance says."""
-    done, heavy, measured = film.done[band.pixels], (band.weight > 0.0).astype(np.float64), moves.measured
+    done, heavy, measured = film.done[band.pixels], np.flatnonzero(band.weight), moves.measured
     moments, moved = MARGIN * _moments(film, band), MARGIN * moves.variance
-    spread = film.spread[band.pixels].astype(np.float64)
-    deviation = np.sqrt([_pooled(spread[:, other], band).max(axis=1) for other in (1, 0)]) * band.weight
-    total, now = np.array([[_line_sums(band, half) for half in one] for one in (deviation, done.T * heavy)])
+    spread, lines = film.spread[band.pixels].astype(np.float64), len(moments)
+    deviation = np.sqrt([_pooled(spread[:, other], band, heavy).max(axis=1) for other in (1, 0)]) * band.weight[heavy]
+    both = deviation, done[heavy].T
+    total, now = np.array([[np.bincount(band.line[heavy], half, lines) for half in one] for one in both])
     alone = _needed(now, moments, MARGIN * total**2 / 2.0)
-    count = np.maximum(_line_sums(band, measured.astype(np.float64)), 1.0)
-    each_now = _line_sums(band, done.mean(axis=1) * measured) / count
+    count = np.maximum(moves.pixels, 1)
+    each_now = np.bincount(band.line[measured], done[measured].mean(axis=1), lines) / count
     each = _needed(each_now, moved, np.inf)
     # those that may miss the goal get as much as the others at most
     asked = alone.sum(axis=0) + 2.0 * count * each
-    lines = _line_sums(band, heavy + measured) > 0.0
-    capped = np.minimum(1.0, known_below(asked[lines]) / np.maximum(asked, 1.0))
+    some = (now.sum(axis=0) > 0.0) | (moves.pixels > 0)
+    capped = np.minimum(1.0, known_below(asked[some]) / np.maximum(asked, 1.0))
     alone, each = _step(now, alone, moments, capped), _step(each_now, each, moved, capped)
-    share = deviation / np.maximum(total, 1e-300)[:, band.line]
-    wanted = np.maximum(done, np.ceil(alone[:, band.line] * share).T.astype(np.int32))
+    wanted, of_heavy = done.copy(), band.line[heavy]
+    share = alone[:, of_heavy] * deviation / np.maximum(total, 1e-300)[:, of_heavy]
+    wanted[heavy] = np.maximum(done[heavy], np.ceil(share).T.astype(np.int32))
     # as many of both halves, on all that a line is measured on
     np.maximum.at(each, band.line[measured], wanted[measured].max(axis=1))
     wanted[measured] = np.ceil(each)[band.line[measured], None]
@@ -172,21 +178,16 @@ def _step(now: Float, needed: Float, moments: Float, capped: Float) -> Float:
     return np.where(moments > 1.0, np.where(capped < 1.0, np.clip(capped * needed, now, some), some), 0.0)
 
 
-def _line_sums(band: Band, values: Float) -> Float:
-    """Sums over the pixels of each scan line of the image."""
-    return np.asarray(np.bincount(band.line, values, minlength=max(band.place.shape)), dtype=np.float64)
-
-
-def _pooled(values: Float, band: Band) -> Float:
-    """Values (m, 3) of the band's pixels, each averaged with its neighbours'."""
-    out = np.empty_like(values)
-    pool(values, band.pixels, band.place, out)
+def _pooled(values: Float, band: Band, some: Long) -> Float:
+    """Values (m, 3) of the band's pixels -> (n, 3) of some of them, each averaged with its neighbours'."""
+    out = np.empty((len(some), 3))
+    pool(values, band.pixels[some], band.place, out)
     return out
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def pool(values: Float, pixels: Int, place: Int, out: Float) -> None:
-    """Values (m, c) of the pixels (m,), averaged over those within REACH -> out; place (h, w) as in `Band`."""
+    """Values (m, c) -> out (n, c): of the pixels (n,), averaged over those within REACH; place (h, w) as in `Band`."""
     height, width = place.shape
     for r in range(pixels.shape[0]):
         row, column, count = pixels[r] // width, pixels[r] % width, 0

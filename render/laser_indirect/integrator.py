@@ -347,15 +347,10 @@ def indirect_pilot(
         )
         reserve_for_specular(camera_paths, specular, PILOT_PATHS)
     sampling = Sampling(PILOT_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
-    effect = None if projection is None else Effect(projection)
-    for number in range(passes):
-        buffer = empty_buffer(camera.width * camera.height)
-        task.run(number, sampling, buffer, run.cancelled)
-        # by bits of kind: none, CAUSTIC, SUBSURFACE_LIGHT, both of them; and SPECULAR_CHAIN
-        interreflection, caustic, subsurface, both, specular_chain = buffer.sums
+    found_sums, effect = _pilot_passes(task, sampling, passes, projection, run)
+    # by bits of kind: none, CAUSTIC, SUBSURFACE_LIGHT, both of them; and SPECULAR_CHAIN
+    for interreflection, caustic, subsurface, both, specular_chain in found_sums:
         sums.append((interreflection, caustic, specular_chain, subsurface + both))
-        if effect is not None:
-            effect.add(buffer)
     mean, error = np.mean(sums, axis=0), np.std(sums, axis=0, ddof=1) / math.sqrt(passes)
     pairs = [(float(m), float(e)) for m, e in zip(mean, error, strict=True)]
     found = IndirectPilot(pairs[0], pairs[1], pairs[2], pairs[3])
@@ -367,6 +362,20 @@ def indirect_pilot(
     return replace(found, effects=_effects(task, sampling, passes, effect, run))
 
 
+def _pilot_passes(
+    task: BdptPass, sampling: Sampling, passes: int, projection: Projection | None, run: Run
+) -> tuple[list[Float], Effect | None]:
+    """Sums (KINDS,) of the light of each pass, and what all of them do to the line. Raises Cancelled."""
+    buffers = [empty_buffer(len(sampling.camera_paths)) for _ in range(passes)]
+
+    def work(start: int, stop: int) -> None:
+        for number in range(start, stop):
+            task.run(number, sampling, buffers[number], run.cancelled)
+
+    map_chunks(work, passes, 1, thread_count(run.threads), run.cancelled)
+    return [buffer.sums for buffer in buffers], None if projection is None else Effect.of(projection, buffers)
+
+
 def _effects(task: BdptPass, sampling: Sampling, passes: int, last: Effect, run: Run) -> dict[str, float]:
     """What each kind of light does to the line, by passes of the same random numbers with ever more kinds.
 
@@ -374,12 +383,10 @@ def _effects(task: BdptPass, sampling: Sampling, passes: int, last: Effect, run:
     """
     effects, before = {}, None
     for name, kinds in CUMULATIVE_KINDS.items():
-        with_it = last if kinds == ALL_KINDS else Effect(last.projection)
-        specular = task.specular and bool(kinds & CAUSTIC)
-        for number in range(passes if kinds != ALL_KINDS else 0):
-            buffer = empty_buffer(len(sampling.camera_paths))
-            replace(task, kinds=kinds, specular=specular).run(number, sampling, buffer, run.cancelled)
-            with_it.add(buffer)
+        specular, with_it = task.specular and bool(kinds & CAUSTIC), last
+        if kinds != ALL_KINDS:
+            part = replace(task, kinds=kinds, specular=specular)
+            with_it = _pilot_passes(part, sampling, passes, last.projection, run)[1] or last
         effects[name] = with_it.most(before)
         before = with_it
     return effects

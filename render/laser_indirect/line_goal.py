@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -20,7 +20,7 @@ from scipy.special import gammaincinv
 from render.base.arrays import Float, Float32
 from render.importance import CELL, Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
-from render.laser_indirect.line_sums import run_sums
+from render.laser_indirect.line_sums import mean_image, run_sums
 from render.line_pools import UNMET, pooled, pooled_alike
 
 Int = NDArray[np.int64]
@@ -119,8 +119,8 @@ class LineErrors:
 
     def look(self, buffers: list[PassBuffer], weigh: Weigh, laser: int) -> LineErrors:
         """Projected anew, by the light of some passes, before any wave is added."""
-        light = np.sum([buffer.image for buffer in buffers], axis=0, dtype=np.float32) / np.float32(len(buffers))
-        return LineErrors.of(weigh(gaussian_filter(light.reshape(self.shape), LOOK_SIGMA)), laser)
+        light = gaussian_filter(mean_image(buffers).reshape(self.shape), LOOK_SIGMA)
+        return LineErrors.of(weigh(light), laser)
 
     def spread(self, buffers: list[PassBuffer]) -> tuple[Float, Float32]:
         """(lines,), (blocks, BLOCK / CELL) variance of a pass, of how far its light moves lines and adds to peaks."""
@@ -212,21 +212,22 @@ class LineErrors:
         return found
 
 
-@dataclass
+@dataclass(frozen=True)
 class Effect:
     """What light of a kind does to the line and its rivals, by a few passes alike."""
 
     projection: Projection
-    moves: list[Float] = field(default_factory=list)
+    moves: list[Float]
     """(lines,) of each pass."""
-    rises: list[Float] = field(default_factory=list)
+    rises: list[Float]
     """(blocks, BLOCK / CELL) likewise."""
 
-    def add(self, buffer: PassBuffer) -> None:
-        """One pass more."""
-        self.moves.append(self.projection.moves(buffer.image))
-        if len(self.projection.peaks):
-            self.rises.append(self.projection.rises(buffer.image, np.arange(len(self.projection.peaks))))
+    @classmethod
+    def of(cls, projection: Projection, buffers: list[PassBuffer]) -> Effect:
+        """Of some passes."""
+        blocks = np.arange(len(projection.peaks))
+        moves = [projection.moves(buffer.image) for buffer in buffers]
+        return cls(projection, moves, [projection.rises(one.image, blocks) for one in buffers] if len(blocks) else [])
 
     def most(self, without: Effect | None = None) -> float:
         """The most that the light may well move any line, by its standard error, or add to a peak, over what is

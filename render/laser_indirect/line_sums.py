@@ -5,9 +5,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from render.base.arrays import Float, Float32, Long
+from render.base.arrays import Bool, Float, Float32, Long
 from render.importance import CELL
-from render.laser_indirect.connection_buffer import BLOCK
+from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 
 
 def run_sums(image: Float, weight: Float32, blocks: Long) -> Float:
@@ -16,6 +16,21 @@ def run_sums(image: Float, weight: Float32, blocks: Long) -> Float:
     out = np.empty((len(blocks), BLOCK // CELL))
     _run_sums(image, weight, blocks, out)
     return out
+
+
+def mean_image(buffers: list[PassBuffer]) -> Float32:
+    """(pixels,) mean of the images of passes."""
+    out = np.zeros(len(buffers[0].image), np.float32)
+    for buffer in buffers:
+        _add_touched(buffer.image, buffer.touched, 1.0 / len(buffers), out)
+    return out
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _add_touched(image: Float, touched: Bool, share: float, out: Float32) -> None:
+    for block in np.flatnonzero(touched):
+        for pixel in range(block * BLOCK, min((block + 1) * BLOCK, image.shape[0])):
+            out[pixel] += share * image[pixel]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

@@ -118,20 +118,32 @@ def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, 
     """
     project = _as_far_as_known(project, frame)
     electrons = _electrons(project, frame, laser, threads)
-    image = _expected_image(project, electrons)
+    image = _expected_image(project, electrons, threads)
     line = extract_line(project, image, laser, threads)
     deviation = DECISION * goal.depth * np.sqrt(np.maximum(electrons + noise_model(image, project, laser).floor, 1e-2))
     found = np.zeros(len(line.valid), np.bool_)
     for pair in range(PAIRS):
-        drawn = np.random.default_rng((project.seed, laser, pair)).standard_normal(electrons.shape, np.float32)
+        noise = _noise(deviation, (project.seed, laser, pair), threads)
         one, other = (
-            extract_line(project, _expected_image(project, electrons + sign * deviation * drawn), laser, threads)
-            for sign in (1.0, -1.0)
+            extract_line(project, _expected_image(project, light, threads), laser, threads)
+            for light in (electrons + noise, electrons - noise)
         )
         bent = np.abs(one.u + other.u - 2.0 * line.u) > JUMP * goal.depth * line.sigma_u
         changed = (one.valid != line.valid) | (other.valid != line.valid)
         found |= np.any(changed | (line.valid & bent), axis=1)
     return int(found.sum())
+
+
+def _noise(deviation: Float32, seed: tuple[int, ...], threads: int | None) -> Float32:
+    """Deviations (h, w) -> normal noise."""
+    noise = np.empty_like(deviation)
+
+    def work(start: int, stop: int) -> None:
+        np.random.default_rng((*seed, start)).standard_normal(out=noise[start:stop], dtype=np.float32)
+        noise[start:stop] *= deviation[start:stop]
+
+    map_chunks(work, len(noise), ROWS, threads)
+    return noise
 
 
 @dataclass(frozen=True)
@@ -150,7 +162,7 @@ class Weights:
     bands: Float
     """(2, 2) by ambient radiance."""
 
-    def put(self, lines: slice, moved: Float, risen: Float32, even: Float) -> None:
+    def put(self, lines: slice, moved: Float32, risen: Float32, even: Float32) -> None:
         """Of some scan lines, the first of them even, how far an electron moves the line over what is allowed, how far
         it goes to make or hide a peak, and how far any light that is spread evenly."""
         lit = self.illumination[lines]
@@ -167,7 +179,7 @@ def _weigh(
     """The weights of one laser -> out; allowed: shares of a scan line's sigma, of what moves the line, and of the noise
     of each pixel that a narrow line is measured on."""
     electrons = _electrons(project, frame, laser, threads)
-    image = _expected_image(project, electrons)
+    image = _expected_image(project, electrons, threads)
     noise = noise_model(image, project, laser)
     line = extract_line(project, image, laser, threads)
     settings = project.extraction
@@ -188,9 +200,12 @@ def _weigh(
         counted = np.maximum(light + np.float32(noise.floor), np.float32(1e-2))
         # one more on either side, as windows begin with the pixel
         decided = maximum_filter1d((moves != 0.0) & narrow[some], 3, axis=1)
-        share = allowed[1] * np.sqrt(np.count_nonzero(decided, axis=1).clip(1))
-        even = np.maximum(risen * np.float32(evenly), decided / (share[:, None] * np.sqrt(counted)))
-        moved = moves / (allowed[0] * _sigma(line, some, moves, light + noise.floor))[:, None]
+        share = (1.0 / (allowed[1] * np.sqrt(np.count_nonzero(decided, axis=1).clip(1)))).astype(np.float32)
+        even = risen * np.float32(evenly)
+        place = np.nonzero(decided)
+        even[place] = np.maximum(even[place], share[place[0]] / np.sqrt(counted[place]))
+        sigma = allowed[0] * _sigma(line, some, moves, light + np.float32(noise.floor))
+        moved = moves * (1.0 / sigma).astype(np.float32)[:, None]
         out.put(some, moved, risen, even)
 
     map_chunks(work, len(electrons), ROWS, threads)
@@ -202,12 +217,20 @@ def _electrons(project: Project, frame: Frame, laser: int, threads: int | None) 
     return expected_electrons(frame, project.scene, project.sensor, threads=threads, laser_power=powers)
 
 
-def _expected_image(project: Project, electrons: Float32) -> Image:
+def _expected_image(project: Project, electrons: Float32, threads: int | None = None) -> Image:
     """The image of mean electrons (h, w), not quantised."""
     sensor = project.sensor
     top, gain = float(2**sensor.bits - 1), sensor.dn_per_electron
     saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
-    numbers: Any = np.minimum(np.float32(gain) * electrons + np.float32(sensor.black_level), np.float32(saturation))
+    numbers: Any = np.empty_like(electrons)
+
+    def work(start: int, stop: int) -> None:
+        out = numbers[start:stop]
+        np.multiply(electrons[start:stop], np.float32(gain), out=out)
+        out += np.float32(sensor.black_level)
+        np.minimum(out, np.float32(saturation), out=out)
+
+    map_chunks(work, len(electrons), ROWS, threads)
     pattern = sensor.pattern if sensor.colour == "bayer" else None
     return Image(
         numbers, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time
@@ -264,6 +287,8 @@ def _row_peaks(light: Float32, line: Line, rows: slice, noise: NoiseModel, extra
 
 def _tiled(response: Float, illumination: Float32) -> Float32:
     """(h, w) of a (2, 2) response by parity of row and column, times the illumination."""
+    if np.all(response == response[0, 0]):
+        return illumination * np.float32(response[0, 0])
     out = np.empty(illumination.shape, np.float32)
     for i in range(2):
         for j in range(2):

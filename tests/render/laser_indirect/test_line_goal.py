@@ -170,14 +170,13 @@ def test_what_a_checkpoint_keeps_gives_the_same_error() -> None:
 
 
 def test_even_light_has_no_effect_on_the_line_but_a_slope_has() -> None:
-    even, slope = Effect(Projection.of(importance(), 0)), Effect(Projection.of(importance(), 0))
-    columns = np.arange(HEIGHT * WIDTH) % WIDTH
+    columns, flat, rising = np.arange(HEIGHT * WIDTH) % WIDTH, [], []
     for _ in range(4):
-        buffer = empty_buffer(HEIGHT * WIDTH)
-        buffer.image[:] = 3.0
-        even.add(buffer)
-        buffer.image[:] += 0.1 * columns
-        slope.add(buffer)
+        flat.append(empty_buffer(HEIGHT * WIDTH))
+        flat[-1].image[:] = 3.0
+        rising.append(empty_buffer(HEIGHT * WIDTH))
+        rising[-1].image[:] = 3.0 + 0.1 * columns
+    even, slope = (Effect.of(Projection.of(importance(), 0), buffers) for buffers in (flat, rising))
     assert even.most() < 1e-5
     expected = 0.1 * np.sum(np.linspace(-1.0, 1.0, 8) * np.arange(8))
     assert slope.most() == pytest.approx(expected, rel=1e-5)
@@ -185,9 +184,8 @@ def test_even_light_has_no_effect_on_the_line_but_a_slope_has() -> None:
 
 
 def test_light_beside_the_line_counts_by_the_peak_that_it_would_be() -> None:
-    effect = Effect(Projection.of(importance(peaks=0.25), 0))
-    for _ in range(4):
-        buffer = empty_buffer(HEIGHT * WIDTH)
+    buffers = [empty_buffer(HEIGHT * WIDTH) for _ in range(4)]
+    for buffer in buffers:
         buffer.image[50 * WIDTH + 8 : 50 * WIDTH + 8 + CELL] = 2.0
-        effect.add(buffer)
+    effect = Effect.of(Projection.of(importance(peaks=0.25), 0), buffers)
     assert effect.most() == pytest.approx(0.25 * 2.0 * CELL)
