@@ -77,12 +77,13 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
     The image depends on the scene and the seed alone.
     """
     width = paths.view.width
-    film, block, count = PixelSamples(width, height), BLOCK, FIRST_SAMPLES
-    held = _held_out(width * height, run)
+    held, block, count = _held_out(width * height, run), BLOCK, FIRST_SAMPLES
+    film = PixelSamples(held)
     film.add(paths, held, np.full((len(held), 2), HELD_OUT_SAMPLES, np.int32), run.between(0.0, 0.1))
     while True:
         grid, across = grid_of(width, height, block)
         part = run.between(0.1, 0.5)
+        film.extend(grid)
         for level in range(1, FIRST_SAMPLES + 1):
             film.add(paths, grid, np.full((len(grid), 2), level, np.int32), part)
         if count > FIRST_SAMPLES:
@@ -109,7 +110,7 @@ def _held_out(pixels: int, run: Run) -> Int:
 
 def _shares(film: PixelSamples, grid: Int, across: int) -> Float:
     """(n, 2) samples of each half on the points of a grid over their mean, by the deviation in the other half."""
-    variance = film.spread[grid].mean(axis=2).reshape(-1, across, 2)
+    variance = film.spread[film.place(grid)].mean(axis=2).reshape(-1, across, 2)
     deviation = np.sqrt(uniform_filter(variance, (3, 3, 0), mode="nearest")).reshape(-1, 2)[:, ::-1]
     mean = deviation.mean(axis=0)
     relative = np.where(mean > 0.0, deviation / np.where(mean > 0.0, mean, 1.0), 1.0)

@@ -29,6 +29,7 @@ from render.ambient.line_moves import LineMoves
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
 from render.base.arrays import Bool, Float, Int, Long
+from render.base.threads import map_chunks
 from render.importance import Importance, known_below
 from render.run import Run
 
@@ -64,63 +65,73 @@ class Band:
     """(h, w) of each pixel in `pixels`, -1: it is none of them."""
 
 
-def band_of(importance: Importance, coarse: CoarseImage) -> Band:
+def band_of(importance: Importance, coarse: CoarseImage, threads: int | None = None) -> Band:
     """Where the error of the coarse image would matter, and all that a line is measured on which it matters to."""
-    weight = np.abs(importance.ambient)
-    height, width = weight.shape
-    along = 1 if importance.axis == "rows" else 0
-    off = coarse.deviation[np.arange(height) // TILE][:, np.arange(width) // TILE]
-    wide = weight * off > ENOUGH
-    weight = np.where(wide, weight, np.float32(0.0))
-    near = np.zeros_like(wide)
-    moves = []
+    weight, (height, width) = importance.ambient, importance.ambient.shape
+    column, lines = np.arange(width) // TILE, height if importance.axis == "rows" else width
+    wide = np.empty((height, width), np.bool_)
+
+    def work(start: int, stop: int) -> None:
+        off = coarse.deviation[np.arange(start, stop) // TILE][:, column]
+        wide[start:stop] = np.abs(weight[start:stop]) * off > ENOUGH
+
+    map_chunks(work, height, TILE, threads)
+    matters = np.flatnonzero(wide)
+    moves, measured = [], []
     for move in importance.ambient_moves:
-        known = ~np.any(np.abs(move) * off > ENOUGH, axis=along, keepdims=True)
-        moves.append(np.where(known, np.float32(0.0), move))
-        near |= moves[-1] != 0.0
-    wide, near = _grown(wide | near), _grown(near)
-    pixels = np.flatnonzero(wide).astype(np.int32)
+        on = np.flatnonzero(move)
+        line = on // width if importance.axis == "rows" else on % width
+        off = coarse.deviation[on // width // TILE, on % width // TILE]
+        unknown = np.bincount(line, np.abs(move.ravel()[on]) * off > ENOUGH, lines) > 0.0
+        measured.append(on[unknown[line]])
+    near = _around(np.concatenate([np.zeros(0, np.int64), *measured]), wide.shape)
+    pixels = np.flatnonzero(near | _around(matters, wide.shape)).astype(np.int32)
     place = np.full(weight.shape, -1, np.int32)
     place.ravel()[pixels] = np.arange(len(pixels), dtype=np.int32)
     line = pixels // width if importance.axis == "rows" else pixels % width
-    keys = np.where(near.ravel()[pixels], np.int32(weight.size) + line, pixels).astype(np.int32)
-    of_band = tuple(move.ravel()[pixels].astype(np.float64) for move in moves)
-    return Band(pixels, weight.ravel()[pixels].astype(np.float64), of_band, line, keys, place)
+    keys = np.where(near[pixels], np.int32(weight.size) + line, pixels).astype(np.int32)
+    alone = np.where(wide.ravel()[pixels], np.abs(weight.ravel()[pixels]), 0.0).astype(np.float64)
+    for move, on in zip(importance.ambient_moves, measured, strict=True):
+        moves.append(np.zeros(len(pixels)))
+        moves[-1][place.ravel()[on]] = move.ravel()[on]
+    return Band(pixels, alone, tuple(moves), line, keys, place)
 
 
-def _grown(mask: Bool) -> Bool:
-    """(h, w) with all that is within AROUND pixels, along rows and columns taken together."""
-    for _ in range(AROUND):
-        grown = mask.copy()
-        grown[1:] |= mask[:-1]
-        grown[:-1] |= mask[1:]
-        grown[:, 1:] |= mask[:, :-1]
-        grown[:, :-1] |= mask[:, 1:]
-        mask = grown
+def _around(pixels: Long, shape: tuple[int, int]) -> Bool:
+    """(h * w,) the pixels (n,) of an image and all within AROUND of them, along rows and columns taken together."""
+    height, width = shape
+    mask, row, column = np.zeros(height * width, np.bool_), pixels // width, pixels % width
+    for down in range(-AROUND, AROUND + 1):
+        for right in range(-AROUND + abs(down), AROUND - abs(down) + 1):
+            there = (row + down >= 0) & (row + down < height) & (column + right >= 0) & (column + right < width)
+            mask[(pixels + down * width + right)[there]] = True
     return mask
 
 
 def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, run: Run) -> Float:
-    """Samples of the band until each scan line meets the goal, or `most` are spent -> (n,) standard deviation of each
-    line with weight over the allowed one, in the colour that is known worst. Raises Cancelled."""
+    """Samples of the band, of whose pixels the film is, until each scan line meets the goal, or `most` are spent.
+
+    Returns (n,) standard deviation of each line with weight over the allowed one, in the colour that is known worst.
+    Raises Cancelled.
+    """
     lines = max(band.place.shape)
     moves = LineMoves(band.moves, band.line, lines)
 
     def add(batch: int, count: Int, part: Run) -> None:
-        sums, done = film.sums[band.pixels], film.done[band.pixels]
+        sums, done = film.sums.copy(), film.done.copy()
         keys = np.where(band.keys < band.place.size, band.keys, band.keys + np.int32(batch * lines))
         film.add(paths, band.pixels, count, part, keys)
-        moves.add(film.sums[band.pixels] - sums, count - done)
+        moves.add(film.sums - sums, count - done)
 
     for level in range(PILOT):
         add(level, np.full((len(band.pixels), 2), level + 1, np.int32), run.between(0.0, 0.3))
     for level in range(PILOT, PILOT + PASSES):
         count = _wanted(film, band, moves)
-        more = count - film.done[band.pixels]
+        more = count - film.done
         left, asked = max(most - film.total, 0), more.sum(dtype=np.int64)
         if asked > left:
-            count = film.done[band.pixels] + (more * (left / asked)).astype(np.int32)
-            more = count - film.done[band.pixels]
+            count = film.done + (more * (left / asked)).astype(np.int32)
+            more = count - film.done
         if not more.any():
             break
         add(level, count, run.between(0.3, 1.0))
@@ -133,7 +144,7 @@ def _moments(film: PixelSamples, band: Band) -> Float:
     heavy = np.flatnonzero(band.weight)
     if not len(heavy):
         return np.zeros(max(band.place.shape))
-    halves, count = film.means(band.pixels).astype(np.float64), 1.0 / film.done[band.pixels]
+    halves, count = film.means().astype(np.float64), 1.0 / film.done
     single = (halves[:, 0] - halves[:, 1]) ** 2 / count.sum(axis=1)[:, None]
     variance = _pooled(single, band, heavy) * count[heavy].sum(axis=1)[:, None] / 4.0
     weight, line = band.weight[heavy] ** 2, band.line[heavy]
@@ -143,9 +154,9 @@ def _moments(film: PixelSamples, band: Band) -> Float:
 def _wanted(film: PixelSamples, band: Band, moves: LineMoves) -> Int:
     """(m, 2) samples of each half for the scan lines to meet the goal: as many on all pixels that a line is measured
     on, beside them as the other half's variance says."""
-    done, heavy, measured = film.done[band.pixels], np.flatnonzero(band.weight), moves.measured
+    done, heavy, measured = film.done, np.flatnonzero(band.weight), moves.measured
     moments, moved = MARGIN * _moments(film, band), MARGIN * moves.variance
-    spread, lines = film.spread[band.pixels].astype(np.float64), len(moments)
+    spread, lines = film.spread.astype(np.float64), len(moments)
     deviation = np.sqrt([_pooled(spread[:, other], band, heavy).max(axis=1) for other in (1, 0)]) * band.weight[heavy]
     both = deviation, done[heavy].T
     total, now = np.array([[np.bincount(band.line[heavy], half, lines) for half in one] for one in both])

@@ -56,7 +56,8 @@ def measured_images(
         share = min(COARSE_SAMPLES / most, COARSE_SHARE)
         coarse = coarse_image(paths, camera.height, int(share * budget), run.between(0.0, 0.5))
         run.leave("coarse ambient", placed.world, made_of, coarse)
-    film, band = PixelSamples(camera.width, camera.height), band_of(importance, coarse)
+    band = band_of(importance, coarse, run.threads)
+    film = PixelSamples(band.pixels)
     yield _image(coarse, film, band, None)
     deviations = np.zeros(0)
     if len(band.pixels):
@@ -78,7 +79,7 @@ def _image(coarse: CoarseImage, film: PixelSamples, band: Band, deviations: Floa
     if deviations is not None:
         # whoever shows the first image still holds it
         radiance = radiance.copy()
-        radiance.reshape(-1, 3)[band.pixels] = film.means(band.pixels).mean(axis=1)
+        radiance.reshape(-1, 3)[band.pixels] = film.means().mean(axis=1)
         error, lines, unknown = known_below(deviations), len(deviations), int(np.sum(deviations > 1.0))
     return AmbientImage(
         radiance,

@@ -7,7 +7,7 @@ import numpy as np
 
 from render.ambient.path_state import CLAMPED_RADIANCE
 from render.ambient.path_tracer import WAVEFRONT, CameraPaths
-from render.base.arrays import Float, Float32, Int
+from render.base.arrays import Float, Float32, Int, Long
 from render.run import Run
 
 ROUND = 1 << 10
@@ -15,14 +15,15 @@ ROUND = 1 << 10
 
 
 class PixelSamples:
-    """Sums over the samples of an image's pixels. What no sample was taken of takes no memory."""
+    """Sums over the samples of some pixels of an image."""
 
-    def __init__(self, width: int, height: int) -> None:
-        self.width, self.height = width, height
-        self.sums = np.zeros((height * width, 2, 3), np.float32)
-        self.spread = np.zeros((height * width, 2, 3), np.float32)
+    def __init__(self, pixels: Int) -> None:
+        """pixels: (m,) ascending."""
+        self.pixels = pixels
+        self.sums = np.zeros((len(pixels), 2, 3), np.float32)
+        self.spread = np.zeros((len(pixels), 2, 3), np.float32)
         """Estimate of the variance of a single sample, by each half's last samples beside those before them."""
-        self.done = np.zeros((height * width, 2), np.int32)
+        self.done = np.zeros((len(pixels), 2), np.int32)
         self.invalid_counts = np.zeros(2)
         self.cut = 0.0
         """Sum of what the clamp took of the samples."""
@@ -32,47 +33,63 @@ class PixelSamples:
         """Samples so far."""
         return int(self.done.sum(dtype=np.int64))
 
-    def means(self, pixels: Int) -> Float32:
-        """(m, 2, 3) radiance of both halves of some pixels; each half must have samples."""
-        return np.asarray(self.sums[pixels] / self.done[pixels][..., None], dtype=np.float32)
+    def extend(self, pixels: Int) -> None:
+        """Take on more pixels, in any order."""
+        before, self.pixels = self.pixels, np.union1d(self.pixels, pixels).astype(np.int32)
+        place = self.place(before)
+        for name in ("sums", "spread", "done"):
+            old = getattr(self, name)
+            new = np.zeros((len(self.pixels), *old.shape[1:]), old.dtype)
+            new[place] = old
+            setattr(self, name, new)
+
+    def place(self, pixels: Int) -> Long:
+        """(n,) where some pixels are among all."""
+        return np.searchsorted(self.pixels, pixels)
+
+    def means(self, pixels: Int | None = None) -> Float32:
+        """(n, 2, 3) radiance of both halves of some pixels, or of all; each half must have samples."""
+        some = slice(None) if pixels is None else self.place(pixels)
+        return np.asarray(self.sums[some] / self.done[some][..., None], dtype=np.float32)
 
     def add(self, paths: CameraPaths, pixels: Int, count: Int | Float, run: Run, keys: Int | None = None) -> None:
-        """Samples until each of the pixels (m,), all different, has count (m, 2) of both halves. Raises Cancelled.
+        """Samples until each of some pixels (n,), all different, has count (n, 2) of both halves. Raises Cancelled.
 
         keys: as for `CameraPaths.add`.
         """
+        place = self.place(pixels)
         while True:
-            more = np.clip(count - self.done[pixels], 0, ROUND).astype(np.int32)
+            more = np.clip(count - self.done[place], 0, ROUND).astype(np.int32)
             wanting = np.flatnonzero(more.any(axis=1))
             if not len(wanting):
                 return
             keyed = pixels if keys is None else keys
-            self._add_round(paths, pixels[wanting], keyed[wanting], more[wanting], run)
+            self._add_round(paths, place[wanting], keyed[wanting], more[wanting], run)
 
-    def _add_round(self, paths: CameraPaths, pixels: Int, keys: Int, more: Int, run: Run) -> None:
+    def _add_round(self, paths: CameraPaths, place: Long, keys: Int, more: Int, run: Run) -> None:
         rays = more.sum(axis=1, dtype=np.int64)
         chunk = (np.cumsum(rays) - rays) // (WAVEFRONT - 2 * ROUND)
-        edges = np.append(np.flatnonzero(np.diff(chunk, prepend=-1)), len(pixels))
+        edges = np.append(np.flatnonzero(np.diff(chunk, prepend=-1)), len(place))
         counts, cut = np.zeros((len(edges) - 1, 2)), np.zeros(len(edges) - 1)
 
         def work(start: int, stop: int) -> None:
             for i in range(start, stop):
                 some = slice(edges[i], edges[i + 1])
-                cut[i] = self._trace(paths, pixels[some], keys[some], more[some], counts[i], run)
+                cut[i] = self._trace(paths, place[some], keys[some], more[some], counts[i], run)
 
         run.map(work, len(edges) - 1, 1)
         # in the order of the chunks, whichever thread was first
         self.invalid_counts += counts.sum(axis=0)
         self.cut += float(cut.sum())
 
-    def _trace(self, paths: CameraPaths, pixels: Int, keys: Int, more: Int, invalid_counts: Float, run: Run) -> float:
-        sums, first = np.zeros((2 * len(pixels), 4)), self.done[pixels]
-        paths.add(pixels, first, more, sums, invalid_counts, run.cancelled, keys)
-        new, old = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32), self.sums[pixels]
+    def _trace(self, paths: CameraPaths, place: Long, keys: Int, more: Int, invalid_counts: Float, run: Run) -> float:
+        sums, first = np.zeros((2 * len(place), 4)), self.done[place]
+        paths.add(self.pixels[place], first, more, sums, invalid_counts, run.cancelled, keys)
+        new, old = sums.reshape(-1, 2, 4)[..., :3].astype(np.float32), self.sums[place]
         before, added = np.maximum(first, 1)[..., None], np.maximum(more, 1)[..., None]
         variance = (old / before - new / added) ** 2 / (1.0 / before + 1.0 / added)
         both = (first > 0) & (more > 0)
-        self.spread[pixels] = np.where(both[..., None], variance, self.spread[pixels])
-        self.sums[pixels] = old + new
-        self.done[pixels] = first + more
+        self.spread[place] = np.where(both[..., None], variance, self.spread[place])
+        self.sums[place] = old + new
+        self.done[place] = first + more
         return float(sums[:, CLAMPED_RADIANCE].sum())

@@ -62,11 +62,11 @@ def many_bands():
     band = band_of(Importance((), band_weights(height, width, 20.0)), even)
     images, samples = [], []
     for seed in range(SEEDS):
-        film = PixelSamples(width, height)
+        film = PixelSamples(band.pixels)
         sample_band(film, paths_of(placed, seed), band, 10**9, Run())
         images.append(film.means(band.pixels).mean(axis=1))
-        samples.append(film.done[band.pixels].sum(axis=1))
-    film = PixelSamples(width, height)
+        samples.append(film.done.sum(axis=1))
+    film = PixelSamples(band.pixels)
     film.add(paths_of(placed, 99), band.pixels, np.full((len(band.pixels), 2), REFERENCE_SAMPLES, np.int32), Run())
     return band, np.array(images, np.float64), film.means(band.pixels).astype(np.float64), np.array(samples)
 
@@ -122,11 +122,11 @@ def moved_lines(shared=True, scale=0.05, seeds=SEEDS):
 
     found, told, samples = [], [], []
     for seed in range(seeds):
-        film = PixelSamples(width, height)
+        film = PixelSamples(band.pixels)
         told.append(sample_band(film, paths_of(placed, seed), band, 10**9, Run()))
         found.append(moves(film.means(band.pixels).mean(axis=1)))
         samples.append(film.total)
-    film = PixelSamples(width, height)
+    film = PixelSamples(band.pixels)
     film.add(paths_of(placed, 99), band.pixels, np.full((len(band.pixels), 2), 64, np.int32), Run(), band.keys)
     halves = [moves(half) for half in np.swapaxes(film.means(band.pixels).astype(np.float64), 0, 1)]
     return np.array(found), np.array(halves), np.array(told), np.mean(samples)
@@ -172,7 +172,8 @@ def test_the_error_told_of_the_coarse_image_is_the_true_one():
     scene, world = box_on_a_wall()
     placed = PlacedScene(world, scene)
     width, height = scene.camera.width, scene.camera.height
-    film, every = PixelSamples(width, height), np.arange(width * height, dtype=np.int32)
+    every = np.arange(width * height, dtype=np.int32)
+    film = PixelSamples(every)
     film.add(paths_of(placed, 99), every, np.full((len(every), 2), 128, np.int32), Run())
     truth = film.means(every).astype(np.float64)
     told, true = [], []
