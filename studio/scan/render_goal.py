@@ -81,7 +81,8 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     lasers, peaks, moves = [], [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
     for i, laser in enumerate(scene.lasers):
-        weight, peak, move = (np.empty_like(ambient) for _ in range(3))
+        # zero but about the line: the system finds memory only for what is written
+        peak, weight, move = np.empty_like(ambient), np.zeros_like(ambient), np.zeros_like(ambient)
         response = joule * laser_response(sensor, laser.wavelength_nm)
         if rows:
             out = Weights(weight, peak, ambient, move, illumination, response, bands)
@@ -165,12 +166,13 @@ class Weights:
     def put(self, lines: slice, moved: Float32, risen: Float32, even: Float32) -> None:
         """Of some scan lines, the first of them even, how far an electron moves the line over what is allowed, how far
         it goes to make or hide a peak, and how far any light that is spread evenly."""
-        lit = self.illumination[lines]
+        lit, on = self.illumination[lines], np.nonzero(moved)
         response, bands = (_tiled(one, lit) for one in (self.response, self.bands))
-        self.laser[lines] = moved * response
-        self.peaks[lines] = risen * response
-        self.moves[lines] = moved * bands
-        self.ambient[lines] = np.maximum(self.ambient[lines], even * bands)
+        self.laser[lines][on] = moved[on] * response[on]
+        self.moves[lines][on] = moved[on] * bands[on]
+        np.multiply(risen, response, out=self.peaks[lines])
+        even *= bands
+        np.maximum(self.ambient[lines], even, out=self.ambient[lines])
 
 
 def _weigh(
