@@ -3,8 +3,8 @@
     python tests/validation/random_scenes.py [--scenes 40] [--scale 0.15]
 
 Each scene is the step block's table and rig with two to four bodies of any shape and material about the line. Both
-renders have the same goal. The line changes where the RMS difference of its rows, in their own sigma, over the 95 % that
-change least, is above the goal; or where more rows are found by one alone than 1 % and than the frame tells to be not
+renders have the same goal. The line changes where the RMS difference of its rows, in their own sigma, over 95 % that
+change least is above the goal; or where more rows are found by one alone than 1 % and than the frame tells to be not
 known or undecided. Exit code 1: more than one scene in forty changes, or one does whose frame does not tell that its
 goal is out of reach or that more than 5 % of its rows miss it.
 """
