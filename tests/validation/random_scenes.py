@@ -58,7 +58,10 @@ def drawn(rng: np.random.Generator) -> list[dict[str, Any]]:
         place = [float(rng.uniform(-0.06, 0.06)), float(rng.uniform(-0.15, 0.15)), float(rng.uniform(0.0, 0.06))]
         turn = [float(angle) for angle in rng.uniform(-0.6, 0.6, 3)]
         pose = {"translation": place, "rotation": turn}
-        bodies.append({"name": f"body {i}", "shape": shape(), "material": material(), "T_world_object": pose})
+        of = material()
+        if of["kind"] == "glass":
+            of["priority"] = i
+        bodies.append({"name": f"body {i}", "shape": shape(), "material": of, "T_world_object": pose})
     return bodies
 
 
