@@ -1,4 +1,4 @@
-"""Photon merging, for what no connection can bring: light through clear glass or off mirrors on both sides.
+"""Photon merging, for what neither connection nor walk can bring: light through glass or off mirrors on both sides.
 
 The light arrives at its one rough surface between by a direction that only scattering can give, and leaves by another,
 so a camera path that ends within a small radius of where a light path ended is taken to be connected to it (progressive
@@ -59,7 +59,7 @@ def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, bu
     kernel = 1.0 / (math.pi * radius * radius * photons.light_paths)
     for r in range(vertices.shape[0]):
         v, path = vertices[r], paths[r]
-        if not path.all_specular or not path.after_specular:
+        if not path.all_specular or not path.after_specular or path.walked:
             continue
         if is_specular(v, rows):
             continue
