@@ -132,8 +132,17 @@ def smooth_ball():
     return Mesh(mesh.vertices, mesh.triangles, normals=corner_normals(mesh.vertices, mesh.triangles, 1.0))
 
 
+def leaning_wall():
+    """The wall, shaded as if it leant by 40 degrees towards the laser's side."""
+    a, b, c = (WALL.vertices[i] for i in WALL.triangles[0])
+    side = math.copysign(1.0, np.cross(b - a, c - a)[2])
+    lean = side * np.array([-math.sin(math.radians(40)), 0.0, math.cos(math.radians(40))])
+    return Mesh(WALL.vertices, WALL.triangles, normals=np.broadcast_to(lean, (2, 3, 3)).astype(np.float32))
+
+
 SCENES = {
     "a plate on both ways": ([WALL, PLATE], [GREY, GLASS]),
+    "a plate before a wall with shading normals": ([leaning_wall(), PLATE], [GREY, GLASS]),
     "a smooth ball, seen through a window": ([WALL, WINDOW, smooth_ball()], [GREY, GLASS, GLASS]),
     "a mirror behind a window": (
         [
