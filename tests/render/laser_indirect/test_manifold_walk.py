@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from render.camera.camera import Lens
 from render.laser.laser import Divergence
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.bdpt_pass import BdptPass, Sampling
@@ -142,6 +143,7 @@ def leaning_wall():
 
 SCENES = {
     "a plate on both ways": ([WALL, PLATE], [GREY, GLASS]),
+    "a plate, through a lens that blurs and distorts": ([WALL, PLATE], [GREY, GLASS]),
     "a plate before a wall with shading normals": ([leaning_wall(), PLATE], [GREY, GLASS]),
     "a smooth ball, seen through a window": ([WALL, WINDOW, smooth_ball()], [GREY, GLASS, GLASS]),
     "a mirror behind a window": (
@@ -155,9 +157,17 @@ SCENES = {
 }
 
 
+CAMERAS = {
+    "a plate, through a lens that blurs and distorts": paper_camera(0.05, (0.2, -0.1, 0.001, 0.002, 0.0)).model_copy(
+        update={"lens": Lens(model="thin-lens", f_number=1.0, focus_distance=0.6)}
+    )
+}
+"""In place of a small pinhole camera."""
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_walks_bring_the_light_that_merging_brings_with_less_noise(name):
-    _, parts = setting(*SCENES[name], camera=paper_camera(0.05))
+    _, parts = setting(*SCENES[name], camera=CAMERAS.get(name, paper_camera(0.05)))
     merged, _ = chain_light(parts, chains=None)
     walked, _ = chain_light(parts)
     error = math.sqrt((merged.var(ddof=1) + walked.var(ddof=1)) / len(merged))
