@@ -20,7 +20,7 @@ LIGHT = {
     (
         "indirect",
         "specular-chain",
-    ): "laser light through clear glass or off mirrors both before and after each rough surface, by photon merging",
+    ): "laser light through clear glass or off mirrors both before and after each rough surface, by walks or merging",
     ("indirect", "subsurface"): "laser light scattered below a surface, by random walk",
     ("ambient", "ambient"): "light of lamps, surroundings and shining objects",
     ("ambient", "interreflection"): "ambient light that meets two or more surfaces (interreflection, light through "

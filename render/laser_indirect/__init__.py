@@ -1,1 +1,1 @@
-"""Laser light over several surfaces: bidirectional path tracing, guiding, photon merging."""
+"""Laser light over several surfaces: bidirectional path tracing, guiding, manifold walks, photon merging."""

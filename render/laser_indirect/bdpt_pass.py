@@ -21,6 +21,7 @@ from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_position
 from render.camera.view import View
 from render.laser.laser import LineLaser
+from render.laser_indirect.chain_connections import empty_walks, splat_walks, walk_to_camera
 from render.laser_indirect.connection_buffer import Connections, PassBuffer, empty_connections, splat_unoccluded
 from render.laser_indirect.connections import (
     CameraSampling,
@@ -50,6 +51,7 @@ from render.laser_indirect.photon_emission import FanDistribution, Photons, emit
 from render.laser_indirect.photon_merging import RADIUS_EXPONENT, PhotonMap, merge, photon_map
 from render.laser_indirect.random_walk import random_walk_step
 from render.laser_indirect.ris import LightVertices, connect_by_ris
+from render.laser_indirect.specular_chains import ChainIndex, mark_listed, seen_chains
 from render.material.material import reflectance_weights
 from render.material.medium import MOST_STEPS
 from render.sampling.random import uniform, wrapped
@@ -113,6 +115,8 @@ class BdptPass:
     """Some transparent bodies overlap."""
     interiors: tuple[int, int]
     """Of them, those that the laser and the camera are within (`render.world.interior_list`)."""
+    chains: ChainIndex | None
+    """Plane mirrors and glass before the camera, over which light is found by walks; None: there are none."""
 
     @classmethod
     def of(cls, placed: PlacedLaser, reference_distance: float, seed: int, kinds: int = ALL_KINDS) -> BdptPass:
@@ -120,6 +124,8 @@ class BdptPass:
         surface = world.surface_at((laser.wavelength_nm,) * 3)
         nested, ends = has_overlaps(surface), (T_world_laser[:3, 3], T_world_camera[:3, 3])
         at_laser, at_camera = (surroundings(world, surface, end)[0] if nested else 0 for end in ends)
+        specular = bool(kinds & CAUSTIC) and any_specular(surface)
+        walked = specular and bool(kinds & SPECULAR_CHAIN) and not nested
         return cls(
             world=world,
             surface=surface,
@@ -131,9 +137,10 @@ class BdptPass:
             reference_distance=reference_distance,
             seed=seed,
             kinds=kinds,
-            specular=bool(kinds & CAUSTIC) and any_specular(surface),
+            specular=specular,
             nested=nested,
             interiors=(at_laser, at_camera),
+            chains=seen_chains(world, surface, camera, T_world_camera) if walked else None,
         )
 
     def run(
@@ -217,6 +224,8 @@ class BdptPass:
             else:
                 connected = connect_to_camera(vertices, paths, context, camera, depth, connections)
                 self.splat(connections, connected, 1.0 / sampling.light_paths, buffer)
+                if self.chains is not None and self.kinds & SPECULAR_CHAIN:
+                    self.walk(vertices, paths, self.chains, context, camera, depth, buffer)
             if keep:
                 kept.append((depth, *connectable(vertices, paths, context.rows)))
             n = scatter(vertices, paths, context, depth, shift[2:], True, origin, direction)
@@ -253,6 +262,8 @@ class BdptPass:
             else:
                 self.splat(connections, connect_to_laser(vertices, paths, context, laser, connections), 1.0, buffer)
             if photons is not None:
+                if self.chains is not None:
+                    mark_listed(vertices, paths, self.chains)
                 merge(vertices, paths, context.rows, photons, buffer)
             for light in light_vertices:
                 connected = connect_by_ris(vertices, paths, light, sampling.guide, depth, context, buffer, connections)
@@ -304,6 +315,26 @@ class BdptPass:
             else:
                 occluded = self.world.rays.occluded(*ends)
             splat_unoccluded(connections, occluded, connected, scale, buffer)
+
+    def walk(
+        self,
+        vertices: Records,
+        paths: Records,
+        chains: ChainIndex,
+        context: PassContext,
+        camera: CameraSampling,
+        depth: int,
+        buffer: PassBuffer,
+    ) -> None:
+        """Splat what comes from light vertices to the camera over listed chains and is not occluded."""
+        first, counts = 0, np.zeros(2, np.int64)
+        walks = empty_walks(max(len(vertices), chains.most))
+        while first < len(vertices):
+            first = walk_to_camera(first, vertices, paths, chains, self.surface, context, camera, depth, counts, walks)
+            rays = int(counts[1])
+            ends = walks.origin[:rays], walks.direction[:rays], walks.distance[:rays]
+            occluded = self.world.rays.occluded(*ends) if rays else np.zeros(0, np.bool_)
+            splat_walks(walks, occluded, int(counts[0]), 1.0 / camera.light_paths, buffer)
 
     def photon_map(self, parts: list[Vertices], number: int, sampling: Sampling) -> PhotonMap:
         """The light vertices that only merging can use; the radius is a pixel's, less with each pass."""

@@ -2,8 +2,9 @@
 
 Every pass (`render.laser_indirect.bdpt_pass`) draws light paths, stratified along the fan, and camera paths where the
 passes before saw light. The passes of a wave differ only in their random numbers, so their spread estimates the error.
-What no connection can make, light through clear glass on both sides, is found by merging
-(`render.laser_indirect.photon_merging`). The equations are in `render/README.md`.
+What no connection can make, light through clear glass on both sides, is found by walks
+(`render.laser_indirect.manifold_walk`) where the camera sees it over plane mirrors and faces of glass, and by merging
+(`render.laser_indirect.photon_merging`) where it does not. The equations are in `render/README.md`.
 """
 
 from __future__ import annotations

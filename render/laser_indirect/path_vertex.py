@@ -69,17 +69,23 @@ PATH = np.dtype(
         ("kind", "i4"),  # of light: bits CAUSTIC, SUBSURFACE_LIGHT
         ("medium", "i4"),  # material of the medium it is in; -1: none
         ("fan_bin", "i4"),  # of light paths
+        ("triangle", "i4"),  # that it has reached
+        ("count", "i4"),  # of `facets`; -1: too many, or other surfaces as well
+        ("facets", "i4", 4),  # 1 + the triangles that have refracted it since it began, minus those that have reflected
         ("all_specular", "?"),  # no surface so far could be connected to the one before it (camera paths: to anything)
         ("after_specular", "?"),  # the last surface was specular
+        ("walked", "?"),  # of camera paths: what could be merged here is found by walks
     ],
     align=True,
 )
 INTERREFLECTION, CAUSTIC, SUBSURFACE_LIGHT, SPECULAR_CHAIN = 0, 1, 2, 4
-"""Kinds of light, as bits: none; through clear glass or off a mirror; through a medium; found by merging alone."""
+"""Kinds of light, as bits: none; through clear glass or off a mirror; through a medium; found by walks or merging."""
 ALL_KINDS = CAUSTIC | SUBSURFACE_LIGHT | SPECULAR_CHAIN
 INNER, OUTER = 1, 2
 """Sides of a surface, as bits: behind its shading normal, and before it."""
 MOST_BOUNCES = 64
+MOST_FACETS = 4
+"""Of the mirrors and faces of glass at a path's beginning that are remembered: `facets` of PATH."""
 FIRST_ROULETTE_SURFACE = 4
 """Surface, counted from 1, on leaving which a path may first be ended by Russian roulette."""
 MOST_SURVIVAL = 0.95
@@ -148,6 +154,7 @@ def intersect(
         v.turbid = INNER if context.rows[material, KIND] == SUBSURFACE else 0
         paths[hits] = paths[r]
         path = paths[hits]
+        path.triangle = t
         bit = bit_of(context.rows, material)
         if bit > 0 or path.interior > 0:
             set_surroundings(v, context.rows, path.interior & ~bit, bit)
@@ -312,8 +319,19 @@ def scatter(
         after.throughput, after.dvcm, after.dvc = throughput, dvcm, dvc
         after.kind, after.medium, after.interior = kind, medium, interior
         after.all_specular, after.after_specular = all_specular, specular
+        remember(after, specular, crosses)
         going += 1
     return going
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def remember(path: Record, specular: bool, crosses: bool) -> None:
+    """Add the triangle that a path has reached to its `facets`, if it goes on from there in one direction alone."""
+    if not specular or path.count == MOST_FACETS:
+        path.count = -1
+    if path.count >= 0:
+        path.facets[path.count] = 1 + path.triangle if crosses else -1 - path.triangle
+        path.count += 1
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)

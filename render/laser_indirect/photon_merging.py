@@ -1,4 +1,4 @@
-"""Photon merging, for what no connection can bring: light through clear glass or off mirrors on both sides.
+"""Photon merging, for what neither connection nor walk can bring: light through glass or off mirrors on both sides.
 
 The light arrives at its one rough surface between by a direction that only scattering can give, and leaves by another,
 so a camera path that ends within a small radius of where a light path ended is taken to be connected to it (progressive
@@ -17,7 +17,15 @@ import numpy as np
 from render.base.arrays import Float, Long
 from render.base.vectors import dot, minus, vector
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
-from render.laser_indirect.path_vertex import SPECULAR_CHAIN, Record, Records, cosine_to, eval_bsdf, is_specular
+from render.laser_indirect.path_vertex import (
+    SPECULAR_CHAIN,
+    Record,
+    Records,
+    cosine_to,
+    eval_bsdf,
+    is_specular,
+    shading_normal_factor,
+)
 
 RADIUS_EXPONENT = 1.0 / 6.0
 """The radius falls as n^-(1/6) with the passes (Knaus and Zwicker 2011, alpha = 2/3)."""
@@ -59,7 +67,7 @@ def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, bu
     kernel = 1.0 / (math.pi * radius * radius * photons.light_paths)
     for r in range(vertices.shape[0]):
         v, path = vertices[r], paths[r]
-        if not path.all_specular or not path.after_specular:
+        if not path.all_specular or not path.after_specular or path.walked:
             continue
         if is_specular(v, rows):
             continue
@@ -92,7 +100,7 @@ def gather_photons(
             apart = minus(vector(w.p), vector(v.p))
             near = dot(apart, apart) < radius * radius
             if near and cosine_to(v, vector(w.n)) > LEAST_COSINE:
-                f = eval_bsdf(v, rows, vector(w.wo), vector(v.wo))
+                f = eval_bsdf(v, rows, vector(w.wo), vector(v.wo)) * shading_normal_factor(w)
                 value = photons.power[j] * f
                 if 0.0 <= value < math.inf:
                     total += value

@@ -1,0 +1,200 @@
+"""Manifold walks: how light at a point reaches the camera over a chain of plane mirrors and faces of clear glass.
+
+A ray through the lens's point is (q, r, 1) in the camera's frame. Refracted and reflected at the planes of given facets
+it meets the plane of a point's surface at F(q, r); the walk solves F(q, r) = x for the point x, by Newton's method on
+the manifold of paths that obey Snell's law (Jakob and Marschner 2012; Zeltner et al. 2020). The chain is a list of
+facets, which makes the solution unique and its probability 1: between planes the optical path is a convex function of
+the points on them, a sum of distances times indices, and it is least on the one path that obeys the law (Fermat). The
+last matrix of Newton's method then says how many pixels there are to an area about x,
+
+    du dv / dA  =  (du dv / dq dr) / |dF/dq x dF/dr|,
+
+the generalised geometry term of the chain, times the share of light that Fresnel's equations let through.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+
+from render.base.arrays import Float
+from render.base.vectors import (
+    Vector,
+    along,
+    divided,
+    dot,
+    length,
+    minus,
+    plus,
+    scaled,
+    store_row,
+    vector,
+)
+from render.camera.lens import lens_position, lens_project
+from render.camera.view import View
+from render.laser_indirect.path_vertex import Record
+from render.material.bsdf import DIELECTRIC, eval_band
+from render.material.fresnel import fresnel_dielectric
+from render.material.record import INDEX, INTERNAL, KIND, METAL_K, METAL_N
+from render.material.scattering import Lobes
+from render.world.triangles import Surface, barycentric, plane_of, slot_reflectance
+
+MOST_ITERATIONS, MOST_HALVINGS = 16, 8
+ACCURACY = 1e-7
+"""Of a solution's slopes q and r: 4e-4 px at a focal length of 3500 px."""
+STEP = 1e-6
+"""Of the difference quotients, in slopes."""
+
+
+class Solution(NamedTuple):
+    """A path from a point to the camera."""
+
+    found: bool
+    slopes: tuple[float, float]
+    """q and r."""
+    spread: float
+    """|dF/dq x dF/dr|, m^2."""
+
+
+NO_SOLUTION = Solution(False, (0.0, 0.0), 0.0)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def turned(surface: Surface, facet: int, o: Vector, d: Vector) -> tuple[bool, Vector, Vector]:
+    """A ray of unit direction on from the plane of a facet (`facets` of `path_vertex.PATH`), as if this had no edge.
+
+    False: it does not come to the plane, or is not refracted there.
+    """
+    a0, a1, a2, n0, n1, n2 = plane_of(surface, abs(facet) - 1)
+    normal = (n0, n1, n2)
+    c = -dot(normal, d)
+    s = -dot(normal, minus((a0, a1, a2), o)) / c
+    if not s > 0.0:
+        return False, o, d
+    o = along(o, s, d)
+    if facet < 0:
+        return True, o, plus(d, scaled(2.0 * c, normal))
+    index = surface.rows[surface.object_id[facet - 1], INDEX]
+    eta = index if c > 0.0 else 1.0 / index
+    _, beyond = fresnel_dielectric(abs(c), eta)
+    return beyond > 0.0, o, plus(scaled(1.0 / eta, d), scaled(c / eta - math.copysign(beyond, c), normal))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def landing(
+    surface: Surface, chain: Record, m: Float, origin: Vector, q: float, r: float, x: Vector, n: Vector
+) -> tuple[bool, Vector]:
+    """F(q, r) on the plane through x with normal n; False: there is none."""
+    d = (
+        m[0, 0] * q + m[0, 1] * r + m[0, 2],
+        m[1, 0] * q + m[1, 1] * r + m[1, 2],
+        m[2, 0] * q + m[2, 1] * r + m[2, 2],
+    )
+    o, d = origin, divided(d, length(d))
+    for j in range(chain.count):
+        ok, o, d = turned(surface, chain.facets[j], o, d)
+        if not ok:
+            return False, o
+    s = dot(n, minus(x, o)) / dot(n, d)
+    return s > 0.0, along(o, s, d)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def walk(
+    surface: Surface,
+    chain: Record,
+    m: Float,
+    origin: Vector,
+    x: Vector,
+    n: Vector,
+) -> Solution:
+    """The ray through a point of the lens that comes over a chain to x, of a plane with normal n, or NO_SOLUTION.
+
+    chain: a record of `specular_chains.SEEN`, whose facets are taken without their edges; its slopes are the first. m
+    (4, 4): the camera's pose. A step that does not bring it nearer is halved.
+    """
+    q, r = chain.slopes
+    ok, p = landing(surface, chain, m, origin, q, r, x, n)
+    for _ in range(MOST_ITERATIONS):
+        ok_q, p_q = landing(surface, chain, m, origin, q + STEP, r, x, n)
+        ok_r, p_r = landing(surface, chain, m, origin, q, r + STEP, x, n)
+        if not (ok and ok_q and ok_r):
+            return NO_SOLUTION
+        by_q, by_r, off = scaled(1.0 / STEP, minus(p_q, p)), scaled(1.0 / STEP, minus(p_r, p)), minus(x, p)
+        qq, qr, rr = dot(by_q, by_q), dot(by_q, by_r), dot(by_r, by_r)
+        determinant = qq * rr - qr * qr
+        oq, orr = dot(by_q, off), dot(by_r, off)
+        dq, dr = (rr * oq - qr * orr) / determinant, (qq * orr - qr * oq) / determinant
+        if not determinant > 0.0:
+            return NO_SOLUTION
+        if abs(dq) + abs(dr) <= ACCURACY:
+            return Solution(True, (q + dq, r + dr), math.sqrt(determinant))
+        distance, factor = length(off), 1.0
+        for _ in range(MOST_HALVINGS):
+            ok, p = landing(surface, chain, m, origin, q + factor * dq, r + factor * dr, x, n)
+            if ok and length(minus(x, p)) < distance:
+                break
+            factor *= 0.5
+        q, r = q + factor * dq, r + factor * dr
+    return NO_SOLUTION
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def passed(
+    surface: Surface,
+    weights: Float,
+    chain: Record,
+    m: Float,
+    origin: Vector,
+    slopes: tuple[float, float],
+    places: Float,
+    rgb: Float,
+) -> float:
+    """The weight of a camera path after a chain, as `path_vertex.scatter` has it -> places (count, 3) on the facets.
+
+    0: it goes past the edge of one. weights (3,) of the RGB reflectance; rgb (3,) is changed.
+    """
+    q, r = slopes
+    d = (
+        m[0, 0] * q + m[0, 1] * r + m[0, 2],
+        m[1, 0] * q + m[1, 1] * r + m[1, 2],
+        m[2, 0] * q + m[2, 1] * r + m[2, 2],
+    )
+    o, d = origin, divided(d, length(d))
+    share = 1.0
+    for j in range(chain.count):
+        t = abs(chain.facets[j]) - 1
+        _, _, _, n0, n1, n2 = plane_of(surface, t)
+        c = -dot((n0, n1, n2), d)
+        ok, o, d = turned(surface, chain.facets[j], o, d)
+        f, g = barycentric(surface, t, o)
+        if not ok or min(f, g, 1.0 - f - g) < 0.0:
+            return 0.0
+        store_row(places, j, o)
+        slot = surface.object_id[t]
+        row = surface.rows[slot]
+        slot_reflectance(surface, slot, t, o[0], o[1], o[2], rgb)
+        tint = dot(vector(weights), vector(rgb))
+        if row[KIND] == DIELECTRIC:
+            eta = row[INDEX] if c > 0.0 else 1.0 / row[INDEX]
+            reflected, _ = fresnel_dielectric(abs(c), eta)
+            share *= tint * ((1.0 - reflected) / (eta * eta) if chain.facets[j] > 0 else reflected)
+        else:
+            share *= eval_band(row[KIND], Lobes(1.0, abs(c), 0.0), tint, row[METAL_N], row[METAL_K], row[INTERNAL])
+    return share
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def pixel_on_way(
+    view: View, tilt: Float, distorted: bool, height: int, p: Vector, a: float, b: float
+) -> tuple[int, float]:
+    """The pixel of a ray through lens point (a, b) that comes by p, -1 if none, and du dv / dq dr there."""
+    x, y, area = lens_project(view, tilt, distorted, p[0], p[1], p[2], a, b)
+    if not (area > 0.0 and -0.5 <= x < view.width - 0.5 and -0.5 <= y < height - 0.5):
+        return -1, 0.0
+    to, m = minus(p, lens_position(view, a, b)), view.T_world_camera
+    distance = length(to)
+    cosine = (m[0, 2] * to[0] + m[1, 2] * to[1] + m[2, 2] * to[2]) / distance
+    return int(math.floor(y + 0.5)) * view.width + int(math.floor(x + 0.5)), area * distance**2 * cosine**3

@@ -1,0 +1,187 @@
+"""Chains of plane mirrors and faces of clear glass between the camera and a place: which light is walked to the camera.
+
+Rays of a grid over the image are followed over mirrors and glass, by reflection and by refraction, until they meet a
+rough surface; each tells over which chain of facets the camera sees that place, and the cells of space about it list
+the chain. Light that only merging could bring (`render.laser_indirect.photon_merging`) is brought from a cell to the
+camera over the chains that are listed there, by walks (`render.laser_indirect.manifold_walk`); camera paths that come
+to a cell over a listed chain are not merged. Both know the list, so each path is found once, whatever is listed; what
+the grid has missed is merged.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from render.base.arrays import Bool, Float, Int, Long
+from render.base.vectors import Vector, dot, store, vector
+from render.camera.camera import Camera
+from render.laser_indirect.manifold_walk import turned
+from render.laser_indirect.path_vertex import (
+    MOST_FACETS,
+    Records,
+)
+from render.material.bsdf import is_specular_row
+from render.material.fresnel import fresnel_dielectric
+from render.material.record import DIELECTRIC, INDEX, KIND
+from render.world.triangles import Surface, off_surface, plane_of
+from render.world.world import World
+
+SEEN = np.dtype(
+    [
+        ("facets", "i4", MOST_FACETS),  # as of `path_vertex.PATH`
+        ("count", "i4"),
+        ("slopes", "f8", 2),  # of the ray: q and r (`manifold_walk`)
+        ("o", "f8", 3),  # where it is, or where it has come to
+        ("d", "f8", 3),
+        ("share", "f8"),  # of its light that reflections and refractions leave, roughly
+    ],
+    align=True,
+)
+GRID_RAYS = 1 << 14
+"""Rays of the grid, about; no less than a pixel apart. Chosen, not tuned."""
+CELL_RAYS = 2.0
+"""Size of a cell, in the spacing of the grid's rays at their median distance."""
+LEAST_SHARE = 1e-4
+"""Of a ray's light, below which it is not followed; what it would have shown is merged. Chosen, not tuned."""
+BITS = 21
+"""Of a cell's number, for each axis."""
+
+
+class ChainIndex(NamedTuple):
+    """(k,) cells, in order, that the camera sees over chains: seen[starts[i] : starts[i + 1]] of cell i."""
+
+    cells: Long
+    starts: Long
+    seen: Records
+    """(n,) SEEN, one of each chain of a cell."""
+    centre: Float
+    """(3,) m, of the cells' grid."""
+    size: float
+    """Of a cell, m."""
+    most: int
+    """Of a cell's chains."""
+
+
+def seen_chains(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> ChainIndex | None:
+    """The chains over which the camera sees rough surfaces; None: none is of plane mirrors and faces alone."""
+    rays = world.rays
+    plain = (surface.detail == 0) & (surface.second < 0)
+    walkable = plain & np.array([is_specular_row(row) for row in surface.rows])
+    if not np.any(walkable[: surface.object_id.max() + 1]):
+        return None
+    spacing = max(1.0, math.sqrt(camera.width * camera.height / GRID_RAYS))
+    v, u = np.mgrid[0 : camera.height - 1 : spacing, 0 : camera.width - 1 : spacing]
+    directions, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1))
+    ahead = np.zeros(int(known.sum()), SEEN)
+    ahead["slopes"] = directions[known, :2] / directions[known, 2:]
+    ahead["o"], ahead["d"], ahead["share"] = T_world_camera[:3, 3], directions[known] @ T_world_camera[:3, :3].T, 1.0
+    found: list[Records] = []
+    for _ in range(MOST_FACETS + 1):
+        triangle, _ = rays.intersect((ahead["o"] - rays.centre).astype(np.float32), ahead["d"].astype(np.float32))
+        after, landed = np.empty(2 * len(ahead), SEEN), np.empty(len(ahead), SEEN)
+        n, k = follow(surface, walkable, rays.surface_offset, triangle, ahead, after, landed)
+        ahead = after[:n]
+        found.append(landed[:k])
+        if not n:
+            break
+    seen = np.concatenate(found)
+    if not len(seen):
+        return None
+    distance = np.linalg.norm(seen["o"] - T_world_camera[:3, 3], axis=1)
+    size = CELL_RAYS * spacing * float(np.median(distance)) / max(camera.fx, camera.fy)
+    return listed_by_cell(seen, rays.centre, size)
+
+
+def listed_by_cell(seen: Records, centre: Float, size: float) -> ChainIndex:
+    """SEEN records (n,) by the cells within half a cell of where they have come to, one of each chain and cell."""
+    key, low = chain_keys(seen["facets"]), np.floor((seen["o"] - centre) / size - 0.5).astype(np.int64)
+    corners = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)])
+    place = low[:, None] + corners + (1 << (BITS - 1))
+    cells = ((place[..., 0] << 2 * BITS) | (place[..., 1] << BITS) | place[..., 2]).ravel()
+    whose, key = np.repeat(np.arange(len(seen)), 8), np.repeat(key, 8)
+    order = np.lexsort((key, cells))
+    cells, key, whose = cells[order], key[order], whose[order]
+    first = np.ones(len(cells), np.bool_)
+    first[1:] = (cells[1:] != cells[:-1]) | (key[1:] != key[:-1])
+    cells, starts = np.unique(cells[first], return_index=True)
+    starts = np.append(starts, first.sum())
+    return ChainIndex(cells, starts, seen.take(whose[first]), centre, size, int(np.diff(starts).max()))
+
+
+def chain_keys(facets: Int) -> Long:
+    """(n, MOST_FACETS) facets -> (n,) a number for each list of them, the same for the same."""
+    _, key = np.unique(facets, axis=0, return_inverse=True)
+    return key.ravel()
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def follow(
+    surface: Surface, walkable: Bool, epsilon: float, triangle: Int, ahead: Records, after: Records, landed: Records
+) -> tuple[int, int]:
+    """SEEN rays (n,) beyond their triangles (-1: none) -> after, reflected and refracted, and landed; their numbers."""
+    n = k = 0
+    for i in range(ahead.shape[0]):
+        t, ray = triangle[i], ahead[i]
+        if t < 0:
+            continue
+        slot = surface.object_id[t]
+        _, _, _, n0, n1, n2 = plane_of(surface, t)
+        normal, d = (n0, n1, n2), vector(ray.d)
+        if not is_specular_row(surface.rows[slot]):
+            if ray.count > 0:
+                _, o, _ = turned(surface, -1 - t, vector(ray.o), d)
+                landed[k] = ray
+                store(landed[k].o, o)
+                k += 1
+            continue
+        if not walkable[slot] or ray.count == MOST_FACETS:
+            continue
+        c = -dot(normal, d)
+        glass = surface.rows[slot, KIND] == DIELECTRIC
+        index = surface.rows[slot, INDEX]
+        reflected, _ = fresnel_dielectric(abs(c), index if c > 0.0 else 1.0 / index) if glass else (1.0, 0.0)
+        for crosses in range(2 if glass else 1):
+            share = ray.share * ((1.0 - reflected) if crosses else reflected)
+            facet = 1 + t if crosses else -1 - t
+            ok, o, out = turned(surface, facet, vector(ray.o), d)
+            if not ok or share < LEAST_SHARE:
+                continue
+            after[n] = ray
+            after[n].facets[ray.count] = facet
+            after[n].count, after[n].share = ray.count + 1, share
+            store(after[n].o, off_surface(o, normal, epsilon if dot(normal, out) > 0.0 else -epsilon))
+            store(after[n].d, out)
+            n += 1
+    return n, k
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def cell_at(index: ChainIndex, p: Vector) -> int:
+    """The number of the cell that a point is in; -1: nothing is listed there."""
+    half = 1 << (BITS - 1)
+    x = int(math.floor((p[0] - index.centre[0]) / index.size)) + half
+    y = int(math.floor((p[1] - index.centre[1]) / index.size)) + half
+    z = int(math.floor((p[2] - index.centre[2]) / index.size)) + half
+    key = (np.int64(x) << 2 * BITS) | (np.int64(y) << BITS) | np.int64(z)
+    i = int(np.searchsorted(index.cells, key))
+    return i if i < index.cells.shape[0] and index.cells[i] == key else -1
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def mark_listed(vertices: Records, paths: Records, index: ChainIndex) -> None:
+    """Camera paths (n,) that have come over a chain that is listed there: `walked` of PATH."""
+    for r in range(vertices.shape[0]):
+        path = paths[r]
+        path.walked = False
+        i = cell_at(index, vector(vertices[r].p)) if path.count > 0 else -1
+        if i < 0:
+            continue
+        for j in range(index.starts[i], index.starts[i + 1]):
+            same = True
+            for k in range(MOST_FACETS):
+                same &= index.seen[j].facets[k] == path.facets[k]
+            path.walked |= same
