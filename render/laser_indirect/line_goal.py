@@ -20,8 +20,8 @@ from scipy.special import gammaincinv
 from render.base.arrays import Float, Float32
 from render.importance import CELL, Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
+from render.laser_indirect.line_pools import UNMET, pooled, pooled_alike
 from render.laser_indirect.line_sums import mean_image, run_sums
-from render.line_pools import UNMET, pooled, pooled_alike
 
 Int = NDArray[np.int64]
 Weigh = Callable[[Float32], Importance]

@@ -22,7 +22,7 @@ from render.base.arrays import Float, Float32, Int
 from render.laser_indirect.connection_buffer import BLOCK
 from render.laser_indirect.guiding import MOST_CAMERA_PATHS
 from render.laser_indirect.line_goal import Projection, all_but_unmet
-from render.line_pools import POOLED, pooled
+from render.laser_indirect.line_pools import POOLED, pooled
 
 LEAST_NEED = 0.02
 """Of the camera paths of a scan line that needs most: what every line gets beside it."""
