@@ -10,11 +10,13 @@ from render.ambient.integrator import AmbientImage, ambient_images
 from render.ambient.measured_light import measured_images, seen_from
 from render.ambient.transport_plan import (
     DARK,
+    EFFECT,
     LAMPS,
     ONWARD,
     SWITCHED_OFF,
     AmbientPlan,
     has_ambient,
+    onward_effect,
     onward_share,
     plan_of,
 )
@@ -58,8 +60,11 @@ class AmbientLight(LightGroup[AmbientPlan]):
         return settings.transport != "direct" and has_ambient(scene)
 
     def measured(self, placed: PlacedScene, settings: RenderSettings, frame: Frame, run: Run) -> Shares:
-        """Light that goes on over that by way of one surface."""
-        return {ONWARD: onward_share(placed, settings.max_bounces, run)}
+        """Light that goes on over that by way of one surface; with a goal also what it does to the line."""
+        shares: Shares = {ONWARD: onward_share(placed, settings.max_bounces, run)}
+        if settings.goal is not None and frame.importance is not None:
+            shares[EFFECT] = onward_effect(placed, frame.importance, settings.max_bounces, run), 0.0
+        return shares
 
     def plan(self, shares: Shares | None, world: World, scene: Scene, settings: RenderSettings) -> AmbientPlan:
         return plan_of(shares, world, scene, settings)
