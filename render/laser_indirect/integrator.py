@@ -18,7 +18,7 @@ import numpy as np
 
 from render.base.arrays import Bool, Float, Float32
 from render.base.errors import Cancelled
-from render.base.threads import map_chunks, thread_count
+from render.base.threads import Cancel, map_chunks, thread_count
 from render.camera.camera import Camera
 from render.importance import Importance
 from render.laser.laser import LineLaser
@@ -175,12 +175,19 @@ def indirect_images(
         known = so_far.error <= target or (aim is not None and so_far.line_error <= 1.0)
         return not known and so_far.paths < most_paths
 
+    def over() -> bool:
+        return run.cancelled() or (so_far.passes > 0 and time_is_over())
+
     shown = so_far.paths
     while unfinished():
         try:
             # after the passes of the looks
-            waves.trace(PASSES_A_WAVE * (LOOKS + so_far.waves), sampling_of(so_far, so_far.next_paths))
+            sampling = sampling_of(so_far, so_far.next_paths)
+            waves.trace(PASSES_A_WAVE * (LOOKS + so_far.waves), sampling, stopped=over)
         except Cancelled:
+            if not run.cancelled():
+                # the time is over, and the wave under way is lost
+                break
             if so_far.passes and run.keep_partial():
                 yield image()
             raise
@@ -191,8 +198,8 @@ def indirect_images(
             so_far.line.judge(so_far.line_deviation, off, so_far.paths, most_paths)
         run.keep(so_far)
         # the error falls with the root of the paths, at least
-        over = min(off, math.inf if aim is None else so_far.line_error)
-        done = max(over**-2, so_far.paths / most_paths) if over > 0.0 else 1.0
+        beyond = min(off, math.inf if aim is None else so_far.line_error)
+        done = max(beyond**-2, so_far.paths / most_paths) if beyond > 0.0 else 1.0
         run.progress(min(0.99, done))
         if time_is_over():
             break
@@ -209,15 +216,18 @@ class Waves:
         self.task, self.camera, self.run = task, camera, run
         self.buffers = [empty_buffer(camera.width * camera.height) for _ in range(PASSES_A_WAVE)]
 
-    def trace(self, first: int, sampling: Sampling, specular: Bool | None = None) -> None:
-        """Passes first .. first + PASSES_A_WAVE; specular: as for `BdptPass.run`. Raises Cancelled."""
-        run = self.run
+    def trace(
+        self, first: int, sampling: Sampling, specular: Bool | None = None, stopped: Cancel | None = None
+    ) -> None:
+        """Passes first .. first + PASSES_A_WAVE; specular: as for `BdptPass.run`; stopped: in place of the run's
+        `cancelled`. Raises Cancelled."""
+        run, cancelled = self.run, stopped or self.run.cancelled
 
         def work(start: int, stop: int) -> None:
             for number in range(start, stop):
-                self.task.run(first + number, sampling, self.buffers[number], run.cancelled, specular)
+                self.task.run(first + number, sampling, self.buffers[number], cancelled, specular)
 
-        map_chunks(work, PASSES_A_WAVE, 1, min(PASSES_A_WAVE, thread_count(run.threads)), run.cancelled)
+        map_chunks(work, PASSES_A_WAVE, 1, min(PASSES_A_WAVE, thread_count(run.threads)), cancelled)
 
     def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None) -> Accumulator:
         """An empty accumulator that knows where laser and camera should look; the light of the looks is thrown away.

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from render.base.deadline import Deadline
 from render.frame import Frame
 from render.laser.laser import Divergence, LineLaser
 from render.laser_direct.integrator import direct_image
@@ -339,3 +340,26 @@ def test_an_image_of_a_hundred_pixels_is_rendered_as_any_other():
     image = indirect_image(*placed, target=0.2, run=Run(seed=1))
     assert image.radiance.sum() > 0.0
     assert image.error < 0.2
+
+
+class CallsLeft(Deadline):
+    """Over once it has been asked so often."""
+
+    def __init__(self, calls):
+        super().__init__(1e6)
+        self.calls = calls
+
+    def share(self, parts):
+        def over():
+            self.calls -= 1
+            return self.calls < 0
+
+        return over
+
+
+@pytest.mark.parametrize("calls", [3, 40])
+def test_the_end_of_the_time_within_a_wave_leaves_the_waves_before_it(calls):
+    _, parts = setting([turned_groove()], [Lambertian(albedo=0.8)])
+    ended = indirect_image(*parts, target=0.0, most_paths=1 << 19, run=Run(threads=1, deadline=CallsLeft(calls)))
+    whole = indirect_image(*parts, target=0.0, most_paths=ended.paths, run=Run(threads=1))
+    assert 0 < ended.paths < 1 << 19 and np.array_equal(ended.radiance, whole.radiance)
