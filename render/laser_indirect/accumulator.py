@@ -258,7 +258,7 @@ def sum_passes(
 
 @numba.njit(nogil=True, cache=True)
 def sum_pixels(  # noqa: PLR0913
-    images: tuple[Float, ...],
+    images: tuple[Float32, ...],
     camera_radiance: tuple[Float32, ...],
     touched: tuple[NDArray[np.bool_], ...],
     total: Float,

@@ -43,7 +43,7 @@ class Connections(NamedTuple):
 class PassBuffer(NamedTuple):
     """What one pass accumulates."""
 
-    image: Float
+    image: Float32
     """(pixels,) radiance."""
     camera_radiance: Float32
     """(pixels,) of it, what techniques that start at the camera can make as well."""

@@ -412,7 +412,7 @@ def empty_buffer(pixels: int) -> PassBuffer:
     """Zeros, without a guide; the system finds memory for the images only where light arrives."""
     zeros = np.zeros(KINDS), np.zeros(FAN_BINS), np.zeros((0, BINS))
     touched = np.zeros(-(-pixels // BLOCK), np.bool_)
-    return PassBuffer(np.zeros(pixels), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)
+    return PassBuffer(np.zeros(pixels, np.float32), np.zeros(pixels, np.float32), *zeros, np.zeros(1), touched)
 
 
 def first_camera_paths(specular: Bool, camera: Camera, count: int) -> Float:

@@ -72,17 +72,17 @@ class Projection:
             pixel, weight.ravel()[pixel].astype(np.float64), line, lit, peaks, np.arange(blocks) * BLOCK // width
         )
 
-    def line_means(self, image: Float) -> Float:
+    def line_means(self, image: Float | Float32) -> Float:
         """(pixels,) -> (lines,) mean over the pixels that each line is measured on; 0: there are none."""
         counts = np.bincount(self.line, minlength=len(self.lit))
         return np.asarray(np.bincount(self.line, image[self.pixel], len(self.lit)) / np.maximum(counts, 1))
 
-    def moves(self, image: Float) -> Float:
+    def moves(self, image: Float32) -> Float:
         """(lines,) how far the light of an image (pixels,) moves each line, over the allowed deviation."""
         moved = self.weight * image[self.pixel]
         return np.bincount(self.line, moved, len(self.lit)).astype(np.float64)
 
-    def rises(self, image: Float, blocks: Int) -> Float:
+    def rises(self, image: Float32, blocks: Int) -> Float:
         """(n, BLOCK / CELL) what (pixels,) adds to each run of pixels of some blocks, over the allowed deviation."""
         return run_sums(image, self.peaks, blocks)
 

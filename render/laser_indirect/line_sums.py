@@ -10,7 +10,7 @@ from render.importance import CELL
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 
 
-def run_sums(image: Float, weight: Float32, blocks: Long) -> Float:
+def run_sums(image: Float32, weight: Float32, blocks: Long) -> Float:
     """An image (pixels,), weights (all blocks, BLOCK) and some blocks (n,) -> (n, BLOCK / CELL) weighted sums of each
     run of pixels."""
     out = np.empty((len(blocks), BLOCK // CELL))
@@ -27,14 +27,14 @@ def mean_image(buffers: list[PassBuffer]) -> Float32:
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def _add_touched(image: Float, touched: Bool, share: float, out: Float32) -> None:
+def _add_touched(image: Float32, touched: Bool, share: float, out: Float32) -> None:
     for block in np.flatnonzero(touched):
         for pixel in range(block * BLOCK, min((block + 1) * BLOCK, image.shape[0])):
             out[pixel] += share * image[pixel]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def _run_sums(image: Float, weight: Float32, blocks: Long, out: Float) -> None:
+def _run_sums(image: Float32, weight: Float32, blocks: Long, out: Float) -> None:
     for i in range(blocks.shape[0]):
         block = blocks[i]
         for j in range(BLOCK // CELL):

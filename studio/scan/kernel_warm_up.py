@@ -277,7 +277,7 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     frame = render_world(world, scene, settings=_few(transport), run=run)
     ones = np.ones((camera.height, camera.width), np.float32)
     everywhere = Importance((ones,), ones, peaks=(ones,))
-    dark = np.zeros(ones.size)
+    dark = np.zeros(ones.size, np.float32)
     Projection.of(everywhere, 0).rises(dark, np.arange(1))
     list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
     return frame
