@@ -6,4 +6,6 @@ from render.base.kernel_cache import keep_kernels
 
 # what OpenCV says of a damaged image on its own is told in a message of ours
 os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+# of every type that an operation does not take numba colours a message that nobody reads
+os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
 keep_kernels()

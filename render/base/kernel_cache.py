@@ -125,6 +125,7 @@ class _Dispatcher(MetaPathFinder):
             def execute_and_change(module: ModuleType) -> None:
                 execute(module)
                 _use_seals(module)
+                _compile_less(module)
 
             spec.loader.exec_module = execute_and_change  # type: ignore[method-assign]
         return spec
@@ -137,3 +138,12 @@ def _use_seals(dispatcher: ModuleType) -> None:
         return cache_of(kernel)
 
     dispatcher.FunctionCache = sealed  # type: ignore[attr-defined]
+
+
+def _compile_less(dispatcher: ModuleType) -> None:
+    """Only before numba derives others from its dispatcher; later kernels are as good, but take longer to compile."""
+    if "render.base.kernel_dispatcher" in sys.modules:  # which somebody imports before numba, and waits for it
+        return
+    from render.base.kernel_dispatcher import KernelDispatcher
+
+    dispatcher.Dispatcher = KernelDispatcher  # type: ignore[attr-defined]
