@@ -17,6 +17,7 @@ from contextlib import suppress
 from functools import cache
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
@@ -27,6 +28,8 @@ KEPT = 2
 UNUSED = 24 * 3600.0
 """Age, s, above which other folders are removed; a program started before the change may still use a younger one."""
 DISPATCHER = "numba.core.dispatcher"
+KNOWN_NUMBA = "0.68."
+"""Versions of numba whose inside `kernel_dispatcher` was made for, and is tested with."""
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 KERNEL = re.compile(rb"^\s*@(?:(?:numba\.)?njit|peak_kernel)\b", re.MULTILINE)
 CONSTANT = re.compile(rb"\b(?:[A-Z][A-Z0-9_]+|Flag)\b")
@@ -141,8 +144,11 @@ def _use_seals(dispatcher: ModuleType) -> None:
 
 
 def _compile_less(dispatcher: ModuleType) -> None:
-    """Only before numba derives others from its dispatcher; later kernels are as good, but take longer to compile."""
+    """Only before numba derives others from its dispatcher, and of the numba whose inside it was made for; else kernels
+    are as good, but take longer to compile."""
     if "render.base.kernel_dispatcher" in sys.modules:  # which somebody imports before numba, and waits for it
+        return
+    if not version("numba").startswith(KNOWN_NUMBA):
         return
     from render.base.kernel_dispatcher import KernelDispatcher
 
