@@ -5,20 +5,16 @@ A wavefront: all rays of a chunk are traced, their vertices connected, and scatt
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float, Int
 from render.base.errors import Cancelled
 from render.base.pose import invert
 from render.base.threads import Cancel
-from render.camera.distortion import tilt_matrix
-from render.camera.lens import chief_ray, lens_direction, lens_position
 from render.camera.view import View
 from render.laser.laser import LineLaser
 from render.laser_indirect.chain_connections import empty_walks, splat_walks, walk_to_camera
@@ -32,7 +28,6 @@ from render.laser_indirect.connections import (
     init_camera_mis,
     init_light_mis,
     mark_reachable,
-    path_lens_point,
 )
 from render.laser_indirect.guiding import DrawnPaths, Guide, any_specular, draw_camera_paths
 from render.laser_indirect.path_vertex import (
@@ -49,6 +44,7 @@ from render.laser_indirect.path_vertex import (
 )
 from render.laser_indirect.photon_emission import FanDistribution, Photons, emit
 from render.laser_indirect.photon_merging import RADIUS_EXPONENT, PhotonMap, merge, photon_map
+from render.laser_indirect.pixel_rays import pixel_rays
 from render.laser_indirect.random_walk import random_walk_step
 from render.laser_indirect.ris import LightVertices, connect_by_ris
 from render.laser_indirect.specular_chains import ChainIndex, mark_listed, seen_chains
@@ -69,8 +65,6 @@ CANDIDATES, LATER_CANDIDATES = 8, 2
 """Light vertices of the first surface weighed against each other, at the camera's first surface and those after it."""
 CAMERA_SEED = 0x5DEECE66D
 """Parts the random numbers of camera paths from those of light paths."""
-MOST_OF_A_KEY = 1 << 16
-"""More than the camera paths that a pixel may have in a pass."""
 NO_KEYS: Int = np.zeros(0, np.int32)
 KINDS = 5
 """Sums of a pass: of each combination of the bits CAUSTIC and SUBSURFACE_LIGHT, and of SPECULAR_CHAIN by itself."""
@@ -353,40 +347,6 @@ class BdptPass:
 
     def _laser(self, sampling: Sampling) -> LaserSampling:
         return LaserSampling(invert(self.T_world_laser), self.laser.packed(), sampling.fan)
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
-def pixel_rays(
-    sampling: CameraSampling, drawn: DrawnPaths, seed: int, origin: Float, direction: Float, paths: Records
-) -> None:
-    """Camera paths for some pixels, spread over each pixel's area, with random numbers by their number or key."""
-    pixels, keys, starts = drawn
-    view = sampling.camera
-    tilt = tilt_matrix(view.distortion[12], view.distortion[13])
-    distorted = bool(np.any(view.distortion))
-    r = 0
-    for n in range(pixels.shape[0]):
-        pixel = pixels[n]
-        column, row = pixel % view.width, pixel // view.width
-        alike = keys.shape[0] > 0
-        key = keys[n] if alike else pixel
-        u0, v0 = uniform(seed, key, 0, 90), uniform(seed, key, 0, 91)
-        count, expected = starts[n + 1] - starts[n], sampling.camera_paths[pixel]
-        # where every pass has one, their number need not be known beforehand
-        throughput = 1.0 / count if expected >= 1.0 else 1.0 / expected
-        for sample in range(count):
-            u = column - 0.5 + (u0 + sample * 0.7548776662466927) % 1.0
-            v = row - 0.5 + (v0 + sample * 0.5698402909980532) % 1.0
-            x, y, ok = chief_ray(view, tilt, distorted, u, v)
-            index = key * MOST_OF_A_KEY + sample if alike else starts[n] + sample
-            a, b = path_lens_point(view, seed, index)
-            origin[r, 0], origin[r, 1], origin[r, 2] = lens_position(view, a, b)
-            d0, d1, d2 = lens_direction(view, x, y, a, b)
-            length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2) if ok else math.inf
-            direction[r, 0], direction[r, 1], direction[r, 2] = d0 / length, d1 / length, d2 / length
-            path = paths[r]
-            path.throughput, path.index, path.pixel = throughput, index, pixel
-            r += 1
 
 
 def _begun(count: int, interior: int) -> Records:

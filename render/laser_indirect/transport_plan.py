@@ -11,9 +11,9 @@ import numpy as np
 
 from render.base.arrays import Float32
 from render.importance import Importance
-from render.laser_indirect.integrator import indirect_pilot
 from render.laser_indirect.line_goal import Projection
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
+from render.laser_indirect.pilot import indirect_pilot
 from render.light_group import Shares
 from render.plan import GroupPlan, TransportStep
 from render.run import Run
@@ -34,7 +34,7 @@ class LightKind:
 
     @property
     def field(self) -> str:
-        """Field of `render.laser_indirect.integrator.IndirectPilot`."""
+        """Field of `render.laser_indirect.pilot.IndirectPilot`."""
         return self.name.replace("-", "_")
 
 

@@ -268,7 +268,9 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     """By next to no paths of every kind, for the image; and its ambient light for what is measured as well."""
     from render.ambient.measured_light import LEAST_SAMPLES, measured_images
     from render.importance import Importance
+    from render.laser_indirect.integrator import empty_buffer
     from render.laser_indirect.line_goal import Projection
+    from render.laser_indirect.line_sums import mean_image
     from render.render import render_world
     from render.world.placed import PlacedScene
     from render.world.world import build_world
@@ -277,8 +279,7 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     frame = render_world(world, scene, settings=_few(transport), run=run)
     ones = np.ones((camera.height, camera.width), np.float32)
     everywhere = Importance((ones,), ones, peaks=(ones,))
-    dark = np.zeros(ones.size, np.float32)
-    Projection.of(everywhere, 0).rises(dark, np.arange(1))
+    Projection.of(everywhere, 0).rises(mean_image([empty_buffer(ones.size)]), np.arange(1))
     list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
     return frame
 

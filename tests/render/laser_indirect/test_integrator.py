@@ -9,7 +9,7 @@ from render.laser.laser import Divergence, LineLaser
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.bdpt_pass import BdptPass, Sampling
 from render.laser_indirect.guiding import no_guide
-from render.laser_indirect.integrator import empty_buffer, indirect_image, indirect_pilot
+from render.laser_indirect.integrator import empty_buffer, indirect_image
 from render.laser_indirect.light_group import IndirectLight
 from render.laser_indirect.photon_emission import (
     fan_integral,
@@ -18,6 +18,7 @@ from render.laser_indirect.photon_emission import (
     uniform_fan,
     visible_fan_range,
 )
+from render.laser_indirect.pilot import indirect_pilot
 from render.light_group import chosen_plan
 from render.material.material import Coated, Conductor, Glass, Lambertian, Subsurface
 from render.mesh.mesh import Mesh

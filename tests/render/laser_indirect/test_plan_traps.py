@@ -14,8 +14,9 @@ from scipy.stats import t as student
 
 from render.laser_direct.integrator import direct_image
 from render.laser_indirect.guiding import find_specular_pixels
-from render.laser_indirect.integrator import indirect_image, indirect_pilot
+from render.laser_indirect.integrator import indirect_image
 from render.laser_indirect.path_vertex import CAUSTIC, INTERREFLECTION, SPECULAR_CHAIN, SUBSURFACE_LIGHT
+from render.laser_indirect.pilot import indirect_pilot
 from render.laser_indirect.transport_plan import pilot_shares, plan_of
 from render.material.material import Conductor, Glass, Lambertian, Subsurface
 from render.mesh.primitives import primitive_mesh

@@ -15,7 +15,8 @@ from render.base.pose import Pose
 from render.base.vectors import store, vector
 from render.laser.laser import Divergence
 from render.laser_direct.integrator import direct_image
-from render.laser_indirect.integrator import indirect_image, indirect_pilot
+from render.laser_indirect.integrator import indirect_image
+from render.laser_indirect.pilot import indirect_pilot
 from render.material import bsdf
 from render.material.material import (
     BumpMap,
