@@ -21,12 +21,12 @@ from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
 from studio.scan.depth_noise import foreseen_noise, noise_records, reached_noise
 from studio.scan.frame_writer import FrameWriter
+from studio.scan.frames_ahead import rendered_frames
 from studio.scan.gauging import measures_record
 from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
 from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.render_goal import goal_of
-from studio.scan.resume import frame_of_step
 from studio.scan.run_record import ended_by_clock, run_text
 from studio.scan.stages import Clock, Measurement, develop_step, scaled, step_world, validated
 from studio.scan.summary import profile_rate, summarise
@@ -175,16 +175,15 @@ def _check_options(options: ScanOptions) -> None:
 
 def _take_frames(scan: Scan, first: World, count: int, written: Written, measuring: Measuring | None) -> None:
     """Render, write and measure one frame after the other; `first`: the world of step 0."""
-    scan, world = replace(scan, plan=_plan(scan, first)), first
-    with FrameWriter(scan) as writer:
-        for step in scan.clock.frames(count):
-            world = world if step == 0 else step_world(scan.project, scan.begun.root, step, world)
-            frame, state = frame_of_step(scan, world, step)
-            written.add(frame)
-            images = develop_step(scan.project, frame, scan.clock, scan.options.threads)
-            writer.add(frame, state, images)
+    scan = replace(scan, plan=_plan(scan, first))
+    with FrameWriter(scan) as writer, closing(rendered_frames(scan, first, count)) as frames:
+        for _ in scan.clock.frames(count):
+            found = next(frames)
+            written.add(found.frame)
+            images = develop_step(scan.project, found.frame, scan.clock, scan.options.threads)
+            writer.add(found.frame, found.state, images)
             if measuring is not None:
-                measuring.add(frame, world, images)
+                measuring.add(found.frame, found.world, images)
         writer.finish()
     if measuring is not None:
         measuring.finish()

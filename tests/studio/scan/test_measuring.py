@@ -22,7 +22,7 @@ from render.world.world import build_world
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.runtime.console import frame_of
-from studio.scan import scan
+from studio.scan import frames_ahead
 from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan import run_scan
 from studio.scan.scan_folder import open_folder
@@ -53,7 +53,7 @@ def rendered_once(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
         warnings.warn("every frame says the same", UserWarning, stacklevel=1)
         return replace(frame, step=step, warnings=(f"doubtful, by {step} %",)), RenderState({})
 
-    monkeypatch.setattr(scan, "frame_of_step", again)
+    monkeypatch.setattr(frames_ahead, "frame_of_step", again)
 
 
 def test_nothing_held_grows_with_the_frames_but_a_few_numbers(
@@ -62,7 +62,7 @@ def test_nothing_held_grows_with_the_frames_but_a_few_numbers(
     """By tracemalloc at two frames of the same scan, well after the sample is full; one frame's points are 100 kB."""
     monkeypatch.setattr("studio.scan.measuring.ScanRecord", partial(ScanRecord, most_lines=512))
     monkeypatch.setattr("analysis.spool.IN_MEMORY", 1)
-    take, held = scan.frame_of_step, []
+    take, held = frames_ahead.frame_of_step, []
 
     def traced(*args, **options):
         if not tracemalloc.is_tracing():
@@ -74,7 +74,7 @@ def test_nothing_held_grows_with_the_frames_but_a_few_numbers(
             gc.collect()
             held.append(tracemalloc.get_traced_memory()[0])
 
-    monkeypatch.setattr(scan, "frame_of_step", traced)
+    monkeypatch.setattr(frames_ahead, "frame_of_step", traced)
     try:
         done = run_scan(
             project,
