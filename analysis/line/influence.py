@@ -309,8 +309,9 @@ def _profile(distance: Float, width: Float, integrated: bool) -> tuple[Float, Fl
 def _scatter(image: Float32, rows: Int, first: Int, weight: Float) -> None:
     """Add weights (n, m) from pixel `first` (n,) on to rows (n,) of an image."""
     x = first[:, None] + np.arange(weight.shape[1])
-    inside = (x >= 0) & (x < image.shape[1])
-    np.add.at(image, (np.broadcast_to(rows[:, None], x.shape)[inside], x[inside]), weight[inside].astype(np.float32))
+    # a scan line is there once, so that none of its pixels is added to twice
+    n, k = np.nonzero((x >= 0) & (x < image.shape[1]) & (weight != 0.0))
+    image[rows[n], x[n, k]] += weight[n, k].astype(np.float32)
 
 
 def _of_nearest(u: Float, rows: Int, tried_u: Float, tried: Int, first: Int, weight: Float) -> tuple[Int, Float]:

@@ -81,8 +81,9 @@ def importance(project: Project, goal: DepthGoal, frame: Frame, threads: int | N
     lasers, peaks, moves = [], [], []
     ambient: Float32 = np.zeros(illumination.shape, np.float32)
     for i, laser in enumerate(scene.lasers):
-        # zero but about the line: the system finds memory only for what is written
-        peak, weight, move = np.empty_like(ambient), np.zeros_like(ambient), np.zeros_like(ambient)
+        peak = np.empty_like(ambient)
+        # zero but about the line: the system finds memory only for what is written, which `zeros_like` is
+        weight, move = (np.zeros(ambient.shape, np.float32) for _ in range(2))
         response = joule * laser_response(sensor, laser.wavelength_nm)
         if rows:
             out = Weights(weight, peak, ambient, move, illumination, response, bands)
@@ -121,13 +122,13 @@ def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, 
     electrons = _electrons(project, frame, laser, threads)
     image = _expected_image(project, electrons, threads)
     line = extract_line(project, image, laser, threads)
-    deviation = DECISION * goal.depth * np.sqrt(np.maximum(electrons + noise_model(image, project, laser).floor, 1e-2))
+    floor = noise_model(image, project, laser).floor
     found = np.zeros(len(line.valid), np.bool_)
     for pair in range(PAIRS):
-        noise = _noise(deviation, (project.seed, laser, pair), threads)
+        noise = _noise(electrons, floor, DECISION * goal.depth, (project.seed, laser, pair), threads)
         one, other = (
-            extract_line(project, _expected_image(project, light, threads), laser, threads)
-            for light in (electrons + noise, electrons - noise)
+            extract_line(project, _expected_image(project, electrons, threads, light), laser, threads)
+            for light in ((1.0, noise), (-1.0, noise))
         )
         bent = np.abs(one.u + other.u - 2.0 * line.u) > JUMP * goal.depth * line.sigma_u
         changed = (one.valid != line.valid) | (other.valid != line.valid)
@@ -135,13 +136,16 @@ def undecided_rows(project: Project, goal: DepthGoal, frame: Frame, laser: int, 
     return int(found.sum())
 
 
-def _noise(deviation: Float32, seed: tuple[int, ...], threads: int | None) -> Float32:
-    """Deviations (h, w) -> normal noise."""
-    noise = np.empty_like(deviation)
+def _noise(electrons: Float32, floor: float, share: float, seed: tuple[int, ...], threads: int | None) -> Float32:
+    """(h, w) normal noise, a share of that of electrons (h, w) and the floor, e-^2, beneath them."""
+    noise = np.empty_like(electrons)
 
     def work(start: int, stop: int) -> None:
         np.random.default_rng((*seed, start)).standard_normal(out=noise[start:stop], dtype=np.float32)
-        noise[start:stop] *= deviation[start:stop]
+        counted = electrons[start:stop] + np.float32(floor)
+        noise[start:stop] *= np.float32(share) * np.sqrt(
+            np.maximum(counted, np.float32(1e-2), out=counted), out=counted
+        )
 
     map_chunks(work, len(noise), ROWS, threads)
     return noise
@@ -219,8 +223,10 @@ def _electrons(project: Project, frame: Frame, laser: int, threads: int | None) 
     return expected_electrons(frame, project.scene, project.sensor, threads=threads, laser_power=powers)
 
 
-def _expected_image(project: Project, electrons: Float32, threads: int | None = None) -> Image:
-    """The image of mean electrons (h, w), not quantised."""
+def _expected_image(
+    project: Project, electrons: Float32, threads: int | None = None, more: tuple[float, Float32] | None = None
+) -> Image:
+    """The image of mean electrons (h, w), not quantised; more: how often others (h, w) are added."""
     sensor = project.sensor
     top, gain = float(2**sensor.bits - 1), sensor.dn_per_electron
     saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
@@ -229,6 +235,8 @@ def _expected_image(project: Project, electrons: Float32, threads: int | None = 
     def work(start: int, stop: int) -> None:
         out = numbers[start:stop]
         np.multiply(electrons[start:stop], np.float32(gain), out=out)
+        if more is not None:
+            out += np.float32(gain * more[0]) * more[1][start:stop]
         out += np.float32(sensor.black_level)
         np.minimum(out, np.float32(saturation), out=out)
 
