@@ -5,13 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+import numpy as np
+
 from render.base.arrays import Float, Float32, Int
 from render.base.counts import Counts
 from render.base.finite import check_finite
+from render.base.threads import map_chunks
 from render.importance import Importance
 from render.plan import GroupQuality, Plan
 
 Axis = Literal["rows", "columns"]
+ROWS = 64
+"""Rows of an image that a thread does at a time."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,15 @@ class Frame:
     def laser(self, index: int) -> Float32:
         """(h, w) radiance of one laser's group: direct and indirect."""
         direct = self.laser_direct[index]
-        return direct + self.laser_indirect[index] if self.laser_indirect else direct
+        if not self.laser_indirect:
+            return direct
+        both, reflected = np.empty_like(direct), self.laser_indirect[index]
+
+        def work(start: int, stop: int) -> None:
+            np.add(direct[start:stop], reflected[start:stop], out=both[start:stop])
+
+        map_chunks(work, len(direct), ROWS)
+        return both
 
     def quality_of(self, group: str, laser: str | None = None) -> GroupQuality | None:
         """How well a light group is known, of the laser of that name; None: it has not begun."""
@@ -137,12 +150,22 @@ class Frame:
             quality=(*(one for one in before.quality if one.group not in begun), *self.quality),
         )
 
-    def check(self) -> None:
-        """InputError: the light or the exact lines hold a number that is none. Truth has NaN where nothing is hit."""
-        for radiance in (*self.laser_direct, *self.laser_indirect, *([] if self.ambient is None else [self.ambient])):
-            check_finite("render", radiances=radiance)
-        for curve in self.curves:
+    def check(self, known: Frame | None = None) -> None:
+        """InputError: the light or the exact lines hold a number that is none. Truth has NaN where nothing is hit.
+
+        known: a frame that was checked; what it has too is not looked at again.
+        """
+        checked = set() if known is None else {id(image) for image in known.light}
+        for radiance in self.light:
+            if id(radiance) not in checked:
+                check_finite("render", radiances=radiance)
+        for curve in self.curves if known is None or known.curves is not self.curves else ():
             check_finite("render", line_positions=curve.position, points_of_the_line=curve.point)
+
+    @property
+    def light(self) -> tuple[Float32, ...]:
+        """The images of all light groups so far."""
+        return (*self.laser_direct, *self.laser_indirect, *(() if self.ambient is None else (self.ambient,)))
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from render.base.arrays import Float, Float32
+from render.base.arrays import Float, Float32, Int
 
 
 @dataclass(frozen=True)
@@ -41,14 +41,16 @@ class Importance:
     direct: float = 1.0
     """The share that direct light has, likewise over the line's own sigma."""
 
-    def line_deviations(self, laser: int, deviation: Float32) -> Float:
-        """(h, w) standard deviations of independent pixels of a laser's light -> (lines,) those of the lines that it
-        moves, over their own sigma."""
+    def line_deviations(self, laser: int, pixels: Int, deviation: Float) -> Float:
+        """Standard deviations (n,) of independent pixels of a laser's light, by their flat index (n,) -> (lines,) those
+        of the lines that it moves, over their own sigma."""
         weight = self.laser[laser]
-        row, column = np.nonzero(weight)
-        line = row if self.axis == "rows" else column
-        variance = np.bincount(line, np.square(weight[row, column] * deviation[row, column], dtype=np.float64))
-        return np.asarray(self.allowed * np.sqrt(variance[np.bincount(line) > 0]))
+        height, width = weight.shape
+        rows = self.axis == "rows"
+        measured = np.any(weight, axis=1 if rows else 0)
+        moved = np.square(weight.ravel()[pixels] * deviation, dtype=np.float64)
+        variance = np.bincount(pixels // width if rows else pixels % width, moved, height if rows else width)
+        return np.asarray(self.allowed * np.sqrt(variance[measured]))
 
 
 LINES_KNOWN = 0.95

@@ -110,7 +110,7 @@ def frames(
             frame = replace(frame, plan=frame.plan.with_steps(product.group, chosen.steps))
             for estimate in product.estimates(placed, settings, chosen, replace(seen, plan=frame.plan), part):
                 frame = frame.with_estimate(product.field, estimate)
-                frame.check()
+                frame.check(shown)
                 counts = {RAYS: float(rays.rays - ray_start), EMBREE_SECONDS: rays.seconds - embree_start}
                 shown = frame = replace(frame, seconds=clock.so_far(), counts=counts)
                 with clock.shown():

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from render.ambient.coarse_image import CoarseImage, coarse_image
+from render.ambient.coarse_image import TILE, CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
 from render.ambient.line_samples import PILOT, Band, band_of, sample_band
 from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
-from render.base.arrays import Float
+from render.base.arrays import Float, Float32
+from render.base.threads import map_chunks
 from render.importance import Importance, known_below
 from render.run import Run
 from render.world.placed import PlacedScene
@@ -65,6 +66,17 @@ def measured_images(
     yield _image(coarse, film, band, deviations)
 
 
+def _copied(radiance: Float32) -> Float32:
+    """(h, w, 3) of the first image, which whoever shows it still holds."""
+    copy = np.empty_like(radiance)
+
+    def work(start: int, stop: int) -> None:
+        copy[start:stop] = radiance[start:stop]
+
+    map_chunks(work, len(copy), TILE)
+    return copy
+
+
 def seen_from(placed: PlacedScene, *settings: object) -> tuple[object, ...]:
     """All that the ambient light depends on besides the world, with the settings of its render: not the lasers."""
     scene = placed.scene
@@ -77,8 +89,7 @@ def _image(coarse: CoarseImage, film: PixelSamples, band: Band, deviations: Floa
     lines: int | None = None
     unknown: int | None = None
     if deviations is not None:
-        # whoever shows the first image still holds it
-        radiance = radiance.copy()
+        radiance = _copied(radiance)
         radiance.reshape(-1, 3)[band.pixels] = film.means().mean(axis=1)
         error, lines, unknown = known_below(deviations), len(deviations), int(np.sum(deviations > 1.0))
     return AmbientImage(

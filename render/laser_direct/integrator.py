@@ -88,11 +88,11 @@ class DirectImage:
     standard_error: Float
     """(n,) estimated, of those, W/(m^2 sr)."""
 
-    def deviation(self) -> Float32:
-        """(h, w) estimated standard error of each pixel, W/(m^2 sr)."""
-        image = np.zeros(self.radiance.size, np.float32)
-        write_pixels(self.reached, self.standard_error, image)
-        return image.reshape(self.radiance.shape)
+    @property
+    def known_error(self) -> Float:
+        """(n,) `standard_error`, 0 of the pixels that are invalid."""
+        known = (self.standard_error >= 0.0) & np.isfinite(self.standard_error)
+        return np.where(known, self.standard_error, 0.0)
 
 
 def direct_image(

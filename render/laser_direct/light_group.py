@@ -92,7 +92,7 @@ def known_lines(placed: PlacedLaser, target: float, importance: Importance, lase
 
 def line_deviation(image: DirectImage, importance: Importance, laser: int) -> float:
     """By how much the error of the image moves `LINES_KNOWN` of the lines at most, over their own sigma."""
-    return known_below(importance.line_deviations(laser, image.deviation()))
+    return known_below(importance.line_deviations(laser, image.reached, image.known_error))
 
 
 def quality_of(
@@ -102,7 +102,9 @@ def quality_of(
 
     importance: where errors of the light of laser number `index` matter, once the line is the goal.
     """
-    deviations = np.zeros(0) if importance is None else importance.line_deviations(index, image.deviation())
+    deviations = (
+        np.zeros(0) if importance is None else importance.line_deviations(index, image.reached, image.known_error)
+    )
     return GroupQuality(
         "direct",
         laser,

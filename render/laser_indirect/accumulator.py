@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.arrays import Float, Float32
+from render.base.nonzero import nonzero_places
 from render.base.threads import map_chunks
 from render.importance import Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
@@ -25,10 +26,11 @@ from render.laser_indirect.line_goal import LineErrors
 from render.laser_indirect.line_paths import PathDemand
 from render.laser_indirect.photon_emission import FanDistribution
 
-PASSES_A_WAVE = 4
-"""Whatever the number of threads."""
-MOST_PASS = 1 << 15
-MOST_CAMERA_PASS = 1 << 18
+PASSES_A_WAVE = 8
+"""Whatever the number of threads. With fewer, a wave says so little of its own variance that a goal which is to be
+reached with confidence takes several times the paths."""
+MOST_PASS = 1 << 14
+MOST_CAMERA_PASS = 1 << 17
 """Most paths of a pass: a cancelled render loses at most one wave."""
 MOST_DOUBLINGS = 2
 """Times that light paths are doubled where camera paths can reach nothing, and would be idle."""
@@ -164,7 +166,7 @@ class Accumulator:
             math.sqrt(self.variance_sum / max(self.squares - self.variance_sum, 1e-300)) if self.squares > 0.0 else 0.0
         )
         self.guide = update_guide(self.guide, wave_moments, self.guide_moments, threads)
-        self.allocate(self.passes / growth)
+        self.guide_camera(self.camera_radiance, self.passes / growth)
         self.consistent = True
 
     def learn(self, variance: tuple[Float, Float32], size: float) -> None:
@@ -175,7 +177,7 @@ class Accumulator:
 
     def aim_at(self, importance: Importance | None, laser: int) -> None:
         """Know where errors matter from now on, if it was not known or is another; None: everywhere alike."""
-        aimed = "" if importance is None else hashlib.sha256(importance.laser[laser].tobytes()).hexdigest()
+        aimed = "" if importance is None else _digest(importance.laser[laser])
         if importance is None:
             self.line = None
         elif self.line is None or self.aimed not in ("", aimed):
@@ -186,12 +188,14 @@ class Accumulator:
             self.line.all_waves = PASSES_A_WAVE * sum(weights)
         self.aimed = aimed
 
-    def allocate(self, drawn: float) -> None:
-        """Allocate the next wave's camera paths, where each pixel has had `drawn` times its `camera_paths` so far."""
-        allocate_camera_paths(self.camera_radiance, self.guide.width, self.next_camera_paths, self.camera_paths, drawn)
-        if self.line is not None and not self.line.out_of_reach:
-            projection, count = self.line.projection, self.next_camera_paths
-            self.demand.aim(self.camera_paths, projection, self.guide.width, count)
+    def guide_camera(self, radiance: Float32, drawn: float) -> None:
+        """Allocate the next wave's camera paths by radiance (pixels,) that techniques which start at the camera can
+        make, where each pixel has had `drawn` times its `camera_paths` so far."""
+        line = None if self.line is None or self.line.out_of_reach else self.line
+        width, count = self.guide.width, self.next_camera_paths
+        allocate_camera_paths(radiance, width, count if line is None else None, self.camera_paths, drawn)
+        if line is not None:
+            self.demand.aim(self.camera_paths, line.projection, width, count)
         reserve_for_specular(self.camera_paths, self.specular, self.next_camera_paths)
 
     def radiance(self, shape: tuple[int, int]) -> Float32:
@@ -232,6 +236,12 @@ class Accumulator:
         demand = PathDemand(arrays["demand_lines"], arrays["demand_blocks"], float(arrays["demand_size"].item()))
         aimed = str(arrays["aimed"].item())
         return cls(**numbers, **images, fan=fan, guide=guide, line=line, demand=demand, aimed=aimed)
+
+
+def _digest(weight: Float32) -> str:
+    """Of weights (h, w), most of which are zero."""
+    pixel = nonzero_places(weight)
+    return hashlib.sha256(pixel.tobytes() + weight.ravel()[pixel].tobytes()).hexdigest()
 
 
 def sum_passes(
@@ -306,3 +316,45 @@ def sum_pixels(  # noqa: PLR0913
                 if passes > 1:
                     variance_sum += max(passes * second - first * first, 0.0) / (passes - 1)
     return light, by_camera, squares, variance_sum, clamped, clamped_radiance
+
+
+def sum_looks(buffers: list[PassBuffer], camera_radiance: Float32) -> tuple[float, float]:
+    """Radiance of passes, and what of it techniques that start at the camera can make, which is also added to
+    `camera_radiance` (pixels,); the passes' images are zeroed."""
+    images, parts = tuple(buffer.image for buffer in buffers), tuple(buffer.camera_radiance for buffer in buffers)
+    touched = tuple(buffer.touched for buffer in buffers)
+    sums = np.zeros((-(-len(camera_radiance) // PIXELS_A_CHUNK), 2))
+
+    def work(start: int, stop: int) -> None:
+        sums[start // PIXELS_A_CHUNK] = sum_look_pixels(images, parts, touched, camera_radiance, start, stop)
+
+    map_chunks(work, len(camera_radiance), PIXELS_A_CHUNK)
+    light, by_camera = sums.sum(axis=0).tolist()
+    return light, by_camera
+
+
+@numba.njit(nogil=True, cache=True)
+def sum_look_pixels(
+    images: tuple[Float32, ...],
+    camera_radiance: tuple[Float32, ...],
+    touched: tuple[NDArray[np.bool_], ...],
+    total_camera_radiance: Float32,
+    start: int,
+    stop: int,
+) -> tuple[float, float]:
+    """Pixels [start, stop) of `sum_looks`."""
+    light = by_camera = 0.0
+    for k in range(len(images)):
+        for block in range(start // BLOCK, (stop + BLOCK - 1) // BLOCK):
+            if not touched[k][block]:
+                continue
+            touched[k][block] = False
+            for j in range(block * BLOCK, min((block + 1) * BLOCK, stop)):
+                if images[k][j] != 0.0:
+                    light += images[k][j]
+                    images[k][j] = 0.0
+                if camera_radiance[k][j] != 0.0:
+                    by_camera += camera_radiance[k][j]
+                    total_camera_radiance[j] += camera_radiance[k][j]
+                    camera_radiance[k][j] = 0.0
+    return light, by_camera

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, uniform_filter
 
 from render.base.arrays import Bool, Float, Float32, Int
+from render.base.nonzero import nonzero_places
 from render.base.threads import Cancel, map_chunks
 from render.camera.camera import Camera
 from render.laser_indirect.specular_edges import find_edges
@@ -78,7 +79,7 @@ class DrawnPaths(NamedTuple):
 def allocate_camera_paths(
     image: Float32,
     width: int,
-    count: float,
+    count: float | None,
     camera_paths: Float | None = None,
     drawn: float = 0.0,
     threads: int | None = None,
@@ -87,8 +88,8 @@ def allocate_camera_paths(
     """(pixels,) radiance so far -> expected camera paths of each pixel, about `count` in all; into `camera_paths`.
 
     In proportion to a pixel's radiance as its own paths so far know it, `drawn` times `camera_paths`, and before there
-    are any as its neighbourhood does. More than one path a pass only lessens the variance within the pixel, and is
-    given less. Raises Cancelled.
+    are any as its neighbourhood does; without a count that radiance itself. More than one path a pass only lessens the
+    variance within the pixel, and is given less. Raises Cancelled.
     """
     if camera_paths is None:
         camera_paths = np.zeros(len(image))
@@ -96,7 +97,7 @@ def allocate_camera_paths(
     sums = np.zeros(len(cells))
     map_chunks(partial(sum_cells, image, width, cells, sums), len(cells), CELL_ROWS, threads, cancelled)
     total = float(sums.sum())
-    if total <= 0.0 or count <= 0.0:
+    if total <= 0.0 or (count is not None and count <= 0.0):
         camera_paths[:] = 0.0
         return camera_paths
     about = np.zeros_like(cells)
@@ -104,13 +105,14 @@ def allocate_camera_paths(
         about += uniform_filter(cells, window, mode="constant") * np.float32(share / COARSE**2)
     work = partial(predict_radiance, image, width, about, drawn, LEAST * total, camera_paths)
     map_chunks(work, len(cells), CELL_ROWS, threads, cancelled)
-    scale(camera_paths, active_pixels(camera_paths), count, threads)
+    if count is not None:
+        scale(camera_paths, active_pixels(camera_paths), count, threads)
     return camera_paths
 
 
 def active_pixels(camera_paths: Float) -> Int:
     """(n,) the pixels that may have camera paths, in order."""
-    return np.flatnonzero(camera_paths).astype(np.int32)
+    return nonzero_places(camera_paths)
 
 
 @numba.njit(nogil=True, cache=True)

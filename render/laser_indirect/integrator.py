@@ -18,11 +18,12 @@ import numpy as np
 
 from render.base.arrays import Bool, Float, Float32
 from render.base.errors import Cancelled
+from render.base.nonzero import nonzero_places
 from render.base.threads import Cancel, map_chunks, thread_count
 from render.camera.camera import Camera
 from render.importance import Importance
 from render.laser.laser import LineLaser
-from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, PASSES_A_WAVE, Accumulator, sum_passes
+from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, PASSES_A_WAVE, Accumulator, sum_looks
 from render.laser_indirect.bdpt_pass import KINDS, NO_KEYS, BdptPass, Sampling
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
@@ -44,10 +45,11 @@ from render.run import Run
 from render.world.placed import PlacedLaser
 from render.world.world import World
 
-LEAST_PASS = 1 << 12
-"""Light paths in a pass of the first wave: at least, more in a large image; and half of its camera paths."""
-LOOK_PATHS = 1 << 11
-"""Light paths in a pass of a first look, which only guides. Chosen, not tuned."""
+LEAST_PASS, LINE_PASS = 1 << 11, 1 << 9
+"""Light paths in a pass of the first wave: at least, more in a large image; and half of its camera paths. Where the
+line is the goal, whose needs do not grow with the image."""
+LOOK_PATHS, LINE_LOOK = 1 << 10, 1 << 9
+"""Light paths in a pass of a first look, which only guides; where the line is the goal. Chosen, not tuned."""
 LOOKS = 3
 """First looks at most, before whose passes those of the waves are not numbered."""
 
@@ -208,19 +210,19 @@ class Waves:
         The first finds, by light, where it arrives at all (what is behind glass only the camera finds), the second,
         from there, which light matters, and a third, where the line is the goal, how many paths each scan line needs.
         """
-        task, camera = self.task, self.camera
+        task, camera, look_paths = self.task, self.camera, LOOK_PATHS if aim is None else LINE_LOOK
         specular = seen_specular(task, placed.world, camera, placed.T_world_camera)
         behind = specular if task.specular else None
-        camera_paths = first_camera_paths(specular, camera, 8 * LOOK_PATHS)
-        first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
+        camera_paths = first_camera_paths(specular, camera, 16 * look_paths)
+        first_look = Sampling(look_paths, fan, camera_paths, active_pixels(camera_paths), no_guide(camera))
         self.trace(0, first_look, behind)
         found = initialise_guiding(self.buffers, fan, camera, kinds, specular, aimed=aim is not None)
         wave_moments = attach_wave_moments(self.buffers, found)
-        self.trace(PASSES_A_WAVE, sampling_of(found, LOOK_PATHS), behind)
+        self.trace(PASSES_A_WAVE, sampling_of(found, look_paths), behind)
         if aim is not None:
             found.aim_at(aim.importance, aim.laser)
             assert found.line is not None
-            found.learn(found.line.spread(self.buffers), LOOK_PATHS / found.size)
+            found.learn(found.line.spread(self.buffers), look_paths / found.size)
         refine_guiding(found, self.buffers, wave_moments, camera)
         if aim is not None and found.line is not None:
             self.trace(2 * PASSES_A_WAVE, sampling_of(found, found.next_paths), behind)
@@ -234,17 +236,16 @@ def initialise_guiding(
     buffers: list[PassBuffer], fan: FanDistribution, camera: Camera, kinds: int, specular: Bool, *, aimed: bool
 ) -> Accumulator:
     """An empty accumulator, guided by a first look, whose buffers are zeroed; aimed: the line is the goal."""
-    pixels = camera.width * camera.height
+    pixels, look_paths = camera.width * camera.height, LINE_LOOK if aimed else LOOK_PATHS
     fan = guided_fan(fan, np.sum([buffer.fan_moments for buffer in buffers], axis=0))
     share, camera_radiance = camera_reachable_share(buffers)
-    camera_paths = allocate_camera_paths(
-        camera_radiance, camera.width, LOOK_PATHS * share, arrived_paths(camera_radiance), 1.0
-    )
-    reserve_for_specular(camera_paths, specular, LOOK_PATHS)
+    # where the line is the goal this is only asked for its surroundings, which the next look is to find
+    arrived = None if aimed else arrived_paths(camera_radiance)
+    camera_paths = allocate_camera_paths(camera_radiance, camera.width, look_paths * share, arrived, 1.0)
+    reserve_for_specular(camera_paths, specular, look_paths)
     guide = first_guide(camera_paths, camera)
     guide_moments = np.zeros((len(guide.cumulative), BINS))
-    # what a line needs does not grow with the image
-    size = LEAST_PASS if aimed else min(max(1 << max((pixels >> 8).bit_length() - 1, 0), LEAST_PASS), MOST_PASS)
+    size = LINE_PASS if aimed else min(max(1 << max((pixels >> 9).bit_length() - 1, 0), LEAST_PASS), MOST_PASS)
     sums = np.zeros(pixels), np.zeros(pixels, np.float32)
     return Accumulator(kinds, fan, size, 1, share, specular, camera_paths, guide, guide_moments, *sums)
 
@@ -258,17 +259,15 @@ def refine_guiding(first: Accumulator, buffers: list[PassBuffer], wave_moments: 
         first.camera_radiance[:] = camera_radiance
     # a wide glow is best known by passes with a path for each of its pixels
     first.growth_limit = max((MOST_CAMERA_PASS // 2 if first.camera_share > 0.5 else MOST_PASS) // first.size, 1)
-    allocate_camera_paths(
-        camera_radiance, camera.width, first.next_camera_paths, first.camera_paths, float(PASSES_A_WAVE)
-    )
-    if first.line is not None:
-        first.demand.aim(first.camera_paths, first.line.projection, camera.width, first.next_camera_paths)
-    reserve_for_specular(first.camera_paths, first.specular, first.next_camera_paths)
+    first.guide_camera(camera_radiance, float(PASSES_A_WAVE))
 
 
 def arrived_paths(camera_radiance: Float32) -> Float:
     """(pixels,) roughly how many light paths of a first look came to each."""
-    return camera_radiance.astype(np.float64) * (PASSES_A_WAVE * LOOK_PATHS / max(float(camera_radiance.sum()), 1e-300))
+    paths, arrived = np.zeros(len(camera_radiance)), nonzero_places(camera_radiance)
+    radiance = camera_radiance[arrived].astype(np.float64)
+    paths[arrived] = radiance * (PASSES_A_WAVE * LOOK_PATHS / max(float(radiance.sum()), 1e-300))
+    return paths
 
 
 def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
@@ -276,8 +275,8 @@ def camera_reachable_share(buffers: list[PassBuffer]) -> tuple[float, Float32]:
 
     The buffers are zeroed.
     """
-    camera_radiance = np.zeros_like(buffers[0].camera_radiance)
-    light, by_camera, *_ = sum_passes(buffers, np.zeros(len(camera_radiance)), camera_radiance)
+    camera_radiance = np.zeros(len(buffers[0].camera_radiance), np.float32)
+    light, by_camera = sum_looks(buffers, camera_radiance)
     for buffer in buffers:
         buffer.invalid[:] = 0.0
     return min(by_camera / light, 1.0) if light > 0.0 else 1.0, camera_radiance

@@ -10,20 +10,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 from scipy.special import gammaincinv
 
-from render.base.arrays import Float, Float32
+from render.base.arrays import Float, Float32, Int, Long
+from render.base.nonzero import nonzero_places
+from render.base.threads import map_chunks
 from render.importance import CELL, Importance
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.line_pools import UNMET, pooled, pooled_alike
-from render.laser_indirect.line_sums import mean_image, run_sums
+from render.laser_indirect.line_sums import BLOCKS_A_CHUNK, mean_image, run_means, run_variances, smoothed
 
-Int = NDArray[np.int64]
 Weigh = Callable[[Float32], Importance]
 """Where errors matter, by the reflected light (h, w) of a laser so far."""
 
@@ -51,7 +52,7 @@ class Projection:
     """(lines,) with a line."""
     peaks: Float32
     """(blocks, BLOCK) weights where peaks could appear; (0, BLOCK): nowhere."""
-    block_row: Int
+    block_row: Long
     """(blocks,) the row of the image that a block begins in."""
 
     @classmethod
@@ -59,17 +60,18 @@ class Projection:
         """Of the weights of one laser."""
         weight = importance.laser[laser]
         height, width = weight.shape
-        pixel = np.flatnonzero(weight)
+        pixel = nonzero_places(weight)
         line = pixel // width if importance.axis == "rows" else pixel % width
         lines = height if importance.axis == "rows" else width
         lit = np.zeros(lines, np.bool_)
         lit[line] = True
         blocks = -(-weight.size // BLOCK)
-        peaks: Float32 = np.zeros((blocks if importance.peaks else 0, BLOCK), np.float32)
-        if importance.peaks:
-            peaks.ravel()[: weight.size] = importance.peaks[laser].ravel()
+        peaks = importance.peaks[laser].ravel() if importance.peaks else np.zeros(0, np.float32)
+        if len(peaks) % BLOCK:
+            peaks = np.pad(peaks, (0, -len(peaks) % BLOCK))
+        rows = np.arange(blocks) * BLOCK // width
         return cls(
-            pixel, weight.ravel()[pixel].astype(np.float64), line, lit, peaks, np.arange(blocks) * BLOCK // width
+            pixel, weight.ravel()[pixel].astype(np.float64), line, lit, peaks.reshape(len(peaks) // BLOCK, BLOCK), rows
         )
 
     def line_means(self, image: Float | Float32) -> Float:
@@ -81,10 +83,6 @@ class Projection:
         """(lines,) how far the light of an image (pixels,) moves each line, over the allowed deviation."""
         moved = self.weight * image[self.pixel]
         return np.bincount(self.line, moved, len(self.lit)).astype(np.float64)
-
-    def rises(self, image: Float32, blocks: Int) -> Float:
-        """(n, BLOCK / CELL) what (pixels,) adds to each run of pixels of some blocks, over the allowed deviation."""
-        return run_sums(image, self.peaks, blocks)
 
 
 @dataclass
@@ -119,17 +117,17 @@ class LineErrors:
 
     def look(self, buffers: list[PassBuffer], weigh: Weigh, laser: int) -> LineErrors:
         """Projected anew, by the light of some passes, before any wave is added."""
-        light = gaussian_filter(mean_image(buffers).reshape(self.shape), LOOK_SIGMA)
+        light = smoothed(mean_image(buffers).reshape(self.shape), LOOK_SIGMA)
         return LineErrors.of(weigh(light), laser)
 
     def spread(self, buffers: list[PassBuffer]) -> tuple[Float, Float32]:
         """(lines,), (blocks, BLOCK / CELL) variance of a pass, of how far its light moves lines and adds to peaks."""
         moves = np.stack([self.projection.moves(buffer.image) for buffer in buffers])
-        rises = np.zeros_like(self.risen)
+        rises = np.zeros(self.risen.shape, np.float32)
         if len(self.projection.peaks):
             touched = np.flatnonzero(np.any([buffer.touched for buffer in buffers], axis=0))
-            found = np.stack([self.projection.rises(buffer.image, touched) for buffer in buffers])
-            rises[touched] = np.var(found, axis=0, ddof=1)
+            images, weights = tuple(buffer.image for buffer in buffers), self.projection.peaks
+            map_chunks(partial(run_variances, images, weights, touched, rises), len(touched), BLOCKS_A_CHUNK)
         return np.var(moves, axis=0, ddof=1), rises
 
     def add(self, buffers: list[PassBuffer], weight: float, size: float) -> tuple[Float, Float32]:
@@ -166,7 +164,8 @@ class LineErrors:
         scale = self.all_waves / self.measured / weights**2
         rows = np.zeros(self.shape[0])
         if len(self.risen):
-            np.maximum.at(rows, self.projection.block_row, self.risen.max(axis=1))
+            found, begin = np.unique(self.projection.block_row, return_index=True)
+            rows[found] = np.maximum.reduceat(self.risen, begin, axis=0).max(axis=1)
         worst = max(all_but_unmet(self.moved[self.projection.lit]), all_but_unmet(rows))
         return math.sqrt(scale * worst)
 
@@ -219,28 +218,31 @@ class Effect:
     projection: Projection
     moves: list[Float]
     """(lines,) of each pass."""
-    rises: list[Float]
-    """(blocks, BLOCK / CELL) likewise."""
+    rises: Float
+    """(blocks, BLOCK / CELL) of all passes, their mean."""
 
     @classmethod
     def of(cls, projection: Projection, buffers: list[PassBuffer]) -> Effect:
         """Of some passes."""
-        blocks = np.arange(len(projection.peaks))
-        moves = [projection.moves(buffer.image) for buffer in buffers]
-        return cls(projection, moves, [projection.rises(one.image, blocks) for one in buffers] if len(blocks) else [])
+        moves, rises = [projection.moves(buffer.image) for buffer in buffers], np.zeros((1, 1))
+        if len(projection.peaks):
+            touched = np.flatnonzero(np.any([buffer.touched for buffer in buffers], axis=0))
+            rises = np.zeros((len(projection.peaks), BLOCK // CELL))
+            images, weights = tuple(buffer.image for buffer in buffers), projection.peaks
+            map_chunks(partial(run_means, images, weights, touched, rises), len(touched), BLOCKS_A_CHUNK)
+        return cls(projection, moves, rises)
 
     def most(self, without: Effect | None = None) -> float:
         """The most that the light may well move any line, by its standard error, or add to a peak, over what is
         allowed; without: less what other passes of the same random numbers do."""
-        moves, rises = np.stack(self.moves), np.stack(self.rises) if self.rises else np.zeros((1, 1))
+        moves, rises = np.stack(self.moves), self.rises
         if without is not None:
-            moves = moves - np.stack(without.moves)
-            rises = rises - np.stack(without.rises) if without.rises else rises
+            moves, rises = moves - np.stack(without.moves), rises - without.rises
         lit = self.projection.lit
         moves = np.stack([pooled(one, lit) for one in moves])
         error = moves.std(axis=0, ddof=1) / math.sqrt(len(moves))
         moved = (np.abs(moves.mean(axis=0)) + 2.0 * error)[lit]
-        return max(float(moved.max(initial=0.0)), float(rises.mean(axis=0).max(initial=0.0)))
+        return max(float(moved.max(initial=0.0)), float(rises.max(initial=0.0)))
 
 
 def all_but_unmet(values: Float) -> float:

@@ -23,6 +23,7 @@ from render.laser_indirect.connection_buffer import BLOCK
 from render.laser_indirect.guiding import MOST_CAMERA_PATHS
 from render.laser_indirect.line_goal import Projection, all_but_unmet
 from render.laser_indirect.line_pools import POOLED, pooled
+from render.laser_indirect.line_sums import block_sums, scale_blocks, weigh_blocks
 
 LEAST_NEED = 0.02
 """Of the camera paths of a scan line that needs most: what every line gets beside it."""
@@ -60,7 +61,7 @@ class PathDemand:
         lines, blocks = moves * np.maximum(drawn, least), self.blocks
         share = size / (self.size + size)
         if len(rises):
-            found = rises.max(axis=1) * _block_sums(camera_paths, len(rises))
+            found = rises.max(axis=1) * block_sums(camera_paths, len(rises))
             blocks = blocks + share * (found - blocks)
         return PathDemand(self.lines + share * (lines - self.lines), blocks, self.size + size)
 
@@ -70,20 +71,16 @@ class PathDemand:
         Where none does light tracing alone remains.
         """
         lines = self._of_lines(projection)[projection.line]
-        if len(projection.peaks):
-            peaks = camera_paths * projection.peaks.ravel()[: len(camera_paths)]
-            peaks[projection.pixel] = 0.0
-            of_blocks = self._of_blocks(projection, width)
-            for_peaks = float(of_blocks.sum())
-            self._to_peaks(peaks, of_blocks)
+        camera_paths[projection.pixel] = 0.0
+        if not len(projection.peaks):
+            camera_paths[:] = 0.0
+            total = float(lines.sum())
         else:
-            peaks, for_peaks = np.zeros_like(camera_paths), 0.0
-        camera_paths[:] = peaks
-        camera_paths[projection.pixel] = lines
-        total = float(lines.sum()) + for_peaks
-        if total > 0.0:
-            camera_paths *= count / total
-            np.minimum(camera_paths, MOST_CAMERA_PATHS, out=camera_paths)
+            of_blocks = self._of_blocks(projection, width)
+            total = float(lines.sum() + of_blocks.sum())
+            sums = weigh_blocks(camera_paths, projection.peaks)
+            scale_blocks(camera_paths, _factors(sums, of_blocks) * (count / max(total, 1e-300)), MOST_CAMERA_PATHS)
+        camera_paths[projection.pixel] = np.minimum(lines * (count / max(total, 1e-300)), MOST_CAMERA_PATHS)
 
     def _of_lines(self, projection: Projection) -> Float:
         """(lines,) by a line's own demand and that of its neighbours; those that need most may miss the goal."""
@@ -104,17 +101,6 @@ class PathDemand:
         np.maximum.at(largest, projection.block_row, needed)
         return np.asarray(np.minimum(needed, all_but_unmet(largest)))
 
-    @staticmethod
-    def _to_peaks(weighted: Float, of_blocks: Float) -> None:
-        """Radiance times weight (pixels,) -> camera paths: in each block (blocks,) of them, but for EVERYWHERE."""
-        sums = _block_sums(weighted, len(of_blocks))
-        total, whole = float(of_blocks.sum()), float(sums.sum())
-        factor = (1.0 - EVERYWHERE) * of_blocks / np.where(sums > 0.0, sums, np.inf)
-        factor += EVERYWHERE * total / whole if whole > 0.0 else 0.0
-        full = len(weighted) // BLOCK
-        weighted[: full * BLOCK].reshape(full, BLOCK)[:] *= factor[:full, None]
-        weighted[full * BLOCK :] *= factor[-1]
-
 
 def alike_on_a_line(active: Int, projection: Projection) -> Int:
     """(n,) pixels in order -> the key of each: the same for all that a scan line is measured on, else their own."""
@@ -126,11 +112,9 @@ def alike_on_a_line(active: Int, projection: Projection) -> Int:
     return keys
 
 
-def _block_sums(values: Float, blocks: int) -> Float:
-    """(pixels,) -> (blocks,)."""
-    full = len(values) // BLOCK
-    sums = np.zeros(blocks)
-    sums[:full] = values[: full * BLOCK].reshape(full, BLOCK).sum(axis=1)
-    if full < blocks:
-        sums[full] = values[full * BLOCK :].sum()
-    return sums
+def _factors(sums: Float, of_blocks: Float) -> Float:
+    """Radiance times weight in each block (blocks,) -> by what it becomes as many camera paths as the block needs, but
+    for EVERYWHERE."""
+    total, whole = float(of_blocks.sum()), float(sums.sum())
+    factors = (1.0 - EVERYWHERE) * of_blocks / np.where(sums > 0.0, sums, np.inf)
+    return np.asarray(factors + (EVERYWHERE * total / whole if whole > 0.0 else 0.0))

@@ -11,6 +11,7 @@ from render.base.arrays import Float
 from render.base.threads import map_chunks, thread_count
 from render.camera.camera import Camera
 from render.laser.laser import LineLaser
+from render.laser_indirect.accumulator import PASSES_A_WAVE
 from render.laser_indirect.bdpt_pass import BdptPass, Sampling
 from render.laser_indirect.guiding import active_pixels, allocate_camera_paths, no_guide, reserve_for_specular
 from render.laser_indirect.integrator import (
@@ -28,7 +29,7 @@ from render.run import Run
 from render.world.placed import PlacedLaser
 from render.world.world import World
 
-PILOT_PATHS = 1 << 13
+PILOT_PATHS = 1 << 12
 """Light paths in a pass of the pilot. Chosen, not tuned."""
 
 CUMULATIVE_KINDS = {
@@ -64,7 +65,7 @@ def indirect_pilot(
     T_world_camera: Float,
     T_world_laser: Float,
     *,
-    passes: int = 4,
+    passes: int = PASSES_A_WAVE,
     projection: Projection | None = None,
     run: Run = Run(),
 ) -> IndirectPilot:
@@ -83,7 +84,7 @@ def indirect_pilot(
     camera_paths = first_camera_paths(specular, camera, PILOT_PATHS)
     if task.specular:
         # what is seen through glass may be small, and is worth a look of its own
-        first_look = Sampling(LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
+        first_look = Sampling(2 * LOOK_PATHS, fan, camera_paths, active_pixels(camera_paths), guide)
         task.run(passes, first_look, buffer, run.cancelled, specular)
         _, camera_radiance = camera_reachable_share([buffer])
         camera_paths = allocate_camera_paths(

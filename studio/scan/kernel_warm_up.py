@@ -268,8 +268,10 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     """By next to no paths of every kind, for the image; and its ambient light for what is measured as well."""
     from render.ambient.measured_light import LEAST_SAMPLES, measured_images
     from render.importance import Importance
+    from render.laser_indirect.accumulator import PASSES_A_WAVE
     from render.laser_indirect.integrator import empty_buffer
-    from render.laser_indirect.line_goal import Projection
+    from render.laser_indirect.line_goal import Effect, LineErrors
+    from render.laser_indirect.line_paths import PathDemand
     from render.laser_indirect.line_sums import mean_image
     from render.render import render_world
     from render.world.placed import PlacedScene
@@ -279,7 +281,13 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     frame = render_world(world, scene, settings=_few(transport), run=run)
     ones = np.ones((camera.height, camera.width), np.float32)
     everywhere = Importance((ones,), ones, peaks=(ones,))
-    Projection.of(everywhere, 0).rises(mean_image([empty_buffer(ones.size)]), np.arange(1))
+    buffers, errors = [empty_buffer(ones.size) for _ in range(PASSES_A_WAVE)], LineErrors.of(everywhere, 0)
+    buffers[0].touched[:] = True
+    mean_image(buffers)
+    Effect.of(errors.projection, buffers)
+    paths = np.ones(ones.size)
+    demand = PathDemand.none(errors.projection).learned(errors.projection, errors.spread(buffers), paths, 1.0)
+    demand.aim(paths, errors.projection, camera.width, 1.0)
     list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
     return frame
 

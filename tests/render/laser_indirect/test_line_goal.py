@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from render.importance import CELL, Importance
-from render.laser_indirect.connection_buffer import PassBuffer
+from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.integrator import empty_buffer
 from render.laser_indirect.line_goal import Effect, LineErrors, Projection
 
@@ -187,5 +187,6 @@ def test_light_beside_the_line_counts_by_the_peak_that_it_would_be() -> None:
     buffers = [empty_buffer(HEIGHT * WIDTH) for _ in range(4)]
     for buffer in buffers:
         buffer.image[50 * WIDTH + 8 : 50 * WIDTH + 8 + CELL] = 2.0
+        buffer.touched[(50 * WIDTH + 8) // BLOCK] = True
     effect = Effect.of(Projection.of(importance(peaks=0.25), 0), buffers)
     assert effect.most() == pytest.approx(0.25 * 2.0 * CELL)
