@@ -21,7 +21,7 @@ from render.frame import Axis, Frame, LaserCurve
 from render.laser_direct.light_group import QUICK_ERROR
 from render.light_group import LightGroup, chosen_plan, has_work
 from render.products import AIMED, PRODUCTS, QUICK, ambient_look, expected_plan
-from render.run import Run, never
+from render.run import Memory, Run, never
 from render.scan_plan import ScanPlan
 from render.scene.scene import Scene
 from render.scene.settings import RenderSettings
@@ -136,7 +136,9 @@ def _begun(run: Run) -> Run:
     """The run of a frame whose time begins now, and stands still while a person holds the render."""
     deadline = Deadline(run.seconds)
     cancelled = run.cancelled if run.cancelled is never else deadline.pausing(run.cancelled)
-    return replace(run, deadline=deadline, cancelled=cancelled)
+    # the parts of a frame find in it what parts before them did
+    memory = Memory() if run.memory is None else run.memory
+    return replace(run, deadline=deadline, cancelled=cancelled, memory=memory)
 
 
 def _build_work(world: World) -> float:

@@ -20,6 +20,9 @@ INV_SQRT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
 SHEET_SIGMAS = 5.0
 """Sigmas from the sheet's middle at which it is cut off: 6e-7 of its power lies beyond."""
 
+MOST_SIGMAS = 7.0
+"""Sigmas beyond which no photon leaves the laser: 3e-12 of its power."""
+
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def sheet_sigma(z: float, beam: Array) -> tuple[float, float]:
@@ -44,6 +47,13 @@ def fan_density(y: float, beam: Array) -> float:
         sigma = 0.5 * edge
         return math.exp(-0.5 * (y / sigma) ** 2) * INV_SQRT_2PI / (sigma * math.erf(edge / (sigma * SQRT2)))
     return 0.5 / edge
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def slope_density(x: float, beam: Array) -> float:
+    """Sheet profile g(X), of unit area over the slopes X = x / z, of a sheet without a waist."""
+    q = x / beam[3]
+    return math.exp(-0.5 * q * q) * INV_SQRT_2PI / beam[3] if abs(q) < MOST_SIGMAS else 0.0
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")

@@ -11,13 +11,14 @@ from itertools import pairwise
 
 import numpy as np
 
-from render.base.arrays import Bool, Float, Int
+from render.base.arrays import Bool, Float, Int, Long
 from render.base.errors import Cancelled
 from render.base.pose import invert
 from render.base.threads import Cancel
+from render.camera.camera import Camera
 from render.camera.view import View
 from render.laser.laser import LineLaser
-from render.laser_indirect.chain_connections import empty_walks, splat_walks, walk_to_camera
+from render.laser_indirect.chain_connections import Walks, empty_walks, splat_walks, walk_to_camera
 from render.laser_indirect.connection_buffer import Connections, PassBuffer, empty_connections, splat_unoccluded
 from render.laser_indirect.connections import (
     CameraSampling,
@@ -47,7 +48,7 @@ from render.laser_indirect.photon_merging import RADIUS_EXPONENT, PhotonMap, mer
 from render.laser_indirect.pixel_rays import pixel_rays
 from render.laser_indirect.random_walk import random_walk_step
 from render.laser_indirect.ris import LightVertices, connect_by_ris
-from render.laser_indirect.specular_chains import ChainIndex, mark_listed, seen_chains
+from render.laser_indirect.specular_chains import ChainIndex, lit_chains, mark_listed, seen_chains
 from render.material.material import reflectance_weights
 from render.material.medium import MOST_STEPS
 from render.sampling.random import uniform, wrapped
@@ -66,6 +67,7 @@ CANDIDATES, LATER_CANDIDATES = 8, 2
 CAMERA_SEED = 0x5DEECE66D
 """Parts the random numbers of camera paths from those of light paths."""
 NO_KEYS: Int = np.zeros(0, np.int32)
+NOWHERE: Bool = np.zeros(0, np.bool_)
 KINDS = 5
 """Sums of a pass: of each combination of the bits CAUSTIC and SUBSURFACE_LIGHT, and of SPECULAR_CHAIN by itself."""
 
@@ -92,8 +94,8 @@ class BdptPass:
 
     world: World
     surface: Surface
+    camera: Camera
     view: View
-    height: int
     laser: LineLaser
     weights: Float
     """(3,) of the RGB reflectance at the laser's wavelength."""
@@ -111,6 +113,10 @@ class BdptPass:
     """Of them, those that the laser and the camera are within (`render.world.interior_list`)."""
     chains: ChainIndex | None
     """Plane mirrors and glass before the camera, over which light is found by walks; None: there are none."""
+    lit_chains: ChainIndex | None
+    """Likewise before the laser."""
+    clear: Bool = field(default_factory=lambda: NOWHERE)
+    """(pixels,) where light over `lit_chains` is integrated (`render.laser_indirect.clear_light`); (0,): nowhere."""
 
     @classmethod
     def of(cls, placed: PlacedLaser, reference_distance: float, seed: int, kinds: int = ALL_KINDS) -> BdptPass:
@@ -123,8 +129,8 @@ class BdptPass:
         return cls(
             world=world,
             surface=surface,
+            camera=camera,
             view=camera.view(T_world_camera),
-            height=camera.height,
             laser=laser,
             weights=np.array(reflectance_weights(laser.wavelength_nm)),
             T_world_laser=T_world_laser,
@@ -135,6 +141,7 @@ class BdptPass:
             nested=nested,
             interiors=(at_laser, at_camera),
             chains=seen_chains(world, surface, camera, T_world_camera) if walked else None,
+            lit_chains=lit_chains(world, surface, laser, T_world_laser) if specular and not nested else None,
         )
 
     def run(
@@ -189,7 +196,7 @@ class BdptPass:
 
         Raises Cancelled.
         """
-        context, laser, camera = self._context(seed), self._laser(sampling), self._camera(sampling)
+        context, laser, camera = self.context(seed), self.laser_sampling(sampling.fan), self._camera(sampling)
         shift = np.array([uniform(seed, 0, dimension, 99) for dimension in range(5)])
         long = np.empty((2, count), np.int64)
         emitted = Photons(np.empty((count, 3)), np.empty((count, 3)), np.empty(count), long[0], long[1])
@@ -204,7 +211,7 @@ class BdptPass:
             emitted,
         )
         origin, direction = emitted.origin, emitted.direction
-        paths = _begun(count, self.interiors[0])
+        paths = begun_paths(count, self.interiors[0])
         paths["throughput"], paths["index"], paths["fan_bin"] = emitted.power, emitted.path_index, emitted.fan_bin
         connections = empty_connections(count)
         kept: list[Vertices] = []
@@ -216,6 +223,8 @@ class BdptPass:
             if depth == 0:
                 init_light_mis(vertices, paths, laser)
             else:
+                if self.lit_chains is not None:
+                    mark_listed(vertices, paths, self.lit_chains)
                 connected = connect_to_camera(vertices, paths, context, camera, depth, connections)
                 self.splat(connections, connected, 1.0 / sampling.light_paths, buffer)
                 if self.chains is not None and self.kinds & SPECULAR_CHAIN:
@@ -240,9 +249,9 @@ class BdptPass:
 
         Raises Cancelled.
         """
-        context, laser, camera = self._context(seed), self._laser(sampling), self._camera(sampling)
+        context, laser, camera = self.context(seed), self.laser_sampling(sampling.fan), self._camera(sampling)
         count = int(drawn.starts[-1] - drawn.starts[0])
-        origin, direction, paths = np.empty((count, 3)), np.empty((count, 3)), _begun(count, self.interiors[1])
+        origin, direction, paths = np.empty((count, 3)), np.empty((count, 3)), begun_paths(count, self.interiors[1])
         pixel_rays(camera, drawn, seed, origin, direction, paths)
         connections = empty_connections(count)
         unused = np.zeros(3)
@@ -258,7 +267,7 @@ class BdptPass:
             if photons is not None:
                 if self.chains is not None:
                     mark_listed(vertices, paths, self.chains)
-                merge(vertices, paths, context.rows, photons, buffer)
+                merge(vertices, paths, context.rows, photons, self.clear, buffer)
             for light in light_vertices:
                 connected = connect_by_ris(vertices, paths, light, sampling.guide, depth, context, buffer, connections)
                 self.splat(connections, connected, 1.0, buffer)
@@ -325,10 +334,13 @@ class BdptPass:
         walks = empty_walks(max(len(vertices), chains.most))
         while first < len(vertices):
             first = walk_to_camera(first, vertices, paths, chains, self.surface, context, camera, depth, counts, walks)
-            rays = int(counts[1])
-            ends = walks.origin[:rays], walks.direction[:rays], walks.distance[:rays]
-            occluded = self.world.rays.occluded(*ends) if rays else np.zeros(0, np.bool_)
-            splat_walks(walks, occluded, int(counts[0]), 1.0 / camera.light_paths, buffer)
+            splat_walks(walks, self.occluded(walks, counts), int(counts[0]), 1.0 / camera.light_paths, buffer)
+
+    def occluded(self, walks: Walks, counts: Long) -> Bool:
+        """(rays,) whether shadow rays of walks, counts (2,) of solutions and rays, are occluded."""
+        rays = int(counts[1])
+        ends = walks.origin[:rays], walks.direction[:rays], walks.distance[:rays]
+        return self.world.rays.occluded(*ends) if rays else np.zeros(0, np.bool_)
 
     def photon_map(self, parts: list[Vertices], number: int, sampling: Sampling) -> PhotonMap:
         """The light vertices that only merging can use; the radius is a pixel's, less with each pass."""
@@ -338,18 +350,18 @@ class BdptPass:
         pixel = float(np.median(distance)) / max(self.view.intrinsics[:2]) if len(vertices) else 1.0
         return photon_map(vertices, paths, pixel * (1.0 + number) ** -RADIUS_EXPONENT, sampling.light_paths)
 
-    def _context(self, seed: int) -> PassContext:
+    def context(self, seed: int) -> PassContext:
         rays = self.world.rays
         return PassContext(self.surface.rows, self.weights, seed, self.kinds, rays.centre, rays.surface_offset)
 
     def _camera(self, sampling: Sampling) -> CameraSampling:
-        return CameraSampling(self.view, self.height, sampling.camera_paths, sampling.light_paths)
+        return CameraSampling(self.view, self.camera.height, sampling.camera_paths, sampling.light_paths, self.clear)
 
-    def _laser(self, sampling: Sampling) -> LaserSampling:
-        return LaserSampling(invert(self.T_world_laser), self.laser.packed(), sampling.fan)
+    def laser_sampling(self, fan: FanDistribution) -> LaserSampling:
+        return LaserSampling(self.T_world_laser, invert(self.T_world_laser), self.laser.packed(), fan)
 
 
-def _begun(count: int, interior: int) -> Records:
+def begun_paths(count: int, interior: int) -> Records:
     """Paths that have met nothing yet, and begin within some bodies."""
     paths = np.zeros(count, PATH)
     paths["all_specular"], paths["medium"], paths["interior"] = True, -1, interior

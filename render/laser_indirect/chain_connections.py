@@ -13,7 +13,7 @@ from render.base.vectors import Vector, divided, dot, length, minus, row_vector,
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import lens_point, lens_position
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
-from render.laser_indirect.connections import CameraSampling, towards
+from render.laser_indirect.connections import CameraSampling, is_clear_light, towards
 from render.laser_indirect.manifold_walk import passed, pixel_on_way, walk
 from render.laser_indirect.path_vertex import (
     MOST_FACETS,
@@ -33,12 +33,12 @@ from render.world.triangles import Surface, off_surface, plane_of
 
 
 class Walks(NamedTuple):
-    """(n,) solutions: pixel, contribution and bin of the fan; (m, 3) shadow rays from scene-centred origins, (m,) their
+    """(n,) solutions, as of `Connections`; (m, 3) shadow rays from scene-centred origins, (m,) their
     length, and whose they are."""
 
     pixel: Int
-    contribution: Float
     fan_bin: Int
+    contribution: Float
     origin: Float32
     direction: Float32
     distance: Float32
@@ -49,7 +49,8 @@ def empty_walks(n: int) -> Walks:
     """Room for n solutions."""
     rays = n * (MOST_FACETS + 1)
     ends = np.empty((rays, 3), np.float32), np.empty((rays, 3), np.float32), np.empty(rays, np.float32)
-    return Walks(np.empty(n, np.int32), np.empty(n), np.empty(n, np.int32), *ends, np.empty(rays, np.int32))
+    pixel, fan_bin = np.empty(n, np.int32), np.empty(n, np.int32)
+    return Walks(pixel, fan_bin, np.empty(n), *ends, np.empty(rays, np.int32))
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -63,7 +64,7 @@ def add_shadow_rays(
     counts: Long,
     walks: Walks,
 ) -> None:
-    """Shadow rays of solution counts[0] from the lens over the places on the facets to vertex v; counts grow."""
+    """Shadow rays of solution counts[0] from the lens, or the laser, over places on facets to vertex v; counts grow."""
     start, normal = origin, (0.0, 0.0, 0.0)
     for j in range(chain.count + 1):
         if j == chain.count:
@@ -129,13 +130,15 @@ def walk_to_camera(  # noqa: PLR0913
             solution = walk(surface, seen, m, origin, x, n)
             if not solution.found:
                 continue
-            share = passed(surface, context.weights, seen, m, origin, solution.slopes, places, rgb)
+            share = passed(surface, context.weights, seen, m, origin, solution.slopes, False, places, rgb)
             if share == 0.0:
                 continue
             pixel, density = pixel_on_way(view, tilt, distorted, sampling.height, row_vector(places, 0), a, b)
             direction, _ = towards(v, row_vector(places, seen.count - 1))
             wi = to_shading(v, direction)
-            if pixel < 0 or cosine_to(v, direction) * wi[2] <= 0.0:
+            if pixel < 0 or is_clear_light(path, sampling, pixel):
+                continue
+            if cosine_to(v, direction) * wi[2] <= 0.0:
                 continue
             f = eval_bsdf(v, context.rows, vector(v.wo), wi) * shading_normal_factor(v)
             contribution = path.throughput * f * share * density / solution.spread

@@ -52,15 +52,25 @@ class CameraSampling(NamedTuple):
     camera_paths: Float
     """(pixels,) expected camera paths of a pass."""
     light_paths: int
+    clear: Bool
+    """(pixels,) where light over listed chains is integrated; (0,): nowhere."""
 
 
 class LaserSampling(NamedTuple):
     """The laser's light, and how a pass draws photons of it."""
 
+    T_world_laser: Float
     T_laser_world: Float
     beam: Float
     """`LineLaser.packed`."""
     fan: FanDistribution
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+def is_clear_light(path: Record, sampling: CameraSampling, pixel: int) -> bool:
+    """What a light path brings to a pixel, over nothing more than mirrors and clear glass, is integrated there
+    (`render.laser_indirect.clear_light`)."""
+    return path.walked and sampling.clear.shape[0] > 0 and sampling.clear[pixel]
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
@@ -86,7 +96,7 @@ def connect_to_camera(
             r1, r2 = uniform(context.seed, path.index, depth, 8), uniform(context.seed, path.index, depth, 9)
             a, b = lens_point(view.lens[0], r1, r2)
         pixel, area = pixel_of(view, tilt, distorted, sampling.height, v, a, b)
-        if pixel < 0:
+        if pixel < 0 or is_clear_light(path, sampling, pixel):
             continue
         direction, distance = towards(v, lens_position(view, a, b))
         cosine, wi, wo = cosine_to(v, direction), to_shading(v, direction), vector(v.wo)

@@ -25,6 +25,7 @@ from render.importance import Importance
 from render.laser.laser import LineLaser
 from render.laser_indirect.accumulator import MOST_CAMERA_PASS, MOST_PASS, PASSES_A_WAVE, Accumulator, sum_looks
 from render.laser_indirect.bdpt_pass import KINDS, NO_KEYS, BdptPass, Sampling
+from render.laser_indirect.clear_light import NO_LIGHT, ClearLight, clear_light
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.guiding import (
     BINS,
@@ -124,7 +125,10 @@ def indirect_images(
     if high <= low:
         yield IndirectImage(np.zeros(shape, np.float32), 0.0, 0, line_deviation=0.0)
         return
-    waves = Waves(BdptPass.of(placed, reach, run.seed, kinds), camera, run)
+    task = BdptPass.of(placed, reach, run.seed, kinds)
+    clear = clear_light(task, run)
+    clear_deviation = 0.0 if aim is None else clear.line_deviation(aim.importance, aim.laser)
+    waves = Waves(replace(task, clear=clear.mask(camera.width * camera.height)), camera, run, clear)
     time_is_over = run.time_is_over(left)
     so_far = run.restore(Accumulator.of_arrays)
     if so_far is None:
@@ -133,10 +137,15 @@ def indirect_images(
     wave_moments = attach_wave_moments(waves.buffers, so_far)
 
     def image() -> IndirectImage:
-        counts = so_far.paths, round(so_far.invalid), round(so_far.clamped)
+        counts = so_far.paths, round(so_far.invalid) + clear.invalid, round(so_far.clamped)
         clamped_radiance = so_far.clamped_radiance / so_far.weight / so_far.total.size
         found = IndirectImage(
-            so_far.radiance(shape), so_far.error, *counts, clamped_radiance, so_far.line_deviation, given_up()
+            clear.added_to(so_far.radiance(shape), kinds),
+            clear.error_with(so_far, kinds),
+            *counts,
+            clamped_radiance,
+            math.hypot(so_far.line_deviation, clear_deviation),
+            given_up(),
         )
         line = so_far.line
         if line is None:
@@ -147,7 +156,7 @@ def indirect_images(
         return so_far.line is not None and so_far.line.out_of_reach
 
     def unfinished() -> bool:
-        known = so_far.error <= target or (aim is not None and so_far.line_error <= 1.0)
+        known = clear.error_with(so_far, kinds) <= target or (aim is not None and so_far.line_error <= 1.0)
         return not known and so_far.paths < most_paths
 
     def over() -> bool:
@@ -168,7 +177,7 @@ def indirect_images(
             raise
         so_far.add(waves.buffers, wave_moments, clamp, run.threads)
         # a target of zero is never reached: the paths that there may be end the render
-        off = so_far.error / target if target > 0.0 else math.inf
+        off = clear.error_with(so_far, kinds) / target if target > 0.0 else math.inf
         if so_far.line is not None:
             so_far.line.judge(so_far.line_deviation, off, so_far.paths, most_paths)
         run.keep(so_far)
@@ -187,8 +196,8 @@ def indirect_images(
 class Waves:
     """Waves of passes, each pass into a buffer of its own, of which there are as many as a wave has passes."""
 
-    def __init__(self, task: BdptPass, camera: Camera, run: Run) -> None:
-        self.task, self.camera, self.run = task, camera, run
+    def __init__(self, task: BdptPass, camera: Camera, run: Run, clear: ClearLight = NO_LIGHT) -> None:
+        self.task, self.camera, self.run, self.clear = task, camera, run, clear
         self.buffers = [empty_buffer(camera.width * camera.height) for _ in range(PASSES_A_WAVE)]
 
     def trace(
@@ -225,8 +234,12 @@ class Waves:
             found.learn(found.line.spread(self.buffers), look_paths / found.size)
         refine_guiding(found, self.buffers, wave_moments, camera)
         if aim is not None and found.line is not None:
+
+            def weigh(light: Float32) -> Importance:
+                return aim.weigh(self.clear.added_to(light, kinds))
+
             self.trace(2 * PASSES_A_WAVE, sampling_of(found, found.next_paths), behind)
-            found.line = found.line.look(self.buffers, aim.weigh, aim.laser)
+            found.line = found.line.look(self.buffers, weigh, aim.laser)
             found.learn(found.line.spread(self.buffers), 1.0)
             refine_guiding(found, self.buffers, wave_moments, camera)
         return found

@@ -1,11 +1,12 @@
-"""Manifold walks: how light at a point reaches the camera over a chain of plane mirrors and faces of clear glass.
+"""Manifold walks: how a point and the camera or the laser see each other over a chain of plane mirrors and clear glass.
 
-A ray through the lens's point is (q, r, 1) in the camera's frame. Refracted and reflected at the planes of given facets
-it meets the plane of a point's surface at F(q, r); the walk solves F(q, r) = x for the point x, by Newton's method on
-the manifold of paths that obey Snell's law (Jakob and Marschner 2012; Zeltner et al. 2020). The chain is a list of
-facets, which makes the solution unique and its probability 1: between planes the optical path is a convex function of
-the points on them, a sum of distances times indices, and it is least on the one path that obeys the law (Fermat). The
-last matrix of Newton's method then says how many pixels there are to an area about x,
+A ray through the lens's point is (q, r, 1) in the camera's frame, one from the laser's apex likewise in the laser's.
+Refracted and reflected at the planes of given facets it meets the plane of a point's surface at F(q, r); the walk
+solves F(q, r) = x for the point x, by Newton's method on the manifold of paths that obey Snell's law (Jakob and
+Marschner 2012; Zeltner et al. 2020). The chain is a list of facets, which makes the solution unique and its probability
+1: between planes the optical path is a convex function of the points on them, a sum of distances times indices, and it
+is least on the one path that obeys the law (Fermat). The last matrix of Newton's method then says how many pixels there
+are to an area about x,
 
     du dv / dA  =  (du dv / dq dr) / |dF/dq x dF/dr|,
 
@@ -110,10 +111,11 @@ def walk(
     x: Vector,
     n: Vector,
 ) -> Solution:
-    """The ray through a point of the lens that comes over a chain to x, of a plane with normal n, or NO_SOLUTION.
+    """The ray from a point, of the lens or the laser, that comes over a chain to x, of a plane with normal n, or
+    NO_SOLUTION.
 
     chain: a record of `specular_chains.SEEN`, whose facets are taken without their edges; its slopes are the first. m
-    (4, 4): the camera's pose. A step that does not bring it nearer is halved.
+    (4, 4): the pose of camera or laser. A step that does not bring it nearer is halved.
     """
     q, r = chain.slopes
     ok, p = landing(surface, chain, m, origin, q, r, x, n)
@@ -142,19 +144,21 @@ def walk(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def passed(
+def passed(  # noqa: PLR0913
     surface: Surface,
     weights: Float,
     chain: Record,
     m: Float,
     origin: Vector,
     slopes: tuple[float, float],
+    from_light: bool,
     places: Float,
     rgb: Float,
 ) -> float:
-    """The weight of a camera path after a chain, as `path_vertex.scatter` has it -> places (count, 3) on the facets.
+    """The weight of a path after a chain, as `path_vertex.scatter` has it -> places (count, 3) on the facets.
 
-    0: it goes past the edge of one. weights (3,) of the RGB reflectance; rgb (3,) is changed.
+    0: it goes past the edge of one. Radiance, which camera paths carry, changes with the square of the refractive
+    index; power, from the light, does not. weights (3,) of the RGB reflectance; rgb (3,) is changed.
     """
     q, r = slopes
     d = (
@@ -180,7 +184,8 @@ def passed(
         if row[KIND] == DIELECTRIC:
             eta = row[INDEX] if c > 0.0 else 1.0 / row[INDEX]
             reflected, _ = fresnel_dielectric(abs(c), eta)
-            share *= tint * ((1.0 - reflected) / (eta * eta) if chain.facets[j] > 0 else reflected)
+            crossing = 1.0 - reflected if from_light else (1.0 - reflected) / (eta * eta)
+            share *= tint * (crossing if chain.facets[j] > 0 else reflected)
         else:
             share *= eval_band(row[KIND], Lobes(1.0, abs(c), 0.0), tint, row[METAL_N], row[METAL_K], row[INTERNAL])
     return share

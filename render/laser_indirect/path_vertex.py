@@ -74,7 +74,7 @@ PATH = np.dtype(
         ("facets", "i4", 4),  # 1 + the triangles that have refracted it since it began, minus those that have reflected
         ("all_specular", "?"),  # no surface so far could be connected to the one before it (camera paths: to anything)
         ("after_specular", "?"),  # the last surface was specular
-        ("walked", "?"),  # of camera paths: what could be merged here is found by walks
+        ("walked", "?"),  # the chain that it has come over is listed here (`render.laser_indirect.specular_chains`)
     ],
     align=True,
 )

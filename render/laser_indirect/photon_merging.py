@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from render.base.arrays import Float, Long
+from render.base.arrays import Bool, Float, Long
 from render.base.vectors import dot, minus, vector
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.path_vertex import (
@@ -35,10 +35,12 @@ tuned."""
 
 
 class PhotonMap(NamedTuple):
-    """(n,) photons in the order of their cells: vertices, power, bin of the fan; the cells' origin and size, m."""
+    """(n,) photons in the order of their cells: vertices, power, `walked` of PATH, bin of the fan; the cells' origin
+    and size, m."""
 
     vertices: Records
     power: Float
+    walked: Bool
     fan_bin: Long
     cell: Long
     corner: Float
@@ -57,12 +59,21 @@ def photon_map(vertices: Records, paths: Records, radius: float, light_paths: in
     order = np.argsort(cell, kind="stable")
     sorted_alone = alone[order]
     power, fan_bin = paths["throughput"][sorted_alone], paths["fan_bin"][sorted_alone].astype(np.int64)
-    return PhotonMap(vertices.take(sorted_alone), power, fan_bin, cell[order], corner, size, light_paths)
+    return PhotonMap(
+        vertices.take(sorted_alone),
+        power,
+        paths["walked"][sorted_alone],
+        fan_bin,
+        cell[order],
+        corner,
+        size,
+        light_paths,
+    )
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, buffer: PassBuffer) -> None:
-    """Splat what the photons about each camera vertex bring."""
+def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, clear: Bool, buffer: PassBuffer) -> None:
+    """Splat what the photons about each camera vertex bring; clear: of `CameraSampling`."""
     radius = 0.5 * photons.size
     kernel = 1.0 / (math.pi * radius * radius * photons.light_paths)
     for r in range(vertices.shape[0]):
@@ -71,7 +82,8 @@ def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, bu
             continue
         if is_specular(v, rows):
             continue
-        contribution = path.throughput * gather_photons(v, path, rows, photons, kernel, buffer) * kernel
+        integrated = path.count >= 0 and clear.shape[0] > 0 and clear[path.pixel]
+        contribution = path.throughput * gather_photons(v, path, rows, photons, integrated, kernel, buffer) * kernel
         if not 0.0 <= contribution < math.inf:
             buffer.invalid[0] += 1.0
         elif contribution > 0.0:
@@ -83,9 +95,12 @@ def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, bu
 
 @numba.njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 def gather_photons(
-    v: Record, path: Record, rows: Float, photons: PhotonMap, kernel: float, buffer: PassBuffer
+    v: Record, path: Record, rows: Float, photons: PhotonMap, integrated: bool, kernel: float, buffer: PassBuffer
 ) -> float:
-    """Sum of power times BSDF of the photons within the radius of v; their moments go to the fan's bins."""
+    """Sum of power times BSDF of the photons within the radius of v; their moments go to the fan's bins.
+
+    integrated: what comes over listed chains is known here.
+    """
     radius, total = 0.5 * photons.size, 0.0
     # the two cells along each axis that the sphere can reach
     a = [int(math.floor((v.p[axis] - photons.corner[axis]) / photons.size - 0.5)) for axis in range(3)]
@@ -99,7 +114,8 @@ def gather_photons(
             w = photons.vertices[j]
             apart = minus(vector(w.p), vector(v.p))
             near = dot(apart, apart) < radius * radius
-            if near and cosine_to(v, vector(w.n)) > LEAST_COSINE:
+            elsewhere = integrated and photons.walked[j]
+            if near and not elsewhere and cosine_to(v, vector(w.n)) > LEAST_COSINE:
                 f = eval_bsdf(v, rows, vector(w.wo), vector(v.wo)) * shading_normal_factor(w)
                 value = photons.power[j] * f
                 if 0.0 <= value < math.inf:

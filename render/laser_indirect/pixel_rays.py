@@ -10,6 +10,7 @@ import numpy as np
 from render.base.arrays import Float
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_position
+from render.camera.view import View
 from render.laser_indirect.connections import CameraSampling, path_lens_point
 from render.laser_indirect.guiding import DrawnPaths
 from render.laser_indirect.path_vertex import Records
@@ -41,13 +42,30 @@ def pixel_rays(
         for sample in range(count):
             u = column - 0.5 + (u0 + sample * 0.7548776662466927) % 1.0
             v = row - 0.5 + (v0 + sample * 0.5698402909980532) % 1.0
-            x, y, ok = chief_ray(view, tilt, distorted, u, v)
             index = key * MOST_OF_A_KEY + sample if alike else starts[n] + sample
             a, b = path_lens_point(view, seed, index)
-            origin[r, 0], origin[r, 1], origin[r, 2] = lens_position(view, a, b)
-            d0, d1, d2 = lens_direction(view, x, y, a, b)
-            length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2) if ok else math.inf
-            direction[r, 0], direction[r, 1], direction[r, 2] = d0 / length, d1 / length, d2 / length
+            set_pixel_ray(view, tilt, distorted, u, v, a, b, r, origin, direction)
             path = paths[r]
             path.throughput, path.index, path.pixel = throughput, index, pixel
             r += 1
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def set_pixel_ray(  # noqa: PLR0913
+    view: View,
+    tilt: Float,
+    distorted: bool,
+    u: float,
+    v: float,
+    a: float,
+    b: float,
+    r: int,
+    origin: Float,
+    direction: Float,
+) -> None:
+    """Ray r (n, 3) of the image point (u, v) through lens point (a, b); one of no length: there is none."""
+    x, y, ok = chief_ray(view, tilt, distorted, u, v)
+    origin[r, 0], origin[r, 1], origin[r, 2] = lens_position(view, a, b)
+    d0, d1, d2 = lens_direction(view, x, y, a, b)
+    length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2) if ok else math.inf
+    direction[r, 0], direction[r, 1], direction[r, 2] = d0 / length, d1 / length, d2 / length

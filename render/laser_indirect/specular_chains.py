@@ -1,11 +1,12 @@
-"""Chains of plane mirrors and faces of clear glass between the camera and a place: which light is walked to the camera.
+"""Chains of plane mirrors and faces of clear glass from the camera or the laser to a place: which light is walked.
 
-Rays of a grid over the image are followed over mirrors and glass, by reflection and by refraction, until they meet a
-rough surface; each tells over which chain of facets the camera sees that place, and the cells of space about it list
-the chain. Light that only merging could bring (`render.laser_indirect.photon_merging`) is brought from a cell to the
-camera over the chains that are listed there, by walks (`render.laser_indirect.manifold_walk`); camera paths that come
-to a cell over a listed chain are not merged. Both know the list, so each path is found once, whatever is listed; what
-the grid has missed is merged.
+Rays of a grid over the image, or the sheet, are followed over mirrors and glass, by reflection and by refraction, until
+they meet a rough surface; each tells over which chain of facets that place is seen, and the cells of space about it
+list the chain. Light that only merging could bring (`render.laser_indirect.photon_merging`) is brought from a cell to
+the camera over the chains that are listed there, by walks (`render.laser_indirect.manifold_walk`); camera paths that
+come to a cell over a listed chain are not merged. Camera paths that come to a cell with chains from the laser know its
+light there (`render.laser_indirect.laser_walks`). All know the lists, so each path is found once, whatever is listed;
+what the grid has missed is found by light paths.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ import numpy as np
 from render.base.arrays import Bool, Float, Int, Long
 from render.base.vectors import Vector, dot, store, vector
 from render.camera.camera import Camera
+from render.laser.irradiance import SHEET_SIGMAS
+from render.laser.laser import LineLaser
 from render.laser_indirect.manifold_walk import turned
 from render.laser_indirect.path_vertex import (
     MOST_FACETS,
@@ -42,7 +45,7 @@ SEEN = np.dtype(
     align=True,
 )
 GRID_RAYS = 1 << 14
-"""Rays of the grid, about; no less than a pixel apart. Chosen, not tuned."""
+"""Rays of the grid, about; of the camera's no less than a pixel apart. Chosen, not tuned."""
 CELL_RAYS = 2.0
 """Size of a cell, in the spacing of the grid's rays at their median distance."""
 LEAST_SHARE = 1e-4
@@ -52,7 +55,7 @@ BITS = 21
 
 
 class ChainIndex(NamedTuple):
-    """(k,) cells, in order, that the camera sees over chains: seen[starts[i] : starts[i + 1]] of cell i."""
+    """(k,) cells, in order, that are seen over chains: seen[starts[i] : starts[i + 1]] of cell i."""
 
     cells: Long
     starts: Long
@@ -68,17 +71,40 @@ class ChainIndex(NamedTuple):
 
 def seen_chains(world: World, surface: Surface, camera: Camera, T_world_camera: Float) -> ChainIndex | None:
     """The chains over which the camera sees rough surfaces; None: none is of plane mirrors and faces alone."""
+    spacing = max(1.0, math.sqrt(camera.width * camera.height / GRID_RAYS))
+    v, u = np.mgrid[0 : camera.height - 1 : spacing, 0 : camera.width - 1 : spacing]
+    directions, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1))
+    slopes = directions[known, :2] / directions[known, 2:]
+    return _chains_of_rays(world, surface, slopes, T_world_camera, spacing / max(camera.fx, camera.fy))
+
+
+def lit_chains(world: World, surface: Surface, laser: LineLaser, T_world_laser: Float) -> ChainIndex | None:
+    """The chains over which the laser lights rough surfaces; None: there are none, or its sheet has a waist, so that
+    its light does not come from one point."""
+    beam = laser.packed()
+    if beam[1] != 0.0:
+        return None
+    across, along = SHEET_SIGMAS * beam[3], beam[4]
+    spacing = math.sqrt(4.0 * across * along / GRID_RAYS)
+    x, y = (np.linspace(-end, end, max(3, math.ceil(2.0 * end / spacing))) for end in (across, along))
+    slopes = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return _chains_of_rays(world, surface, slopes, T_world_laser, max(x[1] - x[0], y[1] - y[0]))
+
+
+def _chains_of_rays(
+    world: World, surface: Surface, slopes: Float, T_world_origin: Float, spacing: float
+) -> ChainIndex | None:
+    """The chains that rays of slopes (n, 2), `spacing` apart, come over from the origin of a frame."""
     rays = world.rays
     plain = (surface.detail == 0) & (surface.second < 0)
     walkable = plain & np.array([is_specular_row(row) for row in surface.rows])
     if not np.any(walkable[: surface.object_id.max() + 1]):
         return None
-    spacing = max(1.0, math.sqrt(camera.width * camera.height / GRID_RAYS))
-    v, u = np.mgrid[0 : camera.height - 1 : spacing, 0 : camera.width - 1 : spacing]
-    directions, known = camera.rays(np.stack([u.ravel(), v.ravel()], axis=1))
-    ahead = np.zeros(int(known.sum()), SEEN)
-    ahead["slopes"] = directions[known, :2] / directions[known, 2:]
-    ahead["o"], ahead["d"], ahead["share"] = T_world_camera[:3, 3], directions[known] @ T_world_camera[:3, :3].T, 1.0
+    ahead = np.zeros(len(slopes), SEEN)
+    directions = np.concatenate([slopes, np.ones((len(slopes), 1))], axis=1)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    ahead["slopes"], ahead["d"] = slopes, directions @ T_world_origin[:3, :3].T
+    ahead["o"], ahead["share"] = T_world_origin[:3, 3], 1.0
     found: list[Records] = []
     for _ in range(MOST_FACETS + 1):
         triangle, _ = rays.intersect((ahead["o"] - rays.centre).astype(np.float32), ahead["d"].astype(np.float32))
@@ -91,9 +117,8 @@ def seen_chains(world: World, surface: Surface, camera: Camera, T_world_camera: 
     seen = np.concatenate(found)
     if not len(seen):
         return None
-    distance = np.linalg.norm(seen["o"] - T_world_camera[:3, 3], axis=1)
-    size = CELL_RAYS * spacing * float(np.median(distance)) / max(camera.fx, camera.fy)
-    return listed_by_cell(seen, rays.centre, size)
+    distance = np.linalg.norm(seen["o"] - T_world_origin[:3, 3], axis=1)
+    return listed_by_cell(seen, rays.centre, CELL_RAYS * spacing * float(np.median(distance)))
 
 
 def listed_by_cell(seen: Records, centre: Float, size: float) -> ChainIndex:
@@ -173,7 +198,7 @@ def cell_at(index: ChainIndex, p: Vector) -> int:
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def mark_listed(vertices: Records, paths: Records, index: ChainIndex) -> None:
-    """Camera paths (n,) that have come over a chain that is listed there: `walked` of PATH."""
+    """Paths (n,) that have come over a chain that is listed there: `walked` of PATH."""
     for r in range(vertices.shape[0]):
         path = paths[r]
         path.walked = False

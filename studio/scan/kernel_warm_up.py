@@ -269,6 +269,8 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     from render.ambient.measured_light import LEAST_SAMPLES, measured_images
     from render.importance import Importance
     from render.laser_indirect.accumulator import PASSES_A_WAVE
+    from render.laser_indirect.bdpt_pass import BdptPass
+    from render.laser_indirect.clear_light import Integral, integrated
     from render.laser_indirect.integrator import empty_buffer
     from render.laser_indirect.line_goal import Effect, LineErrors
     from render.laser_indirect.line_paths import PathDemand
@@ -288,7 +290,13 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     paths = np.ones(ones.size)
     demand = PathDemand.none(errors.projection).learned(errors.projection, errors.spread(buffers), paths, 1.0)
     demand.aim(paths, errors.projection, camera.width, 1.0)
-    list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
+    placed = PlacedScene(world, scene)
+    for laser in placed.lasers:
+        task = BdptPass.of(laser, 1.0, 1)
+        if task.lit_chains is not None:
+            # images as small as this are left to random paths
+            integrated(Integral(task, run, []))
+    list(measured_images(placed, everywhere, most=LEAST_SAMPLES, run=run))
     return frame
 
 

@@ -86,7 +86,7 @@ def test_a_walk_through_a_plate_is_the_path_of_snells_law_and_brings_what_fresne
         assert found.slopes == pytest.approx((slope * x / radius, slope * y / radius), abs=1e-9)
         # a ring of slopes dS about the axis lands on a ring dR
         assert found.spread == pytest.approx(by_slope * radius / slope, rel=1e-5)
-        shares.append(passed(surface, np.full(3, 1 / 3), chain, pose, origin, found.slopes, places, rgb))
+        shares.append(passed(surface, np.full(3, 1 / 3), chain, pose, origin, found.slopes, False, places, rgb))
     angle = math.atan(slope)
     expected = (1 - fresnel(angle, math.asin(math.sin(angle) / 1.5))) ** 2
     assert [share for share in {round(share, 12) for share in shares} if share > 0] == [pytest.approx(expected)]
