@@ -27,6 +27,6 @@ BARS = (
 QUICK = {"s2": ("ours", "mitsuba ptracer, LLVM", "mitsuba ptracer, aimed", "luxcore light", "cycles guided")}
 QUICK |= {
     "s2-shiny": ("ours", "mitsuba ptracer, LLVM", "mitsuba ptracer, aimed", "mitsuba path", "luxcore light"),
-    "s3": ("ours", "mitsuba ptracer, aimed", "luxcore light", "luxcore caches", "luxcore hybrid"),
+    "s3": ("ours", "mitsuba ptracer, aimed", "luxcore light", "luxcore hybrid"),
 }
 """Scenes of the reflections' bars, and what comes near to one of them there, by the start of its name."""
