@@ -29,7 +29,7 @@ validate: $(INSTALLED_VALIDATION)
 	$(BIN)/pytest -m validation tests
 
 benchmark: system-tests $(INSTALLED)
-	@for script in $(filter-out %/bench_peers.py,$(wildcard tests/benchmarks/bench_*.py)); do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+	@for script in $(filter-out %/bench_peers.py %/bench_bars.py,$(wildcard tests/benchmarks/bench_*.py)); do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 peers: $(INSTALLED_VALIDATION)
 	$(BIN)/python tests/benchmarks/bench_peers.py

@@ -39,6 +39,7 @@ from render.ambient.path_vertex import (
     vertex_of,
 )
 from render.base.arrays import Float, Float32, Int
+from render.base.borrowed import borrowed
 from render.base.vectors import Vector, along, divided, dot, minus, plus, row_vector, store_row, times, vector
 from render.material.bsdf import is_boundary, is_diffuse, is_specular_row
 from render.material.record import BSDF_COLUMNS, INDEX
@@ -47,8 +48,9 @@ from render.world.interior_list import bit_of, index_beside, medium_within
 from render.world.surface_interaction import interaction
 from render.world.triangles import Surface, scattering
 
-FIRST_ROULETTE_SURFACE = 2
-"""Surface, counted from 1, on leaving which a path may first be ended by Russian roulette."""
+FIRST_ROULETTE_SURFACE = 4
+"""Surface, counted from 1, on leaving which a path may first be ended by Russian roulette: as for laser light. From the
+second on the weld seam took twice the samples to 1 %, from the first six times."""
 MOST_SURVIVAL = 0.95
 """Largest probability of surviving it, so that paths among mirrors end. Chosen, not tuned."""
 
@@ -105,7 +107,8 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
 
         Returns the number of paths that go on (the first rows of `paths`) and of shadow rays.
         """
-        # taking an array out of a named tuple costs a reference count, so it is done once and not for every path
+        surface, lights, samples, paths = borrowed(surface), borrowed(lights), borrowed(samples), borrowed(paths)
+        triangle, shadow_rays, film = borrowed(triangle), borrowed(shadow_rays), borrowed(film)
         vertices, triangles, materials = surface.vertices, surface.triangles, surface.rows
         rows, rectangles, environment = lights.rows, lights.rectangles, vector(lights.environment)
         (table, seed, keys), (sums, counts), lamps = samples, film, lights.rows.shape[0]
@@ -115,8 +118,8 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
         clamp = bounce.clamp if depth > 1 else np.inf
         # where no object shines, a shadow ray is enough to find out what the last surface sees
         last = depth + 1 == bounce.most_surfaces and lights.shining.shape[0] == 0
-        rho, alpha, frame = np.empty(3), np.empty(2), np.empty((3, 3))
-        row, weight = np.empty(BSDF_COLUMNS), np.empty(3)
+        room = np.empty(3), np.empty(2), np.empty((3, 3)), np.empty(BSDF_COLUMNS), np.empty(3)
+        rho, alpha, frame, row, weight = borrowed(room)
         going = connected = 0
         base = FIRST_SURFACE + EACH_SURFACE * depth
         for r in range(triangle.shape[0]):
@@ -233,6 +236,8 @@ def _shade_kernel(glossy: bool) -> Any:  # noqa: PLR0915
             pdfs[going], pixel_slots[going], numbers[going] = bsdf_pdf, pixel_slot, s
             media[going], interiors[going] = medium, on.interior
             going += 1
+        # held to here
+        room[0][0] = 0.0
         return going, connected
 
     return shade

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.arrays import Float, Float32, Int, Long
+from render.base.borrowed import borrowed
 from render.base.vectors import Vector, row_vector, store_row
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_point, lens_position
@@ -72,6 +73,7 @@ def camera_rays(
     view: View, samples: Samples, pixels: Int, first: Int, count: Int, centre: Float, paths: PathState
 ) -> int:
     """Rays of samples first .. first + count of both halves, (m, 2), of pixels (m,) -> paths. Returns how many."""
+    view, samples, paths = borrowed(view), borrowed(samples), borrowed(paths)
     table, seed, k = samples.table, samples.seed, view.distortion
     tilt, distorted = tilt_matrix(k[12], k[13]), bool(np.any(k))
     fx, fy, cx, cy, skew = view.intrinsics
@@ -129,6 +131,7 @@ def accumulate_unoccluded(
     shadow_rays: ShadowRays, occluded: NDArray[np.bool_], clamp: float, sums: Float, counts: Float
 ) -> None:
     """Add what every unoccluded shadow ray sees to its pixel: sums (.., 4), counts (2,)."""
+    shadow_rays, sums, counts = borrowed(shadow_rays), borrowed(sums), borrowed(counts)
     for j in range(occluded.shape[0]):
         if not occluded[j]:
             accumulate(sums, counts, shadow_rays.pixel_slot[j], clamp, row_vector(shadow_rays.light, j))

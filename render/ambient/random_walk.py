@@ -14,6 +14,7 @@ import numpy as np
 
 from render.ambient.path_state import PathState, Samples
 from render.base.arrays import Float, Float32, Int
+from render.base.borrowed import borrowed
 from render.material.bsdf import ANISOTROPY, EXTINCTION, SCATTERED
 from render.material.medium import MOST_STEPS, henyey_greenstein, turn
 from render.sampling.random import uniform
@@ -38,6 +39,8 @@ def random_walk_step(
     distance (n,): to the boundary along each path's ray. Origin, direction and throughput in `paths` are moved; a path
     that is absorbed, or found no boundary, carries nothing and gets triangle -1. Returns how many stay.
     """
+    walking, distance, rows, samples = borrowed(walking), borrowed(distance), borrowed(rows), borrowed(samples)
+    paths, triangle = borrowed(paths), borrowed(triangle)
     _, seed, keys = samples
     left = 0
     d, w, extinction, pdf = np.empty(3), np.empty(3), np.empty(3), np.empty(3)

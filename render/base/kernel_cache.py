@@ -31,7 +31,7 @@ DISPATCHER = "numba.core.dispatcher"
 KNOWN_NUMBA = "0.68."
 """Versions of numba whose inside `kernel_dispatcher` was made for, and is tested with."""
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
-KERNEL = re.compile(rb"^\s*@(?:(?:numba\.)?njit|peak_kernel)\b", re.MULTILINE)
+KERNEL = re.compile(rb"^\s*@(?:(?:numba\.)?njit|peak_kernel|intrinsic)\b", re.MULTILINE)
 CONSTANT = re.compile(rb"\b(?:[A-Z][A-Z0-9_]+|Flag)\b")
 
 

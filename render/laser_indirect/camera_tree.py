@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Float, Long
+from render.base.borrowed import borrowed
 from render.base.vectors import store_row, vector
 from render.camera.distortion import tilt_matrix
 from render.camera.view import View
@@ -103,6 +104,7 @@ def divide(
     Returns how many go on, those of a weight of `least` and more. Radiance changes with the square of the refractive
     index, as in `path_vertex.scatter`.
     """
+    vertices, paths, context, divided = borrowed(vertices), borrowed(paths), borrowed(context), borrowed(divided)
     row, f = np.empty(BSDF_COLUMNS), np.empty(1)
     going = 0
     for r in range(vertices.shape[0]):

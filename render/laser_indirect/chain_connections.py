@@ -9,6 +9,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float, Float32, Int, Long
+from render.base.borrowed import borrowed
 from render.base.vectors import Vector, divided, dot, length, minus, row_vector, store_row, vector
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import lens_point, lens_position
@@ -102,6 +103,8 @@ def walk_to_camera(  # noqa: PLR0913
 
     counts (2,): -> of solutions and shadow rays. Returns the first vertex that there was no room for.
     """
+    vertices, paths, index, surface = borrowed(vertices), borrowed(paths), borrowed(index), borrowed(surface)
+    context, sampling, counts, walks = borrowed(context), borrowed(sampling), borrowed(counts), borrowed(walks)
     view = sampling.camera
     m, tilt = view.T_world_camera, tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
@@ -153,6 +156,7 @@ def walk_to_camera(  # noqa: PLR0913
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def splat_walks(walks: Walks, occluded: Bool, solutions: int, scale: float, buffer: PassBuffer) -> None:
     """Splat the solutions none of whose shadow rays (n,) is occluded."""
+    walks, occluded, buffer = borrowed(walks), borrowed(occluded), borrowed(buffer)
     for ray in range(occluded.shape[0]):
         if occluded[ray]:
             walks.contribution[walks.owner[ray]] = 0.0

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float, Float32, Int, Long
+from render.base.borrowed import borrowed
 from render.base.vectors import Vector, along, minus, store_row, vector
 from render.laser_indirect.path_vertex import PassContext, Record, cosine_to
 
@@ -93,6 +94,7 @@ def set_shadow_ray(
 @numba.njit(nogil=True, cache=True)
 def splat_unoccluded(connections: Connections, occluded: Bool, count: int, scale: float, buffer: PassBuffer) -> None:
     """Splat the connections that nothing occludes: to the image, the sum of their kind of light, the fan's moments."""
+    connections, occluded, buffer = borrowed(connections), borrowed(occluded), borrowed(buffer)
     for j in range(count):
         if occluded[j]:
             continue

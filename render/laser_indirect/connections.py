@@ -22,6 +22,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float
+from render.base.borrowed import borrowed
 from render.base.vectors import Vector, divided, length, minus, rotated, transformed, vector
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import lens_point, lens_position, lens_project
@@ -83,6 +84,8 @@ def connect_to_camera(
     connections: Connections,
 ) -> int:
     """Connect light vertices (n,) to the camera -> connections, to be divided by the light paths; their number."""
+    vertices, paths, context, sampling = borrowed(vertices), borrowed(paths), borrowed(context), borrowed(sampling)
+    connections = borrowed(connections)
     view, rows = sampling.camera, context.rows
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
@@ -124,6 +127,8 @@ def connect_to_laser(
     vertices: Records, paths: Records, context: PassContext, laser: LaserSampling, connections: Connections
 ) -> int:
     """Connect camera vertices (n,) to the laser -> connections. Returns their number."""
+    vertices, paths, context, laser = borrowed(vertices), borrowed(paths), borrowed(context), borrowed(laser)
+    connections = borrowed(connections)
     m, rows = laser.T_laser_world, context.rows
     position = (
         -(m[0, 0] * m[0, 3] + m[1, 0] * m[1, 3] + m[2, 0] * m[2, 3]),
@@ -157,6 +162,7 @@ def connect_to_laser(
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def init_light_mis(vertices: Records, paths: Records, laser: LaserSampling) -> None:
     """The partial MIS sums of light paths at the first surface that they meet."""
+    vertices, paths, laser = borrowed(vertices), borrowed(paths), borrowed(laser)
     for r in range(vertices.shape[0]):
         _, photon_pdf = laser_irradiance(vertices[r], laser)
         path = paths[r]
@@ -167,6 +173,7 @@ def init_light_mis(vertices: Records, paths: Records, laser: LaserSampling) -> N
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def init_camera_mis(vertices: Records, paths: Records, sampling: CameraSampling, seed: int) -> None:
     """The partial MIS sums of camera paths at the first surface that they meet."""
+    vertices, paths, sampling = borrowed(vertices), borrowed(paths), borrowed(sampling)
     view = sampling.camera
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))
@@ -189,6 +196,8 @@ def mark_reachable(
 
     specular (pixels,): where the camera sees a mirror or clear glass. It only says where camera paths are worthwhile.
     """
+    vertices, paths, sampling = borrowed(vertices), borrowed(paths), borrowed(sampling)
+    specular, buffer = borrowed(specular), borrowed(buffer)
     view = sampling.camera
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])
     distorted = bool(np.any(view.distortion))

@@ -17,6 +17,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float, Long
+from render.base.borrowed import borrowed
 from render.base.vectors import row_vector, vector
 from render.laser.irradiance import fan_density, slope_density
 from render.laser_indirect.chain_connections import Walks, add_shadow_rays
@@ -55,6 +56,8 @@ def walk_to_laser(  # noqa: PLR0913
 
     counts (2,): -> of solutions and shadow rays. Returns the first vertex that there was no room for.
     """
+    vertices, paths, index, surface = borrowed(vertices), borrowed(paths), borrowed(index), borrowed(surface)
+    context, laser, walks = borrowed(context), borrowed(laser), borrowed(walks)
     m = laser.T_world_laser
     origin = (m[0, 3], m[1, 3], m[2, 3])
     places, rgb = np.empty((MOST_FACETS, 3)), np.empty(3)

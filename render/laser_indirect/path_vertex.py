@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.base.arrays import Float, Int
+from render.base.borrowed import borrowed
 from render.base.vectors import (
     Vector,
     along,
@@ -123,6 +124,9 @@ def intersect(
 
     Takes the partial MIS sums from solid angle to area.
     """
+    surface, context, origin = borrowed(surface), borrowed(context), borrowed(origin)
+    direction, triangle, paths = borrowed(direction), borrowed(triangle), borrowed(paths)
+    vertices = borrowed(vertices)
     rgb, alpha, frame = np.empty(3), np.empty(2), np.empty((3, 3))
     hits = 0
     for r in range(triangle.shape[0]):
@@ -261,6 +265,8 @@ def scatter(
     which camera paths carry, changes with the square of the refractive index; power does not. Shading normals: Veach
     (1997), 5.3.
     """
+    vertices, paths, context, shift = borrowed(vertices), borrowed(paths), borrowed(context), borrowed(shift)
+    origin, direction = borrowed(origin), borrowed(direction)
     rows = context.rows
     row, f = np.empty(BSDF_COLUMNS), np.empty(1)
     going = 0

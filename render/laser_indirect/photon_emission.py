@@ -9,6 +9,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Float, Long
+from render.base.borrowed import borrowed
 from render.base.pose import invert, transform_points
 from render.laser.irradiance import sheet_sigma
 from render.laser.laser import CONSTANT, GAUSSIAN, LineLaser
@@ -112,6 +113,8 @@ def emit(
 
     A focused sheet bends; its photons fly straight towards where the sheet is at the reference distance, the part's.
     """
+    shift, beam, fan, T_world_laser = borrowed(shift), borrowed(beam), borrowed(fan), borrowed(T_world_laser)
+    photons = borrowed(photons)
     m = T_world_laser
     emitter, _ = sheet_sigma(0.0, beam)
     sigma, _ = sheet_sigma(reference_distance, beam)

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float, Long
+from render.base.borrowed import borrowed
 from render.base.vectors import dot, minus, vector
 from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 from render.laser_indirect.path_vertex import (
@@ -74,6 +75,8 @@ def photon_map(vertices: Records, paths: Records, radius: float, light_paths: in
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def merge(vertices: Records, paths: Records, rows: Float, photons: PhotonMap, clear: Bool, buffer: PassBuffer) -> None:
     """Splat what the photons about each camera vertex bring; clear: of `CameraSampling`."""
+    vertices, paths, rows, photons = borrowed(vertices), borrowed(paths), borrowed(rows), borrowed(photons)
+    buffer = borrowed(buffer)
     radius = 0.5 * photons.size
     kernel = 1.0 / (math.pi * radius * radius * photons.light_paths)
     for r in range(vertices.shape[0]):

@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Float
+from render.base.borrowed import borrowed
 from render.camera.distortion import tilt_matrix
 from render.camera.lens import chief_ray, lens_direction, lens_position
 from render.camera.view import View
@@ -25,6 +26,8 @@ def pixel_rays(
     sampling: CameraSampling, drawn: DrawnPaths, seed: int, origin: Float, direction: Float, paths: Records
 ) -> None:
     """Camera paths for some pixels, spread over each pixel's area, with random numbers by their number or key."""
+    sampling, drawn, origin, direction = borrowed(sampling), borrowed(drawn), borrowed(origin), borrowed(direction)
+    paths = borrowed(paths)
     pixels, keys, starts = drawn
     view = sampling.camera
     tilt = tilt_matrix(view.distortion[12], view.distortion[13])

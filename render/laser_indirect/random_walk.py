@@ -11,6 +11,7 @@ import math
 import numba
 
 from render.base.arrays import Float, Float32, Int
+from render.base.borrowed import borrowed
 from render.laser_indirect.path_vertex import PassContext, Records
 from render.material.bsdf import ANISOTROPY, EXTINCTION, SCATTERED
 from render.material.medium import MOST_STEPS, henyey_greenstein, turn
@@ -37,6 +38,8 @@ def random_walk_step(  # noqa: PLR0913
     distance (n,): to the boundary along each path's ray. origin, direction are moved; a path that is absorbed gets
     triangle -1. Returns how many stay.
     """
+    walking, distance, paths, context = borrowed(walking), borrowed(distance), borrowed(paths), borrowed(context)
+    origin, direction, triangle = borrowed(origin), borrowed(direction), borrowed(triangle)
     staying = 0
     for w in range(walking.shape[0]):
         r = walking[w]

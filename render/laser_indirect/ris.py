@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Float, Long
+from render.base.borrowed import borrowed
 from render.base.vectors import Vector, divided, dot, length, minus, negative, store_row, vector
 from render.laser_indirect.connection_buffer import Connections, PassBuffer
 from render.laser_indirect.connections import towards
@@ -69,7 +70,10 @@ def connect_by_ris(
     Candidates are stratified along the lit curve, and denser where the guide expects most. The squared target weights
     that they meet go to `buffer.wave_moments`, for the guide of the passes to come.
     """
-    weights, chosen = np.empty(MOST_CANDIDATES), np.empty(MOST_CANDIDATES, np.int64)
+    vertices, paths, light, guide = borrowed(vertices), borrowed(paths), borrowed(light), borrowed(guide)
+    context, buffer, connections = borrowed(context), borrowed(buffer), borrowed(connections)
+    room = np.empty(MOST_CANDIDATES), np.empty(MOST_CANDIDATES, np.int64)
+    weights, chosen = borrowed(room)
     count = light.vertices.shape[0]
     candidates = light.candidates[0] if depth == 0 else light.candidates[1]
     guided = light.ordered and depth == 0 and count >= BINS
@@ -106,6 +110,8 @@ def connect_by_ris(
         direction, _ = towards(v, vector(w.p))
         connections.interior[n] = interior_beyond(v, path, context.rows, cosine_to(v, direction))
         n += 1
+    # held to here
+    room[0][0] = 0.0
     return n
 
 

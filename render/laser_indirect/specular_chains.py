@@ -18,6 +18,7 @@ import numba
 import numpy as np
 
 from render.base.arrays import Bool, Float, Int, Long
+from render.base.borrowed import borrowed
 from render.base.vectors import Vector, dot, store, vector
 from render.camera.camera import Camera
 from render.laser.irradiance import SHEET_SIGMAS
@@ -199,6 +200,7 @@ def cell_at(index: ChainIndex, p: Vector) -> int:
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def mark_listed(vertices: Records, paths: Records, index: ChainIndex) -> None:
     """Paths (n,) that have come over a chain that is listed there: `walked` of PATH."""
+    vertices, paths, index = borrowed(vertices), borrowed(paths), borrowed(index)
     for r in range(vertices.shape[0]):
         path = paths[r]
         path.walked = False

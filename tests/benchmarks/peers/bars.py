@@ -13,16 +13,20 @@ class Bar:
     error: float
     ratio: float
     """Times sooner than the best peer."""
-    only: str = ""
-    """Peers that count, by the start of their name; empty: all."""
 
 
 BARS = (
     Bar("s1", "line", 0.01, 150.0),
     Bar("s1", "line", 0.001, 1000.0),
     Bar("s2", "line", 0.02, 8.0),
-    Bar("s2", "reflection", 0.10, 6.0),
-    Bar("s2", "reflection", 0.03, 6.0),
-    Bar("s2-shiny", "reflection", 0.10, 8.0),
-    Bar("s3", "reflection", 0.10, 10.0, "luxcore"),
+    Bar("s2", "reflection", 0.10, 15.0),
+    Bar("s2", "reflection", 0.03, 40.0),
+    Bar("s2-shiny", "reflection", 0.10, 100.0),
+    Bar("s3", "reflection", 0.10, 30.0),
 )
+QUICK = {"s2": ("ours", "mitsuba ptracer, LLVM", "mitsuba ptracer, aimed", "luxcore light", "cycles guided")}
+QUICK |= {
+    "s2-shiny": ("ours", "mitsuba ptracer, LLVM", "mitsuba ptracer, aimed", "mitsuba path", "luxcore light"),
+    "s3": ("ours", "mitsuba ptracer, aimed", "luxcore light", "luxcore hybrid"),
+}
+"""Scenes of the reflections' bars, and what comes near to one of them there, by the start of its name."""

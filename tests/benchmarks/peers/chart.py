@@ -21,8 +21,9 @@ TITLES = {
     ("s4", "reflection"): "caustic behind a glass plate",
 }
 # colour-blind safe (Okabe and Ito 2008); ours in black
-COLOURS = ("#000000", "#0072B2", "#56B4E9", "#009E73", "#D55E00", "#E69F00", "#CC79A7", "#999999")
-MARKERS = ("o", "s", "D", "^", "v", "<", ">", "x")
+COLOURS = ("#000000", "#0072B2", "#56B4E9", "#882255", "#009E73", "#D55E00", "#E69F00", "#CC79A7", "#999999")
+COLOURS += ("#44AA99", "#6699CC", "#AA4466")
+MARKERS = ("o", "s", "D", "P", "^", "v", "<", ">", "x", "*", "p", "h")
 
 
 def draw(rows: list[dict], folder: Path) -> list[Path]:

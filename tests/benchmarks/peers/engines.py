@@ -19,12 +19,18 @@ ENGINES = {
     OURS: ("peers.ours",),
     "mitsuba ptracer, LLVM": ("peers.mitsuba_run", "llvm_ad_rgb", "ptracer"),
     "mitsuba ptracer, scalar": ("peers.mitsuba_run", "scalar_rgb", "ptracer"),
+    "mitsuba ptracer, aimed": ("peers.mitsuba_run", "llvm_ad_rgb", "ptracer", "aimed"),
     "mitsuba path, LLVM": ("peers.mitsuba_run", "llvm_ad_rgb", "path"),
     "luxcore light": ("peers.luxcore_run", "light"),
     "luxcore path": ("peers.luxcore_run", "path"),
     "luxcore bidir, halved": ("peers.luxcore_run", "bidir"),
     "luxcore hybrid": ("peers.luxcore_run", "hybrid"),
+    "luxcore caches": ("peers.luxcore_run", "caches"),
+    "cycles path": ("peers.cycles_run", "path"),
+    "cycles guided": ("peers.cycles_run", "guided"),
 }
+PACKAGES = {"mitsuba": "mitsuba", "luxcore": "pyluxcore", "cycles": "bpy"}
+"""What an engine is installed as, by the start of its name."""
 GRACE = 600.0
 """Seconds a process may take beside its longest budget: loading, compiling, and a machine that does other things."""
 
@@ -38,11 +44,25 @@ class Shot:
     more: dict
 
 
-def run(engine: str, scene: str, budgets: list[float], seed: int) -> tuple[list[Shot], str]:
-    """All images that the engine made before it ended, and what went wrong ("" if nothing did)."""
+def installed(engine: str, python: str) -> bool:
+    """Whether this interpreter has the engine's package."""
+    package = next((name for start, name in PACKAGES.items() if engine.startswith(start)), None)
+    if package is None:
+        return True
+    asked = f"import importlib.util, sys; sys.exit(importlib.util.find_spec({package!r}) is None)"
+    return subprocess.run([python, "-c", asked]).returncode == 0
+
+
+def run(
+    engine: str, scene: str, budgets: list[float], seed: int, python: str = sys.executable
+) -> tuple[list[Shot], str]:
+    """All images that the engine made before it ended, and what went wrong ("" if nothing did).
+
+    python: the interpreter that has it.
+    """
     module, *mode = ENGINES[engine]
     folder = Path(tempfile.mkdtemp(prefix="peers-"))
-    command = [sys.executable, "-m", module, scene, *mode, str(seed), str(folder), *map(str, budgets)]
+    command = [python, "-m", module, scene, *mode, str(seed), str(folder), *map(str, budgets)]
     root = BENCHMARKS.parents[1]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(BENCHMARKS)])}
     trouble = ""

@@ -2,7 +2,8 @@
 
     python -m peers.luxcore_run SCENE MODE SEED FOLDER BUDGET...
 
-MODE: path, bidir, hybrid (path tracing with light tracing for caustics), light.
+MODE: path, bidir, hybrid (path tracing with light tracing for caustics), light, caches (path tracing with its photon
+caches, PhotonGI, of indirect light and of caustics; biased).
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ ENGINES = {
     "path": "renderengine.type = PATHCPU\n",
     "bidir": f"renderengine.type = BIDIRCPU\nlight.maxdepth = {BOUNCES}\n",
     "hybrid": "renderengine.type = PATHCPU\npath.hybridbackforward.enable = 1\n",
+    "caches": "renderengine.type = PATHCPU\npath.photongi.sampler.type = METROPOLIS\n"
+    "path.photongi.indirect.enabled = 1\npath.photongi.caustic.enabled = 1\n"
+    "path.photongi.photon.maxcount = 2000000\npath.photongi.indirect.maxsize = 100000\n"
+    "path.photongi.caustic.maxsize = 1000000\n",
     "light": f"renderengine.type = LIGHTCPU\nlight.maxdepth = {BOUNCES}\n",
 }
 

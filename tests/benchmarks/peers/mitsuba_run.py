@@ -1,6 +1,9 @@
 """Mitsuba 3 on one scene, in a process of its own: passes of a fixed size, an image at each budget.
 
-python -m peers.mitsuba_run SCENE VARIANT INTEGRATOR SEED FOLDER BUDGET...
+python -m peers.mitsuba_run SCENE VARIANT INTEGRATOR [aimed] SEED FOLDER BUDGET...
+
+aimed: the projector's picture is dark where the sheet meets nothing, or nothing that reflections come by way of, so
+that no particle is sent there. Mitsuba has no guiding of its own (3.9).
 """
 
 from __future__ import annotations
@@ -32,13 +35,19 @@ def find_llvm() -> None:
         os.environ["DRJIT_LIBLLVM_PATH"] = places[int(np.argmax(digits))]
 
 
-def projector(mi) -> dict:
-    """The laser: a projector whose texture holds irradiance on z = 1 over pi, constant radiant intensity."""
+def projector(mi, aim: tuple[float, float] | None = None) -> dict:
+    """The laser: a projector whose texture holds irradiance on z = 1 over pi, constant radiant intensity.
+
+    aim: the tangents along the fan between which it shines; None: the whole fan.
+    """
     half = REACH * scenes.SIGMA
     edge = math.tan(scenes.FAN / 2)
     texels_along = round(TEXELS * edge / half)
-    y = ((np.arange(texels_along) + 0.5) / texels_along * 2 - 1) * edge
+    # the first row of a picture is its top
+    y = (1 - (np.arange(texels_along) + 0.5) / texels_along * 2) * edge
     along = (1 + y * y) ** -1.5 / (2 * math.sin(scenes.FAN / 2))
+    if aim is not None:
+        along[(y < aim[0] - 2 * edge / texels_along) | (y > aim[1] + 2 * edge / texels_along)] = 0.0
     picture = scenes.POWER / math.pi * np.outer(along, scenes.sheet_profile(TEXELS, REACH)).astype(np.float32)
     origin, axis, up = scenes.T_WORLD_LASER[:3, 3], scenes.T_WORLD_LASER[:3, 2], scenes.T_WORLD_LASER[:3, 1]
     return {
@@ -83,7 +92,9 @@ def mesh(mi, part: scenes.Part):
 
 
 def main() -> None:
-    name, variant, integrator, seed, folder, *budgets = sys.argv[1:]
+    name, variant, integrator, *more = sys.argv[1:]
+    aimed = more[0] == "aimed"
+    seed, folder, *budgets = more[aimed:]
     keep_to()
     find_llvm()
     import mitsuba as mi
@@ -102,7 +113,7 @@ def main() -> None:
             "film": {**film, "rfilter": {"type": "box"}, "pixel_format": "rgb"},
             "sampler": {"type": "independent", "sample_count": 1},
         },
-        "laser": projector(mi),
+        "laser": projector(mi, scenes.aim(scenes.setting(name)) if aimed else None),
     }
     for part in scenes.setting(name).parts:
         description[part.name] = mesh(mi, part)

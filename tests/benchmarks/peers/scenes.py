@@ -67,6 +67,8 @@ class Setting:
     name: str
     title: str
     parts: tuple[Part, ...]
+    backdrop: tuple[str, ...] = ()
+    """Parts that send light to no other: an aimed laser may pass them by."""
 
 
 WALL = Material("diffuse", albedo=0.5)
@@ -144,13 +146,30 @@ def setting(name: str, ball_segments: int = 256) -> Setting:
     if name == "s2-shiny":
         return Setting(name, "tee weld, metal of alpha 0.03", _tee(0.03))
     if name == "s3":
-        return Setting(name, "glass ball before a wall", (_wall(), _ball(ball_segments)))
+        return Setting(name, "glass ball before a wall", (_wall(), _ball(ball_segments)), ("wall",))
     if name == "s4":
         return Setting(name, "ball and wall behind a glass plate", (_wall(), _ball(ball_segments), _plate()))
     raise ValueError(f"scene {name!r}; known: {', '.join(NAMES)}")
 
 
 NAMES = ("s1", "s2", "s2-shiny", "s3", "s4")
+
+
+def aim(of: Setting) -> tuple[float, float]:
+    """Tangents along the fan, in the laser's frame, between which the sheet meets what reflections come by way of."""
+    world_to_laser = np.linalg.inv(T_WORLD_LASER)
+    low, high, edge = math.inf, -math.inf, math.tan(FAN / 2)
+    for part in (part for part in of.parts if part.name not in of.backdrop):
+        points = part.vertices.astype(np.float64) @ world_to_laser[:3, :3].T + world_to_laser[:3, 3]
+        a, b = (points[part.triangles[:, k]] for k in ([0, 1, 2], [1, 2, 0]))
+        # where an edge of a triangle goes through the sheet's plane
+        through = a[..., 0] * b[..., 0] <= 0.0
+        a, b = a[through], b[through]
+        share = a[:, 0] / np.where(a[:, 0] == b[:, 0], 1.0, a[:, 0] - b[:, 0])
+        met = a + share[:, None] * (b - a)
+        tangents = met[:, 1] / met[:, 2]
+        low, high = min([low, *tangents]), max([high, *tangents])
+    return max(float(low), -edge), min(float(high), edge)
 
 
 def sheet_profile(texels: int, reach: float) -> np.ndarray:
