@@ -69,6 +69,8 @@ class CoarseImage:
     clamped: int
     cut: float
     """As in `AmbientImage`."""
+    taken_over: bool = False
+    """It is that of another frame, which was checked as a whole alone: of a single place nothing is known for sure."""
 
 
 def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> CoarseImage:

@@ -37,6 +37,7 @@ from render.laser_indirect.guiding import (
     reserve_for_specular,
     update_guide,
 )
+from render.laser_indirect.lesson import ReflectedLesson
 from render.laser_indirect.line_goal import Weigh
 from render.laser_indirect.line_paths import alike_on_a_line
 from render.laser_indirect.path_vertex import ALL_KINDS
@@ -128,7 +129,7 @@ def indirect_images(
     time_is_over = run.time_is_over(left)
     so_far = run.restore(Accumulator.of_arrays)
     if so_far is None:
-        so_far = waves.first_looks(placed, uniform_fan(low, high), kinds, aim)
+        so_far = waves.begun(placed, uniform_fan(low, high), kinds, aim)
     so_far.aim_at(None if aim is None else aim.importance, 0 if aim is None else aim.laser)
     wave_moments = attach_wave_moments(waves.buffers, so_far)
 
@@ -181,6 +182,7 @@ def indirect_images(
         if so_far.paths >= 2 * shown and unfinished():
             shown = so_far.paths
             yield image()
+    run.teach(run.part, ReflectedLesson.of(so_far))
     yield image()
 
 
@@ -203,6 +205,16 @@ class Waves:
                 self.task.run(first + number, sampling, self.buffers[number], cancelled, specular)
 
         map_chunks(work, PASSES_A_WAVE, 1, min(PASSES_A_WAVE, thread_count(run.threads)), cancelled)
+
+    def begun(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None) -> Accumulator:
+        """An empty accumulator that knows where to look: by what the first frame of a block found, or first looks."""
+        lesson: ReflectedLesson | None = self.run.taught(self.run.part)
+        if lesson is not None and aim is not None:
+            specular = seen_specular(self.task, placed.world, self.camera, placed.T_world_camera)
+            found = lesson.begin(fan, kinds, specular, aim.importance, aim.laser)
+            if found is not None:
+                return found
+        return self.first_looks(placed, fan, kinds, aim)
 
     def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None) -> Accumulator:
         """An empty accumulator that knows where laser and camera should look; the light of the looks is thrown away.
