@@ -72,7 +72,7 @@ def _coarse(placed: PlacedScene, paths: CameraPaths, settings: tuple[Any, ...], 
     world, made_of = placed.world, seen_from(placed, *settings)
     found: CoarseImage | None = run.recall(COARSE, world, made_of)
     lesson: CoarseLesson | None = run.taught(COARSE)
-    if found is None and lesson is not None and lesson.world is world and lesson.seen_from == made_of:
+    if found is None and lesson is not None and lesson.placed.world is world and lesson.seen_from == made_of:
         found = lesson.coarse
     if found is not None:
         return found
@@ -82,7 +82,7 @@ def _coarse(placed: PlacedScene, paths: CameraPaths, settings: tuple[Any, ...], 
         share = min(COARSE_SAMPLES / settings[0], COARSE_SHARE)
         found = coarse_image(paths, placed.camera.height, int(share * budget), run)
     run.leave(COARSE, world, made_of, found)
-    run.teach(COARSE, CoarseLesson(found, world, made_of))
+    run.teach(COARSE, CoarseLesson(found, placed, made_of))
     return found
 
 
