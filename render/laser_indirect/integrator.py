@@ -51,8 +51,9 @@ LEAST_PASS, LINE_PASS = 1 << 11, 1 << 9
 line is the goal, whose needs do not grow with the image."""
 LOOK_PATHS, LINE_LOOK = 1 << 10, 1 << 9
 """Light paths in a pass of a first look, which only guides; where the line is the goal. Chosen, not tuned."""
-LOOKS = 3
-"""First looks at most, before whose passes those of the waves are not numbered."""
+LOOKS, TAUGHT = 3, 1 << 16
+"""First looks at most, before whose passes those of the waves are not numbered; and waves at most of the frame that
+teaches, whose random numbers those that it teaches must not have again: they would be sampled by what they gave."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,7 @@ def indirect_images(
         try:
             # after the passes of the looks
             sampling = sampling_of(so_far, so_far.next_paths)
-            waves.trace(PASSES_A_WAVE * (LOOKS + so_far.waves), sampling, stopped=over)
+            waves.trace(PASSES_A_WAVE * (waves.looks + so_far.waves), sampling, stopped=over)
         except Cancelled:
             if not run.cancelled():
                 # the time is over, and the wave under way is lost
@@ -191,6 +192,9 @@ class Waves:
 
     def __init__(self, task: BdptPass, camera: Camera, run: Run) -> None:
         self.task, self.camera, self.run = task, camera, run
+        self.lesson: ReflectedLesson | None = run.taught(run.part)
+        self.looks = LOOKS if self.lesson is None else TAUGHT
+        """Waves, before whose passes those of the waves are not numbered."""
         self.buffers = [empty_buffer(camera.width * camera.height) for _ in range(PASSES_A_WAVE)]
 
     def trace(
@@ -208,10 +212,9 @@ class Waves:
 
     def begun(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None) -> Accumulator:
         """An empty accumulator that knows where to look: by what the first frame of a block found, or first looks."""
-        lesson: ReflectedLesson | None = self.run.taught(self.run.part)
-        if lesson is not None and aim is not None:
+        if self.lesson is not None and aim is not None:
             specular = seen_specular(self.task, placed.world, self.camera, placed.T_world_camera)
-            found = lesson.begin(fan, kinds, specular, aim.importance, aim.laser)
+            found = self.lesson.begin(fan, kinds, specular, aim.importance, aim.laser)
             if found is not None:
                 return found
         return self.first_looks(placed, fan, kinds, aim)

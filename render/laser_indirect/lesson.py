@@ -24,7 +24,7 @@ SIZES = (1, 1, 2)
 says too little of the error."""
 LEAST_PASS, MOST_PASS = 1 << 8, 1 << 14
 """Light paths in a pass of the first wave."""
-AIMED_AT = 0.95
+AIMED_AT = 0.85
 """Of what a line may be off: a little more than is needed, as another wave would double the work."""
 
 
@@ -40,6 +40,8 @@ class ReflectedLesson:
     camera_radiance: Float32
     """(pixels,) as `Accumulator.camera_radiance`."""
     demand: PathDemand
+    alone: Float
+    """(lines,) as `LineErrors.alone`: which lines are alike."""
     size: int
     """Light paths in a pass of a first wave with which waves of `SIZES` would have met the goal."""
 
@@ -61,6 +63,7 @@ class ReflectedLesson:
             found.growth_limit,
             found.camera_radiance,
             found.demand,
+            found.line.alone,
             int(min(max(size, LEAST_PASS), MOST_PASS)),
         )
 
@@ -87,6 +90,7 @@ class ReflectedLesson:
         found.aim_at(importance, laser)
         if [found.demand.lines.shape, found.demand.blocks.shape] == [self.demand.lines.shape, self.demand.blocks.shape]:
             found.demand = self._demand(np.any(importance.laser[laser], axis=1 if importance.axis == "rows" else 0))
+            found.line = None if found.line is None else replace(found.line, alone=self.alone)
         found.guide_camera(self.camera_radiance, 0.0)
         return found
 
