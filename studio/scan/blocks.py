@@ -13,7 +13,7 @@ from render.base.threads import Cancel
 from render.lessons import Lessons
 from render.world.world import World
 from studio.scan.options import Scan
-from studio.scan.stages import Clock, render_step, step_world
+from studio.scan.stages import Clock, moved_world, render_step
 
 FRAMES = 16
 """Most frames of a block. With as many a first frame, which takes about three times as long, costs an eighth of all."""
@@ -77,6 +77,6 @@ class Blocks:
     def _render(self, first: int, lessons: Lessons, cancelled: Cancel) -> None:
         scan = self._scan
         project, quiet = scan.rendered, Clock(lambda stage, done: None, cancelled)
-        world = self._first if first == 0 else step_world(project, scan.begun.root, first, self._first)
+        world = moved_world(project, first, self._first)
         run = replace(scan.run, cancelled=cancelled, lessons=lessons)
         render_step(project, world, first, quiet, run, scan=scan.plan)

@@ -23,7 +23,7 @@ from studio.scan.blocks import Blocks
 from studio.scan.interrupt import stop_on_interrupt
 from studio.scan.options import Scan
 from studio.scan.resume import frame_of_step
-from studio.scan.stages import Clock, step_world
+from studio.scan.stages import Clock, moved_world
 
 PIXELS_AT_ONCE = 3_000_000
 """Of the frames that are rendered at once: their memory is that of one large frame."""
@@ -49,9 +49,8 @@ def rendered_frames(scan: Scan, first: World, count: int) -> Generator[Rendered,
         with closing(_at_once(scan, first, count, at_once, blocks)) as frames:
             yield from frames
         return
-    world = first
     for step in range(count):
-        world = world if step == 0 else step_world(scan.project, scan.begun.root, step, world)
+        world = moved_world(scan.project, step, first)
         yield _rendered(scan, world, step, blocks)
         blocks.forget(step + 1)
 
@@ -101,7 +100,7 @@ def _at_once(scan: Scan, first: World, count: int, at_once: int, blocks: Blocks)
         # of a single block all others wait for the first
         options = replace(scan.options, threads=threads if step == 0 and not several else threads // at_once)
         part = replace(scan, clock=clock, options=options, refined=lambda frame: None)
-        world = first if step == 0 else step_world(scan.project, scan.begun.root, step, first)
+        world = moved_world(scan.project, step, first)
         if teacher != step and (under_way := futures.get(teacher)) is not None:
             wait((under_way,))
         return _rendered(part, world, step, blocks), clock
