@@ -83,7 +83,7 @@ def frames(
     """
     world, scene, step = placed.world, placed.scene, placed.step
     goal = run.goal if settings.goal is not None and scene.lasers else None
-    run = _begun(replace(run, goal=goal))
+    run = _begun(replace(run, goal=goal, memory=run.memory or Memory()))
     with clock.stage("acceleration structure", _build_work(world)):
         check_placement(world, scene, step)
         run.stop()
@@ -94,6 +94,7 @@ def frames(
         frame = Frame(step, (), None, (), None, plan, warnings=scene_warnings(world, scene, step))
         rays = _rays(world, run.cancelled)
     look: Float32 | None = None
+    follows = run.lessons is not None and run.lessons.given
     ray_start, embree_start = rays.rays, rays.seconds
     with clock.stage("exact line", 0):
         frame = replace(frame, curves=_curves(placed, axis, run.threads))
@@ -117,8 +118,13 @@ def frames(
                     yield frame
         if goal is not None and product.group in AIMING and aimed_later(waiting[i + 1 :], product):
             with clock.stage(AIM, 0):
-                look = ambient_look(placed, settings, run) if look is None else look
-                frame = replace(frame, importance=goal(replace(frame, ambient=look)))
+                if not follows:
+                    look = ambient_look(placed, settings, run) if look is None else look
+                    frame = replace(frame, importance=goal(replace(frame, ambient=look)))
+                elif frame.importance is None:
+                    # by the light of the block's first frame; of light much like it asking again tells nothing more
+                    look, reflected = run.taught("ambient"), run.taught("laser_indirect") or ()
+                    frame = replace(frame, importance=goal(replace(frame, ambient=look, laser_indirect=reflected)))
     if frame is not shown:
         # nothing was left to do but to say so
         yield replace(frame, seconds=clock.so_far())

@@ -13,6 +13,7 @@ from render.base.errors import Cancelled
 from render.base.threads import Cancel, Progress, map_chunks
 from render.frame import Frame
 from render.importance import Importance
+from render.lessons import Lessons
 from render.sampling.random import wrapped
 
 Arrays = dict[str, NDArray[Any]]
@@ -83,6 +84,8 @@ class Run:
     """What to go on from, and what keeps the sums under way."""
     memory: Memory | None = None
     """What frames before this one left: the same value for all frames of a scan. None: each is by itself."""
+    lessons: Lessons | None = None
+    """Of the block of a scan that the frame is in: what its first frame leaves to the others. None: each by itself."""
     deadline: Deadline = Deadline()  # noqa: RUF009, it has no end and does not change
     """Of the frame under way, which `render.progressive` begins from `seconds`."""
     later: int = 0
@@ -131,6 +134,15 @@ class Run:
         """As `Memory.keep`."""
         if self.memory is not None:
             self.memory.keep(part, world, made_of, value)
+
+    def taught(self, part: str) -> Any:
+        """What the first frame of the block found of a part; None: this is it, or there is no block."""
+        return None if self.lessons is None else self.lessons.taught(part)
+
+    def teach(self, part: str, value: object) -> None:
+        """Leave what was found of a part to the other frames of the block, if this is its first."""
+        if self.lessons is not None:
+            self.lessons.teach(part, value)
 
     def until_over(self, images: Callable[[Run], Iterator[Item]]) -> Iterator[Item]:
         """images(run), whose run the end of the time cancels as well, though not before there is a first image.

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
+from render.ambient.guided_image import LightGrid, Places, guided_image, places_of
 from render.ambient.guided_interpolation import (
     ON_EDGE,
     grid_of,
-    interpolate,
     predict_by_neighbours,
     seen_at,
     smooth_grid,
@@ -35,7 +35,6 @@ from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
 from render.base.arrays import Float, Float32, Int
 from render.run import Run
-from render.world.embree import CHUNK
 
 COARSE_ERROR = 0.05
 """Relative RMS error that is enough where no error matters to what is measured: peaks are found there against the noise
@@ -69,6 +68,10 @@ class CoarseImage:
     clamped: int
     cut: float
     """As in `AmbientImage`."""
+    grid: LightGrid | None = None
+    """That it was interpolated from; None: it was not."""
+    taken_over: bool = False
+    """It is that of another frame, which was checked as a whole alone: of a single place nothing is known for sure."""
 
 
 def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> CoarseImage:
@@ -94,10 +97,10 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
         if error <= COARSE_ERROR or film.total + needed > most:
             break
         count, block = (2 * count, block) if noisy else (count, block // 2)
-    radiance = _image(film, paths, height, grid, block, run.between(0.5, 1.0))
+    radiance, known = _image(film, paths, height, grid, block, run.between(0.5, 1.0))
     dropped, clamped = film.invalid_counts.astype(int).tolist()
     deviation = _deviation(film, paths, height, grid, block)
-    return CoarseImage(radiance, error, deviation, block, film.total, dropped, clamped, film.cut / film.total)
+    return CoarseImage(radiance, error, deviation, block, film.total, dropped, clamped, film.cut / film.total, known)
 
 
 def _held_out(pixels: int, run: Run) -> Int:
@@ -199,24 +202,24 @@ def _interpolated(
     film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, pixels: Int, *, apart: bool
 ) -> Float32:
     """(n, 3) radiance of some pixels as the grid has it; apart: (n, 6), of both halves."""
-    known = _grid_light(film, paths, height, grid, block, apart)
-    out = np.empty((len(pixels), known[2].shape[1]), np.float32)
+    known = LightGrid((height, paths.view.width), block, *_grid_light(film, paths, height, grid, block, apart))
+    return radiance_at(known, paths, pixels, lambda pixels, seen, item: places_of(pixels, paths.view.width))
+
+
+def radiance_at(grid: LightGrid, paths: CameraPaths, pixels: Int, places: Places) -> Float32:
+    """(n, c) radiance of some pixels as a grid, of their image or of another, has it."""
+    out = np.empty((len(pixels), grid.light.shape[1]), np.float32)
     seen, item = seen_at(pixels, paths.view, paths.surface, paths.lights, paths.rays)
-    interpolate(pixels, (height, paths.view.width), block, seen, item, known, out)
+    grid.at(places(pixels, seen, item), seen, item, out)
     return out
 
 
-def _image(film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, run: Run) -> Float32:
-    """(h, w, 3) radiance. Raises Cancelled."""
+def _image(
+    film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, run: Run
+) -> tuple[Float32, LightGrid | None]:
+    """(h, w, 3) radiance, and the grid that it is made of; None: every pixel was sampled. Raises Cancelled."""
     width = paths.view.width
     if block == 1:
-        return film.means(grid).mean(axis=1).reshape(height, width, 3)
-    image, known = np.empty((height * width, 3), np.float32), _grid_light(film, paths, height, grid, block, False)
-
-    def work(start: int, stop: int) -> None:
-        pixels = np.arange(start, stop, dtype=np.int32)
-        seen, item = seen_at(pixels, paths.view, paths.surface, paths.lights, paths.rays)
-        interpolate(pixels, (height, width), block, seen, item, known, image[start:stop])
-
-    run.map(work, height * width, CHUNK)
-    return image.reshape(height, width, 3)
+        return film.means(grid).mean(axis=1).reshape(height, width, 3), None
+    known = LightGrid((height, width), block, *_grid_light(film, paths, height, grid, block, False))
+    return guided_image(known, paths, height, lambda pixels, seen, item: places_of(pixels, width), run), known

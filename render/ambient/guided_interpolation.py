@@ -152,7 +152,7 @@ def predict_by_neighbours(across: int, seen: Float32, item: Int, radiance: Float
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def interpolate(
-    pixels: Int,
+    places: Float,
     shape: tuple[int, int],
     block: int,
     seen: Float32,
@@ -160,19 +160,20 @@ def interpolate(
     grid: tuple[Float32, Int, Float32],
     out: Float32,
 ) -> None:
-    """The pixels (n,) of an image of shape (h, w) -> out (n, c) radiance, c as in `smooth_grid`.
+    """Rows and columns (n, 2) of an image of shape (h, w) -> out (n, c) radiance, c as in `smooth_grid`.
 
-    seen, item: of the pixels; grid: the same of its points, which are `block` pixels apart, and their light.
+    What is beyond the image is as at its edge. seen, item: of the places; grid: the same of its points, which are
+    `block` pixels apart, and their light.
     """
-    width, (grid_seen, grid_item, light) = shape[1], grid
+    (height, width), (grid_seen, grid_item, light) = shape, grid
     across = (width - 2) // block + 2
     down = grid_item.shape[0] // across
     total = np.empty(light.shape[1])
-    for r in range(pixels.shape[0]):
-        row, column = pixels[r] // width, pixels[r] % width
-        i, j = min(row // block, max(down - 2, 0)), min(column // block, max(across - 2, 0))
+    for r in range(places.shape[0]):
+        row, column = min(max(places[r, 0], 0.0), height - 1.0), min(max(places[r, 1], 0.0), width - 1.0)
+        i, j = min(int(row) // block, max(down - 2, 0)), min(int(column) // block, max(across - 2, 0))
         # the last row and column of the grid are those of the image
-        below, right = min((i + 1) * block, shape[0] - 1) - i * block, min((j + 1) * block, width - 1) - j * block
+        below, right = min((i + 1) * block, height - 1) - i * block, min((j + 1) * block, width - 1) - j * block
         v = (row - i * block) / below if below > 0 else 0.0
         u = (column - j * block) / right if right > 0 else 0.0
         total[:], weight = 0.0, 0.0

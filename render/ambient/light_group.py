@@ -93,6 +93,7 @@ class AmbientLight(LightGroup[AmbientPlan]):
             run.leave(self.field, placed.world, made_of, image)
 
         for image in replace(run, part="ambient").until_over(images):
+            run.teach(self.field, image.radiance)
             yield Estimate(image.radiance, (quality_of(image, settings, importance),))
 
 

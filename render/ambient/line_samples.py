@@ -44,6 +44,9 @@ REACH = 2
 """Pixels on each side over which variances are averaged."""
 PILOT, GROWTH, PASSES = 2, 4.0, 12
 """Samples of each half on every pixel at first; most by which a pass multiplies those of a scan line; most passes."""
+SURE, SURE_LINES = 0.05, 0.99
+"""Of the variance that a scan line may have, and share of the lines: where a single sample of each half tells less of
+so many, no more are drawn. Of one line they tell little, as light through a gap is met by one sample in many."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,7 @@ def band_of(importance: Importance, coarse: CoarseImage, threads: int | None = N
         line = on // width if importance.axis == "rows" else on % width
         off = coarse.deviation[on // width // TILE, on % width // TILE]
         unknown = np.bincount(line, np.abs(move.ravel()[on]) * off > ENOUGH, lines) > 0.0
+        unknown |= coarse.taken_over
         measured.append(on[unknown[line]])
     near = _around(np.concatenate([np.zeros(0, np.int64), *measured]), wide.shape)
     pixels = np.flatnonzero(near | _around(matters, wide.shape)).astype(np.int32)
@@ -123,8 +127,14 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
         film.add(paths, band.pixels, count, part, keys)
         moves.add(film.sums - sums, count - done)
 
+    def known() -> Float:
+        some = np.unique(band.line[(band.weight > 0.0) | moves.measured])
+        return np.asarray(np.maximum(_moments(film, band), moves.variance)[some])
+
     for level in range(PILOT):
         add(level, np.full((len(band.pixels), 2), level + 1, np.int32), run.between(0.0, 0.3))
+        if level == 0 and np.mean(known() <= SURE) >= SURE_LINES:
+            return np.sqrt(known())
     for level in range(PILOT, PILOT + PASSES):
         count = _wanted(film, band, moves)
         more = count - film.done
@@ -135,8 +145,7 @@ def sample_band(film: PixelSamples, paths: CameraPaths, band: Band, most: int, r
         if not more.any():
             break
         add(level, count, run.between(0.3, 1.0))
-    known = np.unique(band.line[(band.weight > 0.0) | moves.measured])
-    return np.asarray(np.sqrt(np.maximum(_moments(film, band), moves.variance)[known]))
+    return np.sqrt(known())
 
 
 def _moments(film: PixelSamples, band: Band) -> Float:

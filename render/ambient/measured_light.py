@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -10,8 +12,9 @@ from render.ambient.coarse_image import TILE, CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
 from render.ambient.line_samples import PILOT, Band, band_of, sample_band
 from render.ambient.path_state import CLAMPED, INVALID
-from render.ambient.path_tracer import camera_paths
+from render.ambient.path_tracer import CameraPaths, camera_paths
 from render.ambient.pixel_samples import PixelSamples
+from render.ambient.taught_image import CHECK_SEED, CoarseLesson, taken_over
 from render.base.arrays import Float, Float32
 from render.base.threads import map_chunks
 from render.importance import Importance, known_below
@@ -23,6 +26,8 @@ COARSE_SAMPLES, COARSE_SHARE = 0.5, 0.125
 band is wider."""
 LEAST_SAMPLES = 2 * PILOT
 """Samples a pixel with which lines can be looked at."""
+COARSE = "coarse ambient"
+"""Part of a memory and of the lessons of a block."""
 
 
 def measured_images(
@@ -51,12 +56,7 @@ def measured_images(
         return
     paths = camera_paths(placed.world, placed.scene, view, surfaces=surfaces, clamp=clamp, seed=run.seed)
     budget = most * camera.width * camera.height
-    made_of = seen_from(placed, most, surfaces, clamp, run.seed)
-    coarse: CoarseImage | None = run.recall("coarse ambient", placed.world, made_of)
-    if coarse is None:
-        share = min(COARSE_SAMPLES / most, COARSE_SHARE)
-        coarse = coarse_image(paths, camera.height, int(share * budget), run.between(0.0, 0.5))
-        run.leave("coarse ambient", placed.world, made_of, coarse)
+    coarse = _coarse(placed, paths, (most, surfaces, clamp, run.seed), budget, run.between(0.0, 0.5))
     band = band_of(importance, coarse, run.threads)
     film = PixelSamples(band.pixels)
     yield _image(coarse, film, band, None)
@@ -64,6 +64,26 @@ def measured_images(
     if len(band.pixels):
         deviations = sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
     yield _image(coarse, film, band, deviations)
+
+
+def _coarse(placed: PlacedScene, paths: CameraPaths, settings: tuple[Any, ...], budget: int, run: Run) -> CoarseImage:
+    """The coarse image: of what was seen before as it was, of what is much like another frame as that has it, if that
+    is near enough; else sampled. Raises Cancelled."""
+    world, made_of = placed.world, seen_from(placed, *settings)
+    found: CoarseImage | None = run.recall(COARSE, world, made_of)
+    lesson: CoarseLesson | None = run.taught(COARSE)
+    if found is None and lesson is not None and lesson.placed.world is world and lesson.seen_from == made_of:
+        found = lesson.coarse
+    if found is not None:
+        return found
+    if lesson is not None:
+        found = taken_over(lesson, placed, replace(paths, seed=run.shifted(CHECK_SEED).seed), run)
+    if found is None:
+        share = min(COARSE_SAMPLES / settings[0], COARSE_SHARE)
+        found = coarse_image(paths, placed.camera.height, int(share * budget), run)
+    run.leave(COARSE, world, made_of, found)
+    run.teach(COARSE, CoarseLesson(found, placed, made_of))
+    return found
 
 
 def _copied(radiance: Float32) -> Float32:

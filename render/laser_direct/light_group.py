@@ -61,7 +61,7 @@ class DirectLight(LightGroup[GroupPlan]):
             if self.aimed and frame.importance is not None:
                 images.append(known_lines(laser, target, frame.importance, i, part))
             else:
-                images.append(direct_image(*laser, target=target, run=part))
+                images.append(first_image(laser, target, i, part))
         importance = frame.importance if self.aimed else None
         quality = [
             quality_of(laser.name, image, settings, importance, i)
@@ -73,10 +73,22 @@ class DirectLight(LightGroup[GroupPlan]):
         return QUICK_ERROR if self.quick else settings.laser_error
 
 
+def first_image(placed: PlacedLaser, target: float, number: int, run: Run) -> DirectImage:
+    """The image to a target; what the run's memory holds of it, where lines are asked for after the image. Raises
+    Cancelled."""
+    world, camera, laser, *poses = placed
+    made_of = camera, laser, *(pose.tobytes() for pose in poses), target, run.seed
+    image: DirectImage | None = run.recall(f"laser {number}, direct", world, made_of)
+    if image is None:
+        image = direct_image(*placed, target=target, run=run)
+        run.leave(f"laser {number}, direct", world, made_of, image)
+    return image
+
+
 def known_lines(placed: PlacedLaser, target: float, importance: Importance, laser: int, run: Run) -> DirectImage:
     """The image whose lines are known as well as direct light's share of the goal asks, to the target at least; or the
     finest that edges allow. Raises Cancelled."""
-    image = direct_image(*placed, target=target, run=run)
+    image = first_image(placed, target, laser, run)
     for _ in range(ROUNDS):
         over = line_deviation(image, importance, laser) / importance.direct
         target = min(target, image.error)

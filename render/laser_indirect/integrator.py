@@ -38,6 +38,7 @@ from render.laser_indirect.guiding import (
     reserve_for_specular,
     update_guide,
 )
+from render.laser_indirect.lesson import ReflectedLesson
 from render.laser_indirect.line_goal import Weigh
 from render.laser_indirect.line_paths import alike_on_a_line
 from render.laser_indirect.path_vertex import ALL_KINDS
@@ -51,8 +52,9 @@ LEAST_PASS, LINE_PASS = 1 << 11, 1 << 9
 line is the goal, whose needs do not grow with the image."""
 LOOK_PATHS, LINE_LOOK = 1 << 10, 1 << 9
 """Light paths in a pass of a first look, which only guides; where the line is the goal. Chosen, not tuned."""
-LOOKS = 3
-"""First looks at most, before whose passes those of the waves are not numbered."""
+LOOKS, TAUGHT = 3, 1 << 16
+"""First looks at most, before whose passes those of the waves are not numbered; and waves at most of the frame that
+teaches, whose random numbers those that it teaches must not have again: they would be sampled by what they gave."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +134,7 @@ def indirect_images(
     time_is_over = run.time_is_over(left)
     so_far = run.restore(Accumulator.of_arrays)
     if so_far is None:
-        so_far = waves.first_looks(placed, uniform_fan(low, high), kinds, aim)
+        so_far = waves.begun(placed, uniform_fan(low, high), kinds, aim)
     so_far.aim_at(None if aim is None else aim.importance, 0 if aim is None else aim.laser)
     wave_moments = attach_wave_moments(waves.buffers, so_far)
 
@@ -167,7 +169,7 @@ def indirect_images(
         try:
             # after the passes of the looks
             sampling = sampling_of(so_far, so_far.next_paths)
-            waves.trace(PASSES_A_WAVE * (LOOKS + so_far.waves), sampling, stopped=over)
+            waves.trace(PASSES_A_WAVE * (waves.looks + so_far.waves), sampling, stopped=over)
         except Cancelled:
             if not run.cancelled():
                 # the time is over, and the wave under way is lost
@@ -190,6 +192,7 @@ def indirect_images(
         if so_far.paths >= 2 * shown and unfinished():
             shown = so_far.paths
             yield image()
+    run.teach(run.part, ReflectedLesson.of(so_far))
     yield image()
 
 
@@ -198,6 +201,9 @@ class Waves:
 
     def __init__(self, task: BdptPass, camera: Camera, run: Run, clear: ClearLight = NO_LIGHT) -> None:
         self.task, self.camera, self.run, self.clear = task, camera, run, clear
+        self.lesson: ReflectedLesson | None = run.taught(run.part)
+        self.looks = LOOKS if self.lesson is None else TAUGHT
+        """Waves, before whose passes those of the waves are not numbered."""
         self.buffers = [empty_buffer(camera.width * camera.height) for _ in range(PASSES_A_WAVE)]
 
     def trace(
@@ -212,6 +218,15 @@ class Waves:
                 self.task.run(first + number, sampling, self.buffers[number], cancelled, specular)
 
         map_chunks(work, PASSES_A_WAVE, 1, min(PASSES_A_WAVE, thread_count(run.threads)), cancelled)
+
+    def begun(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None) -> Accumulator:
+        """An empty accumulator that knows where to look: by what the first frame of a block found, or first looks."""
+        if self.lesson is not None and aim is not None:
+            specular = seen_specular(self.task, placed.world, self.camera, placed.T_world_camera)
+            found = self.lesson.begin(fan, kinds, specular, aim.importance, aim.laser)
+            if found is not None:
+                return found
+        return self.first_looks(placed, fan, kinds, aim)
 
     def first_looks(self, placed: PlacedLaser, fan: FanDistribution, kinds: int, aim: Aim | None) -> Accumulator:
         """An empty accumulator that knows where laser and camera should look; the light of the looks is thrown away.

@@ -11,6 +11,8 @@ from render.base.arrays import Float32
 from render.frame import Estimate, Frame
 from render.importance import Importance
 from render.laser_indirect.integrator import Aim, IndirectImage, indirect_images
+from render.laser_indirect.line_goal import LOOK_SIGMA
+from render.laser_indirect.line_sums import smoothed
 from render.laser_indirect.path_vertex import INTERREFLECTION
 from render.laser_indirect.transport_plan import SWITCHED_OFF, IndirectPlan, pilot_shares, plan_of
 from render.light_group import LightGroup, Shares
@@ -82,6 +84,8 @@ class IndirectLight(LightGroup[IndirectPlan]):
                 allowed = None if aim is None else aim.importance.allowed
                 quality[i:] = [quality_of(laser.laser.name, image, settings, allowed, frame.laser_direct[i])]
                 yield Estimate(tuple(images), tuple(quality))
+        if frame.importance is not None:
+            run.teach(self.field, tuple(smoothed(image, LOOK_SIGMA) for image in images))
 
 
 def _aim(laser: int, images: list[Float32], frame: Frame, run: Run) -> Aim | None:

@@ -139,7 +139,7 @@ class LineErrors:
         moved = weight**2 * passes * moves
         # three degrees of freedom a wave say little of a single line; a few bad ones are not to speak for all about
         # them, so later waves take those together that were known alike without this one
-        self.moved += pooled_alike(moved, self.alone, lit) if self.waves else pooled(moved, lit)
+        self.moved += pooled_alike(moved, self.alone, lit) if self.alone.any() else pooled(moved, lit)
         self.alone = self.alone + moved
         self.waves, self.measured, self.all_waves = self.waves + 1, self.measured + share, self.all_waves + share
         self.squares += share**2 / (passes - 1)

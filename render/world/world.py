@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -62,6 +63,19 @@ class World:
     def rays(self) -> RayScene:
         """The acceleration structure for ray queries, built at first use."""
         return RayScene(self.vertices, self.triangles)
+
+    def moved(self, motion: Float) -> World:
+        """The world after a rigid motion (4, 4) of all its objects: nothing is read again, and after a mere shift no
+        acceleration structure built."""
+        kept: dict[str, Any] = {"nesting": self.nesting}
+        vertices, normals = transform_points(motion, self.vertices), self.normals
+        if np.array_equal(motion[:3, :3], np.eye(3)):
+            kept["rays"] = self.rays.shifted(motion[:3, 3])
+        else:
+            normals = normals @ motion[:3, :3].T.astype(np.float32)
+        other = replace(self, vertices=vertices, normals=normals)
+        vars(other).update(kept)
+        return other
 
     @cached_property
     def nesting(self) -> Nesting:

@@ -19,7 +19,7 @@ from studio.scan.gauging import measures_record
 from studio.scan.measuring import Measuring
 from studio.scan.redevelop import Development, development
 from studio.scan.run_record import ended_by_clock, run_text
-from studio.scan.stages import Clock, develop_step, step_world
+from studio.scan.stages import Clock, develop_step, moved_world
 from studio.scan.summary import summarise
 
 MEASURED_WITH = ("sensor", "extraction", "measures")
@@ -62,7 +62,7 @@ def _measured(
     image_scale = scan_folder.image_scale_of(found)
     cautions = Cautions(project, image_scale, how.laser_power)
     with clock.stage("loading meshes"), cautions.listening():
-        first = world = build_world(project.scene, root, 0)
+        first = build_world(project.scene, root, 0)
     aimed = False
     with closing(Measuring(project, out, clock, threads, len(found.frames))) as measuring:
         for n in clock.frames(len(found.frames)):
@@ -75,7 +75,7 @@ def _measured(
                 raise InputError(
                     "the frame's step is not in the project", where=str(path), found=frame.step, allowed=allowed
                 )
-            world = step_world(project, root, frame.step, None if frame.step == 0 else world)
+            world = moved_world(project, frame.step, first)
             aimed |= is_aimed(frame)
             cautions.look(frame, (*frame.warnings, *scene_warnings(world, project.scene, frame.step)))
             measuring.add(frame, world, develop_step(project, frame, clock, threads, how.laser_power))

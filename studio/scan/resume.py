@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from render.base.errors import Cancelled, InputError
 from render.checkpoint import RenderState, read_state, state_of
 from render.frame import Frame
+from render.lessons import Lessons
 from render.output.frame_files import read_frame
 from render.world.material_checks import scene_warnings
 from render.world.world import World
@@ -24,11 +26,13 @@ def saved_path(out: Path, step: int) -> Path:
     return out / f"{scan_folder.frame_stem(step)}.state.npz"
 
 
-def frame_of_step(scan: Scan, world: World, step: int) -> tuple[Frame, RenderState]:
+def frame_of_step(
+    scan: Scan, world: World, step: int, lessons: Callable[[], Lessons | None] = lambda: None
+) -> tuple[Frame, RenderState]:
     """One frame: found, gone on with or rendered; and its state, for `settle` once the frame is written.
 
-    InputError: what an earlier scan left in the folder, and is to be gone on with, is of something else. Cancelled:
-    what was done is kept in a file.
+    lessons: those of its block, which are asked for where the frame is not found. InputError: what an earlier scan
+    left in the folder, and is to be gone on with, is of something else. Cancelled: what was done is kept in a file.
     """
     project = scan.rendered
     path = saved_path(scan.begun.folder, step)
@@ -45,7 +49,7 @@ def frame_of_step(scan: Scan, world: World, step: int) -> tuple[Frame, RenderSta
         state = read_state(state)
     try:
         with stop_on_interrupt(scan.clock.cancelled) as cancelled:
-            run = replace(scan.run, cancelled=cancelled, checkpoint=state)
+            run = replace(scan.run, cancelled=cancelled, checkpoint=state, lessons=lessons())
             frame = render_step(project, world, step, scan.clock, run, refined=scan.refined, scan=scan.plan)
     except Cancelled:
         if state.write():

@@ -28,7 +28,7 @@ from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.render_goal import goal_of
 from studio.scan.run_record import ended_by_clock, run_text
-from studio.scan.stages import Clock, Measurement, develop_step, scaled, step_world, validated
+from studio.scan.stages import Clock, Measurement, develop_step, moved_world, scaled, validated
 from studio.scan.summary import profile_rate, summarise
 
 __all__ = ["Measurement", "ScanResult", "run_scan"]
@@ -198,7 +198,7 @@ def _plan(scan: Scan, first: World) -> ScanPlan | None:
         return None
 
     def world(step: int) -> World:
-        return first if step == 0 else step_world(project, scan.begun.root, step, first)
+        return moved_world(project, step, first)
 
     with scan.clock.stage("plan for all frames") as progress:
         run = replace(scan.run, progress=progress, goal=goal_of(project, scan.run.threads))

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from analysis.error import Errors, compare
 from analysis.line.result import Line
 from analysis.line.settings import Method
@@ -101,9 +103,20 @@ def validated(project: Project, where: str) -> Project:
 
 def step_world(project: Project, root: Path, step: int, before: World | None) -> World:
     """The placed triangles of a step; the ones before where the objects stand still."""
+    return before if before is not None and not _objects_move(project) else build_world(project.scene, root, step)
+
+
+def moved_world(project: Project, step: int, first: World) -> World:
+    """The placed triangles of a step, from those of step 0; nothing is read or built again."""
+    if step == 0 or not _objects_move(project):
+        return first
     motion = project.scene.motion
-    objects_move = not isinstance(motion, NoMotion) and motion.moves == "objects"
-    return before if before is not None and not objects_move else build_world(project.scene, root, step)
+    return first.moved(motion.displacement(step) @ np.linalg.inv(motion.displacement(0)))
+
+
+def _objects_move(project: Project) -> bool:
+    motion = project.scene.motion
+    return not isinstance(motion, NoMotion) and motion.moves == "objects"
 
 
 def render_step(

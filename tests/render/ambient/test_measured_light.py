@@ -10,6 +10,7 @@ import pytest
 from scipy.ndimage import maximum_filter
 
 from render.ambient.coarse_image import COARSE_ERROR, CoarseImage, coarse_image
+from render.ambient.guided_image import places_of
 from render.ambient.guided_interpolation import SEEN, grid_of, interpolate, smooth_grid
 from render.ambient.integrator import ambient_images
 from render.ambient.light_group import AmbientLight
@@ -207,14 +208,14 @@ def test_light_over_a_texture_is_interpolated_as_light():
     light = np.empty((len(grid), 3), np.float32)
     smooth_grid(across, seen[grid], item[grid], radiance[grid], light)
     out = np.empty_like(radiance)
-    interpolate(pixels, (height, width), block, seen, item, (seen[grid], item[grid], light), out)
+    interpolate(places_of(pixels, width), (height, width), block, seen, item, (seen[grid], item[grid], light), out)
     # the neighbours of a point of the grid, of other albedos, count in proportion to these
     assert np.sqrt(np.mean((out / radiance - 1.0) ** 2)) < 0.03
     # and no light passes from one object to the next
     item[column > 30] = 1
     radiance[column > 30] = 0.0
     smooth_grid(across, seen[grid], item[grid], radiance[grid], light)
-    interpolate(pixels, (height, width), block, seen, item, (seen[grid], item[grid], light), out)
+    interpolate(places_of(pixels, width), (height, width), block, seen, item, (seen[grid], item[grid], light), out)
     assert np.abs(out[column > 30]).max() < 0.01 * radiance.max()
 
 

@@ -46,7 +46,7 @@ def test_it_is_rendered_finer_until_the_lines_are_known(monkeypatch: pytest.Monk
     monkeypatch.setattr(light_group, "direct_image", direct_image)
     weight = np.full((LINES, WIDTH), 100.0, np.float32)
     found = Importance((weight,), weight, allowed=1.0, direct=0.1)
-    placed: Any = ()
+    placed: Any = (None, None, None, np.eye(4), np.eye(4))
     image = known_lines(placed, 0.003, found, 0, Run())
     assert line_deviation(image, found, 0) <= found.direct and 1 < len(targets) <= 4
     # a line that is known asks for nothing

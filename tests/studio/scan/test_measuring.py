@@ -49,7 +49,7 @@ def rendered_once(project: Project, monkeypatch: pytest.MonkeyPatch) -> None:
     world = build_world(small.scene, ROOT, 0)
     frame = render_step(small, world, 0, Clock(lambda stage, done: None, lambda: False))
 
-    def again(scan, world, step):
+    def again(scan, world, step, lessons):
         warnings.warn("every frame says the same", UserWarning, stacklevel=1)
         return replace(frame, step=step, warnings=(f"doubtful, by {step} %",)), RenderState({})
 
