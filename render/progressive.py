@@ -142,9 +142,7 @@ def _begun(run: Run) -> Run:
     """The run of a frame whose time begins now, and stands still while a person holds the render."""
     deadline = Deadline(run.seconds)
     cancelled = run.cancelled if run.cancelled is never else deadline.pausing(run.cancelled)
-    # the parts of a frame find in it what parts before them did
-    memory = Memory() if run.memory is None else run.memory
-    return replace(run, deadline=deadline, cancelled=cancelled, memory=memory)
+    return replace(run, deadline=deadline, cancelled=cancelled)
 
 
 def _build_work(world: World) -> float:

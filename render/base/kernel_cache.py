@@ -30,9 +30,12 @@ UNUSED = 24 * 3600.0
 DISPATCHER = "numba.core.dispatcher"
 KNOWN_NUMBA = "0.68."
 """Versions of numba whose inside `kernel_dispatcher` was made for, and is tested with."""
+CALLEE = ".callee"
+"""End of the names of files that hold what kernels call, which go as soon as all kernels are there."""
 IMPORT = re.compile(rb"^from ((?:render|analysis)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 KERNEL = re.compile(rb"^\s*@(?:(?:numba\.)?njit|peak_kernel|intrinsic)\b", re.MULTILINE)
 CONSTANT = re.compile(rb"\b(?:[A-Z][A-Z0-9_]+|Flag)\b")
+_handing_over: list[bool] = []
 
 
 def source_key(root: Path = ROOT) -> str:
@@ -92,6 +95,23 @@ def keep_kernels(root: Path = ROOT) -> Path | None:
 def kept_in() -> str:
     """The folder that is used as long as this program runs, its own or the one that NUMBA_CACHE_DIR names."""
     return os.environ.get("NUMBA_CACHE_DIR") or str(cache_folder() / source_key())
+
+
+def hand_over_callees() -> None:
+    """From now on what is compiled for kernels is shared with a process that compiles at the same time."""
+    _handing_over.append(True)
+
+
+def hands_over() -> bool:
+    return bool(_handing_over)
+
+
+def remove_callees() -> None:
+    """What was handed over: every kernel is there."""
+    _handing_over.clear()
+    for path in Path(kept_in()).glob(f"*/*{CALLEE}"):
+        with suppress(OSError):
+            path.unlink()
 
 
 def _remove_old(folder: Path, kept: Path) -> None:

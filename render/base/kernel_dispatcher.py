@@ -7,21 +7,28 @@ Here these are made once Python calls such a function itself. The code of a kern
 
 from __future__ import annotations
 
+import itertools
 import os
+import secrets
 from typing import Any
 
+import llvmlite.binding as llvm
 import numba
-from numba.core import compiler, errors, event, sigutils, typing
+from numba.core import bytecode, compiler, errors, event, sigutils, types, typing
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher, _FunctionCompiler  # type: ignore[attr-defined]
 
-from render.base.sealed_cache import ROOM_PATHS
+from render.base.sealed_cache import ROOM_PATHS, KernelCache
 
 SOURCES = (*ROOM_PATHS, os.path.join(os.path.dirname(numba.__file__), ""))
 """Whose functions are compiled so: ours, and numba's own that they call."""
 HANDED_DOWN = ("error_model", "fastmath", "forceinline", "nrt")
 """Options that what a function calls inherits, where it does not say otherwise."""
+NARROW = frozenset((types.int8, types.int16, types.int32))
+
+# names of functions in intermediate code end in these numbers: what other processes hand over has none of ours
+bytecode.FunctionIdentity._unique_ids = itertools.count(secrets.randbits(40))
 
 
 class KernelFlags(compiler.Flags):
@@ -46,16 +53,35 @@ class KernelLibrary(JITCodeLibrary):
     """The code of what Python calls."""
 
     def _optimize_functions(self, module: Any) -> None:
-        """As numba does, but for functions that are only declared, by far the most."""
+        """All at once, when they are linked: numba optimises each function by itself before."""
+        module.data_layout = self._codegen._data_layout
+
+
+class CalleeLibrary(KernelLibrary):
+    """Intermediate code that others link: optimised, never made machine code."""
+
+    @classmethod
+    def of_bitcode(cls, codegen: Any, name: str, bitcode: bytes) -> CalleeLibrary:
+        library = cls(codegen, name)
+        library._final_module = llvm.parse_bitcode(bitcode)
+        library._finalize_final_module()
+        return library
+
+    def _optimize_functions(self, module: Any) -> None:
+        """As numba does; what is linked in before that is optimised with what links it."""
         module.data_layout = self._codegen._data_layout
         for function in module.functions:
             if not function.is_declaration:
                 manager, builder = self._codegen._function_pass_manager()
                 manager.run(function, builder)
 
-
-class CalleeLibrary(KernelLibrary):
-    """Intermediate code that others link: optimised, never made machine code."""
+    def _optimize_final_module(self) -> None:
+        """By the cheap passes alone, which take in what is always inlined: a kernel optimises all that it calls."""
+        codegen = self._codegen
+        manager, builder = codegen._module_pass_manager(
+            loop_vectorize=codegen._loopvect, slp_vectorize=False, opt=codegen._opt_level, cost="cheap"
+        )
+        manager.run(self._final_module, builder)
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
@@ -104,10 +130,38 @@ class CalleeCompiler(KernelCompiler):
         flags, context = self._flags(), self.targetdescr.target_context
         flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
         library = CalleeLibrary(context.codegen(), self.py_func.__qualname__)
-        made = self._compile_into(library, flags, args, return_type)
+        return self.without_entry(self._compile_into(library, flags, args, return_type))
+
+    def without_entry(self, made: Any) -> Any:
         entry = NoEntry()
-        context.insert_user_function(entry, made.fndesc, [library])
+        self.targetdescr.target_context.insert_user_function(entry, made.fndesc, [made.library])
         return made._replace(entry_point=entry)
+
+    def parts(self, made: Any) -> tuple[Any, ...]:
+        """What `of_parts` makes the same of in another process."""
+        made.fndesc.typemap = made.fndesc.calltypes = None  # as numba does: they need not be picklable
+        made.library._ensure_finalized()
+        bitcode = made.library._final_module.as_bitcode()
+        environments = tuple(made._find_referenced_environments())
+        return made.library.name, bitcode, made.fndesc, made.environment, made.signature, environments
+
+    def of_parts(self, name: str, bitcode: bytes, fndesc: Any, environment: Any, signature: Any, others: Any) -> Any:
+        context = self.targetdescr.target_context
+        library = CalleeLibrary.of_bitcode(context.codegen(), name, bitcode)
+        made = compiler.compile_result(
+            typing_context=self.targetdescr.typing_context,
+            target_context=context,
+            entry_point=None,
+            library=library,
+            fndesc=fndesc,
+            environment=environment,
+            signature=signature,
+            objectmode=False,
+            lifted=(),
+            reload_init=[],
+            referenced_envs=others,
+        )
+        return self.without_entry(made)
 
 
 class KernelDispatcher(Dispatcher):
@@ -136,11 +190,17 @@ class KernelDispatcher(Dispatcher):
         if self._callee_compiler is None:
             return super().get_call_template(args, kws)
         signature, args = self._compiler.fold_argument_types(args, kws)
+        wide = tuple(map(_widened, args))
         with global_compiler_lock:
-            if self._can_compile and args not in self.overloads:
-                self._compile_callee(args)
-        name = self.py_func.__name__
-        signatures = self.nopython_signatures
+            if self._can_compile and wide not in self.overloads:
+                try:
+                    self._compile_callee(wide)
+                except errors.ForceLiteralArg:  # it indexes a tuple by an argument, or the like
+                    wide = args
+                    if wide not in self.overloads:
+                        self._compile_callee(wide)
+        args, name = wide, self.py_func.__name__
+        signatures = [self.overloads[args].signature] if args in self.overloads else self.nopython_signatures
         template = typing.make_concrete_template(f"CallTemplate({name})", key=name, signatures=signatures)
         return template, signature, args, {}
 
@@ -165,9 +225,23 @@ class KernelDispatcher(Dispatcher):
             self.targetctx.insert_user_function(made.entry_point, made.fndesc, [made.library])
             self.add_overload(made)
             return
+        codegen, maker = self.targetctx.codegen(), self._callee_compiler
+        parts = self._cache.handed_over(args, codegen) if isinstance(self._cache, KernelCache) else None
+        if parts is not None:
+            self.overloads[args] = maker.of_parts(*parts)
+            return
         details = {"dispatcher": self, "args": args, "return_type": None}
         with self._compiling_counter, event.trigger_event("numba:compile", data=details):
             try:
-                self.overloads[args] = self._callee_compiler.compile(args, None)
+                made = self.overloads[args] = maker.compile(args, None)
             except errors.ForceLiteralArg as wanted:
                 raise wanted.bind_fold_arguments(lambda a, k: self.fold_argument_types(a, k)[1]) from wanted
+        if isinstance(self._cache, KernelCache) and not made.reload_init:
+            self._cache.hand_over(args, codegen, maker.parts(made))
+
+
+def _widened(kind: Any) -> Any:
+    """The type as which an argument is handed to a function: one for all numbers known beforehand, and for all signed
+    ones, with which numba computes alike."""
+    kind = kind.literal_type if isinstance(kind, (types.IntegerLiteral, types.BooleanLiteral)) else kind
+    return types.int64 if kind in NARROW else kind

@@ -11,12 +11,13 @@ import hashlib
 import os
 import pickle
 import warnings
+from contextlib import suppress
 from typing import Any
 
 import numba
 from numba.core import caching
 
-from render.base.kernel_cache import ROOMS, ROOT, kept_in
+from render.base.kernel_cache import CALLEE, ROOMS, ROOT, hands_over, kept_in
 
 SEAL_BYTES = 16
 ROOM_PATHS = tuple(os.path.join(ROOT, room, "") for room in ROOMS)
@@ -58,6 +59,25 @@ class SealedFiles(caching.IndexDataCacheFile):
             return None
         return found[1] if found is not None and found[0] == key else None
 
+    def save_callee(self, key: Any, data: Any) -> None:
+        """In a file of its own, without an index."""
+        key = self._index_name, key
+        self._write(self._callee_path(key), self._dump((key, data)))
+
+    def load_callee(self, key: Any) -> Any:
+        """What `save_callee` has written, or None."""
+        key = self._index_name, key
+        try:
+            with open(self._callee_path(key), "rb") as file:
+                stored, data = pickle.loads(_unsealed(file.name, file.read()))
+        except Exception:  # of reading and of unpickling
+            return None
+        return data if stored == key else None
+
+    def _callee_path(self, key: Any) -> str:
+        digest = hashlib.blake2b(repr(key).encode(), digest_size=SEAL_BYTES)
+        return os.path.join(self._cache_path, digest.hexdigest() + CALLEE)
+
     def _load_index(self) -> dict[Any, str]:
         try:
             self._check(self._index_path)
@@ -83,9 +103,7 @@ class SealedFiles(caching.IndexDataCacheFile):
     def _check(self, path: str) -> None:
         """OSError: the file is missing, cannot be read or is not as it was written."""
         with open(path, "rb") as file:
-            data = file.read()
-        if data[-SEAL_BYTES:] != _seal(path, data[:-SEAL_BYTES]):
-            raise OSError(f"{path} is damaged")
+            _unsealed(path, file.read())
 
 
 class KernelCache(caching.FunctionCache):
@@ -99,6 +117,17 @@ class KernelCache(caching.FunctionCache):
         stamp = self._impl.locator.get_source_stamp()
         self._cache_file: Any = SealedFiles(self._cache_path, self._impl.filename_base, stamp)
 
+    def hand_over(self, signature: Any, codegen: Any, data: Any) -> None:
+        """Leave what kernels call to a process that compiles at the same time; without files that does it itself."""
+        if hands_over():
+            with suppress(OSError):
+                self._impl.locator.ensure_cache_path()
+                self._cache_file.save_callee(self._index_key(signature, codegen), data)
+
+    def handed_over(self, signature: Any, codegen: Any) -> Any:
+        """What another process has left; None: nothing."""
+        return self._cache_file.load_callee(self._index_key(signature, codegen)) if hands_over() else None
+
     def save_overload(self, signature: Any, data: Any) -> None:
         try:
             super().save_overload(signature, data)
@@ -107,6 +136,14 @@ class KernelCache(caching.FunctionCache):
                 KernelCache._warned = True
                 reason = f"{error.strerror or error}; they are compiled anew at the next start"
                 warnings.warn(f"compiled kernels cannot be kept in {kept_in()}: {reason}", UserWarning, stacklevel=2)
+
+
+def _unsealed(path: str, data: bytes) -> bytes:
+    """The content of a file of that name; OSError: it is not as it was written."""
+    content = data[:-SEAL_BYTES]
+    if data[-SEAL_BYTES:] != _seal(path, content):
+        raise OSError(f"{path} is damaged")
+    return content
 
 
 def _seal(path: str, content: bytes) -> bytes:

@@ -1,9 +1,9 @@
 """Compiles every kernel, or loads it from its cache, by asking of tiny scenes what the program asks of large ones.
 
-That takes most of a minute where the cache is empty, a second where it is not. It happens once in the life of the
+That takes half a minute where the cache is empty, a second where it is not. It happens once in the life of the
 program, step by step on a thread of its own: whoever waits can be cancelled at once, which a compiler cannot. Where the
-cache is empty, a process of its own compiles meanwhile what shares the fewest kernels with the first steps (`beside`);
-here that is then only loaded.
+cache is empty, a process of its own compiles meanwhile what is needed last (`beside`); here that is then only loaded.
+What both need within their kernels, the first hands over to the other (`render.base.sealed_cache`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from render.base.errors import Cancelled
-from render.base.kernel_cache import ROOT, kept_in
+from render.base.kernel_cache import ROOT, hand_over_callees, kept_in, remove_callees
 from render.base.pose import Pose
 from render.base.threads import Cancel, thread_count
 from render.camera.camera import Camera, Lens
@@ -123,6 +123,7 @@ def _compiled() -> Path:
 
 
 def _mark() -> None:
+    remove_callees()
     with suppress(OSError):
         _compiled().touch()
 
@@ -147,6 +148,7 @@ def _start_helper() -> subprocess.Popen[bytes] | None:
     except OSError:  # no more processes or memory: it is compiled here
         return None
     atexit.register(helper.kill)
+    hand_over_callees()
     return helper
 
 
@@ -178,8 +180,8 @@ def look(cancelled: Cancel) -> None:
 
 
 def draw(cancelled: Cancel) -> None:
-    """The line on the tilted plane at 122 x 102 px, in memory, with its pictures."""
-    _drawn(cancelled)
+    """The line on the tilted plane at 122 x 102 px, in memory, with its pictures: the first image of a render."""
+    _drawn(cancelled, None)
 
 
 def scan(cancelled: Cancel) -> None:
@@ -189,21 +191,20 @@ def scan(cancelled: Cancel) -> None:
     from studio.scan.results import measure_frame
 
     smoothed(np.zeros(32), np.ones(32), np.ones(32), np.zeros(32))
-    project, frame, world, images, clock = _drawn(cancelled)
-    aimed = project.render.model_copy(update={"goal": DepthGoal()})
-    foreseen_noise(project.model_copy(update={"render": aimed}), template_folder(TEMPLATE))
+    project, frame, world, images, clock = _drawn(cancelled, DepthGoal())
+    foreseen_noise(project, template_folder(TEMPLATE))
     found = measure_frame(project, frame, world, images, clock, None, keep=False)
     if not found.lasers[0].extractions[0].points.valid.any():
         raise RuntimeError("the warm-up scan found no point: the installation is damaged")
 
 
-def _drawn(cancelled: Cancel) -> tuple[Project, Frame, World, list[Image], Clock]:
+def _drawn(cancelled: Cancel, goal: DepthGoal | None) -> tuple[Project, Frame, World, list[Image], Clock]:
     from render.world.world import build_world
     from studio.scan.stages import Clock, develop_step, render_step
 
     folder, project = template_folder(TEMPLATE), _small()
     line = project.scene.model_copy(update={"lights": (), "environment": Environment()})
-    direct = project.render.model_copy(update={"transport": "direct", "truth_images": False})
+    direct = project.render.model_copy(update={"transport": "direct", "truth_images": False, "goal": goal})
     project = project.model_copy(update={"scene": line, "render": direct})
     clock = Clock(progress=lambda stage, done: None, cancelled=cancelled)
     world = build_world(project.scene, folder, 0)
@@ -222,14 +223,18 @@ def _small() -> Project:
 
 def light(cancelled: Cancel) -> None:
     """Every kind of light: of lamps and shining objects, reflected, through glass, below surfaces."""
-    _render(CAMERA, cancelled, "subsurface")
-    _render(CAMERA, cancelled, "subsurface", Glass(), Conductor(), WAX, Emitter())
-    # drawn into each other
-    _render(CAMERA, cancelled, "subsurface", Glass(), WAX.model_copy(update={"priority": 1}), apart=0.03)
+    drawn_into = Glass(), WAX.model_copy(update={"priority": 1})
+    # that of lamps last, whose kernels another process may have by then
+    for lamps in (False, True):
+        _render(CAMERA, cancelled, "subsurface", lamps=lamps)
+        _render(CAMERA, cancelled, "subsurface", Glass(), Conductor(), WAX, *(Emitter(),) * lamps, lamps=lamps)
+        _render(CAMERA, cancelled, "subsurface", *drawn_into, apart=0.03, lamps=lamps)
+    _aim(_blocks(CAMERA, (), 0.05), cancelled)
+    _integrate(_blocks(CAMERA, (Glass(),), 0.05), cancelled)
 
 
 def beside() -> None:
-    """What needs no laser's light: lines in an image that is made up, then the light of lamps."""
+    """What is needed last: lines in an image that is made up, the light of lamps, a lens that blurs."""
     from render.sensor.develop import Image
     from studio.scan.line_extraction import extract_line
     from studio.scan.results import METHODS
@@ -246,41 +251,52 @@ def beside() -> None:
         extract_line(project, image, 0, None, method)
     scene = _blocks(CAMERA, (Glass(), Conductor(), WAX, Emitter()), 0.05)
     _rendered(scene.model_copy(update={"rig": Rig(camera=CAMERA)}), "subsurface")
+    _aim(_blocks(CAMERA, (), 0.05), never)
+    lens(never)
 
 
 def lens(cancelled: Cancel) -> None:
     """The line by way of a lens that blurs, on plain and on shiny surfaces."""
     blurred = CAMERA.model_copy(update={"lens": Lens(model="thin-lens", focus_distance=0.4)})
-    _render(blurred, cancelled, "direct")
-    _render(blurred, cancelled, "direct", Conductor())
+    _render(blurred, cancelled, "direct", lamps=False)
+    _render(blurred, cancelled, "direct", Conductor(), lamps=False)
 
 
-def _render(camera: Camera, cancelled: Cancel, transport: str, *materials: Material, apart: float = 0.05) -> None:
-    """A plate, and blocks of some materials before it, so far apart, under all sorts of lamps, by few paths."""
+def _render(
+    camera: Camera, cancelled: Cancel, transport: str, *materials: Material, apart: float = 0.05, lamps: bool
+) -> None:
+    """A plate, and blocks of some materials before it, so far apart, under all sorts of lamps or none, by few paths."""
     from studio.scan.exposure import expose
 
     scene = _blocks(camera, materials, apart)
+    if not lamps:
+        scene = scene.model_copy(update={"lights": (), "environment": Environment()})
     frame = _rendered(scene, transport, cancelled)
     _show(scene, frame, [expose(Project(scene=scene, sensor=SENSOR), frame, [1.0], 0)])
 
 
 def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
-    """By next to no paths of every kind, for the image; and its ambient light for what is measured as well."""
+    """By next to no paths of every kind, for the image."""
+    from render.render import render_world
+    from render.world.world import build_world
+
+    run = Run(cancelled=cancelled)
+    return render_world(build_world(scene, Path()), scene, settings=_few(transport), run=run)
+
+
+def _aim(scene: Scene, cancelled: Cancel) -> None:
+    """What a goal asks of reflected light, and ambient light for what is measured."""
     from render.ambient.measured_light import LEAST_SAMPLES, measured_images
     from render.importance import Importance
     from render.laser_indirect.accumulator import PASSES_A_WAVE
-    from render.laser_indirect.bdpt_pass import BdptPass
-    from render.laser_indirect.clear_light import Integral, integrated
     from render.laser_indirect.integrator import empty_buffer
     from render.laser_indirect.line_goal import Effect, LineErrors
     from render.laser_indirect.line_paths import PathDemand
     from render.laser_indirect.line_sums import mean_image
-    from render.render import render_world
     from render.world.placed import PlacedScene
     from render.world.world import build_world
 
     world, run, camera = build_world(scene, Path()), Run(cancelled=cancelled), scene.camera
-    frame = render_world(world, scene, settings=_few(transport), run=run)
     ones = np.ones((camera.height, camera.width), np.float32)
     everywhere = Importance((ones,), ones, peaks=(ones,))
     buffers, errors = [empty_buffer(ones.size) for _ in range(PASSES_A_WAVE)], LineErrors.of(everywhere, 0)
@@ -290,14 +306,18 @@ def _rendered(scene: Scene, transport: str, cancelled: Cancel = never) -> Frame:
     paths = np.ones(ones.size)
     demand = PathDemand.none(errors.projection).learned(errors.projection, errors.spread(buffers), paths, 1.0)
     demand.aim(paths, errors.projection, camera.width, 1.0)
-    placed = PlacedScene(world, scene)
-    for laser in placed.lasers:
-        task = BdptPass.of(laser, 1.0, 1)
-        if task.lit_chains is not None:
-            # images as small as this are left to random paths
-            integrated(Integral(task, run, []))
-    list(measured_images(placed, everywhere, most=LEAST_SAMPLES, run=run))
-    return frame
+    list(measured_images(PlacedScene(world, scene), everywhere, most=LEAST_SAMPLES, run=run))
+
+
+def _integrate(scene: Scene, cancelled: Cancel) -> None:
+    """Light of the laser over plane glass, which images as small as these leave to random paths."""
+    from render.laser_indirect.bdpt_pass import BdptPass
+    from render.laser_indirect.clear_light import Integral, integrated
+    from render.world.placed import PlacedScene
+    from render.world.world import build_world
+
+    for laser in PlacedScene(build_world(scene, Path()), scene).lasers:
+        integrated(Integral(BdptPass.of(laser, 1.0, 1), Run(cancelled=cancelled), []))
 
 
 def _few(transport: str) -> RenderSettings:
@@ -336,9 +356,9 @@ def _show(scene: Scene, frame: Frame, images: list[Image]) -> None:
 STEPS: dict[str, Callable[[Cancel], None]] = {
     "look": look,
     "draw": draw,
+    "light": light,
     "lens": lens,
     "scan": scan,
-    "light": light,
 }
 
 
@@ -347,4 +367,5 @@ if __name__ == "__main__":
         warm_up(STEPS, lambda stage, done: None, never)
     else:
         gc.set_threshold(*COLLECTED)
+        hand_over_callees()
         beside()

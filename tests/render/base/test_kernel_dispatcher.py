@@ -145,3 +145,49 @@ event.register("numba:compile", Made())
 print(both(2), made.count("ol_np_empty.<locals>.impl"))
 """
     assert run(program, code) == ["4", "1"]
+
+
+HANDING = "from render.base.kernel_cache import hand_over_callees, remove_callees\nhand_over_callees()\n"
+COUNT = """
+from numba.core import event
+made = []
+class Made(event.Listener):
+    def on_start(self, told):
+        made.append(told.data["dispatcher"].py_func.__name__)
+    def on_end(self, told):
+        pass
+event.register("numba:compile", Made())
+"""
+
+
+def left(program: Path) -> list[Path]:
+    return list((program / ".cache").rglob("*.callee"))
+
+
+def test_what_one_process_compiled_for_a_kernel_another_takes(program: Path) -> None:
+    """Errors within it as well; a damaged file is compiled anew, and the files go when they are asked to."""
+    (program / "render/more.py").write_text(
+        "from numba import njit\nfrom render.kernels import quotient, twice\n\n\n"
+        '@njit(cache=True, error_model="numpy")\ndef other(x):\n    return quotient(twice(x), x - 1.0)\n'
+    )
+    run(program, HANDING + CALL)
+    assert len(left(program)) == 2  # quotient and twice
+    use = HANDING + COUNT + "from render.more import other\n"
+    broken = "try:\n    other(1.0)\nexcept ZeroDivisionError as error:\n    print(error.args[0])\n"
+    told = run(program, use + "print(other(3.0))\n" + broken + "print(*made)")
+    assert " ".join(told) == "3.0 nothing to divide by other"
+    for path in left(program):
+        path.write_bytes(path.read_bytes()[:-1] + b"?")
+    for path in (program / ".cache").rglob("*other-*"):
+        path.unlink()
+    told = run(program, use + "print(other(3.0), *sorted(made))\nremove_callees()")
+    assert told == ["3.0", "other", "quotient", "twice"] and not left(program)
+
+
+def test_numbers_known_beforehand_and_narrower_ones_need_no_function_of_their_own(program: Path) -> None:
+    (program / "render/more.py").write_text(
+        'from numba import njit\n\n\n@njit(error_model="numpy")\ndef third(a, i):\n    return a[i] + i\n\n\n'
+        '@njit(error_model="numpy")\ndef picked(a, i):\n    return third(a, 2) + third(a, i) + third(a, -i)\n'
+    )
+    code = COUNT + "from render.more import picked\nprint(picked(np.arange(4.0), np.int32(1)), made.count('third'))"
+    assert run(program, code) == ["8.0", "1"]
