@@ -5,6 +5,8 @@
     s2-shiny    the same with alpha 0.03
     s3          a glass ball before a wall: line and caustic
     s4          s3 seen through a plate of glass: light that goes laser - glass - wall - glass - camera
+    channel     a channel of ground copper, crossed by the line: bright concave edges
+    rocker      the trough of a rocker, polished chromium: bright and concave all over
 
 World coordinates are the camera's: x right, y down, z forward, metres. The camera is centred, so that the principal
 point needs no convention. The geometry of s2 is `tee_weld.npz`, float32 vertices; its bead is a grid of 1001 x 51.
@@ -137,6 +139,31 @@ def _plate() -> Part:
     return Part("plate", np.array(corners, np.float32), np.array(triangles, np.int32), GLASS)
 
 
+def _channel() -> Part:
+    """40 mm wide, 30 mm deep, along x, its floor's middle at z = 0.9, tilted by 25 deg so that one wall faces us."""
+    half, depth, reach, tilt = 0.02, 0.03, 0.12, math.radians(25)
+    profile = [(-half, -depth), (-half, 0.0), (half, 0.0), (half, -depth)]
+    turned = [
+        (y * math.cos(tilt) - z * math.sin(tilt), 0.9 + y * math.sin(tilt) + z * math.cos(tilt)) for y, z in profile
+    ]
+    corners = np.array([(x, y, z) for y, z in turned for x in (-reach, reach)], np.float32)
+    triangles = [t for i in (0, 2, 4) for t in ((i, i + 1, i + 3), (i, i + 3, i + 2))]
+    return Part("channel", corners, np.array(triangles, np.int32), Material("metal", alpha=0.2, n=0.24, k=3.6))
+
+
+def _rocker() -> Part:
+    """A trough along x, an arc of 150 deg about a radius of 24 mm, whose floor sinks as a circle of 120 mm does."""
+    along, across = 301, 201
+    x = np.linspace(-0.06, 0.06, along)
+    angle = np.radians(np.linspace(-75.0, 75.0, across))
+    floor = 0.9 + np.sqrt(0.12**2 - x**2) - 0.12
+    y = np.broadcast_to(0.024 * np.sin(angle), (along, across))
+    z = floor[:, None] - 0.024 * (1.0 - np.cos(angle))
+    points = np.stack([np.broadcast_to(x[:, None], y.shape), y, z], axis=-1).reshape(-1, 3)
+    metal = Material("metal", alpha=0.08, n=3.1, k=3.33)
+    return Part("rocker", points.astype(np.float32), _grid(along, across), metal)
+
+
 def setting(name: str, ball_segments: int = 256) -> Setting:
     """One of NAMES. ball_segments: how finely the ball of s3 and s4 is cut."""
     if name == "s1":
@@ -149,10 +176,14 @@ def setting(name: str, ball_segments: int = 256) -> Setting:
         return Setting(name, "glass ball before a wall", (_wall(), _ball(ball_segments)), ("wall",))
     if name == "s4":
         return Setting(name, "ball and wall behind a glass plate", (_wall(), _ball(ball_segments), _plate()))
+    if name == "channel":
+        return Setting(name, "channel of ground copper", (_channel(),))
+    if name == "rocker":
+        return Setting(name, "trough of polished chromium", (_rocker(),))
     raise ValueError(f"scene {name!r}; known: {', '.join(NAMES)}")
 
 
-NAMES = ("s1", "s2", "s2-shiny", "s3", "s4")
+NAMES = ("s1", "s2", "s2-shiny", "s3", "s4", "channel", "rocker")
 
 
 def aim(of: Setting) -> tuple[float, float]:
