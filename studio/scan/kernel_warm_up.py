@@ -230,7 +230,8 @@ def light(cancelled: Cancel) -> None:
         _render(CAMERA, cancelled, "subsurface", Glass(), Conductor(), WAX, *(Emitter(),) * lamps, lamps=lamps)
         _render(CAMERA, cancelled, "subsurface", *drawn_into, apart=0.03, lamps=lamps)
     _aim(_blocks(CAMERA, (), 0.05), cancelled)
-    _integrate(_blocks(CAMERA, (Glass(),), 0.05), cancelled)
+    # the second block stands in the sheet
+    _integrate(_blocks(CAMERA, (Conductor(), Glass()), 0.06), cancelled)
 
 
 def beside() -> None:
@@ -312,12 +313,14 @@ def _aim(scene: Scene, cancelled: Cancel) -> None:
 def _integrate(scene: Scene, cancelled: Cancel) -> None:
     """Light of the laser over plane glass, which images as small as these leave to random paths."""
     from render.laser_indirect.bdpt_pass import BdptPass
-    from render.laser_indirect.clear_light import Integral, integrated
+    from render.laser_indirect.clear_light import Integral
     from render.world.placed import PlacedScene
     from render.world.world import build_world
 
     for laser in PlacedScene(build_world(scene, Path()), scene).lasers:
-        integrated(Integral(BdptPass.of(laser, 1.0, 1), Run(cancelled=cancelled), []))
+        integral = Integral(BdptPass.of(laser, 1.0, 1), Run(cancelled=cancelled), [])
+        integral.candidates()
+        integral.sampled(np.arange(scene.camera.width), 1)
 
 
 def _few(transport: str) -> RenderSettings:

@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 
 from render.base.errors import Cancelled
+from render.laser_indirect.camera_tree import cell_rays, divide
+from render.laser_indirect.laser_walks import add_walks, mark_near, walk_to_laser
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.scan import kernel_warm_up
@@ -87,6 +89,12 @@ def test_nothing_is_compiled_or_loaded_after_the_warm_up(tmp_path):
     told = json.loads(done.stdout.splitlines()[-1])
     assert told["kernels"] > 150
     assert told["late"] == {name: [] for name in (*names, "beside")}
+
+
+def test_light_through_windows_is_prepared_though_small_images_leave_it_to_random_paths():
+    kernel_warm_up.light(lambda: False)
+    for kernel in (walk_to_laser, add_walks, mark_near, cell_rays, divide):
+        assert len(kernel.signatures) == 1
 
 
 def test_a_lens_that_blurs_is_prepared_where_there_is_one():

@@ -293,11 +293,13 @@ class TestRun:
         monkeypatch.setattr(resume, "render_step", counted)
         with qtbot.waitSignal(moving.runner.cancelled, timeout=60_000):
             moving.run_into(tmp_path / "scan", report=False)
-        assert rendered == [0, 1] and moving.go_on.isVisible()
+        # the frame beside it may have begun as well, and keeps nothing
+        assert rendered[0] == 0 and set(rendered) <= {0, 1, 2} and moving.go_on.isVisible()
+        begun = len(rendered)
         window.session.set(("sensor", "bits"), 8)  # what goes on is what was begun
         with qtbot.waitSignal(moving.runner.finished, timeout=60_000):
             qtbot.mouseClick(moving.go_on, Qt.MouseButton.LeftButton)
-        assert rendered == [0, 1, 1, 2] and moving.go_on.isHidden()
+        assert sorted(rendered[begun:]) == [1, 2] and moving.go_on.isHidden()
         assert open_folder(tmp_path / "scan").project.sensor.bits == 12
         shown(window, qtbot, 0)
         window.files.count_as_saved(window.session.project)
