@@ -201,7 +201,7 @@ def _step(now: Float, needed: Float, moments: Float, capped: Float) -> Float:
 def _pooled(values: Float, band: Band, some: Long) -> Float:
     """Values (m, 3) of the band's pixels -> (n, 3) of some of them, each averaged with its neighbours'."""
     out = np.empty((len(some), 3))
-    pool(values, band.pixels[some], band.place, out)
+    pool(np.ascontiguousarray(values), band.pixels[some], band.place, out)
     return out
 
 

@@ -299,7 +299,8 @@ class TestRun:
         window.session.set(("sensor", "bits"), 8)  # what goes on is what was begun
         with qtbot.waitSignal(moving.runner.finished, timeout=60_000):
             qtbot.mouseClick(moving.go_on, Qt.MouseButton.LeftButton)
-        assert sorted(rendered[begun:]) == [1, 2] and moving.go_on.isHidden()
+        # the first frame of the block teaches the others again
+        assert sorted({*rendered[begun:]} - {0}) == [1, 2] and moving.go_on.isHidden()
         assert open_folder(tmp_path / "scan").project.sensor.bits == 12
         shown(window, qtbot, 0)
         window.files.count_as_saved(window.session.project)
