@@ -4,11 +4,11 @@ What plane mirrors and faces of clear glass make of the laser on its way to a su
 these and others make of it on its way to the camera follows from rays (`laser_walks`). This light is the measured line
 itself where a scanner looks through a window; it needs no random paths. With cells of width h a side,
 
-    v_h  =  mean + h^2 / 24 (d^2/du^2 + d^2/dv^2) + O(h^4),
+    v_h  =  mean - h^2 / 24 (d^2/du^2 + d^2/dv^2) L + O(h^4),
 
 so that pixels of one and of four cells say what the mean is (Richardson 1911), and whether it is smooth there: how far
 they differ is then known from the pixels beside them as well. Where it is not, at edges and shadows, cells are smaller,
-at last with rays anywhere in them.
+with a ray anywhere in each.
 """
 
 from __future__ import annotations
@@ -62,8 +62,6 @@ class ClearLight:
     """(n, 2) W/(m^2 sr): `AFTER_NONE`, `AFTER_SOME`."""
     error: Float
     """(n,) estimated."""
-    rays: int
-    """Camera paths that it took."""
     invalid: int
     """Contributions that were NaN, infinite or negative, and count as 0."""
 
@@ -110,7 +108,7 @@ class ClearLight:
         )
 
 
-NO_LIGHT = ClearLight(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0), 0, 0)
+NO_LIGHT = ClearLight(np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0), 0)
 
 
 def clear_light(task: BdptPass, run: Run) -> ClearLight:
@@ -156,20 +154,19 @@ def integrated(integral: Integral) -> ClearLight:
     off[dark] = radiance[dark].sum(axis=1)
     found = radiance.sum(axis=1)
     if not np.any(found):
-        return ClearLight(pixels, radiance, error, 5 * n, sum(integral.invalid))
+        return ClearLight(pixels, radiance, error, sum(integral.invalid))
     largest = np.maximum(np.maximum(near.max(axis=1), middle), found)
-    faint, rays = FAINT * math.sqrt(np.square(found).sum() / np.count_nonzero(found)), 5 * n
+    faint = FAINT * math.sqrt(np.square(found).sum() / np.count_nonzero(found))
     for cells in FINER:
         left = np.flatnonzero(_about(off > SMOOTH * largest + faint, beside))
         if not len(left):
             break
         finer = integral.sampled(pixels[left], cells, jitter=True)
-        rays += cells * cells * len(left)
         off = np.zeros(n)
         off[left] = np.abs((finer - radiance[left]).sum(axis=1))
         # at an edge the error falls as the power 3/2 of the cells' size (Mitchell 1996)
         radiance[left], error[left] = finer, off[left] / 3.0
-    return ClearLight(pixels, np.maximum(radiance, 0.0), error, rays, sum(integral.invalid))
+    return ClearLight(pixels, np.maximum(radiance, 0.0), error, sum(integral.invalid))
 
 
 def _about(some: Bool, beside: Long) -> Bool:
