@@ -23,9 +23,10 @@ from studio.project.templates import template_folder
 from studio.scan.line_extraction import extract_line
 from studio.scan.render_goal import _expected_image, goal_of, importance, undecided_rows
 from studio.scan.stages import Clock, render_step, scaled
+from tests.mean_positions import rendered_variance
 
 FOLDER = template_folder("weld_seam")
-SEEDS = 5
+SEEDS, DRAWS = 5, 16
 
 
 def project_of(**changes: object) -> Project:
@@ -98,7 +99,8 @@ def test_ambient_light_is_known_to_a_share_of_the_noise_of_every_pixel_of_the_li
 
 
 def test_the_goal_is_reached_in_nineteen_rows_of_twenty(world: World) -> None:
-    """Rendered with other seeds, the reflections put each row elsewhere: by less than the goal.
+    """Rendered with other seeds, the reflections put each row elsewhere, on average over the sensor's noise: by less
+    than the goal.
 
     Of a line that its pixels resolve: a narrower one shares its width with its neighbours, whose light moves it too.
     """
@@ -114,12 +116,11 @@ def test_the_goal_is_reached_in_nineteen_rows_of_twenty(world: World) -> None:
         *_, last = indirect_images(placed.lasers[0], target=1e-4, most_paths=1 << 22, aim=aim, run=run)
         assert last.line_deviation <= 1.0
         images.append(last.radiance)
-    lines = [line_in(project, replace(frame, laser_indirect=(image,))) for image in images]
     reference = line_in(project, replace(frame, laser_indirect=(np.mean(images, axis=0, dtype=np.float32),)))
-    u = np.array([line.u[:, 0] for line in lines])
-    found = reference.valid[:, 0] & np.isfinite(u).all(axis=0)
+    variance = rendered_variance(project, [replace(frame, laser_indirect=(image,)) for image in images], DRAWS)
+    found = reference.valid[:, 0] & np.isfinite(variance)
     assert found.sum() >= 0.99 * reference.valid.sum()
-    deviation = u.std(axis=0, ddof=1)[found] / reference.sigma_u[found, 0]
+    deviation = np.sqrt(np.maximum(variance[found], 0.0)) / reference.sigma_u[found, 0]
     assert np.mean(deviation < 0.1) >= 0.95
 
 
