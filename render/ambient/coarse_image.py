@@ -19,12 +19,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
 from render.ambient.guided_image import LightGrid, Places, guided_image, places_of
 from render.ambient.guided_interpolation import (
     ON_EDGE,
+    SEEN,
     grid_of,
     predict_by_neighbours,
     seen_at,
@@ -33,7 +33,8 @@ from render.ambient.guided_interpolation import (
 from render.ambient.integrator import EVEN_SHARE, MOST_SHARE
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
-from render.base.arrays import Float, Float32, Int
+from render.base.arrays import Bool, Float, Float32, Int
+from render.base.threads import map_chunks
 from render.run import Run
 
 COARSE_ERROR = 0.05
@@ -46,6 +47,8 @@ FIRST_SAMPLES, HELD_OUT_SAMPLES = 2, 4
 HELD_OUT, HELD_OUT_SHARE = 8192, 16
 """Most held-out pixels, and pixels of the image for each at least."""
 HELD_OUT_SEED = 32_452_843
+LOOKS = 1 << 13
+"""Pixels that a thread looks at, at a time."""
 TILE = 32
 """Pixels a side of the tiles whose error is told by itself, together with those about it: a multiple of BLOCK."""
 
@@ -74,6 +77,22 @@ class CoarseImage:
     """It is that of another frame, which was checked as a whole alone: of a single place nothing is known for sure."""
 
 
+@dataclass(frozen=True)
+class SeenGrid:
+    """The points of a grid, and what is seen there."""
+
+    pixels: Int
+    """(n,) of the image."""
+    across: int
+    block: int
+    """Pixels from point to point."""
+    seen: Float32
+    item: Int
+    """As `seen_at` gives them."""
+    on_edge: Bool
+    """(n,) another object is seen beside the point."""
+
+
 def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> CoarseImage:
     """Sampled until the error is at most COARSE_ERROR, or `most` samples are spent. Raises Cancelled.
 
@@ -84,22 +103,23 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
     film = PixelSamples(held)
     film.add(paths, held, np.full((len(held), 2), HELD_OUT_SAMPLES, np.int32), run.between(0.0, 0.1))
     while True:
-        grid, across = grid_of(width, height, block)
+        seen = _seen_grid(paths, height, block, run.threads)
+        grid, across = seen.pixels, seen.across
         part = run.between(0.1, 0.5)
         film.extend(grid)
         for level in range(1, FIRST_SAMPLES + 1):
             film.add(paths, grid, np.full((len(grid), 2), level, np.int32), part)
         if count > FIRST_SAMPLES:
             film.add(paths, grid, np.maximum(FIRST_SAMPLES, np.rint(count * _shares(film, grid, across))), part)
-        error, noise = _errors(film, paths, height, grid, block, held)
+        error, noise = _errors(film, paths, height, seen, held, run.threads)
         noisy = 2.0 * noise**2 > error**2 or block == 1
         needed = 2 * count * len(grid) if noisy else 3 * 2 * FIRST_SAMPLES * len(grid)
         if error <= COARSE_ERROR or film.total + needed > most:
             break
         count, block = (2 * count, block) if noisy else (count, block // 2)
-    radiance, known = _image(film, paths, height, grid, block, run.between(0.5, 1.0))
+    radiance, known = _image(film, paths, height, seen, run.between(0.5, 1.0))
     dropped, clamped = film.invalid_counts.astype(int).tolist()
-    deviation = _deviation(film, paths, height, grid, block)
+    deviation = _deviation(film, seen)
     return CoarseImage(radiance, error, deviation, block, film.total, dropped, clamped, film.cut / film.total, known)
 
 
@@ -121,12 +141,12 @@ def _shares(film: PixelSamples, grid: Int, across: int) -> Float:
 
 
 def _errors(
-    film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, held: Int
+    film: PixelSamples, paths: CameraPaths, height: int, grid: SeenGrid, held: Int, threads: int | None
 ) -> tuple[float, float]:
     """Relative RMS error of the image, and what of it is noise."""
-    held = np.setdiff1d(held, grid).astype(np.int32)
+    held = np.setdiff1d(held, grid.pixels).astype(np.int32)
     if not len(held):
-        sampled = film.means(grid).astype(np.float64)
+        sampled = film.means(grid.pixels).astype(np.float64)
         power, square = (
             float(np.sum(sampled[:, 0] * sampled[:, 1])),
             float(np.sum((sampled[:, 0] - sampled[:, 1]) ** 2)),
@@ -134,7 +154,8 @@ def _errors(
         noise = math.sqrt(square / 4.0 / power) if power > 0.0 else 0.0
         return noise, noise
     truth = film.means(held).astype(np.float64)
-    halves = _interpolated(film, paths, height, grid, block, held, apart=True).reshape(-1, 2, 3)
+    apart = _light_grid(film, paths, height, grid, apart=True)
+    halves = radiance_at(apart, paths, held, _own_places(paths), threads).reshape(-1, 2, 3)
     image = halves.mean(axis=1)
     power = float(np.sum(truth[:, 0] * truth[:, 1]))
     if power <= 0.0:
@@ -144,21 +165,19 @@ def _errors(
     return math.sqrt(max(square, 0.0)), math.sqrt(variance)
 
 
-def _deviation(film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int) -> Float32:
+def _deviation(film: PixelSamples, grid: SeenGrid) -> Float32:
     """(tiles down, tiles across) RMS error of the image in each tile."""
-    across = grid_of(paths.view.width, height, block)[1]
-    halves = film.means(grid).reshape(-1, across, 2, 3)
+    halves = film.means(grid.pixels).reshape(-1, grid.across, 2, 3)
     # the least that it may be: the noise of a mean of four
     noise = np.square(halves[:, :, 0] - halves[:, :, 1]).mean(axis=2) / 16.0
-    if block == 1:
+    if grid.block == 1:
         square = 4.0 * noise
     else:
-        seen, item = seen_at(grid, paths.view, paths.surface, paths.lights, paths.rays)
-        predicted = np.empty((len(grid), 3), np.float32)
-        predict_by_neighbours(across, seen, item, halves.mean(axis=2).reshape(-1, 3), predicted)
-        off = predicted.reshape(-1, across, 1, 3) - halves
+        predicted = np.empty((len(grid.pixels), 3), np.float32)
+        predict_by_neighbours(grid.across, grid.seen, grid.item, halves.mean(axis=2).reshape(-1, 3), predicted)
+        off = predicted.reshape(-1, grid.across, 1, 3) - halves
         square = (off[:, :, 0] * off[:, :, 1]).mean(axis=2)
-    points = TILE // block
+    points = TILE // grid.block
     square, noise = (_tile_means(values, points) for values in (square, noise))
     return np.sqrt(np.maximum(square, noise)).astype(np.float32)
 
@@ -175,51 +194,67 @@ def _tile_means(values: Float32, points: int) -> Float32:
     return np.asarray(sums(values) / sums(np.ones_like(values)), np.float32)
 
 
-def _grid_light(
-    film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, apart: bool
-) -> tuple[Float32, Int, Float32]:
-    """What is seen at the points of the grid, and their light: the mean of both halves, or both side by side."""
-    seen, item = seen_at(grid, paths.view, paths.surface, paths.lights, paths.rays)
-    item = np.where(_on_edge(paths, height, grid, item), np.int32(ON_EDGE), item)
-    halves = film.means(grid)
+def _seen_grid(paths: CameraPaths, height: int, block: int, threads: int | None) -> SeenGrid:
+    """The points of a grid, with what is seen there where it is interpolated: with more than a pixel between them."""
+    pixels, across = grid_of(paths.view.width, height, block)
+    if block == 1:
+        nothing = np.zeros(0, np.int32)
+        return SeenGrid(pixels, across, block, np.zeros((0, SEEN), np.float32), nothing, nothing != 0)
+    seen, item = _seen(paths, pixels, threads)
+    return SeenGrid(pixels, across, block, seen, item, _on_edge(pixels, item, paths, height, threads))
+
+
+def _seen(paths: CameraPaths, pixels: Int, threads: int | None) -> tuple[Float32, Int]:
+    """As `seen_at`, on threads."""
+    seen, item = np.empty((len(pixels), SEEN), np.float32), np.empty(len(pixels), np.int32)
+
+    def look(start: int, stop: int) -> None:
+        found = seen_at(pixels[start:stop], paths.view, paths.surface, paths.lights, paths.rays)
+        seen[start:stop], item[start:stop] = found
+
+    map_chunks(look, len(pixels), LOOKS, threads)
+    return seen, item
+
+
+def _light_grid(film: PixelSamples, paths: CameraPaths, height: int, grid: SeenGrid, *, apart: bool) -> LightGrid:
+    """The grid with its light, as of both halves together, or apart side by side (n, 6)."""
+    item = np.where(grid.on_edge, np.int32(ON_EDGE), grid.item)
+    halves = film.means(grid.pixels)
     radiance = halves.reshape(-1, 6) if apart else halves.mean(axis=1)
     light = np.empty_like(radiance)
-    smooth_grid(grid_of(paths.view.width, height, block)[1], seen, item, radiance, light)
-    return seen, item, light
+    smooth_grid(grid.across, grid.seen, item, radiance, light)
+    return LightGrid((height, paths.view.width), grid.block, grid.seen, item, light)
 
 
-def _on_edge(paths: CameraPaths, height: int, grid: Int, item: Int) -> NDArray[np.bool_]:
+def _on_edge(pixels: Int, item: Int, paths: CameraPaths, height: int, threads: int | None) -> Bool:
     """(n,) another object is seen beside a point of the grid: its pixel holds light of both, and speaks for neither."""
-    width, edge = paths.view.width, np.zeros(len(grid), np.bool_)
+    width, edge = paths.view.width, np.zeros(len(pixels), np.bool_)
     for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-        row = np.clip(grid // width + down, 0, height - 1)
-        beside = (row * width + np.clip(grid % width + right, 0, width - 1)).astype(np.int32)
-        edge |= seen_at(beside, paths.view, paths.surface, paths.lights, paths.rays)[1] != item
+        row = np.clip(pixels // width + down, 0, height - 1)
+        beside = (row * width + np.clip(pixels % width + right, 0, width - 1)).astype(np.int32)
+        edge |= _seen(paths, beside, threads)[1] != item
     return edge
 
 
-def _interpolated(
-    film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, pixels: Int, *, apart: bool
+def radiance_at(
+    grid: LightGrid, paths: CameraPaths, pixels: Int, places: Places, threads: int | None = None
 ) -> Float32:
-    """(n, 3) radiance of some pixels as the grid has it; apart: (n, 6), of both halves."""
-    known = LightGrid((height, paths.view.width), block, *_grid_light(film, paths, height, grid, block, apart))
-    return radiance_at(known, paths, pixels, lambda pixels, seen, item: places_of(pixels, paths.view.width))
-
-
-def radiance_at(grid: LightGrid, paths: CameraPaths, pixels: Int, places: Places) -> Float32:
     """(n, c) radiance of some pixels as a grid, of their image or of another, has it."""
     out = np.empty((len(pixels), grid.light.shape[1]), np.float32)
-    seen, item = seen_at(pixels, paths.view, paths.surface, paths.lights, paths.rays)
+    seen, item = _seen(paths, pixels, threads)
     grid.at(places(pixels, seen, item), seen, item, out)
     return out
 
 
+def _own_places(paths: CameraPaths) -> Places:
+    return lambda pixels, seen, item: places_of(pixels, paths.view.width)
+
+
 def _image(
-    film: PixelSamples, paths: CameraPaths, height: int, grid: Int, block: int, run: Run
+    film: PixelSamples, paths: CameraPaths, height: int, grid: SeenGrid, run: Run
 ) -> tuple[Float32, LightGrid | None]:
     """(h, w, 3) radiance, and the grid that it is made of; None: every pixel was sampled. Raises Cancelled."""
-    width = paths.view.width
-    if block == 1:
-        return film.means(grid).mean(axis=1).reshape(height, width, 3), None
-    known = LightGrid((height, width), block, *_grid_light(film, paths, height, grid, block, False))
-    return guided_image(known, paths, height, lambda pixels, seen, item: places_of(pixels, width), run), known
+    if grid.block == 1:
+        return film.means(grid.pixels).mean(axis=1).reshape(height, paths.view.width, 3), None
+    known = _light_grid(film, paths, height, grid, apart=False)
+    return guided_image(known, paths, height, _own_places(paths), run), known

@@ -104,6 +104,8 @@ class LineErrors:
     """The sum of the squares of what each wave adds, over the degrees of freedom of its spread."""
     all_waves: float = 0.0
     """The same of all waves; some were projected onto other weights."""
+    worst_rise: float = 0.0
+    """What all rows of the image but the share UNMET have at most in `risen`."""
     out_of_reach: bool = False
     """The goal would take far more than is allowed: the errors of the image are the goal."""
 
@@ -144,7 +146,16 @@ class LineErrors:
         self.waves, self.measured, self.all_waves = self.waves + 1, self.measured + share, self.all_waves + share
         self.squares += share**2 / (passes - 1)
         self.risen += np.float32(weight**2 * passes) * rises
+        self.worst_rise = self._worst_rise()
         return moves, rises
+
+    def _worst_rise(self) -> float:
+        rows = np.zeros(self.shape[0])
+        if len(self.risen):
+            # blocks are in the order of the rows that they begin in
+            begin = np.flatnonzero(np.diff(self.projection.block_row, prepend=-1))
+            rows[self.projection.block_row[begin]] = np.maximum.reduceat(self.risen.max(axis=1), begin)
+        return all_but_unmet(rows)
 
     @property
     def margin(self) -> float:
@@ -162,11 +173,7 @@ class LineErrors:
         if not self.measured:
             return math.inf
         scale = self.all_waves / self.measured / weights**2
-        rows = np.zeros(self.shape[0])
-        if len(self.risen):
-            found, begin = np.unique(self.projection.block_row, return_index=True)
-            rows[found] = np.maximum.reduceat(self.risen, begin, axis=0).max(axis=1)
-        worst = max(all_but_unmet(self.moved[self.projection.lit]), all_but_unmet(rows))
+        worst = max(all_but_unmet(self.moved[self.projection.lit]), self.worst_rise)
         return math.sqrt(scale * worst)
 
     def unknown(self, weights: float) -> int:
@@ -207,7 +214,7 @@ class LineErrors:
         found.moved, found.alone, found.risen = moved.copy(), arrays["line_alone"].copy(), arrays["line_risen"].copy()
         found.waves, found.measured, found.all_waves = int(waves), measured, all_waves
         found.squares = squares
-        found.out_of_reach = bool(out_of_reach)
+        found.out_of_reach, found.worst_rise = bool(out_of_reach), found._worst_rise()
         return found
 
 

@@ -225,7 +225,7 @@ def check_image(image: object) -> NDArray[Any]:
         raise InputError("image shape is wrong", where="image", found=array.shape, allowed="(h, w) or (h, w, 3)")
     if min(array.shape[:2]) < 1 or max(array.shape[:2]) > 65536:
         raise InputError("image size is out of range", where="image", found=array.shape, allowed="1..65536 px a side")
-    if array.dtype.kind == "f" and not np.isfinite(array).any():
+    if array.dtype.kind == "f" and not any(np.isfinite(line).any() for line in array):
         raise InputError("image has no pixel that is a finite number", where="image", found="NaN or infinity only")
     return array
 
