@@ -116,13 +116,15 @@ class Sample:
 
     def rows(self, laser: int | None, method: int) -> Rows:
         """The points kept of a laser, or of all, by a method, in the order of the scan."""
-        found = [np.empty(0, ROW)]
+        found, images, sizes = [], [], []
         for (image, _), (of, _, place, lengths) in sorted(self._runs.items(), key=lambda item: item[0]):
             if laser in (None, of) and method < len(lengths) and place is not None:
-                part = np.frombuffer(self._spool.read(place + sum(lengths[:method]), lengths[method]), ROW).copy()
-                part["index"] += IMAGE * image
-                found.append(part)
-        return np.concatenate(found)
+                found.append(self._spool.read(place + sum(lengths[:method]), lengths[method]))
+                images.append(image)
+                sizes.append(lengths[method] // ROW.itemsize)
+        rows = np.frombuffer(bytearray().join(found), ROW)
+        rows["index"] += IMAGE * np.repeat(np.array(images, np.int64), sizes)
+        return rows
 
     def lines(self, laser: int | None) -> tuple[int, int]:
         """How many scan lines were kept, and how many there were."""

@@ -90,7 +90,12 @@ def run_scan(
     cautions = Cautions(project, image_scale)
     count = min(options.steps or project.scene.frame_count, project.scene.frame_count)
     clock = Clock(listener.progress, listener.cancelled)
-    measuring = Measuring(project, out, clock, options.threads, count, listener.measured) if options.measure else None
+    compare_all = options.frames != "none"
+    measuring = (
+        Measuring(project, out, clock, options.threads, count, listener.measured, compare_all=compare_all)
+        if options.measure
+        else None
+    )
     with ExitStack() as held, cautions.listening():
         if measuring:
             held.enter_context(closing(measuring))
