@@ -12,6 +12,7 @@ from analysis.cloud import SpooledCloud, cloud, write_csv, write_ply
 from analysis.line.selection.learned import UNLIKE
 from analysis.line.settings import Method
 from analysis.report.model import FrameResult
+from analysis.report.picture import Drawing
 from analysis.report.record import ScanRecord
 from render.frame import Frame
 from render.sensor.develop import Image
@@ -42,10 +43,11 @@ class Measuring:
         each: Callable[[FrameResult], None] = lambda frame: None,
         *,
         compare_all: bool = True,
+        report: bool = False,
     ) -> None:
         """folder: what does not stay in memory is in unnamed files there; count: of frames to come; each: hears of
         every frame once it is measured; compare_all: all frames are measured by the other methods too, else those
-        alone whose images wait for the report.
+        alone whose images wait for the report; report: one is to come, whose drawing begins with the last frame.
 
         InputError: lines are to be measured along time, and nothing moves.
         """
@@ -57,6 +59,8 @@ class Measuring:
         self._compared: tuple[Method, ...] | None = None
         self._shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
         self._compare_all = compare_all
+        self._last = count - 1 if report else None
+        self._drawing: Drawing | None = None
 
     def add(self, frame: Frame, world: World, images: list[Image]) -> None:
         """The next frame with an image for each laser."""
@@ -68,6 +72,8 @@ class Measuring:
 
     def _take(self, ready: Iterable[tuple[Taken, Passing | None]]) -> None:
         for one, passing in ready:
+            if len(self.record.steps) == self._last:
+                self._drawing = Drawing()
             shown = len(self.record.steps) in self._shown
             result = measure_frame(
                 self._project,
@@ -144,12 +150,14 @@ class Measuring:
             run=run,
         )
         with self._clock.stage("report"):
-            return list(write_report(out, data))
+            return list(write_report(out, data, self._drawing))
 
     def close(self) -> None:
         """Let go of what is on disk."""
         self.record.close()
         self._points.close()
+        if self._drawing is not None:
+            self._drawing.stop()
 
 
 def _bound(notes: Counter[str]) -> None:
