@@ -244,17 +244,17 @@ def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
     first = next(parts)
     header = [title(name) for name in first]
     with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(header)
+        csv.writer(file).writerow(header)
         for part in chain([first], parts):
-            writer.writerows(zip(*map(_text_cells, part.values()), strict=True))
+            # numbers need no quotes, which a writer of csv would look for
+            file.writelines(f"{','.join(cells)}\r\n" for cells in zip(*map(_text_cells, part.values()), strict=True))
 
 
-def _text_cells(column: Column) -> list[float | str]:
-    values: list[float | str] = column.tolist()
-    if column.dtype.kind == "f" and np.isnan(column).any():
-        return ["" if value != value else value for value in values]
-    return values
+def _text_cells(column: Column) -> list[str]:
+    cells = list(map(repr, column.tolist()))
+    for i in np.flatnonzero(np.isnan(column)).tolist() if column.dtype.kind == "f" else ():
+        cells[i] = ""
+    return cells
 
 
 def read_csv(path: Path | str) -> Cloud:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from render.base.errors import InputError
 
-IN_MEMORY = 1 << 23
+IN_MEMORY = 1 << 20
 """Bytes that need no file."""
 
 
@@ -21,10 +21,14 @@ class Spool:
 
     def append(self, data: bytes) -> int:
         """Where the bytes begin. InputError: the folder or the disk takes no more."""
+        return self.put(data, None)
+
+    def put(self, data: bytes, start: int | None) -> int:
+        """In place of as many bytes from `start` on; None: at the end. As `append`."""
         try:
             if self._folder is not None:
                 self._folder.mkdir(parents=True, exist_ok=True)
-            start = self._file.seek(0, 2)
+            start = self._file.seek(0, 2) if start is None else self._file.seek(start)
             self._file.write(data)
         except OSError as error:
             raise InputError(

@@ -30,7 +30,7 @@ from analysis.line.posterior_influence import posterior_influence
 from analysis.line.result import NEIGHBOURS, Flag, Line
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float, Float32
-from render.base.threads import map_chunks
+from render.base.threads import map_chunks, rows_of
 
 Int = NDArray[np.int64]
 Flags = NDArray[np.uint8]
@@ -47,7 +47,8 @@ STEP = 0.01
 AT_ONCE = 1024
 """Scan lines that are held with one pixel changed: 20 MB of 2448 px."""
 ROWS = 64
-"""Scan lines that are read at a time."""
+PIXELS = 1 << 17
+"""Scan lines that are read at a time, at least, and their pixels."""
 TRIED = 64
 """Scan lines on which differences are taken; others take their nearest one's, at their own place and brightness."""
 
@@ -178,7 +179,7 @@ def _read_windows(
         held = np.take_along_axis(floor, np.minimum(inside, floor.shape[1] - 1), axis=1).astype(np.float64)
         found.append((start, _Window(light, held, (x == inside) & (wrong == 0))))
 
-    map_chunks(work, len(rows), ROWS, threads)
+    map_chunks(work, len(rows), rows_of(lines.image.shape[1], ROWS, PIXELS), threads)
     return middle, half, found
 
 

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from analysis.report.colour import ACCENT, DIVERGING, INK, MUTED, TRUTH, method_colour, method_name
 from analysis.report.model import FrameResult, ReportInput
+from analysis.report.picture import without_margins
 from analysis.report.style import WIDTH, figure, image_uri, png_uri, short
 from render.base.arrays import Float
 
 SCENE_ASPECT = 1.55
 """Width over height of the scene picture, at least."""
-MARGIN = 24
-"""px left around a cropped picture."""
 MAP_WIDTH = 4.5
 """inch, of the cloud beside its histogram."""
 WIDEST = 1400
@@ -37,13 +36,7 @@ def cropped(path: Path) -> NDArray[np.uint8]:
     """(h, w, 3) picture without its white margins."""
     from PIL import Image
 
-    pixels = np.asarray(Image.open(path).convert("RGB"))
-    drawn = np.any(pixels < 250, axis=2)
-    if not np.any(drawn):
-        return pixels
-    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
-    top, left = max(0, rows[0] - MARGIN), max(0, columns[0] - MARGIN)
-    picture = Image.fromarray(pixels[top : rows[-1] + MARGIN, left : columns[-1] + MARGIN])
+    picture = Image.fromarray(without_margins(np.asarray(Image.open(path).convert("RGB"))))
     if picture.width > WIDEST:
         picture = picture.resize((WIDEST, picture.height * WIDEST // picture.width), Image.Resampling.LANCZOS)
     return np.asarray(picture)

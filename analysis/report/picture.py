@@ -1,6 +1,7 @@
 """Draws the 3D pictures with VTK in a process of its own: where a graphics library is missing, VTK ends the process.
 
-python -m analysis.report.picture FOLDER      reads FOLDER/job.npz, writes FOLDER/scene.png and FOLDER/cloud.png
+python -m analysis.report.picture      told a FOLDER, a line on its standard input, it reads FOLDER/job.npz and writes
+                                       FOLDER/scene.png and FOLDER/cloud.png
 """
 
 from __future__ import annotations
@@ -8,59 +9,85 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.colour import ACCENT, DIVERGING, INK, SLATE, STEEL
-from analysis.report.view import SceneView, View
-from render.base.arrays import Float
+
+if TYPE_CHECKING:  # the process that draws needs none of what these stand on
+    from analysis.report.view import SceneView, View
+    from render.base.arrays import Float
 
 SIZE = (2400, 1500)
+MARGIN = 24
+"""px left around a cropped picture."""
 TIME_LIMIT = 60.0
 """s; drawing takes 3. Without a graphics card a mesh of millions takes longer, but not this long."""
 
 
-def start(folder: Path, vertices: Float, triangles: NDArray[np.int32], scene: SceneView, cloud: Float, error: Float,
-          view: View, limit: float) -> subprocess.Popen[bytes]:  # fmt: skip
-    """Begin to draw both pictures; `limit` is the error at the colours' ends, m."""
-    arrays: dict[str, Any] = {
-        "vertices": vertices, "triangles": triangles, "frustum": scene.frustum, "emitters": scene.emitters,
-        "colours": np.array(scene.colours).reshape(-1, 3), "cloud": cloud, "error": error, "limit": np.array(limit),
-        "scene_view": _pack(scene.view), "cloud_view": _pack(view),
-    }  # fmt: skip
-    for i, (corners, faces) in enumerate(scene.sheets):
-        arrays |= {f"sheet{i}": corners, f"faces{i}": faces, f"edges{i}": scene.edges[i], f"curve{i}": scene.curves[i]}
-    np.savez(folder / "job.npz", **arrays)
-    root = Path(__file__).resolve().parents[2]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])}
-    return subprocess.Popen(
-        [sys.executable, "-m", "analysis.report.picture", str(folder)],
-        env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+class Drawing:
+    """The process that draws, which takes a second to begin: whoever is to have a report may begin it before."""
 
+    def __init__(self) -> None:
+        root = Path(__file__).resolve().parents[2]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])}
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "analysis.report.picture"],
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
 
-def finish(process: subprocess.Popen[bytes], folder: Path) -> tuple[Path, Path] | None:
-    """The two pictures, or None when they could not be drawn here."""
-    try:
-        code = process.wait(TIME_LIMIT)
-    except subprocess.TimeoutExpired:
-        code = 1
-    finally:
-        stop(process)
-    made = folder / "scene.png", folder / "cloud.png"
-    return made if code == 0 and all(path.is_file() for path in made) else None
+    def __enter__(self) -> Drawing:
+        return self
 
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
 
-def stop(process: subprocess.Popen[bytes]) -> None:
-    """End the drawing, if it has not ended."""
-    if process.poll() is None:
-        process.kill()
-        process.wait()
+    def start(self, folder: Path, vertices: Float, triangles: NDArray[np.int32], scene: SceneView, cloud: Float,
+              error: Float, view: View, limit: float) -> None:  # fmt: skip
+        """Draw both pictures into a folder, once; `limit` is the error at the colours' ends, m."""
+        arrays: dict[str, Any] = {
+            "vertices": vertices, "triangles": triangles, "frustum": scene.frustum, "emitters": scene.emitters,
+            "colours": np.array(scene.colours).reshape(-1, 3), "cloud": cloud, "error": error,
+            "limit": np.array(limit), "scene_view": _pack(scene.view), "cloud_view": _pack(view),
+        }  # fmt: skip
+        for i, (corners, faces) in enumerate(scene.sheets):
+            arrays |= {f"sheet{i}": corners, f"faces{i}": faces}
+            arrays |= {f"edges{i}": scene.edges[i], f"curve{i}": scene.curves[i]}
+        np.savez(folder / "job.npz", **arrays)
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it may have ended, which `finish` tells
+            self._process.stdin.write(os.fsencode(folder) + b"\n")
+            self._process.stdin.close()
+
+    def finish(self, folder: Path) -> tuple[Path, Path] | None:
+        """The two pictures, or None when they could not be drawn here."""
+        try:
+            code = self._process.wait(TIME_LIMIT)
+        except subprocess.TimeoutExpired:
+            code = 1
+        finally:
+            self.stop()
+        made = folder / "scene.png", folder / "cloud.png"
+        return made if code == 0 and all(path.is_file() for path in made) else None
+
+    def stop(self) -> None:
+        """End the drawing, if it has not ended."""
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+        if self._process.stdin is not None:
+            with suppress(OSError):
+                self._process.stdin.close()
 
 
 def _pack(view: View) -> Float:
@@ -81,6 +108,25 @@ def _plotter(job: Any, name: str, colour: str, mesh_alpha: float) -> Any:
     plotter.camera.zoom(0.9)  # leaves room for labels
     plotter.enable_anti_aliasing("msaa", multi_samples=8)
     return plotter
+
+
+def _write(plotter: Any, path: Path) -> None:
+    from PIL import Image
+
+    pixels = plotter.screenshot(None, return_img=True)
+    plotter.close()
+    # it is read once and thrown away: quickly rather than small
+    Image.fromarray(np.ascontiguousarray(without_margins(pixels))).save(path, compress_level=1)
+
+
+def without_margins(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(h, w, 3) picture without its white margins but MARGIN; as it is where nothing is drawn."""
+    drawn = np.any(pixels < 250, axis=2)
+    if not np.any(drawn):
+        return pixels
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    top, left = max(0, rows[0] - MARGIN), max(0, columns[0] - MARGIN)
+    return pixels[top : rows[-1] + MARGIN, left : columns[-1] + MARGIN]
 
 
 def draw_scene(job: Any, path: Path) -> None:
@@ -117,8 +163,7 @@ def draw_scene(job: Any, path: Path) -> None:
         np.array(places), labels, font_size=38, text_color=INK, shape=None, show_points=False, always_visible=True
     )
     plotter.renderer.ResetCameraClippingRange()
-    plotter.screenshot(str(path))
-    plotter.close()
+    _write(plotter, path)
 
 
 def draw_cloud(job: Any, path: Path) -> None:
@@ -140,16 +185,21 @@ def draw_cloud(job: Any, path: Path) -> None:
             point_size=5 if dense else 11, render_points_as_spheres=True, lighting=False,
         )  # fmt: skip
     plotter.renderer.ResetCameraClippingRange()
-    plotter.screenshot(str(path))
-    plotter.close()
+    _write(plotter, path)
 
 
-def main(folder: Path) -> None:
-    """Draw both pictures of a job."""
+def main() -> None:
+    """Draw both pictures of a job, once there is one."""
+    import pyvista.plotting  # noqa: F401 - before there is anything to draw
+
+    name = sys.stdin.buffer.readline().removesuffix(b"\n")
+    if not name:
+        return  # nobody wants pictures any more
+    folder = Path(os.fsdecode(name))
     with np.load(folder / "job.npz", allow_pickle=False) as job:
         draw_scene(job, folder / "scene.png")
         draw_cloud(job, folder / "cloud.png")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

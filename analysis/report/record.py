@@ -49,7 +49,7 @@ class ScanRecord:
     """
 
     def __init__(self, scene: Scene, folder: Path | None = None, *, most_lines: int = MOST_LINES) -> None:
-        """folder: for the file of frames, as `Spool`. most_lines: scan lines that the sample holds."""
+        """folder: for the files of frames and sample, as `Spool`. most_lines: scan lines that the sample holds."""
         self.scene = scene
         self.steps: list[StepResult] = []
         self.readings: list[Reading] = []
@@ -59,7 +59,7 @@ class ScanRecord:
         self.counts: dict[Quantity, tuple[float, int]] = {}
         """Sum over the frames, and number of frames that have it."""
         self._sums: dict[tuple[int, int], Sums] = {}
-        self._sample = Sample(most_lines)
+        self._sample = Sample(most_lines, folder)
         self._spool = Spool(folder)
         self._waiting: list[tuple[float, int, int]] = []
         """Depth RMSE, start and size in the spool of the frames with images."""
@@ -95,6 +95,7 @@ class ScanRecord:
 
     def close(self) -> None:
         self._spool.close()
+        self._sample.close()
 
     def _keep(self, frame: FrameResult) -> None:
         whole = all(laser.image is not None for laser in frame.lasers)

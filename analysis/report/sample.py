@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cloud import at_first_step
 from analysis.report.model import Extraction
+from analysis.spool import Spool
 from render.scene.scene import Scene
 
 Rows = NDArray[np.void]
@@ -63,46 +65,71 @@ def rows_of(extraction: Extraction, scene: Scene, step: int) -> Rows:
 
 
 class Sample:
-    """A seeded, uniform random sample of runs, the same runs for every method."""
+    """A seeded, uniform random sample of runs, the same runs for every method.
 
-    def __init__(self, most: int = MOST_LINES) -> None:
+    Their points wait in a file, where those that come take the places of those that go.
+    """
+
+    def __init__(self, most: int = MOST_LINES, folder: Path | None = None) -> None:
+        """folder: as `Spool`."""
         self._most = most
         self._images = 0
         self._kept = 0
         self._seen: dict[int, int] = {}
-        self._runs: dict[tuple[int, int], tuple[int, int, list[Rows]]] = {}
-        """By image and run: the laser, how many scan lines, and their points by each method."""
+        self._runs: dict[tuple[int, int], tuple[int, int, int | None, tuple[int, ...]]] = {}
+        """By image and run: the laser, how many scan lines, where they are in the file, and of how many bytes their
+        points by each method are."""
         self._drawn: list[tuple[float, int, int]] = []
         """A heap of the same runs, the first to go first."""
+        self._spool = Spool(folder)
+        self._left: dict[int, list[int]] = {}
+        """Places in the file that runs of so many bytes have left."""
 
     def add(self, laser: int, lines: int, methods: Sequence[Rows]) -> None:
-        """The points of one image of a laser, with `lines` scan lines, by each method."""
+        """The points of one image of a laser, with `lines` scan lines, by each method. InputError: as `Spool`."""
         starts = np.arange(0, lines, RUN)
         lots = np.random.default_rng([SEED, self._images]).random(len(starts))
         edges = [np.searchsorted(rows["index"], np.append(starts, lines)) for rows in methods]
         self._seen[laser] = self._seen.get(laser, 0) + lines
         for run, lot in enumerate(lots.tolist()):
             size = min(RUN, lines - run * RUN)
-            parts = [rows[edge[run] : edge[run + 1]].copy() for rows, edge in zip(methods, edges, strict=True)]
-            self._runs[self._images, run] = laser, size, parts
             self._kept += size
             heapq.heappush(self._drawn, (-lot, self._images, run))
+            self._runs[self._images, run] = laser, size, None, ()
             while self._kept > self._most:
-                _, image, last = heapq.heappop(self._drawn)
-                self._kept -= self._runs.pop((image, last))[1]
+                self._drop()
+            if (self._images, run) in self._runs:
+                parts = [rows[edge[run] : edge[run + 1]].tobytes() for rows, edge in zip(methods, edges, strict=True)]
+                self._runs[self._images, run] = laser, size, self._put(b"".join(parts)), tuple(map(len, parts))
         self._images += 1
+
+    def _drop(self) -> None:
+        _, image, run = heapq.heappop(self._drawn)
+        _, size, place, lengths = self._runs.pop((image, run))
+        self._kept -= size
+        if place is not None:
+            self._left.setdefault(sum(lengths), []).append(place)
+
+    def _put(self, data: bytes) -> int:
+        places = self._left.get(len(data))
+        return self._spool.put(data, places.pop() if places else None)
 
     def rows(self, laser: int | None, method: int) -> Rows:
         """The points kept of a laser, or of all, by a method, in the order of the scan."""
-        found = [np.empty(0, ROW)]
-        for (image, _), (of, _, methods) in sorted(self._runs.items(), key=lambda item: item[0]):
-            if laser in (None, of) and method < len(methods):
-                part = methods[method].copy()
-                part["index"] += IMAGE * image
-                found.append(part)
-        return np.concatenate(found)
+        found, images, sizes = [], [], []
+        for (image, _), (of, _, place, lengths) in sorted(self._runs.items(), key=lambda item: item[0]):
+            if laser in (None, of) and method < len(lengths) and place is not None:
+                found.append(self._spool.read(place + sum(lengths[:method]), lengths[method]))
+                images.append(image)
+                sizes.append(lengths[method] // ROW.itemsize)
+        rows = np.frombuffer(bytearray().join(found), ROW)
+        rows["index"] += IMAGE * np.repeat(np.array(images, np.int64), sizes)
+        return rows
 
     def lines(self, laser: int | None) -> tuple[int, int]:
         """How many scan lines were kept, and how many there were."""
-        kept = sum(size for of, size, _ in self._runs.values() if laser in (None, of))
+        kept = sum(size for of, size, _, _ in self._runs.values() if laser in (None, of))
         return kept, sum(seen for of, seen in self._seen.items() if laser in (None, of))
+
+    def close(self) -> None:
+        self._spool.close()

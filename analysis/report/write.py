@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import datetime
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from analysis.report import gauge_table, picture, plain_picture
+from analysis.report import gauge_table, plain_picture
 from analysis.report.colour import method_colour, method_name
 from analysis.report.columns import columns, sentence_height, table_height
 from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
@@ -18,6 +19,7 @@ from analysis.report.light_text import sentences
 from analysis.report.line_figures import camera_figure, profile_figure, three_panel_figure, zoom_figure
 from analysis.report.model import FrameResult, ReportInput
 from analysis.report.page import page_of
+from analysis.report.picture import Drawing
 from analysis.report.style import plain
 from analysis.report.summary import headline, remarks, sample_note
 from analysis.report.tables import (
@@ -40,12 +42,14 @@ MOST_DETAILS = 4
 PLAIN_NOTE = "Drawn in a simple way, because this machine has no library to draw 3D pictures off-screen."
 
 
-def write_report(folder: Path | str, report: ReportInput) -> tuple[Path, Path]:
+def write_report(folder: Path | str, report: ReportInput, drawing: Drawing | None = None) -> tuple[Path, Path]:
     """Write `report.html` and `report.pdf` into a folder (made if missing); returns their paths.
 
+    drawing: begun before, for this report alone.
     The HTML holds all its pictures and refers to nothing outside itself. InputError: a file cannot be written.
     """
-    page = render_page(report)
+    with Drawing() if drawing is None else drawing as process:
+        page = _page(report, process, meanwhile=_prepare_pdf)
     html, pdf = Path(folder) / "report.html", Path(folder) / "report.pdf"
     with atomic_write(html) as temporary:
         temporary.write_text(page, encoding="utf-8")
@@ -56,10 +60,15 @@ def write_report(folder: Path | str, report: ReportInput) -> tuple[Path, Path]:
 
 def render_page(report: ReportInput) -> str:
     """The report as one HTML page."""
-    return page_of(Path(__file__).parent / "template.html", _content(report))
+    with Drawing() as process:
+        return _page(report, process)
 
 
-def _content(report: ReportInput) -> dict[str, Any]:
+def _page(report: ReportInput, process: Drawing, meanwhile: Callable[[], None] = lambda: None) -> str:
+    return page_of(Path(__file__).parent / "template.html", _content(report, process, meanwhile))
+
+
+def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None]) -> dict[str, Any]:
     record = report.record
     frame, found = record.shown_frame(), total(record.chosen())
     view, cloud, error = cloud_view(report)
@@ -71,14 +80,12 @@ def _content(report: ReportInput) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         drawing = (vertices, report.triangles, scene, cloud, error, view, limit)
-        process = picture.start(folder, *drawing)
-        try:  # the other figures, while VTK draws
-            details = [_detail(report, frame, i) for i in range(min(MOST_DETAILS, len(frame.lasers)))]
-            steps = steps_figure(report, frame.step) if len(record.steps) > 1 else None
-        except BaseException:
-            picture.stop(process)
-            raise
-        drawn = picture.finish(process, folder)
+        process.start(folder, *drawing)
+        # the other figures, while VTK draws
+        details = [_detail(report, frame, i) for i in range(min(MOST_DETAILS, len(frame.lasers)))]
+        steps = steps_figure(report, frame.step) if len(record.steps) > 1 else None
+        meanwhile()
+        drawn = process.finish(folder)
         note = "" if drawn is not None else PLAIN_NOTE
         scene_png, cloud_png = drawn if drawn is not None else plain_picture.draw(folder, *drawing)
         pictures = {
@@ -191,6 +198,11 @@ def _tiles(found: Total) -> list[tuple[str, str, str]]:
 def _repeat(report: ReportInput) -> list[tuple[str, str]]:
     seed = [("seed", str(report.seed))] if report.seed is not None else []
     return [*seed, *report.versions.items()]
+
+
+def _prepare_pdf() -> None:
+    """What takes long to load, which it does while something else is waited for."""
+    import weasyprint  # noqa: F401
 
 
 def write_pdf(page: str, path: Path) -> None:

@@ -19,6 +19,12 @@ def thread_count(threads: int | None) -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def rows_of(width: int, least: int, pixels: int = 1 << 15) -> int:
+    """Rows of an image to take at a time: about so many pixels, so that narrow images are not taken in many calls; an
+    even number, at least `least`."""
+    return max(least, pixels // width // 2 * 2)
+
+
 def map_chunks(
     work: Callable[[int, int], None],
     count: int,

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from render.base.arrays import Float, Float32
 from render.base.errors import InputError
 from render.base.finite import check_finite
-from render.base.threads import map_chunks
+from render.base.threads import map_chunks, rows_of
 from render.frame import Frame
 from render.sampling.poisson import poisson
 from render.sampling.random import normal, wrapped
@@ -125,7 +125,7 @@ def develop(
         _read_out(light, fixed[start:stop], start, wrapped(seed), frame.step, chain, noise, numbers)
         pixels[start:stop] = numbers
 
-    map_chunks(rows, height, ROWS, threads)
+    map_chunks(rows, height, rows_of(width, ROWS), threads)
     saturation = min(top, math.floor(gain * sensor.full_well + sensor.black_level + 0.5))
     pattern = sensor.pattern if sensor.colour == "bayer" else None
     image = Image(
@@ -160,7 +160,7 @@ def expected_electrons(
         electrons[start:stop] = exposure.signal(start, stop) + sensor.dark_current * sensor.exposure_time
         check_finite("sensor", electrons=electrons[start:stop])
 
-    map_chunks(rows, electrons.shape[0], ROWS, threads)
+    map_chunks(rows, len(electrons), rows_of(electrons.shape[1], ROWS), threads)
     return electrons
 
 
@@ -293,7 +293,7 @@ def fixed_pattern(height: int, width: int, threads: int | None = None) -> Float3
     def rows(start: int, stop: int) -> None:
         _fill_pattern(pattern[start:stop], start)
 
-    map_chunks(rows, height, ROWS, threads)
+    map_chunks(rows, height, rows_of(width, ROWS), threads)
     pattern.flags.writeable = False
     return pattern
 

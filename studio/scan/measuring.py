@@ -12,6 +12,7 @@ from analysis.cloud import SpooledCloud, cloud, write_csv, write_ply
 from analysis.line.selection.learned import UNLIKE
 from analysis.line.settings import Method
 from analysis.report.model import FrameResult
+from analysis.report.picture import Drawing
 from analysis.report.record import ScanRecord
 from render.frame import Frame
 from render.sensor.develop import Image
@@ -40,9 +41,13 @@ class Measuring:
         threads: int | None,
         count: int,
         each: Callable[[FrameResult], None] = lambda frame: None,
+        *,
+        compare_all: bool = True,
+        report: bool = False,
     ) -> None:
         """folder: what does not stay in memory is in unnamed files there; count: of frames to come; each: hears of
-        every frame once it is measured.
+        every frame once it is measured; compare_all: all frames are measured by the other methods too, else those
+        alone whose images wait for the report; report: one is to come, whose drawing begins with the last frame.
 
         InputError: lines are to be measured along time, and nothing moves.
         """
@@ -53,6 +58,9 @@ class Measuring:
         self._notes: list[Counter[str]] = [Counter() for _ in project.scene.lasers]
         self._compared: tuple[Method, ...] | None = None
         self._shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
+        self._compare_all = compare_all
+        self._last = count - 1 if report else None
+        self._drawing: Drawing | None = None
 
     def add(self, frame: Frame, world: World, images: list[Image]) -> None:
         """The next frame with an image for each laser."""
@@ -64,6 +72,9 @@ class Measuring:
 
     def _take(self, ready: Iterable[tuple[Taken, Passing | None]]) -> None:
         for one, passing in ready:
+            if len(self.record.steps) == self._last:
+                self._drawing = Drawing()
+            shown = len(self.record.steps) in self._shown
             result = measure_frame(
                 self._project,
                 one.frame,
@@ -71,9 +82,9 @@ class Measuring:
                 one.images,
                 self._clock,
                 self._threads,
-                keep=len(self.record.steps) in self._shown,
+                keep=shown,
                 passing=passing,
-                compared=self._compared,
+                compared=self._compared if shown or self._compare_all else (),
             )
             if self._compared is None:
                 self._compared = compared_methods(result)
@@ -93,6 +104,9 @@ class Measuring:
                 if note:
                     where = f" in {times} of {frames} frames" if times < frames else ""
                     notes.append(f"Line of {laser.name}{where}: {note}.")
+        compared = min(len(self._shown), frames)
+        if self._compared and not self._compare_all and compared < frames:
+            notes.insert(0, f"Other methods, to compare with, measured {compared} of {frames} frames.")
         return notes[:MOST_NOTES]
 
     def remarks(self) -> list[str]:
@@ -136,12 +150,14 @@ class Measuring:
             run=run,
         )
         with self._clock.stage("report"):
-            return list(write_report(out, data))
+            return list(write_report(out, data, self._drawing))
 
     def close(self) -> None:
         """Let go of what is on disk."""
         self.record.close()
         self._points.close()
+        if self._drawing is not None:
+            self._drawing.stop()
 
 
 def _bound(notes: Counter[str]) -> None:

@@ -64,7 +64,7 @@ def _measured(
     with clock.stage("loading meshes"), cautions.listening():
         first = build_world(project.scene, root, 0)
     aimed = False
-    with closing(Measuring(project, out, clock, threads, len(found.frames))) as measuring:
+    with closing(Measuring(project, out, clock, threads, len(found.frames), report=report)) as measuring:
         for n in clock.frames(len(found.frames)):
             path = found.frames[n]
             with clock.stage("reading frames"):

@@ -13,16 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import correlate1d, maximum_filter1d, median_filter
+from scipy.ndimage import maximum_filter1d
 
-from analysis.line.detection.matched_filter import BLOCK, NOISE_GAIN, TAPS
-from analysis.line.detection.noise import NoiseModel
+from analysis.line.detection.rivals import rival_weights
 from analysis.line.influence import influence
 from analysis.line.methods.narrow_line import COARSE
-from analysis.line.result import Line
-from analysis.line.settings import ExtractionSettings
-from render.base.arrays import Float, Float32
-from render.base.threads import map_chunks
+from render.base.arrays import Bool, Float, Float32
+from render.base.threads import map_chunks, rows_of
 from render.frame import Frame
 from render.importance import CELL, Importance
 from render.scene.settings import DepthGoal
@@ -31,12 +28,6 @@ from render.sensor.response import band_response, joules_per_radiance, laser_res
 from studio.project.project import Project
 from studio.scan.line_extraction import extract_line, noise_model
 
-CERTAIN = 3.0
-"""Standard deviations of the render by which a response must stay away from what would change a row."""
-NEAREST = 0.25
-"""Of the detection threshold, in the noise of line and rival: nearer than this to a change the sensor decides."""
-AROUND = 3.0
-"""Sigmas of a line within which it is itself the peak."""
 DECISION = 3.0
 """Times the goal, of a pixel's own noise: ambient light that is known so well on the pixels of a narrow line leaves it
 to the sensor which of two widths its fit finds. The influence function knows of one answer alone."""
@@ -45,8 +36,8 @@ DIRECT = 0.1
 light with the power 0.5, and it takes a hundredth of the time: a tenth costs it about twice the rays of a third."""
 PAIRS, JUMP = 2, 3.0
 """Pairs of images with opposite noise, and times the goal by which they must not differ from a straight line."""
-ROWS = 64
-"""Scan lines at a time, which a processor's cache holds; an even number."""
+ROWS, PIXELS = 64, 1 << 17
+"""Scan lines at a time, at least, and pixels, which a processor's cache holds; an even number of lines."""
 
 
 def goal_of(project: Project, threads: int | None = None) -> Callable[[Frame], Importance] | None:
@@ -193,7 +184,8 @@ def _weigh(
         settings = settings.model_copy(update={"pattern": image.pattern})
     # of a selection the candidates' method is the one that measured them
     derivative = influence(image.pixels, line, settings, noise, threads, shared=True)
-    narrow = np.any(line.valid & (line.width < COARSE), axis=1)[:, None]
+    valid = line.valid
+    narrow = np.any(valid & (line.width < COARSE), axis=1)[:, None]
     if line.axis == "columns":
         electrons, derivative = electrons.T, derivative.T
     # a whole row counts as one sum there, of which a quarter of its pixels may come near
@@ -202,7 +194,7 @@ def _weigh(
     def work(start: int, stop: int) -> None:
         some = slice(start, stop)
         light, moves = np.ascontiguousarray(electrons[some]), np.ascontiguousarray(derivative[some])
-        risen = _row_peaks(light, line, some, noise, settings)
+        risen = rival_weights(light, (line.u[some], line.width[some], valid[some]), noise, settings)
         counted = np.maximum(light + np.float32(noise.floor), np.float32(1e-2))
         # one more on either side, as windows begin with the pixel
         decided = maximum_filter1d((moves != 0.0) & narrow[some], 3, axis=1)
@@ -210,11 +202,11 @@ def _weigh(
         even = risen * np.float32(evenly)
         place = np.nonzero(decided)
         even[place] = np.maximum(even[place], share[place[0]] / np.sqrt(counted[place]))
-        sigma = allowed[0] * _sigma(line, some, moves, light + np.float32(noise.floor))
+        sigma = allowed[0] * _sigma(valid[some], line.sigma_u[some], moves, light + np.float32(noise.floor))
         moved = moves * (1.0 / sigma).astype(np.float32)[:, None]
         out.put(some, moved, risen, even)
 
-    map_chunks(work, len(electrons), ROWS, threads)
+    map_chunks(work, len(electrons), rows_of(electrons.shape[1], ROWS, PIXELS), threads)
 
 
 def _electrons(project: Project, frame: Frame, laser: int, threads: int | None) -> Float32:
@@ -240,59 +232,24 @@ def _expected_image(
         out += np.float32(sensor.black_level)
         np.minimum(out, np.float32(saturation), out=out)
 
-    map_chunks(work, len(electrons), ROWS, threads)
+    map_chunks(work, len(electrons), rows_of(electrons.shape[1], ROWS, PIXELS), threads)
     pattern = sensor.pattern if sensor.colour == "bayer" else None
     return Image(
         numbers, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time
     )
 
 
-def _sigma(line: Line, rows: slice, derivative: Float32, variance: Float32) -> Float:
-    """(n,) standard deviation of each scan line's position, px; infinite where there is none.
+def _sigma(valid: Bool, sigma_u: Float, derivative: Float32, variance: Float32) -> Float:
+    """Of peaks (n, k) and pixels (n, w): (n,) standard deviation of each scan line's position, px; infinite where there
+    is none.
 
     At least what the noise of its own pixels makes of it: a line that is moved by more than it tells asks of no light
     to be known better than the goal's share of that noise.
     """
-    valid, sigma_u = line.valid[rows], line.sigma_u[rows]
     told = np.min(np.where(valid & np.isfinite(sigma_u), sigma_u, np.inf), axis=1)
     counted = np.sqrt(np.einsum("ij,ij,ij->i", derivative, derivative, variance, dtype=np.float64))
     sigma = np.maximum(np.where(np.isfinite(told), told, 0.0), counted)
     return np.where(valid.any(axis=1) & (sigma > 0.0), sigma, np.inf)
-
-
-def _row_peaks(light: Float32, line: Line, rows: slice, noise: NoiseModel, extraction: ExtractionSettings) -> Float32:
-    valid, u = line.valid[rows], line.u[rows]
-    response = correlate1d(light, TAPS.astype(np.float32), axis=1, mode="nearest")
-    n, w = response.shape
-    block = max(1, min(BLOCK, w // 8))
-    means = response[:, : w // block * block].reshape(n, -1, block).mean(axis=2)
-    medians = median_filter(means, (1, 7), mode="nearest")
-    column = np.minimum(np.arange(w) // block, medians.shape[1] - 1)
-    margins = extraction.threshold * np.sqrt(NOISE_GAIN * np.maximum(medians + noise.floor, 1e-2))
-    margin = margins.astype(np.float32)[:, column]
-    height = response - medians[:, column]
-    # alone, the strongest peak is the line, and another one counts only where it would be higher
-    top = np.zeros(n, np.float32)
-    if extraction.select == "strongest" and u.shape[1] == 1:
-        centre = np.clip(np.rint(np.where(valid[:, 0], u[:, 0], 0.0)).astype(np.int64), 0, w - 1)
-        top = np.where(valid[:, 0], height[np.arange(n), centre], np.float32(0.0))
-    away = np.abs(np.maximum(margin, top[:, None]) - height)
-    for k in range(u.shape[1]):
-        seen = np.flatnonzero(valid[:, k])
-        reach = AROUND * np.maximum(line.width[rows][seen, k], 1.0)
-        first = np.rint(u[seen, k]).astype(np.int64)
-        most = math.ceil(reach.max(initial=0.0)) + 1
-        x = first[:, None] + np.arange(-most, most + 1)
-        own = (np.abs(x - u[seen, k][:, None]) <= reach[:, None]) & (x >= 0) & (x < w)
-        place = np.broadcast_to(seen[:, None], x.shape)[own], x[own]
-        away[place] = np.maximum(top[place[0]] - margin[place], margin[place])
-    variance = np.maximum(response, 0.0) + (top + np.float32(noise.floor))[:, None]
-    variance *= np.float32(NOISE_GAIN)
-    if noise.scintillation:
-        scattered = np.float32(noise.table[0, 0])
-        variance += scattered * (np.maximum(height, 0.0) ** 2 + top[:, None] ** 2)
-    nearest = np.float32(NEAREST * extraction.threshold) * np.sqrt(np.maximum(variance, np.float32(1e-2)))
-    return np.asarray(np.float32(CERTAIN * TAPS[len(TAPS) // 2]) / np.maximum(away, nearest), np.float32)
 
 
 def _tiled(response: Float, illumination: Float32) -> Float32:

@@ -90,7 +90,10 @@ def run_scan(
     cautions = Cautions(project, image_scale)
     count = min(options.steps or project.scene.frame_count, project.scene.frame_count)
     clock = Clock(listener.progress, listener.cancelled)
-    measuring = Measuring(project, out, clock, options.threads, count, listener.measured) if options.measure else None
+    wanted = {"compare_all": options.frames != "none", "report": options.report}
+    measuring = (
+        Measuring(project, out, clock, options.threads, count, listener.measured, **wanted) if options.measure else None
+    )
     with ExitStack() as held, cautions.listening():
         if measuring:
             held.enter_context(closing(measuring))

@@ -256,6 +256,16 @@ def test_a_machine_that_cannot_draw_3d_gets_a_plain_picture(monkeypatch):
     assert Outward(page).tags.count("img") == 6
 
 
+def test_a_drawing_that_nobody_needs_ends_and_one_begun_before_draws_the_same(tmp_path):
+    with picture.Drawing() as drawing:
+        pass
+    assert drawing._process.poll() is not None
+    report, begun = make_report(), picture.Drawing()
+    html, _ = write_report(tmp_path, report, begun)
+    assert begun._process.poll() is not None
+    assert html.read_text(encoding="utf-8") == render_page(report)
+
+
 def test_remarks_name_what_is_wrong():
     scene, (frame,) = make_frames()
 

@@ -120,3 +120,21 @@ def test_progress_tells_the_frame_under_way() -> None:
         "frame 1 of 20", "frame 19 of 20", "frame 20 of 20", "frame 20 of 20",
     ]  # fmt: skip
     assert [frame_of(i / 2000, 2000) for i in range(2000)] == [f"frame {i + 1} of 2000" for i in range(2000)]
+
+
+def test_where_no_frame_is_kept_other_methods_measure_those_alone_that_the_report_may_show(
+    project: Project, rendered_once: None, tmp_path: Path
+) -> None:
+    """Evenly spread; the project's own method measures all, the same as ever."""
+    found = {}
+    for frames in ("all", "none"):
+        options = ScanOptions(image_scale=SCALE, steps=40, frames=frames, report=False)
+        found[frames] = run_scan(project, ROOT, out=tmp_path / frames, options=options).manifest
+    (own, *others), (same, *fewer) = (found[frames]["results"] for frames in ("all", "none"))
+    assert same == own and [one["method"] for one in fewer] == [one["method"] for one in others] != []
+    for one, of_all in zip(fewer, others, strict=True):
+        assert one["scan_lines"] == of_all["scan_lines"]  # of the scan, whoever measured them
+        assert one["points"] == pytest.approx(16 / 40 * of_all["points"], rel=0.05)
+        assert one["completeness"] == pytest.approx(of_all["completeness"], rel=0.05)
+    told = "Other methods, to compare with, measured 16 of 40 frames."
+    assert told in found["none"]["extraction"] and told not in found["all"]["extraction"]
