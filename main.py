@@ -14,7 +14,8 @@ from typing import Any
 try:
     import click
 
-    from studio.runtime.command_line import BAD_INPUT, Commands, FiniteRange
+    from studio.commands.of_scans import COMMANDS as OF_SCANS
+    from studio.runtime.command_line import BAD_INPUT, Commands, FiniteRange, require_system
     from studio.runtime.command_options import (
         COLOUR,
         THREADS,
@@ -30,7 +31,6 @@ try:
         training,
         working,
     )
-    from studio.runtime.system import message, missing_needs, why_not_in_this_folder
 except KeyboardInterrupt:
     sys.exit(130)
 except ModuleNotFoundError as missing:
@@ -103,7 +103,7 @@ def run(context: click.Context, /, project: Path | None, root: Path | None, **op
 
     A report.html in place of a project is run again as it was, to the same numbers.
     """
-    _require_system()
+    require_system()
     if project is not None and project.suffix.lower() in (".html", ".htm"):
         from studio.commands.run_report import run_report
 
@@ -123,7 +123,7 @@ def run(context: click.Context, /, project: Path | None, root: Path | None, **op
 @working
 def render(project: Path | None, **options: Any) -> None:
     """Render the frames of a project with their truth, and stop there."""
-    _require_system()
+    require_system()
     from studio.commands.commands import render_project
 
     render_project(project, **options)
@@ -147,7 +147,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
     Several photographs are the steps of the project's motion, or, with --hdr, exposures of one scene. They get a report
     of their own: residuals to a straight line and a plane, noise, coverage, warnings and pictures.
     """
-    _require_system()
+    require_system()
     from studio.commands.commands import reconstruct_source
 
     reconstruct_source(sources, **options)
@@ -159,7 +159,7 @@ def reconstruct(sources: tuple[Path, ...], **options: Any) -> None:
 @common
 def extract(images: tuple[Path, ...], **options: Any) -> None:
     """The laser line in image files of a real scanner (PNG, TIFF, EXR, JPEG, BMP), as a table for each."""
-    _require_system()
+    require_system()
     from studio.commands.extract import extract_images
 
     if extract_images(images, **options):
@@ -172,7 +172,7 @@ def extract(images: tuple[Path, ...], **options: Any) -> None:
 @common
 def report(folder: Path, **options: Any) -> None:
     """Rebuild the report of a finished scan from its folder."""
-    _require_system()
+    require_system()
     from studio.commands.commands import rebuild_report
 
     rebuild_report(folder, **options)
@@ -187,23 +187,14 @@ def compare(a: Path, b: Path, **options: Any) -> None:
 
     A and B are results folders, or reports (report.html).
     """
-    _require_system()
+    require_system()
     from studio.commands.compare import compare_paths
 
     compare_paths(a, b, **options)
 
 
-@cli.command()
-@click.argument("source", type=click.Path(path_type=Path))
-@click.option("--pitch", type=FiniteRange(1e-3, 1e3), help="Of the cells, mm  [default: a cell for each point].")
-@click.option("--out", type=click.Path(path_type=Path), help="PNG or TIFF  [default: heightmap.png beside the points].")
-@common
-def heightmap(source: Path, **options: Any) -> None:
-    """Points of a results folder, or a PLY, as heights on a uniform grid: a 16-bit picture, and its scale as JSON."""
-    _require_system()
-    from studio.commands.height_map import make_height_map
-
-    make_height_map(source, **options)
+for of_scan in OF_SCANS:
+    cli.add_command(of_scan)
 
 
 @cli.command()
@@ -211,7 +202,7 @@ def heightmap(source: Path, **options: Any) -> None:
 @common
 def inspect(project: Path | None, **options: Any) -> None:
     """What is in a project, whether it is sane, and what the camera will see."""
-    _require_system()
+    require_system()
     from studio.commands.commands import inspect_project
 
     inspect_project(project, **options)
@@ -240,7 +231,7 @@ def budget(project: Path | None, **options: Any) -> None:
 
     The same command goes on after an interrupt; study show tells what a folder holds.
     """
-    _require_system()
+    require_system()
     from studio.commands.budget import budget_project
 
     budget_project(project, **options)
@@ -254,7 +245,7 @@ def budget(project: Path | None, **options: Any) -> None:
 @repeating
 def advise(project: Path | None, **options: Any) -> None:
     """No more than a scene needs: a cheaper project that is proved to measure depth alike. Default: the sample."""
-    _require_system()
+    require_system()
     from studio.commands.advise import advise_project
 
     advise_project(project, **options)
@@ -272,7 +263,7 @@ def twin(project: Path, photographs: tuple[Path, ...], **options: Any) -> None:
 
     The photographs are the steps of the project's motion, or all of its first step. What they do not tell is kept.
     """
-    _require_system()
+    require_system()
     from studio.commands.twin import twin_project
 
     twin_project(project, photographs, **options)
@@ -287,7 +278,7 @@ def dataset(recipe: Path | None, **options: Any) -> None:
 
     The same command goes on after an interrupt or a kill, with more scenes where --count is raised.
     """
-    _require_system()
+    require_system()
     from studio.commands.dataset import dataset_command
 
     dataset_command(recipe, **options)
@@ -299,7 +290,7 @@ def dataset(recipe: Path | None, **options: Any) -> None:
 @common
 def chooser(recipes: tuple[Path, ...], **options: Any) -> None:
     """Train the network of --select learned on scenes of recipes, or of ready-made ones by their names."""
-    _require_system()
+    require_system()
     from studio.commands.chooser import chooser_command
 
     chooser_command(recipes, **options)
@@ -315,7 +306,7 @@ def calibrate(what: str, folder: Path | None, **options: Any) -> None:
 
     Photographs of one pose are named NAME_off and NAME_on (NAME_laser0, NAME_laser1, ...), or NAME for both in one.
     """
-    _require_system()
+    require_system()
     from studio.commands.calibrate import calibrate_command
 
     if calibrate_command(what, folder, **options):
@@ -329,7 +320,7 @@ def calibrate(what: str, folder: Path | None, **options: Any) -> None:
 @common
 def board(board: str, **options: Any) -> None:
     """A board as a PDF to scale: checkerboard:13x9:25mm (inner corners), charuco:14x10:25mm:18mm (squares)."""
-    _require_system()
+    require_system()
     from studio.commands.board import print_board
 
     print_board(board, **options)
@@ -356,7 +347,7 @@ def list_studies(**options: Any) -> None:
 @common
 def run_study(file: Path, **options: Any) -> None:
     """Run a study file, or a ready-made study by its name. The same command goes on after an interrupt or a kill."""
-    _require_system()
+    require_system()
     from studio.commands.study import run_file
 
     run_file(file, **options)
@@ -367,7 +358,7 @@ def run_study(file: Path, **options: Any) -> None:
 @common
 def show_study(folder: Path, **options: Any) -> None:
     """What a study's folder says so far; its tables and charts are made anew."""
-    _require_system()
+    require_system()
     from studio.commands.study import show_folder
 
     show_folder(folder, **options)
@@ -379,19 +370,10 @@ def show_study(folder: Path, **options: Any) -> None:
 @common
 def merge_studies(folders: tuple[Path, ...], **options: Any) -> None:
     """Put the shards of a study together: the same table as of one run."""
-    _require_system()
+    require_system()
     from studio.commands.study import merge_folders
 
     merge_folders(folders, **options)
-
-
-def _require_system() -> None:
-    """Before heavy imports: name the system libraries that are missing, and the command that brings them."""
-    missing, reason = missing_needs(), why_not_in_this_folder()
-    if missing or reason:
-        from render.base.errors import InputError
-
-        raise InputError(reason or f"the system lacks libraries\n{message(missing)}")
 
 
 if __name__ == "__main__":

@@ -16,17 +16,28 @@ def signed_distance(
 ) -> tuple[Float, NDArray[np.int64]]:
     """Distance of (m, 3) points to a mesh, (v, 3) and (t, 3), with the triangle that is nearest; m, world frame.
 
-    The sign asks what the camera sees: negative when the ray from `camera_centre` (3,) meets the surface before the
-    point. It needs neither a closed mesh nor consistent winding, and is right at edges, where the normal of the nearest
-    triangle is not (Baerentzen & Aanaes 2005). Exact to float64 unless two triangles are equally near to float32
-    (within 0.1 um at 1 m), when either may be taken. Points with NaN, or an empty mesh, give NaN and -1.
+    The sign asks what the camera sees: negative when the ray from `camera_centre`, (3,) or one for each point, meets
+    the surface before the point. It needs neither a closed mesh nor consistent winding, and is right at edges, where
+    the normal of the nearest triangle is not (Baerentzen & Aanaes 2005). Exact to float64 unless two triangles are
+    equally near to float32 (within 0.1 um at 1 m), when either may be taken. Points with NaN, or an empty mesh, give
+    NaN and -1.
     """
     distance, nearest = np.full(len(points), np.nan), np.full(len(points), -1, dtype=np.int64)
     here = np.all(np.isfinite(points), axis=1)
     if not np.any(here) or len(triangles) == 0:
         return distance, nearest
-    distance[here], nearest[here] = _signed_distance(points[here], vertices, triangles, camera_centre)
+    centre = camera_centre if camera_centre.ndim == 1 else camera_centre[here]
+    distance[here], nearest[here] = _signed_distance(points[here], vertices, triangles, centre)
     return distance, nearest
+
+
+def nearest_triangle(points: Float, vertices: Float, triangles: Int) -> NDArray[np.int64]:
+    """(m,) index of the triangle that is nearest to each of (m, 3) finite points."""
+    import open3d as o3d
+
+    built = _Scene.of(vertices, triangles)
+    local = o3d.core.Tensor.from_numpy((points - built.centre).astype(np.float32))
+    return np.asarray(built.scene.compute_closest_points(local)["primitive_ids"].numpy().astype(np.int64))
 
 
 class _Scene:
@@ -66,8 +77,7 @@ def _signed_distance(
     # open3d computes in float32: near the origin it names the right triangles, and float64 does the rest
     built = _Scene.of(vertices, triangles)
     scene, centre = built.scene, built.centre
-    local = o3d.core.Tensor.from_numpy((points - centre).astype(np.float32))
-    nearest = scene.compute_closest_points(local)["primitive_ids"].numpy().astype(np.int64)
+    nearest = nearest_triangle(points, vertices, triangles)
     towards = points - camera_centre
     rays = np.concatenate([np.broadcast_to(camera_centre - centre, points.shape), towards], axis=1)
     seen = scene.cast_rays(o3d.core.Tensor.from_numpy(rays.astype(np.float32)))["primitive_ids"].numpy()

@@ -48,7 +48,7 @@ class TestHelp:
             "studio.runtime",
             *(f"studio.runtime.{name}" for name in ("command_line", "command_options", "streams", "system")),
         }
-        assert "click" in imported and own == {"studio", *runtime}
+        assert "click" in imported and own == {"studio", "studio.commands", "studio.commands.of_scans", *runtime}
 
     def test_help_with_json_is_json(self) -> None:
         answer = json.loads(call("run", "--json", "--help").stdout)
@@ -149,7 +149,7 @@ class TestExitCodes:
     ) -> None:
         from studio.runtime.system import LIBRARIES
 
-        monkeypatch.setattr(main, "missing_needs", lambda: [LIBRARIES[0]])
+        monkeypatch.setattr(command_line, "missing_needs", lambda: [LIBRARIES[0]])
         done = call("inspect")
         assert done.exit_code == 2 and LIBRARIES[0].package in done.stderr and "install" in done.stderr
 

@@ -16,13 +16,22 @@ from typing import Any
 import click
 
 from studio.runtime.streams import finish, print_json, streams
-from studio.runtime.system import missing_python_package
+from studio.runtime.system import message, missing_needs, missing_python_package, why_not_in_this_folder
 
 BAD_INPUT, INTERNAL_ERROR, INTERRUPTED, BROKEN_PIPE = 2, 3, 130, 141
 LONGEST_MESSAGE = 2000
 """Characters; what click and the system quote may be of any length."""
 NEEDS_LESS = "fewer pixels (--scale, where a command has it) or smaller meshes, textures and images need less"
 ISSUE_HINT = "this is a fault of Blazer Studio, please report it; --debug shows where it happened"
+
+
+def require_system() -> None:
+    """Before heavy imports: name the system libraries that are missing, and the command that brings them."""
+    missing, reason = missing_needs(), why_not_in_this_folder()
+    if missing or reason:
+        from render.base.errors import InputError
+
+        raise InputError(reason or f"the system lacks libraries\n{message(missing)}")
 
 
 class FiniteRange(click.FloatRange):

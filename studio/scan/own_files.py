@@ -15,7 +15,9 @@ HEAD = 64 * 1024
 """Bytes at the beginning of a file that tell what it is."""
 EXR_MAGIC = b"\x76\x2f\x31\x01"
 EXR_LAYERS = re.compile(rb"laser\.[^\0]*\.direct\.Y\0|object_id\.Y\0|ambient\.B\0.{16}ambient\.G\0|sigma_time\0", re.S)
-JSON_FORMAT = re.compile(rb'\{\s*"format": "blazer-(frame|scan|heightmap)"')
+JSON_FORMAT = re.compile(rb'\{\s*"format": "blazer-(frame|scan|heightmap|deviation)"')
+FILM_TITLE = b"blazer-film"
+"""In the last box of a film, where players do not look."""
 OF_A_POSITION = ("rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "correlation_length", "flag")
 
 
@@ -58,6 +60,8 @@ MEASURE_COLUMNS = (
     "reason",
 )
 POINT_COLUMNS = tuple(title(name) for name in UNITS)
+DEVIATION_COLUMNS = ("x_m", "y_m", "z_m", "deviation_m", "sigma_m", "verdict", "laser", "step", "row")
+SECTION_COLUMNS = ("of", "line", "across_m", "up_m", "x_m", "y_m", "z_m", "off_plane_m", "sigma_m", "step", "row")
 FORMER_COLUMNS = (
     ("scan_line", *OF_A_POSITION),
     ("scan_line", "rank", "u", "v", "sigma_u", "width", "amplitude", "background", "chi2", "flag"),
@@ -84,6 +88,8 @@ TABLES = tuple(
         RIDGE_COLUMNS,
         POINT_COLUMNS,
         MEASURE_COLUMNS,
+        DEVIATION_COLUMNS,
+        SECTION_COLUMNS,
         *FORMER_COLUMNS,
     )
 )
@@ -110,6 +116,10 @@ def is_own(path: Path) -> bool:
         return head.startswith(EXR_MAGIC) and EXR_LAYERS.search(head) is not None
     if suffix == ".html":
         return b'<meta name="generator" content="Blazer Studio">' in head
+    if suffix == ".mp4":
+        return FILM_TITLE in _tail(path)
+    if suffix == ".dxf":
+        return head.startswith(b"999\nBlazer Studio\n")
     if suffix == ".json":
         return JSON_FORMAT.match(head) is not None
     return path.name.endswith(".state.npz") and path.is_file()
@@ -151,6 +161,17 @@ def _identity(path: Path) -> tuple[int, int] | None:
     except (OSError, ValueError):
         return None
     return status.st_dev, status.st_ino
+
+
+def _tail(path: Path) -> bytes:
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            return b""
+        with open(path, "rb") as file:
+            file.seek(max(0, path.stat().st_size - HEAD))
+            return file.read(HEAD)
+    except (OSError, ValueError):
+        return b""
 
 
 def _head(path: Path) -> bytes:

@@ -1,0 +1,210 @@
+"""How far measured points are from a nominal surface, after the one is laid onto the other; and what a tolerance says.
+
+Points are (m, 3), a surface is (v, 3) vertices and (t, 3) triangles, all m and in one frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from analysis.distance import nearest_triangle, signed_distance
+from render.base.arrays import Float, Int
+from render.base.errors import InputError
+from render.base.pose import rotation_matrix, transform_points
+
+Alignment = Literal["none", "best-fit", "3-2-1"]
+ROUNDS = 60
+STILL = 1e-9
+"""m: a step of the alignment that moves no point farther ends it."""
+FAR = 6.0
+"""Robust sigmas from the median beyond which a point is no part of the best fit."""
+FREE = 0.1
+"""Of the largest singular value: a freedom below it is held by one point in a hundred at most, as by those on a rim,
+and stays as it is."""
+LEVER = 1e-3
+"""The same of six spots, each of which counts: how short the levers between them may be."""
+HELD_BY = ("primary 1", "primary 2", "primary 3", "secondary 1", "secondary 2", "tertiary")
+FEWEST = 6
+SMALL = 0.25
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """How the points were laid onto the surface."""
+
+    motion: Float
+    """(4, 4) rigid: carries the measured points to where they are compared."""
+    used: int
+    """Points that it follows from."""
+    held: int
+    """Freedoms, of 6, that the surface tells; the others stay as they were measured."""
+    rounds: int
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Measured minus nominal along the normal, (m,) m: positive is on the camera's side, too much material."""
+
+    points: Float
+    """(m, 3) after alignment."""
+    value: Float
+    nearest: NDArray[np.int64]
+    """Triangle."""
+    aligned: Aligned
+
+
+Verdicts = NDArray[np.int8]
+BELOW, WITHIN, ABOVE, UNDECIDED = -1, 0, 1, 2
+
+
+def deviations(
+    points: Float, camera_centres: Float, vertices: Float, triangles: Int, aligned: Aligned | None = None
+) -> Deviations:
+    """Of (m, 3) finite points, each seen from its own centre (m, 3); aligned: None for points as they are."""
+    aligned = Aligned(np.eye(4), 0, 0, 0) if aligned is None else aligned
+    moved = transform_points(aligned.motion, points)
+    value, nearest = signed_distance(moved, vertices, triangles, transform_points(aligned.motion, camera_centres))
+    return Deviations(moved, value, nearest, aligned)
+
+
+def best_fit(points: Float, vertices: Float, triangles: Int) -> Aligned:
+    """The motion that makes the sum of squared distances from the surface least.
+
+    Gauss-Newton on the distances to the nearest tangent planes (Chen & Medioni, Image Vision Comput. 10, 1992), each
+    round with the points within FAR robust sigmas. Freedoms that the surface does not tell, as a plane's own shift
+    in itself, are left as they are. InputError: too few points.
+    """
+    if len(points) < FEWEST:
+        raise InputError("so few points fit no surface", found=len(points), allowed=f"at least {FEWEST}")
+    motion, used, held = np.eye(4), len(points), 0
+    for i in range(ROUNDS):
+        moved = transform_points(motion, points)
+        distance, normal = _to_planes(moved, vertices, triangles)
+        middle = float(np.median(distance))
+        spread = 1.4826 * float(np.median(np.abs(distance - middle)))
+        here = np.abs(distance - middle) <= max(FAR * spread, STILL)
+        used = int(np.count_nonzero(here))
+        step, held, largest = _step(moved[here], normal[here], distance[here])
+        motion = step @ motion
+        if largest < STILL:
+            return Aligned(motion, used, held, i + 1)
+    return Aligned(motion, used, held, ROUNDS)
+
+
+def three_two_one(
+    points: Float, vertices: Float, triangles: Int, datums: Sequence[tuple[float, float, float]], radius: float
+) -> Aligned:
+    """The motion by which six spots of the part lie on the nominal surface: three, two and one of them.
+
+    datums: six places on the nominal surface, m; of each, the mean distance of the points within `radius` m becomes
+    zero along the normal that the surface has there. InputError: not six, a spot without points, or spots whose normals
+    leave the part free to move.
+    """
+    if len(datums) != len(HELD_BY):
+        raise InputError("3-2-1 needs six spots", found=len(datums), allowed="three, two and one")
+    spots = np.asarray(datums, dtype=np.float64)
+    facet = nearest_triangle(spots, vertices, triangles)
+    normals = _normals(vertices, triangles, facet)
+    motion, used = np.eye(4), 0
+    for i in range(ROUNDS):
+        moved = transform_points(motion, points)
+        tree = cKDTree(moved)
+        means, middles, used = np.zeros(6), np.zeros((6, 3)), 0
+        for k, around in enumerate(tree.query_ball_point(spots, radius)):
+            if not around:
+                where = "{:.3f}, {:.3f}, {:.3f} mm".format(*(1e3 * spots[k]))
+                cure = "choose a spot that the camera sees, or a larger radius"
+                raise InputError(f"the spot {HELD_BY[k]} has no points", where=where, cure=cure)
+            middles[k] = moved[around].mean(axis=0)
+            means[k] = normals[k] @ (middles[k] - spots[k])
+            used += len(around)
+        step, held, largest = _step(middles, normals, means)
+        if held < 6:
+            cure = "three on one face, two on a second, one on a third"
+            found = f"{held} of 6 freedoms are held"
+            raise InputError("the six spots leave the part free to move", found=found, cure=cure)
+        motion = step @ motion
+        if largest < STILL:
+            return Aligned(motion, used, held, i + 1)
+    return Aligned(motion, used, 6, ROUNDS)
+
+
+def verdicts(value: Float, sigma: Float, lower: float, upper: float) -> Verdicts:
+    """(m,) by ISO 14253-1 with U = 2 sigma, as of `Gauge.verdict`: proved within, proved beyond, or undecided."""
+    uncertainty = 2.0 * np.nan_to_num(sigma)
+    found = np.full(len(value), UNDECIDED, dtype=np.int8)
+    found[(value - uncertainty >= lower) & (value + uncertainty <= upper)] = WITHIN
+    found[value + uncertainty < lower] = BELOW
+    found[value - uncertainty > upper] = ABOVE
+    return found
+
+
+def callouts(points: Float, value: Float, count: int, apart: float) -> list[tuple[int, float]]:
+    """The places to point at: index of a point, and the median deviation around it, the largest first.
+
+    apart: m; a median is over half of it, so that noise of one point is no place, and places are no nearer than it.
+    What is smaller than SMALL of the largest is not worth pointing at.
+    """
+    if len(points) == 0:
+        return []
+    tree = cKDTree(points)
+    chosen: list[tuple[int, float]] = []
+    # cells in place of points: a median for each of a million points would take minutes
+    cells = np.unique(np.floor(points / (apart / 4.0)).astype(np.int64), axis=0, return_index=True)[1]
+    local = np.array([float(np.median(value[around])) for around in tree.query_ball_point(points[cells], apart / 2.0)])
+    left = np.ones(len(cells), dtype=np.bool_)
+    while left.any() and len(chosen) < count:
+        best = int(np.argmax(np.where(left, np.abs(local), -1.0)))
+        if chosen and abs(local[best]) < SMALL * abs(chosen[0][1]):
+            break
+        chosen.append((int(cells[best]), float(local[best])))
+        left &= np.linalg.norm(points[cells] - points[cells[best]], axis=1) > apart
+    return chosen
+
+
+def turn_and_shift(motion: Float, points: Float) -> tuple[Float, float]:
+    """What a motion does to the middle of points: its shift (3,) m, and the angle of its turn, rad."""
+    middle = points.mean(axis=0)
+    cosine = (float(np.trace(motion[:3, :3])) - 1.0) / 2.0
+    return motion[:3, :3] @ middle + motion[:3, 3] - middle, math.acos(min(max(cosine, -1.0), 1.0))
+
+
+def _to_planes(points: Float, vertices: Float, triangles: Int) -> tuple[Float, Float]:
+    """(m,) distance along (m, 3) the direction in which it changes fastest: the facet's normal, or off its rim."""
+    import trimesh
+
+    facet = nearest_triangle(points, vertices, triangles)
+    normal = _normals(vertices, triangles, facet)
+    away = points - trimesh.triangles.closest_point(vertices[triangles[facet]], points)
+    along = np.einsum("ij,ij->i", away, normal)
+    length = np.linalg.norm(away, axis=1)
+    beside = length - np.abs(along) > 1e-9 * np.maximum(length, 1.0)
+    normal[beside] = away[beside] / length[beside, None]
+    return np.where(beside, length, along), normal
+
+
+def _step(points: Float, normal: Float, distance: Float) -> tuple[Float, int, float]:
+    """The small motion (4, 4) by which distances become least in squares, the freedoms it has, and its largest move."""
+    middle = points.mean(axis=0)
+    arm = points - middle
+    size = max(float(np.sqrt((arm**2).sum(axis=1).mean())), 1e-12)
+    jacobian = np.hstack([np.cross(arm, normal) / size, normal])
+    twist, _, rank, _ = np.linalg.lstsq(jacobian, -distance, rcond=FREE if len(points) > len(HELD_BY) else LEVER)
+    step = np.eye(4)
+    step[:3, :3] = rotation_matrix(np.asarray(twist[:3] / size, dtype=np.float64))
+    step[:3, 3] = middle + twist[3:] - step[:3, :3] @ middle
+    return step, int(rank), float(np.linalg.norm(twist[:3]) + np.linalg.norm(twist[3:]))
+
+
+def _normals(vertices: Float, triangles: Int, facet: NDArray[np.int64]) -> Float:
+    """(m, 3) unit normals of facets."""
+    a, b, c = np.moveaxis(vertices[triangles[facet]], 1, 0)
+    cross = np.cross(b - a, c - a)
+    return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))

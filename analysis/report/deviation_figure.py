@@ -1,0 +1,117 @@
+"""Points of a part by their deviation from the nominal, as a map with tolerance bands, callouts and a histogram."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.deviation import callouts
+from analysis.report.colour import INK, MUTED
+from analysis.report.error_figures import nice_limit
+from analysis.report.style import figure
+from render.base.arrays import Float
+
+BANDS = ("#2166ac", "#67a9cf", "#d1e5f0", "#a6d96a", "#a6d96a", "#fddbc7", "#ef8a62", "#b2182b")
+"""Below the tolerance in blue, within in green, above in red: also told apart by their lightness."""
+MOST_DRAWN = 120_000
+CALLOUTS = 5
+
+
+@dataclass(frozen=True)
+class DeviationMap:
+    """What is drawn; m."""
+
+    points: Float
+    """(n, 3)."""
+    value: Float
+    """(n,) positive: too much material."""
+    towards: Float
+    """(3,) from the part to whom it is shown."""
+    lower: float | None = None
+    upper: float | None = None
+    """Limits of the tolerance; None: none are given."""
+
+
+def levels(value: Float, lower: float | None, upper: float | None) -> Float:
+    """(9,) edges of the bands, m: two within the tolerance about its middle, three beyond each of its limits."""
+    if lower is None or upper is None or not upper > lower:
+        limit = nice_limit(value)
+        return np.linspace(-limit, limit, len(BANDS) + 1)
+    farthest = float(np.abs(value).max()) if len(value) else 0.0
+    reach = max(farthest - max(abs(lower), abs(upper)), 0.5 * (upper - lower))
+    beyond = reach * np.array([0.25, 0.6, 1.0])
+    return np.concatenate([lower - beyond[::-1], [lower, 0.5 * (lower + upper), upper], upper + beyond])
+
+
+def draw(what: DeviationMap, seed: int = 0) -> Any:
+    """A matplotlib figure; call within nothing else. Points beyond MOST_DRAWN are drawn by chance."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.ticker import MaxNLocator
+
+    across, up = _axes(what.towards)
+    place = 1e3 * np.column_stack([what.points @ across, what.points @ up])
+    place -= place.min(axis=0) if len(place) else 0.0
+    edges = levels(what.value, what.lower, what.upper)
+    colours, norm = ListedColormap(list(BANDS)), BoundaryNorm(edges * 1e6, len(BANDS))
+    wide, tall = np.ptp(place, axis=0) if len(place) else (1.0, 1.0)
+    height = float(np.clip(4.6 * tall / max(wide, 1e-9), 2.6, 5.6)) + 0.5
+    with figure(height) as made:
+        drawing, bars = made.subplots(1, 2, width_ratios=(4.6, 1.5))
+        kept = np.random.default_rng(seed).permutation(len(place))[:MOST_DRAWN]
+        size = float(np.clip(6000.0 / max(len(kept), 1), 0.4, 12.0))
+        clipped = np.clip(what.value * 1e6, edges[0] * 1e6, edges[-1] * 1e6)
+        drawing.scatter(*place[kept].T, c=clipped[kept], s=size, cmap=colours, norm=norm, linewidths=0)
+        drawing.set_aspect("equal")
+        drawing.grid(False)
+        drawing.set(xlabel="mm", ylabel="mm")
+        drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
+        drawing.set_title("Deviation from the nominal surface")
+        _point_at(drawing, what, place)
+        fine = np.linspace(edges[0], edges[-1], 49) * 1e6
+        counts, _ = np.histogram(clipped, fine)
+        middle = (fine[1:] + fine[:-1]) / 2.0
+        bars.barh(middle, counts, height=np.diff(fine), color=colours(norm(middle)), edgecolor="none")
+        for limit in (what.lower, what.upper):
+            if limit is not None:
+                bars.axhline(limit * 1e6, color=INK, lw=0.8, ls="--")
+        bars.axhline(0.0, color=MUTED, lw=0.6)
+        bars.set(ylabel="deviation (µm), + too much", xlabel="points", ylim=(fine[0], fine[-1]))
+        bars.set_title("Bands")
+        made.canvas.draw()
+        return made
+
+
+def _point_at(axes: Any, what: DeviationMap, place: Float) -> None:
+    """The largest places, numbered, with their median deviation."""
+    if len(place) == 0:
+        return
+    low, high = place.min(axis=0), place.max(axis=0)
+    apart = 1e-3 * max(float(np.linalg.norm(high - low)) / 6.0, 1e-6)
+    middle = 0.5 * (low + high)
+    for number, (i, value) in enumerate(callouts(what.points, what.value, CALLOUTS, apart), 1):
+        is_narrow = high[0] - low[0] < 0.4 * (high[1] - low[1])
+        side = -1.0 if place[i, 0] > middle[0] and not is_narrow else 1.0
+        axes.annotate(
+            f"{number}: {value * 1e6:+.{_places(value)}f} µm", place[i],
+            xytext=(16.0 * side, 14.0 if place[i, 1] < middle[1] else -14.0), textcoords="offset points",
+            ha="left" if side > 0.0 else "right", va="center", fontsize=7, color=INK,
+            bbox={"boxstyle": "round,pad=0.25", "fc": "white", "ec": INK, "lw": 0.5},
+            arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.6}, annotation_clip=False,
+        )  # fmt: skip
+
+
+def _places(value: float) -> int:
+    return 0 if abs(value) >= 1e-4 else 1 if abs(value) >= 1e-5 else 2
+
+
+def _axes(towards: Float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Right and up of who looks at the part along -towards, world z up as far as it can be."""
+    out = towards / max(float(np.linalg.norm(towards)), 1e-300)
+    pole = np.array([0.0, 0.0, 1.0]) if abs(out[2]) < math.cos(math.radians(20.0)) else np.array([0.0, 1.0, 0.0])
+    across = np.cross(pole, out)
+    across /= np.linalg.norm(across)
+    return across, np.cross(out, across)

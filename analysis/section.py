@@ -1,0 +1,86 @@
+"""A plane through surfaces and clouds: where it cuts the one, and what lies near it of the other, in its own axes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.base.arrays import Float, Int
+from render.base.errors import InputError
+
+UPRIGHT = math.cos(math.radians(5.0))
+"""Of a normal's z: steeper planes have no up in them."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Where a section is taken."""
+
+    point: tuple[float, float, float]
+    """m, world frame; the origin of its axes."""
+    normal: tuple[float, float, float]
+    """Of any length but zero."""
+
+    @property
+    def axes(self) -> Float:
+        """(3, 3) rows: across, up, normal; unit, right-handed. Up is the world's z as far as the plane allows, else y.
+
+        InputError: the normal has no direction.
+        """
+        normal = np.asarray(self.normal, dtype=np.float64)
+        length = float(np.linalg.norm(normal))
+        if not (math.isfinite(length) and length > 1e-12):
+            raise InputError("the plane has no direction", found=str(self.normal), allowed="any normal but zero")
+        normal = normal / length
+        pole = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < UPRIGHT else np.array([0.0, 1.0, 0.0])
+        across = np.cross(pole, normal)
+        across /= np.linalg.norm(across)
+        return np.stack([across, np.cross(normal, across), normal])
+
+    def local(self, points: Float) -> Float:
+        """(n, 3) m -> across, up, and how far off the plane."""
+        return np.asarray((points - np.asarray(self.point)) @ self.axes.T)
+
+
+def cut(vertices: Float, triangles: Int, plane: Plane) -> list[Float]:
+    """Polylines (n, 2) across and up, m, in which a plane cuts (v, 3), (t, 3); closed ones end where they begin.
+
+    By VTK's cutter, whose pieces are joined where they meet.
+    """
+    import pyvista
+    from vtkmodules.vtkFiltersCore import vtkCleanPolyData, vtkStripper
+
+    if len(triangles) == 0:
+        return []
+    # in the plane's own axes: the cutter then works about the place, in double precision
+    local = plane.local(vertices)
+    mesh = pyvista.PolyData.from_regular_faces(local, np.asarray(triangles, dtype=np.int64))
+    lines = mesh.slice(normal=(0.0, 0.0, 1.0), origin=(0.0, 0.0, 0.0), generate_triangles=False)
+    if lines.n_cells == 0:
+        return []
+    clean, stripper = vtkCleanPolyData(), vtkStripper()
+    clean.SetInputData(lines)
+    clean.ToleranceIsAbsoluteOn()
+    clean.SetAbsoluteTolerance(1e-9)
+    stripper.SetInputConnection(clean.GetOutputPort())
+    stripper.JoinContiguousSegmentsOn()
+    stripper.SetMaximumLength(10_000_000)
+    stripper.Update()
+    joined = pyvista.wrap(stripper.GetOutput())
+    places = np.asarray(joined.points, dtype=np.float64)[:, :2]
+    cells, at, made = np.asarray(joined.lines), 0, []
+    while at < len(cells):
+        count = int(cells[at])
+        made.append(places[cells[at + 1 : at + 1 + count]])
+        at += count + 1
+    return made
+
+
+def near(points: Float, plane: Plane, thickness: float) -> tuple[NDArray[np.intp], Float]:
+    """The (k,) points of (n, 3) within half of `thickness` m of a plane, and their (k, 3) `Plane.local`."""
+    local = plane.local(points)
+    here = np.flatnonzero(np.abs(local[:, 2]) <= 0.5 * thickness)
+    return here, local[here]

@@ -1,0 +1,73 @@
+"""What `main.py deviation` does: a scan's points against a nominal part, told and written."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from analysis.report.units import micrometres
+from studio.runtime.streams import print_json
+from studio.scan.deviation import Question, compared, write_deviation
+
+MARKS = {"pass": "PASS", "fail": "FAIL", "undecided": "UNDECIDED"}
+
+
+def tell_deviation(folder: Path, **options: Any) -> None:
+    """Options as of the command: mm and um. InputError: as `compared` and `write_deviation`."""
+    cad = options["cad"]
+    question = Question(
+        part=options["part"],
+        cad=cad,
+        cad_unit=options["unit"],
+        alignment=options["align"],
+        datums=[(1e-3 * x, 1e-3 * y, 1e-3 * z) for x, y, z in options["spots"]],
+        datum_radius=1e-3 * options["spot_radius"],
+        lower=_metres(options["lower"]),
+        upper=_metres(options["upper"]),
+    )
+    found = compared(folder, question)
+    out = options["out"] or folder / "deviation.csv"
+    files = write_deviation(found, out, [folder / "points.ply", *([cad] if cad is not None else [])])
+    record = found.record
+    if options["as_json"]:
+        print_json({"ok": True, "files": [str(file) for file in files], **record})
+        return
+    print(f"{files[0]}: {record['points']} points against {record['nominal']}, {sentence(record)}")
+    if options["quiet"]:
+        return
+    for text in details(record):
+        print(text)
+
+
+def sentence(record: dict[str, Any]) -> str:
+    """The deviations in one line, for a terminal."""
+    size = f"mean {_um(record['mean'])}, rms {_um(record['rms'])}"
+    return f"{size}, {_um(record['least'])} to {_um(record['largest'])}"
+
+
+def details(record: dict[str, Any]) -> list[str]:
+    """How it was aligned, and what the tolerance says."""
+    told = []
+    if record["alignment"] != "none":
+        shift = ", ".join(f"{1e3 * value:+.4f}" for value in record["shift"])
+        turn = math.degrees(record["turn"])
+        held = f"{record['freedoms_held']} of 6 freedoms, {record['points_used']} points"
+        told.append(f"Aligned by {record['alignment']} ({held}): shifted by {shift} mm, turned by {turn:.4f} deg")
+    counts = record["verdicts"]
+    if counts is not None:
+        shares = ", ".join(f"{counts[name]} {name}" for name in ("within", "undecided", "above", "below"))
+        told.append(f"{MARKS[record['verdict']]} by ISO 14253-1 with two sigma: {shares}")
+    if record["median_sigma"] is not None:
+        told.append(f"A point's own sigma is {_um(record['median_sigma'])} at most (median)")
+    if record["points_left_out"]:
+        told.append(f"{record['points_left_out']} points are of other objects")
+    return told
+
+
+def _metres(micrometre: float | None) -> float | None:
+    return None if micrometre is None else 1e-6 * micrometre
+
+
+def _um(value: float) -> str:
+    return micrometres(value).replace("µ", "u").replace("\u00a0", " ")

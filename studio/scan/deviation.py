@@ -1,0 +1,269 @@
+"""The points of a scan against a nominal part: the scanned one, or another mesh in its place. Qt-free."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.cloud import Cloud, at_first_step, merge, ply_pieces
+from analysis.deviation import (
+    ABOVE,
+    BELOW,
+    UNDECIDED,
+    WITHIN,
+    Aligned,
+    Alignment,
+    Deviations,
+    Verdicts,
+    best_fit,
+    deviations,
+    three_two_one,
+    turn_and_shift,
+    verdicts,
+)
+from analysis.distance import nearest_triangle
+from analysis.report.deviation_figure import DeviationMap, draw
+from analysis.report.style import DPI
+from render.base.arrays import Float, Int
+from render.base.errors import InputError
+from render.base.files import atomic_write
+from render.base.pose import transform_points
+from render.mesh.load import load_mesh
+from render.scene.scene import Scene, SceneObject
+from render.scene.shape import MeshFile, Unit
+from render.world.world import build_world
+from studio.project.step_file import is_step, read_step
+from studio.scan.height_map import points_of
+from studio.scan.own_files import DEVIATION_COLUMNS, check_replaceable
+from studio.scan.scan_folder import ScanFolder, open_folder
+
+FORMAT, VERSION = "blazer-deviation", 1
+MOST_POINTS = 5_000_000
+CHORD = 1e-5
+"""m, of a STEP file whose points have no sigma."""
+NAMES = {BELOW: "below", WITHIN: "within", ABOVE: "above", UNDECIDED: "undecided"}
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is compared with what; m."""
+
+    part: str | None = None
+    """Name of the object; None: the only one, or all of them."""
+    cad: Path | None = None
+    """The nominal, in the part's own coordinates; None: the part as it was scanned."""
+    cad_unit: Unit | None = None
+    """None: that of the part's file, else mm; a STEP file knows its own."""
+    alignment: Alignment = "none"
+    datums: Sequence[tuple[float, float, float]] = ()
+    """Six places on the nominal in the world, for 3-2-1."""
+    datum_radius: float = 2e-3
+    lower: float | None = None
+    upper: float | None = None
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What came out."""
+
+    found: Deviations
+    sigma: Float
+    """(m,) m, of a point at most along the normal: of chance and of calibration together."""
+    verdicts: Verdicts | None
+    """None: no tolerance was given."""
+    columns: Cloud
+    """laser, step and row of each point."""
+    question: Question
+    towards: Float
+    """(3,) from the part to the camera, on the whole."""
+    left_out: int
+    """Points of other objects."""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What is told of it, SI units."""
+        value, aligned = self.found.value, self.found.aligned
+        shift, turn = turn_and_shift(aligned.motion, self.found.points)
+        counts = None
+        if self.verdicts is not None:
+            counts = {name: int(np.count_nonzero(self.verdicts == key)) for key, name in NAMES.items()}
+        return {
+            "format": FORMAT,
+            "format_version": VERSION,
+            "part": self.question.part,
+            "nominal": "as scanned" if self.question.cad is None else self.question.cad.name,
+            "alignment": self.question.alignment,
+            "motion": aligned.motion.tolist(),
+            "shift": shift.tolist(),
+            "turn": turn,
+            "freedoms_held": aligned.held if self.question.alignment != "none" else None,
+            "points_used": aligned.used if self.question.alignment != "none" else None,
+            "points": len(value),
+            "points_left_out": self.left_out,
+            "mean": float(value.mean()),
+            "rms": float(np.sqrt((value**2).mean())),
+            "standard_deviation": float(value.std()),
+            "least": float(value.min()),
+            "largest": float(value.max()),
+            "p95": float(np.percentile(np.abs(value), 95.0)),
+            "median_sigma": _known(float(np.nanmedian(self.sigma)) if np.isfinite(self.sigma).any() else math.nan),
+            "lower": self.question.lower,
+            "upper": self.question.upper,
+            "verdicts": counts,
+            "verdict": _verdict(counts),
+        }
+
+
+def compared(folder: Path, question: Question) -> Compared:
+    """The points of a results folder against the nominal.
+
+    InputError: there are no points or too many, no such part, the nominal cannot be read, the part is not named where
+    there are several, or as `best_fit` and `three_two_one`.
+    """
+    found = open_folder(folder)
+    return compare_cloud(found, _cloud(points_of(folder)), question)
+
+
+def compare_cloud(found: ScanFolder, cloud: Cloud, question: Question) -> Compared:
+    """As `compared`, of points that were read."""
+    if question.lower is not None and question.upper is not None and not question.upper > question.lower:
+        raise InputError("the tolerance is empty", found=question.upper, allowed=f"above {question.lower}")
+    scene = found.project.scene
+    points = np.column_stack([cloud[name] for name in "xyz"])
+    sigma = np.hypot(cloud["sigma_random"], np.nan_to_num(cloud["sigma_systematic"]))
+    vertices, triangles, here = _nominal(found, scene, points, question, float(np.nanmedian(sigma)))
+    if not here.any():
+        raise InputError(
+            "no point is of the part", where=question.part or "all objects", cure="name another with --part"
+        )
+    points, sigma, eyes = points[here], sigma[here], _eyes(scene, cloud["step"][here])
+    aligned: Aligned | None = None
+    if question.alignment == "best-fit":
+        aligned = best_fit(points, vertices, triangles)
+    elif question.alignment == "3-2-1":
+        aligned = three_two_one(points, vertices, triangles, question.datums, question.datum_radius)
+    made = deviations(points, eyes, vertices, triangles, aligned)
+    judged = None
+    if question.lower is not None or question.upper is not None:
+        lower = -math.inf if question.lower is None else question.lower
+        judged = verdicts(made.value, sigma, lower, math.inf if question.upper is None else question.upper)
+    columns = {name: cloud[name][here] for name in ("laser", "step", "row")}
+    towards = (eyes - points).mean(axis=0)
+    return Compared(made, sigma, judged, columns, question, towards, int(np.count_nonzero(~here)))
+
+
+def write_deviation(what: Compared, path: Path, reads: Sequence[Path] = ()) -> list[Path]:
+    """The points as .csv, and beside it what they come to as .json and the map as .png.
+
+    InputError: the name ends otherwise, a file would replace one of other origin, or cannot be written.
+    """
+    if path.suffix.lower() != ".csv":
+        raise InputError("deviations are a table", where=str(path), allowed="a name ending in .csv")
+    paths = [path, path.with_suffix(".json"), path.with_suffix(".png")]
+    check_replaceable(paths, reads)
+    with atomic_write(paths[1]) as temporary:
+        temporary.write_text(json.dumps(what.record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(DEVIATION_COLUMNS)
+        nothing = [""] * len(what.sigma)
+        sigma = ["" if value != value else value for value in what.sigma.tolist()]
+        told = nothing if what.verdicts is None else [NAMES[key] for key in what.verdicts.tolist()]
+        columns = [what.columns[name].tolist() for name in ("laser", "step", "row")]
+        writer.writerows(
+            zip(*what.found.points.T.tolist(), what.found.value.tolist(), sigma, told, *columns, strict=True)
+        )
+    with atomic_write(paths[2]) as temporary:
+        draw(map_of(what)).savefig(temporary, format="png", dpi=DPI)
+    return paths
+
+
+def map_of(what: Compared) -> DeviationMap:
+    """What is drawn of it."""
+    asked = what.question
+    return DeviationMap(what.found.points, what.found.value, what.towards, asked.lower, asked.upper)
+
+
+def _nominal(
+    found: ScanFolder, scene: Scene, points: Float, question: Question, sigma: float
+) -> tuple[Float, Int, NDArray[np.bool_]]:
+    """Vertices and triangles in the world at step 0, and which points are of them."""
+    world = build_world(scene, found.root)
+    objects = scene.visible_objects
+    names = [item.name for item in objects]
+    if question.part is None and (question.cad is None or len(objects) == 1):
+        vertices, triangles, here = world.vertices, world.triangles, np.ones(len(points), dtype=np.bool_)
+        part = objects[0] if objects else None
+    else:
+        if question.part not in names:
+            raise InputError("which part is meant?", found=str(question.part), allowed=", ".join(names), cure="--part")
+        index = names.index(question.part)
+        part = objects[index]
+        of = nearest_triangle(points, world.vertices, world.triangles)
+        here = world.object_id[of] == index
+        vertices, triangles = world.vertices, world.triangles[world.object_id == index]
+    if question.cad is not None and part is not None:
+        vertices, triangles = _read(question, scene, part, sigma)
+    if len(triangles) == 0:
+        raise InputError("there is no nominal surface", where=str(question.cad or found.folder))
+    return vertices, np.ascontiguousarray(triangles, dtype=np.int64), here
+
+
+def _read(question: Question, scene: Scene, part: SceneObject, sigma: float) -> tuple[Float, Int]:
+    """The nominal's file where the part stands."""
+    assert question.cad is not None
+    matrix = scene.T_world_object(part, 0)
+    if is_step(question.cad):
+        parts = read_step(question.cad, 0.1 * sigma if math.isfinite(sigma) else CHORD)
+        first = np.cumsum([0, *(len(one.vertices) for one in parts)])[:-1]
+        local = part.scale * np.concatenate([one.vertices for one in parts])
+        triangles = np.concatenate([one.triangles + k for one, k in zip(parts, first, strict=True)])
+        return transform_points(matrix, local), triangles
+    own = part.shape.unit if isinstance(part.shape, MeshFile) else "mm"
+    shape = MeshFile(path=question.cad.name, unit=question.cad_unit or own)
+    # of another material: images of the scanned part's would be looked for beside the nominal
+    mesh = load_mesh(SceneObject(name="nominal", shape=shape, scale=part.scale), question.cad.absolute().parent)
+    return transform_points(matrix, mesh.vertices), mesh.triangles
+
+
+def _eyes(scene: Scene, step: NDArray[np.int32]) -> Float:
+    """(m, 3) where the camera stood for each point, carried back with the objects to step 0."""
+    steps, at = np.unique(step, return_inverse=True)
+    centres = [at_first_step(scene.T_world_camera(int(k))[None, :3, 3], scene, int(k))[0] for k in steps]
+    return np.asarray(centres)[at]
+
+
+def _cloud(path: Path) -> Cloud:
+    wanted = ("x", "y", "z", "sigma_random", "sigma_systematic", "row", "laser", "step")
+    pieces, count = [], 0
+    for piece in ply_pieces(path):
+        missing = [name for name in wanted if name not in piece]
+        if missing:
+            raise InputError("the points lack columns", where=str(path), found=f"no {', '.join(missing)}")
+        whole = np.isfinite(piece["x"] + piece["y"] + piece["z"])
+        pieces.append({name: piece[name][whole] for name in wanted})
+        count += int(whole.sum())
+        if count > MOST_POINTS:
+            raise InputError("so many points are not compared", where=str(path), allowed=f"at most {MOST_POINTS}")
+    if count == 0:
+        raise InputError("there are no points", where=str(path))
+    return merge(pieces)
+
+
+def _verdict(counts: dict[str, int] | None) -> str | None:
+    """Of the whole part: it fails by one proved point, and passes only if all are proved."""
+    if counts is None:
+        return None
+    return "fail" if counts["below"] + counts["above"] else "undecided" if counts["undecided"] else "pass"
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,132 @@
+"""A section of a scan by a plane, truth and cloud together, as a drawing (DXF) or a table (CSV). Qt-free."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from analysis.cloud import Cloud, ply_pieces
+from analysis.section import Plane, cut, near
+from render.base.arrays import Float, Int
+from render.base.errors import InputError
+from render.base.files import atomic_write
+from render.world.world import build_world
+from studio.scan.height_map import points_of
+from studio.scan.own_files import SECTION_COLUMNS, check_replaceable
+from studio.scan.scan_folder import ScanFolder, open_folder
+
+TRUE, MEASURED = "TRUE", "MEASURED"
+"""Layers of the drawing, and what a row of the table is of."""
+TAKEN = ("x", "y", "z", "sigma_random", "sigma_systematic", "step", "row")
+
+MOST_POINTS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Section:
+    """m; places are as of `Plane.local`."""
+
+    plane: Plane
+    thickness: float
+    true: list[Float]
+    """Polylines (n, 2) of the part as it was scanned."""
+    measured: Float
+    """(k, 3) across, up, off the plane."""
+    sigma: Float
+    """(k,) of chance and calibration together; NaN: not known."""
+    step: Float
+    row: Float
+
+
+def take_section(folder: Path, plane: Plane, thickness: float) -> Section:
+    """Of a results folder. InputError: it is none, has no points, or the plane meets neither part nor points."""
+    found = open_folder(folder)
+    world = build_world(found.project.scene, found.root)
+    return section_of(found, plane, thickness, world.vertices, world.triangles)
+
+
+def section_of(found: ScanFolder, plane: Plane, thickness: float, vertices: Float, triangles: Int) -> Section:
+    """As `take_section`, of a world that was read: (v, 3), (t, 3) at step 0."""
+    made = from_pieces(_pieces(found.folder), plane, thickness, vertices, triangles)
+    if not made.true and len(made.measured) == 0:
+        cure = "put the plane through the part"
+        raise InputError("the plane meets neither the part nor a point", where=str(plane.point), cure=cure)
+    return made
+
+
+def from_pieces(pieces: list[Cloud], plane: Plane, thickness: float, vertices: Float, triangles: Int) -> Section:
+    """Of points as they are given, columns of `TAKEN`; those without a sigma have NaN."""
+    rows: list[Float] = []
+    for piece in pieces:
+        here, local = near(np.column_stack([piece[name] for name in "xyz"]), plane, thickness)
+        nothing = np.full(len(piece["x"]), np.nan)
+        random, systematic = (piece.get(f"sigma_{name}", nothing)[here] for name in ("random", "systematic"))
+        counts = [piece.get(name, nothing)[here].astype(np.float64) for name in ("step", "row")]
+        rows.append(np.column_stack([local, np.hypot(random, np.nan_to_num(systematic)), *counts]))
+    together = np.concatenate([np.zeros((0, 6)), *rows])
+    if len(together) > MOST_POINTS:
+        cure = "give a smaller thickness"
+        raise InputError(
+            "the section has too many points", found=len(together), allowed=f"at most {MOST_POINTS}", cure=cure
+        )
+    true = cut(vertices, triangles, plane)
+    return Section(plane, thickness, true, together[:, :3], together[:, 3], together[:, 4], together[:, 5])
+
+
+def write_section(made: Section, path: Path, reads: Sequence[Path] = ()) -> Path:
+    """.dxf (mm, layers TRUE and MEASURED) or .csv (m), by the suffix.
+
+    InputError: the suffix is another, the file would replace one of other origin, or cannot be written.
+    """
+    writers = {".dxf": _write_dxf, ".csv": _write_csv}
+    if path.suffix.lower() not in writers:
+        raise InputError("a section is a drawing or a table", where=str(path), allowed="a name ending in .dxf or .csv")
+    check_replaceable([path], reads)
+    with atomic_write(path) as temporary:
+        writers[path.suffix.lower()](made, temporary)
+    return path
+
+
+def _write_dxf(made: Section, path: Path) -> None:
+    import ezdxf
+    from ezdxf import units
+
+    drawing = ezdxf.new("R2010")
+    drawing.units = units.MM
+    drawing.header.custom_vars.append("Made by", "Blazer Studio")
+    drawing.layers.add(TRUE, color=5)
+    drawing.layers.add(MEASURED, color=1)
+    space = drawing.modelspace()
+    for line in made.true:
+        closed = len(line) > 3 and bool(np.allclose(line[0], line[-1], rtol=0.0, atol=1e-9))
+        ring = line[:-1] if closed else line
+        space.add_lwpolyline((1e3 * ring).tolist(), close=closed, dxfattribs={"layer": TRUE})
+    for place in (1e3 * made.measured[:, :2]).tolist():
+        space.add_point((*place, 0.0), dxfattribs={"layer": MEASURED})
+    with open(path, "w", encoding="utf-8", newline="") as file:
+        file.write("999\nBlazer Studio\n")
+        drawing.write(file)
+
+
+def _write_csv(made: Section, path: Path) -> None:
+    axes, origin = made.plane.axes, np.asarray(made.plane.point)
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(SECTION_COLUMNS)
+        for number, line in enumerate(made.true):
+            for place, world in zip(line.tolist(), (origin + line @ axes[:2]).tolist(), strict=True):
+                writer.writerow(["true", number, *place, *world, 0.0, "", "", ""])
+        worlds = (origin + made.measured @ axes).tolist()
+        rest = zip(made.sigma.tolist(), made.step.tolist(), made.row.tolist(), strict=True)
+        for place, world, numbers in zip(made.measured.tolist(), worlds, rest, strict=True):
+            sigma, step, row = ("" if value != value else value for value in numbers)
+            whole = ["" if value == "" else int(value) for value in (step, row)]
+            writer.writerow(["measured", "", *place[:2], *world, place[2], sigma, *whole])
+
+
+def _pieces(folder: Path) -> list[Cloud]:
+    return [{name: piece[name] for name in TAKEN if name in piece} for piece in ply_pieces(points_of(folder))]

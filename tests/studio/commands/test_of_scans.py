@@ -1,0 +1,193 @@
+"""`main.py deviation`, `section` and `film` of a finished scan: what is written, and bad input."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import struct
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from click.testing import CliRunner, Result
+
+import main
+from analysis.cloud import read_ply
+from render.world.world import build_world
+from studio.scan.scan_folder import open_folder
+from tests.studio.scan_of_steps import small_scan
+
+
+def call(*arguments: object) -> Result:
+    return CliRunner().invoke(main.cli, [str(argument) for argument in arguments])
+
+
+def told(*arguments: object) -> dict[str, Any]:
+    done = call(*arguments, "--json")
+    assert done.exit_code == 0, done.output
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    _, folder = small_scan(tmp_path_factory.mktemp("steps"))
+    return folder
+
+
+@pytest.fixture
+def scan(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "scan"))
+
+
+def column(path: Path, name: str) -> np.ndarray:
+    with open(path, newline="", encoding="utf-8") as file:
+        return np.array([float(row[name] or "nan") for row in csv.DictReader(file)])
+
+
+def test_against_the_part_as_scanned_deviations_are_the_scan_s_own_distances(scan: Path) -> None:
+    record = told("deviation", scan, "--lower=-700", "--upper", 700)
+    own = read_ply(scan / "points.ply")["error_distance"]
+    assert np.allclose(column(scan / "deviation.csv", "deviation_m"), own, rtol=0.0, atol=1e-9)
+    assert record["rms"] == pytest.approx(float(np.sqrt(np.mean(own**2))), rel=1e-9)
+    assert sum(record["verdicts"].values()) == len(own) and record["verdict"] == "fail"
+    assert record == {"ok": True, "files": record["files"], **json.loads((scan / "deviation.json").read_text())}
+    assert cv2.imread(str(scan / "deviation.png")) is not None
+    assert call("deviation", scan).exit_code == 0  # replaces its own files
+
+
+def test_a_nominal_that_is_lower_shifts_every_deviation_until_it_is_fitted(scan: Path, tmp_path: Path) -> None:
+    """The scanned mesh, 0.5 mm lower, as a file: the deviation grows by it, and the best fit takes it back."""
+    found = open_folder(scan)
+    world = build_world(found.project.scene, found.root)
+    part = found.project.scene.visible_objects[0]
+    index = world.triangles[world.object_id == 0]
+    local = (world.vertices - part.T_world_object.matrix[:3, 3]) @ part.T_world_object.matrix[:3, :3] / part.scale
+    lower = local - [0.0, 0.0, 5e-4]
+    trimesh.Trimesh(1e3 * lower, index, process=False).export(tmp_path / "nominal.stl")
+    arguments = ("--part", part.name, "--cad", tmp_path / "nominal.stl", "--unit", "mm")
+    as_scanned = told("deviation", scan, "--part", part.name, "--out", tmp_path / "a.csv")
+    measured = told("deviation", scan, *arguments, "--out", tmp_path / "b.csv")
+    assert measured["points"] == as_scanned["points"] > 20
+    tops = np.abs(column(tmp_path / "a.csv", "deviation_m")) < 2e-3
+    shift = (column(tmp_path / "b.csv", "deviation_m") - column(tmp_path / "a.csv", "deviation_m"))[tops]
+    assert np.median(shift) == pytest.approx(5e-4, abs=2e-6)
+    one = told("deviation", scan, "--part", part.name, "--align", "best-fit", "--out", tmp_path / "c.csv")
+    two = told("deviation", scan, *arguments, "--align", "best-fit", "--out", tmp_path / "d.csv")
+    assert two["shift"][2] - one["shift"][2] == pytest.approx(-5e-4, abs=5e-5)
+
+
+def polylines(path: Path) -> list[np.ndarray]:
+    """(n, 2) vertices of each LWPOLYLINE, read by group codes (AutoCAD's DXF reference)."""
+    lines = path.read_text().split("\n")
+    pairs = list(zip((int(code) for code in lines[:-1:2]), lines[1::2], strict=False))
+    found: list[list[list[float]]] = []
+    is_inside = False
+    for code, value in pairs:
+        if code == 0:
+            is_inside = value == "LWPOLYLINE"
+            if is_inside:
+                found.append([])
+        elif is_inside and code == 10:
+            found[-1].append([float(value)])
+        elif is_inside and code == 20:
+            found[-1][-1].append(float(value))
+    return [np.array(one) for one in found]
+
+
+def test_a_section_is_a_drawing_in_mm_of_truth_and_cloud(scan: Path) -> None:
+    import ezdxf
+
+    record = told("section", scan, "--through", "0,2,0", "--normal", "1,0,0", "--thickness", 6)
+    path = scan / "section.dxf"
+    drawing = ezdxf.readfile(path)  # type: ignore[attr-defined]
+    assert drawing.header["$INSUNITS"] == 4 and len(drawing.audit().errors) == 0
+    points = np.array([one.dxf.location for one in drawing.modelspace().query("POINT[layer=='MEASURED']")])
+    cloud = read_ply(scan / "points.ply")
+    here = np.abs(cloud["x"]) <= 3e-3
+    assert record["points"] == len(points) == np.count_nonzero(here) > 10
+    # across and up of a plane whose normal is x are y and z, from the point that it goes through
+    assert np.allclose(points[:, :2], 1e3 * np.column_stack([cloud["y"], cloud["z"]])[here] - [2.0, 0.0], atol=1e-6)
+    found = open_folder(scan)
+    world = build_world(found.project.scene, found.root)
+    lines = polylines(path)
+    assert len(lines) == record["lines"]
+    exact = trimesh.intersections.mesh_plane(
+        trimesh.Trimesh(world.vertices, world.triangles, process=False), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    )
+    length = np.linalg.norm(exact[:, 1] - exact[:, 0], axis=1).sum()
+    assert record["length"] == pytest.approx(float(length), rel=1e-9)
+
+
+def test_the_table_of_a_section_holds_the_same(scan: Path) -> None:
+    record = told("section", scan, "--through", "0,0,0", "--normal", "1,0,0", "--thickness", 6, "--out", scan / "s.csv")
+    with open(scan / "s.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    measured = [row for row in rows if row["of"] == "measured"]
+    assert len(measured) == record["points"] and {row["of"] for row in rows} == {"true", "measured"}
+    assert all(abs(float(row["x_m"])) <= 3e-3 + 1e-12 for row in measured)
+    assert all(abs(float(row["x_m"])) < 1e-9 for row in rows if row["of"] == "true")
+
+
+def samples(path: Path) -> tuple[int, float]:
+    """Number of pictures and seconds of an MP4, from its boxes (ISO 14496-12)."""
+    data = path.read_bytes()
+    assert data[4:8] == b"ftyp"
+    sizes, times = data.index(b"stsz"), data.index(b"mdhd")
+    scale, length = struct.unpack(">II", data[times + 16 : times + 24])
+    return struct.unpack(">I", data[sizes + 12 : sizes + 16])[0], length / scale
+
+
+def test_a_film_has_every_step_and_lasts_as_long_as_was_asked(scan: Path) -> None:
+    record = told("film", scan, "--rate", 2)
+    assert record["frames"] == 3
+    count, seconds = samples(scan / "scan.mp4")
+    assert count == 3 and seconds == pytest.approx(1.5, abs=0.01)
+    film = cv2.VideoCapture(str(scan / "scan.mp4"))
+    coloured = []
+    for _ in range(3):
+        done, picture = film.read()
+        assert done
+        right = picture[:720, -720:].astype(int)
+        coloured.append(int((right.max(axis=2) > 120).sum()))
+    # points of every step stay: the cloud grows
+    assert 0 < coloured[0] < coloured[1] < coloured[2]
+    assert [file.name for file in scan.glob("*.mp4*")] == ["scan.mp4"]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("deviation", "--part", "nobody"),
+        ("deviation", "--align", "3-2-1"),
+        ("deviation", "--lower", "5", "--upper", "-5"),
+        ("deviation", "--cad", "missing.stl"),
+        ("deviation", "--out", "table.txt"),
+        ("section", "--through", "0,0,0", "--normal", "0,0,0"),
+        ("section", "--through", "0,0,90000", "--normal", "0,0,1"),
+        ("section", "--through", "0,0", "--normal", "0,0,1"),
+        ("section", "--through", "0,0,nan", "--normal", "0,0,1"),
+        ("section", "--through", "0,0,0", "--normal", "1,0,0", "--out", "x.dwg"),
+        ("film", "--out", "x.avi"),
+        ("film", "--rate", "0"),
+    ],
+)
+def test_bad_input_is_one_message(made: Path, arguments: tuple[str, ...]) -> None:
+    done = call(arguments[0], made, *arguments[1:], "--json")
+    assert done.exit_code == 2 and json.loads(done.stdout)["ok"] is False
+
+
+def test_files_of_others_are_not_replaced(scan: Path) -> None:
+    for name, command in (
+        ("section.dxf", ("section", scan, "--through", "0,0,0", "--normal", "1,0,0")),
+        ("deviation.csv", ("deviation", scan)),
+        ("scan.mp4", ("film", scan)),
+    ):
+        (scan / name).write_text("mine")
+        done = call(*command, "--json")
+        assert done.exit_code == 2 and "did not write" in json.loads(done.stdout)["error"]["message"], name
+        assert (scan / name).read_text() == "mine"
