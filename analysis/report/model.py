@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from analysis.error import Errors
 from analysis.gauges.read import Reading
 from analysis.line.result import Line
+from analysis.report.delivery import Delivery
 from analysis.triangulate import Points
 from render.base.arrays import Float, Int
 from render.base.counts import Counts
@@ -100,6 +101,10 @@ class ReportInput:
     """Date and time of the run, as it shall be printed."""
     measures: tuple[dict[str, Any], ...] = ()
     """The part's measures, as the scan's record has them."""
+    delivery: Delivery = field(default_factory=Delivery)
+    """Whom it is handed to."""
+    logo: str = ""
+    """data: URI of a PNG; empty: none."""
     run: str = ""
     """What was run, for a program that reads the page: any text; empty: it is not told."""
 

@@ -14,6 +14,7 @@ from analysis.report import gauge_table, plain_picture
 from analysis.report.colour import method_colour, method_name
 from analysis.report.columns import columns, sentence_height, table_height
 from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
+from analysis.report.front import front
 from analysis.report.glossary import GLOSSARY
 from analysis.report.light_text import sentences
 from analysis.report.line_figures import camera_figure, profile_figure, three_panel_figure, zoom_figure
@@ -99,6 +100,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
     spent, spent_in_all = timing(report)
     return pictures | {
         "title": report.title,
+        "front": front(report),
         "facts": _facts(report),
         "chips": laser_chips(report),
         "headline": headline(report),

@@ -12,10 +12,24 @@ Cancel = Callable[[], bool]
 Progress = Callable[[float], None]
 
 
+_most: int | None = None
+
+
+def use_at_most(threads: int | None) -> None:
+    """Of work that asks for no number of threads, from now on; None: as many as there are processors."""
+    global _most
+    _most = threads
+
+
 def thread_count(threads: int | None) -> int:
-    """The requested number, or the number of processors that this process may use."""
+    """The requested number, or the number of processors that this process may use, `use_at_most` at most."""
     if threads is not None:
         return max(1, threads)
+    there = _processors()
+    return there if _most is None else max(1, min(_most, there))
+
+
+def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

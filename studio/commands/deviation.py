@@ -6,6 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from analysis.report.gauge_table import PLAIN
 from analysis.report.units import micrometres
 from studio.runtime.streams import print_json
 from studio.scan.deviation import Question, compared, write_deviation
@@ -33,24 +34,24 @@ def tell_deviation(folder: Path, **options: Any) -> None:
     if options["as_json"]:
         print_json({"ok": True, "files": [str(file) for file in files], **record})
         return
-    print(f"{files[0]}: {record['points']} points against {record['nominal']}, {sentence(record)}")
+    print(f"{files[0]}: {record['points']} points against {record['nominal']}, {sentence(record).translate(PLAIN)}")
     if options["quiet"]:
         return
     for text in details(record):
-        print(text)
+        print(text.translate(PLAIN))
 
 
 def sentence(record: dict[str, Any]) -> str:
-    """The deviations in one line, for a terminal."""
-    size = f"mean {_um(record['mean'])}, rms {_um(record['rms'])}"
-    return f"{size}, {_um(record['least'])} to {_um(record['largest'])}"
+    """The deviations in one line."""
+    size = f"mean {micrometres(record['mean'])}, rms {micrometres(record['rms'])}"
+    return f"{size}, {micrometres(record['least'])} to {micrometres(record['largest'])}"
 
 
 def details(record: dict[str, Any]) -> list[str]:
     """How it was aligned, and what the tolerance says."""
     told = []
     if record["alignment"] != "none":
-        shift = ", ".join(f"{1e3 * value:+.4f}" for value in record["shift"])
+        shift = ", ".join(f"{round(1e3 * value, 4) + 0.0:+.4f}" for value in record["shift"])
         turn = math.degrees(record["turn"])
         held = f"{record['freedoms_held']} of 6 freedoms, {record['points_used']} points"
         told.append(f"Aligned by {record['alignment']} ({held}): shifted by {shift} mm, turned by {turn:.4f} deg")
@@ -59,7 +60,7 @@ def details(record: dict[str, Any]) -> list[str]:
         shares = ", ".join(f"{counts[name]} {name}" for name in ("within", "undecided", "above", "below"))
         told.append(f"{MARKS[record['verdict']]} by ISO 14253-1 with two sigma: {shares}")
     if record["median_sigma"] is not None:
-        told.append(f"A point's own sigma is {_um(record['median_sigma'])} at most (median)")
+        told.append(f"A point's own sigma is {micrometres(record['median_sigma'])} at most (median)")
     if record["points_left_out"]:
         told.append(f"{record['points_left_out']} points are of other objects")
     return told
@@ -67,7 +68,3 @@ def details(record: dict[str, Any]) -> list[str]:
 
 def _metres(micrometre: float | None) -> float | None:
     return None if micrometre is None else 1e-6 * micrometre
-
-
-def _um(value: float) -> str:
-    return micrometres(value).replace("µ", "u").replace("\u00a0", " ")

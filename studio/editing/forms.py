@@ -16,6 +16,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from analysis.line.settings import ExtractionSettings
+from analysis.report.delivery import Delivery
 from render.base.pose import Pose
 from render.camera.camera import Camera
 from render.laser.laser import Divergence, LineLaser, Waist
@@ -34,10 +35,12 @@ Kind = Literal[
     "number", "integer", "text", "file", "flag", "choice", "numbers", "pose", "curve", "model", "union", "list"
 ]
 
-ITEMS = (Camera, Scene, Sensor, RenderSettings, ExtractionSettings, LineLaser, SceneObject, PointLight, RectangleLight)
+ITEMS = (Camera, Scene, Sensor, RenderSettings, ExtractionSettings, LineLaser, SceneObject, PointLight, RectangleLight,
+         Delivery)  # fmt: skip
 """What the scene tree shows as items of their own, and so no form of another item repeats."""
 HIDDEN = ("kind", "source", "schema_version", "sha256", "calibration", "measures")
-FINE_UNITS = {(Camera, "pixel_pitch"): "um", (Waist, "radius"): "um", (Divergence, "full_angle"): "mrad"}
+FINE_UNITS = {(Camera, "pixel_pitch"): "um", (Waist, "radius"): "um", (Divergence, "full_angle"): "mrad",
+              (Delivery, "lower"): "um", (Delivery, "upper"): "um"}  # fmt: skip
 PLAIN = Unit()
 BLANKS = str.maketrans("_-", "  ")
 LABELS = {"T_rig_camera": "Pose on the rig", "T_rig_laser": "Pose on the rig", "T_world_rig": "Pose in the world",
@@ -277,7 +280,12 @@ def _spec(owner: type[BaseModel], name: str, annotation: Any, limits: list[Any],
     if isinstance(only, type) and issubclass(only, BaseModel):
         common["help"] = help or first_sentence(only)
         return FieldSpec(kind="model", fields=describe(value), **common)
-    kinds: dict[Any, Kind] = {bool: "flag", int: "integer", float: "number", str: "file" if name == "path" else "text"}
+    kinds: dict[Any, Kind] = {
+        bool: "flag",
+        int: "integer",
+        float: "number",
+        str: "file" if name in ("path", "logo") else "text",
+    }
     return FieldSpec(kind=kinds[only], **common)
 
 

@@ -18,6 +18,16 @@ FACTORS = {
 }
 """Units that may be typed, by the SI unit that is stored."""
 SHOWN = {"m": "mm", "rad": "deg", "W": "mW", "s": "ms"}
+LENGTHS = ("mm", "um", "cm", "m", "in")
+"""Units that lengths may be shown in."""
+
+
+def show_lengths_in(unit: str) -> None:
+    """In forms that are made from now on. ValueError: it is none of LENGTHS."""
+    if unit not in LENGTHS:
+        raise ValueError(f"{unit}; allowed: {', '.join(LENGTHS)}")
+    SHOWN["m"] = unit
+
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _OPERATION = re.compile(r"[-+*(]|/\s*[\d.,(]")

@@ -31,6 +31,9 @@ class Edit:
 class Document:
     """The only place where the current project changes. Listeners are called after every change, in order."""
 
+    depth = HISTORY
+    """Edits that can be undone, of every document."""
+
     def __init__(self, project: Project, path: Path | None = None, root: Path | None = None) -> None:
         """path: the file it is saved in, None for a new one; root: the folder its mesh paths are relative to."""
         self.project = project
@@ -65,7 +68,7 @@ class Document:
             return
         if not (merge and self._undo and self._undo[-1].merge == merge and not self._redo):
             self._undo.append(Edit(label, self.project, merge))
-            del self._undo[:-HISTORY]
+            del self._undo[: -self.depth]
         self._redo.clear()
         self.project = project
         self._tell()

@@ -14,6 +14,7 @@ from pydantic_core import to_jsonable_python
 
 from analysis.gauges.gauge import MOST_GAUGES, Gauge
 from analysis.line.settings import ExtractionSettings
+from analysis.report.delivery import Delivery
 from render.base.errors import InputError
 from render.base.files import atomic_write, inside, remove_unfinished, sha256
 from render.base.model import Model, quantity
@@ -52,6 +53,7 @@ class Project(Model):
     measures: tuple[Gauge, ...] = quantity(
         (), label="Measures", help="Dimensions of the part, read off every profile.", max_length=MOST_GAUGES
     )
+    delivery: Delivery = Delivery()
     _folder: Path = PrivateAttr(default_factory=Path)
 
     @model_validator(mode="after")

@@ -63,6 +63,8 @@ def carry(project: Project, root: Path, folder: Path) -> list[Path]:
         return []
     pairs = []
     named = named_files(project.scene, "scene")
+    if project.delivery.logo:
+        named[project.delivery.logo] = "delivery.logo"
     weights = project.extraction.chooser
     if weights is not None:
         named |= dict.fromkeys((weights, str(Path(weights).with_suffix(".json"))), "extraction.chooser")

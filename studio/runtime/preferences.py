@@ -37,6 +37,16 @@ class Preferences(BaseModel):
     """Of the window, as Qt saves it, sealed with a checksum."""
     arrangements: dict[str, str] = {}
     """Of the panels in each workspace, as Qt saves them, sealed."""
+    length_unit: Literal["mm", "um", "cm", "m", "in"] = "mm"
+    """Of fields, from the next start."""
+    threads: int | None = Field(default=None, ge=1, le=1024)
+    """At most, of work in the window; None: all processors."""
+    image_scale: Literal["full", "half", "quarter", "eighth"] = "full"
+    """That a render begins with."""
+    autosave: bool = True
+    autosave_every: float = Field(default=20.0, ge=5.0, le=3600.0)
+    """Seconds, while edits never rest."""
+    undo_depth: int = Field(default=500, ge=10, le=10_000)
     folder: str = ""
     """Where a file was opened or saved last."""
 

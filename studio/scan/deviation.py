@@ -43,12 +43,13 @@ from render.world.world import build_world
 from studio.project.step_file import is_step, read_step
 from studio.scan.height_map import points_of
 from studio.scan.own_files import DEVIATION_COLUMNS, check_replaceable
-from studio.scan.scan_folder import ScanFolder, open_folder
+from studio.scan.scan_folder import open_folder
 
 FORMAT, VERSION = "blazer-deviation", 1
 MOST_POINTS = 5_000_000
 CHORD = 1e-5
 """m, of a STEP file whose points have no sigma."""
+TAKEN = ("x", "y", "z", "sigma_random", "sigma_systematic", "row", "laser", "step")
 NAMES = {BELOW: "below", WITHIN: "within", ABOVE: "above", UNDECIDED: "undecided"}
 
 
@@ -129,17 +130,16 @@ def compared(folder: Path, question: Question) -> Compared:
     there are several, or as `best_fit` and `three_two_one`.
     """
     found = open_folder(folder)
-    return compare_cloud(found, _cloud(points_of(folder)), question)
+    return compare_cloud(found.project.scene, found.root, read_cloud(points_of(folder)), question)
 
 
-def compare_cloud(found: ScanFolder, cloud: Cloud, question: Question) -> Compared:
-    """As `compared`, of points that were read."""
+def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) -> Compared:
+    """As `compared`, of points at the pose of step 0, columns of `TAKEN`; root: the folder of the scene's meshes."""
     if question.lower is not None and question.upper is not None and not question.upper > question.lower:
         raise InputError("the tolerance is empty", found=question.upper, allowed=f"above {question.lower}")
-    scene = found.project.scene
     points = np.column_stack([cloud[name] for name in "xyz"])
     sigma = np.hypot(cloud["sigma_random"], np.nan_to_num(cloud["sigma_systematic"]))
-    vertices, triangles, here = _nominal(found, scene, points, question, float(np.nanmedian(sigma)))
+    vertices, triangles, here = _nominal(root, scene, points, question, float(np.nanmedian(sigma)))
     if not here.any():
         raise InputError(
             "no point is of the part", where=question.part or "all objects", cure="name another with --part"
@@ -193,10 +193,10 @@ def map_of(what: Compared) -> DeviationMap:
 
 
 def _nominal(
-    found: ScanFolder, scene: Scene, points: Float, question: Question, sigma: float
+    root: Path, scene: Scene, points: Float, question: Question, sigma: float
 ) -> tuple[Float, Int, NDArray[np.bool_]]:
     """Vertices and triangles in the world at step 0, and which points are of them."""
-    world = build_world(scene, found.root)
+    world = build_world(scene, root)
     objects = scene.visible_objects
     names = [item.name for item in objects]
     if question.part is None and (question.cad is None or len(objects) == 1):
@@ -213,7 +213,7 @@ def _nominal(
     if question.cad is not None and part is not None:
         vertices, triangles = _read(question, scene, part, sigma)
     if len(triangles) == 0:
-        raise InputError("there is no nominal surface", where=str(question.cad or found.folder))
+        raise InputError("there is no nominal surface", where=str(question.cad or root))
     return vertices, np.ascontiguousarray(triangles, dtype=np.int64), here
 
 
@@ -241,15 +241,15 @@ def _eyes(scene: Scene, step: NDArray[np.int32]) -> Float:
     return np.asarray(centres)[at]
 
 
-def _cloud(path: Path) -> Cloud:
-    wanted = ("x", "y", "z", "sigma_random", "sigma_systematic", "row", "laser", "step")
+def read_cloud(path: Path) -> Cloud:
+    """The points of a PLY that have coordinates. InputError: it lacks columns, or has none or too many points."""
     pieces, count = [], 0
     for piece in ply_pieces(path):
-        missing = [name for name in wanted if name not in piece]
+        missing = [name for name in TAKEN if name not in piece]
         if missing:
             raise InputError("the points lack columns", where=str(path), found=f"no {', '.join(missing)}")
         whole = np.isfinite(piece["x"] + piece["y"] + piece["z"])
-        pieces.append({name: piece[name][whole] for name in wanted})
+        pieces.append({name: piece[name][whole] for name in TAKEN})
         count += int(whole.sum())
         if count > MOST_POINTS:
             raise InputError("so many points are not compared", where=str(path), allowed=f"at most {MOST_POINTS}")

@@ -70,7 +70,7 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     with closing(record_of(what.project.scene, [result])) as record:
         notes = cautions.notes(summarise(record))
         data = report_input(
-            what.project,
+            what.project.in_folder(what.root),
             first,
             record,
             {},

@@ -131,16 +131,17 @@ class Measuring:
         out: Path,
         world: World,
         *,
+        root: Path,
         notes: Sequence[str],
         created: str | None = None,
         image_scale: float = 1.0,
         run: str = "",
     ) -> list[Path]:
-        """report.html and report.pdf; `world` is that of step 0, `run` as of `run_text`."""
+        """report.html and report.pdf; `world` is that of step 0, `run` as of `run_text`, root: the project's folder."""
         from analysis.report.write import write_report
 
         data = report_input(
-            self._project,
+            self._project.in_folder(root),
             world,
             self.record,
             self._clock.seconds,

@@ -22,9 +22,6 @@ from studio.scan.run_record import ended_by_clock, run_text
 from studio.scan.stages import Clock, develop_step, moved_world
 from studio.scan.summary import summarise
 
-MEASURED_WITH = ("sensor", "extraction", "measures")
-"""Parts of a project that may be others than those that its frames were rendered with."""
-
 
 def reconstruct_folder(
     found: scan_folder.ScanFolder,
@@ -89,14 +86,14 @@ def _measured(
             measured["measures"] = measures_record(project.measures, measuring.record.readings)
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
             measured["remarks"] = measuring.remarks()
-            if any(getattr(requested, name) != getattr(found.project, name) for name in MEASURED_WITH):
-                measured["measured_with"] = requested.model_dump(mode="json", include=set(MEASURED_WITH))
+            if any(getattr(requested, name) != getattr(found.project, name) for name in scan_folder.MEASURED_WITH):
+                measured["measured_with"] = requested.model_dump(mode="json", include=set(scan_folder.MEASURED_WITH))
             if report:
                 created = str(found.manifest.get("created", now()))
                 # another laser power scales the frames' light, which a render with that power repeats but for rounding
                 run = _run_text(found, how, measuring.record) if how.powered.scene == project.scene else ""
                 reports = measuring.write_reports(
-                    out, first, notes=notes, created=created, image_scale=image_scale, run=run
+                    out, first, root=root, notes=notes, created=created, image_scale=image_scale, run=run
                 )
                 measured["report"] = [path.name for path in reports]
                 files += reports

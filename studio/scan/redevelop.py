@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from analysis.line.settings import Method
+from analysis.report.delivery import Delivery
 from render.base.errors import Cancelled
 from render.base.threads import Cancel
 from render.camera.camera import Lens
@@ -88,6 +89,7 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
         "sensor": now.sensor,
         "extraction": extraction,
         "seed": now.seed,
+        "delivery": now.delivery,
         "measures": tuple(one for one in now.measures if one.laser < len(scene.lasers)),
     }
     if len(now.scene.lasers) == len(scene.lasers) and _size(now.scene) == _size(scene):
@@ -107,7 +109,7 @@ def _size(scene: Scene) -> tuple[int, int]:
 
 def is_developed_otherwise(rendered: Project, now: Project, image_scale: float = 1.0) -> bool:
     """`now` develops a frame of `rendered`, or finds its line, otherwise than that itself does."""
-    rendered, now = (one.model_copy(update={"measures": ()}) for one in (rendered, now))
+    rendered, now = (one.model_copy(update={"measures": (), "delivery": Delivery()}) for one in (rendered, now))
     how, before = development(rendered, now, image_scale), development(rendered, rendered)
     return (how.project.model_copy(update={"seed": rendered.seed}), how.laser_power) != (
         before.project,

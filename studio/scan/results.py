@@ -16,6 +16,7 @@ from render.sensor.develop import Image
 from render.world.world import World
 from studio.project.project import Project
 from studio.scan.gauging import measures_record, readings
+from studio.scan.logo import logo_uri
 from studio.scan.spacetime_window import Passing
 from studio.scan.stages import Clock, Measurement, measure_step
 
@@ -86,7 +87,11 @@ def report_input(
     image_scale: float = 1.0,
     run: str = "",
 ) -> ReportInput:
-    """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage, `run` as of `run_text`."""
+    """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage, `run` as of `run_text`.
+
+    The logo is looked for in the project's folder; one that cannot be shown is a note.
+    """
+    logo, trouble = logo_uri(project.delivery.logo, project.folder)
     return ReportInput(
         title=project.name,
         scene=project.scene,
@@ -100,10 +105,12 @@ def report_input(
         seconds={name: value for name, value in seconds.items() if name not in record.seconds},
         seed=project.seed,
         versions=versions(),
-        notes=tuple(notes),
+        notes=(*notes, *filter(None, [trouble])),
         created=created,
         image_scale=image_scale,
         measures=tuple(measures_record(project.measures, record.readings)),
+        delivery=project.delivery,
+        logo=logo,
         run=run,
     )
 

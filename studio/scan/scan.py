@@ -155,7 +155,13 @@ def run_scan(
                 finished=not ended_by_clock(written.light),
             )
             reports = measuring.write_reports(
-                out, first, notes=result["notes"], created=result["created"], image_scale=image_scale, run=run
+                out,
+                first,
+                root=root,
+                notes=result["notes"],
+                created=result["created"],
+                image_scale=image_scale,
+                run=run,
             )
             manifest = finish(reports)
     return ScanResult(out, (*written.files, *reports, out / scan_folder.MANIFEST), tuple(reports), manifest)

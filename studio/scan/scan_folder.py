@@ -30,6 +30,8 @@ POINTS, REPORT = ("points.ply", "points.csv", "measures.csv"), ("report.html", "
 FORMAT, FORMAT_VERSION = "blazer-scan", 2
 MEASURED = ("results", "measures", "extraction", "notes", "remarks", "measured_with")
 """What a manifest tells of points, beside the report's files."""
+MEASURED_WITH = ("sensor", "extraction", "measures", "delivery")
+"""Parts of a project that may be others than those that its frames were rendered with."""
 FRAME = re.compile(r"frame_(\d{4,})(\.state\.npz|\.png|\.exr|\.json)")
 """A PNG goes before the files that tell whose it is."""
 
@@ -167,7 +169,7 @@ def image_scale_of(found: ScanFolder) -> float:
 
 
 def measured_project(found: ScanFolder) -> Project:
-    """The project with the sensor, extraction and measures of the folder's points, which may be others than its own.
+    """The project with the parts of `MEASURED_WITH` that the folder's points were made with, which may be others.
 
     InputError: the manifest's record of them is none.
     """
@@ -175,11 +177,9 @@ def measured_project(found: ScanFolder) -> Project:
     if record is None:
         return found.project
     data = found.project.model_dump(mode="json")
-    if not isinstance(record, dict) or not record.keys() <= {"sensor", "extraction", "measures"}:
+    if not isinstance(record, dict) or not record.keys() <= set(MEASURED_WITH):
         where = f"{found.folder / MANIFEST}: measured_with"
-        raise InputError(
-            "the settings of the measurement are none", where=where, allowed="sensor, extraction and measures"
-        )
+        raise InputError("the settings of the measurement are none", where=where, allowed=", ".join(MEASURED_WITH))
     return Project.from_data({**data, **record}, f"{found.folder / MANIFEST}: measured_with")
 
 

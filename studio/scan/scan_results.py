@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from analysis.cloud import INTEGERS, Cloud, ply_pieces
+from analysis.report.delivery import Delivery
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.threads import Cancel
@@ -175,7 +176,14 @@ def _comparable(project: Project) -> Project:
     )
     scene = project.scene.model_copy(update={"objects": objects})
     return project.model_copy(
-        update={"name": "project", "scene": scene, "render": RenderSettings(), "seed": 0, "measures": ()}
+        update={
+            "name": "project",
+            "scene": scene,
+            "render": RenderSettings(),
+            "seed": 0,
+            "measures": (),
+            "delivery": Delivery(),
+        }
     )
 
 

@@ -71,6 +71,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command(
         "copy_python", "Edit", "Copy as &Python", "Ctrl+Shift+C", "", "Lines for a notebook that give what is shown"
     ),
+    Command("preferences", "Edit", "Pre&ferences…", "Ctrl+,", "", "Units, threads, image scale, autosave, undo"),
     Command("deselect", "Edit", "Select &nothing", "Ctrl+Shift+A"),
     Command("setup", "View", "&Set up", "F6", "", "", True),
     Command("render_workspace", "View", "&Render", "F7", "", "", True),
@@ -110,6 +111,11 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("previous_line", "Measure", "&Previous scan line", "Alt+Up"),
     Command("next_line", "Measure", "&Next scan line", "Alt+Down"),
     Command("worst_line", "Measure", "&Worst scan line", "Alt+W", "", "Where the error is largest"),
+    "Measure/-",
+    Command(
+        "deviation", "Measure", "&Deviation from nominal…", "Alt+D", "", "From the part or its CAD, with a tolerance"
+    ),
+    Command("section", "Measure", "&Section…", "Alt+S", "", "Truth and points in a plane, as DXF or CSV"),
     "Measure/-",
     Command("frame_points", "Measure", "Points in &view", "Alt+P", "", "The measured points in the middle of the view"),
     Command(

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QMen
 
 from studio.editing.euler_angles import euler_angles, rotation_from_euler
 from studio.editing.forms import REQUIRED, FieldSpec, field_path
-from studio.editing.units import Unit
+from studio.editing.units import SHOWN, Unit
 from studio.project.document import FieldPath
 from studio.qt.forms.fields import ChoiceField, CurveField, CurvePlot, FlagField, NumbersField, TextField, tool_button
 from studio.qt.forms.number_field import NumberField, VectorField
@@ -255,7 +255,7 @@ class PositionRow(Row):
     """The translation of a pose, mm."""
 
     def _title(self) -> tuple[str, str]:
-        return "Position", "mm"
+        return "Position", SHOWN["m"]
 
     def _value(self) -> Any:
         return self.spec.value.translation
@@ -264,7 +264,7 @@ class PositionRow(Row):
         return (0.0, 0.0, 0.0)
 
     def _text(self, value: Any) -> str:
-        return " ".join(Unit.of("m").format(part) for part in value) + " mm"
+        return " ".join(Unit.of("m").format(part) for part in value) + f" {SHOWN['m']}"
 
     def _help(self) -> str:
         return "<b>Position</b><br>x, y, z of its origin. Drag sideways, or click to type."

@@ -217,7 +217,9 @@ class DevelopPanel(QWidget):
 
     def _project_changed(self) -> None:
         before, self._followed = self._followed, self.session.project
-        if before.model_copy(update={"measures": self._followed.measures}) != self._followed:
+        after = self._followed
+        read_off = {"measures": after.measures, "delivery": after.delivery}
+        if before.model_copy(update=read_off) != after:
             self._follow_project()
             self.refresh()  # measures of the part are read off what was measured
 

@@ -19,10 +19,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from render.base.errors import InputError
 from render.output.tone_mapping import Picture, grey
+from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.session import Render, Session
 from studio.qt.image.compare_view import CompareView
 from studio.qt.render.python_copy import copy_as_python
+from studio.qt.render.render_table import RenderTable, keep_render
+from studio.runtime.error_messages import trouble
 from studio.scan.remarks import scale_name, scale_notes
 
 THUMBNAIL = QSize(64, 54)
@@ -109,8 +113,11 @@ class History(QWidget):
         self.compare_button = QPushButton("Compare")
         self.compare_button.setToolTip("Side by side under a line that can be dragged, or their difference")
         self.delete_button = QPushButton("Delete")
+        self.table_button = QPushButton("Table")
+        self.table_button.setToolTip("Figures and settings of all renders, and of those kept with the project")
         top = QHBoxLayout()
         top.addWidget(heading, 1)
+        top.addWidget(self.table_button)
         top.addWidget(self.compare_button)
         top.addWidget(self.delete_button)
         layout = QVBoxLayout(self)
@@ -126,6 +133,7 @@ class History(QWidget):
         self.list.customContextMenuRequested.connect(self._menu)
         self.compare_button.clicked.connect(self.compare)
         self.delete_button.clicked.connect(self.delete)
+        self.table_button.clicked.connect(self.open_table)
         self.refresh()
 
     def selected(self) -> list[Render]:
@@ -180,6 +188,19 @@ class History(QWidget):
         self.comparison.show()
         self.comparison.raise_()
 
+    def open_table(self) -> RenderTable:
+        """All renders side by side, the earliest first."""
+        table = RenderTable(self, self.session, [(render, title(render)) for render in self.session.renders])
+        table.open()
+        return table
+
+    def keep(self, render: Render) -> None:
+        """With the project, by its name."""
+        try:
+            keep_render(self.session, render, title(render))
+        except InputError as error:
+            show_trouble(self.window(), trouble(error, "keep the render"))
+
     def _forget_comparison(self) -> None:
         if self.comparison is not None:
             self.comparison.forget()
@@ -231,6 +252,7 @@ class History(QWidget):
         menu = QMenu(self)
         menu.addAction("Show", lambda: self.session.show(item.data(Qt.ItemDataRole.UserRole)))
         menu.addAction("Rename", lambda: self.list.editItem(item))
+        menu.addAction("Keep with the project", lambda: self.keep(item.data(Qt.ItemDataRole.UserRole)))
         compare = menu.addAction("Compare", self.compare)
         compare.setEnabled(len(self.list.selectedItems()) == 2)
         render = item.data(Qt.ItemDataRole.UserRole)

@@ -134,8 +134,6 @@ class RenderPanel(QWidget):
             return
         session = self.session
         source, root, step = session.project, session.document.root, session.step
-        if image_scale is not None and self.scale.findData(image_scale) >= 0:
-            self.scale.setCurrentIndex(self.scale.findData(image_scale))
         image_scale = self.scale.currentData() if image_scale is None else image_scale
         project = scaled(source, image_scale)
         world = self._same_world(project, step)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from PySide6.QtCore import QObject
 
@@ -14,12 +17,16 @@ from studio.scan.stages import Measurement
 class MeasureActions(QObject):
     """Moves the hovered scan line; what is hovered is marked in every view."""
 
-    def __init__(self, parent: QObject, session: Session, actions: Actions) -> None:
-        super().__init__(parent)
+    def __init__(self, window: Any, session: Session, actions: Actions) -> None:
+        """window: the main one, which has the panels."""
+        super().__init__(window)
+        self.window = window
         self.session, self.actions = session, actions
         actions.connect("previous_line", lambda: self.step(-1))
         actions.connect("next_line", lambda: self.step(1))
         actions.connect("worst_line", self.worst)
+        for key in ("deviation", "section"):
+            actions.connect(key, partial(self.inspect, key))
         session.renders_changed.connect(self.refresh)
         session.measured.connect(self.refresh)
         self.refresh()
@@ -50,6 +57,12 @@ class MeasureActions(QObject):
         best = self._best()
         if best is not None and np.isfinite(best.errors.depth).any():
             self.session.hover(int(best.points.index[np.nanargmax(np.abs(best.errors.depth))]))
+
+    def inspect(self, key: str) -> None:
+        """The panel of deviation and section, with the tab that was asked for."""
+        self.window.call_panel("nominal")
+        panel = self.window.panels["nominal"]
+        panel.show_tab(getattr(panel, key))
 
     def _best(self) -> Measurement | None:
         """The shown render's first laser, by the project's own method."""

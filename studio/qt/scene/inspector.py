@@ -24,7 +24,8 @@ from studio.qt.scene.mesh_bar import MeshBar, take_mesh
 from studio.qt.scene.scene_icons import item_icon
 
 TITLES = {"scene": "Scene", "rig": "Rig", "camera": "Camera", "sensor": "Sensor", "render": "Render settings",
-          "extraction": "Line extraction", "environment": "Environment", "motion": "Motion"}  # fmt: skip
+          "extraction": "Line extraction", "delivery": "Report to hand over",
+          "environment": "Environment", "motion": "Motion"}  # fmt: skip
 LIST_HINTS = {
     "lasers": "The line lasers of the rig.",
     "objects": "What the scanner looks at. Drop mesh files on the scene to add more.",
@@ -150,7 +151,9 @@ class Inspector(QWidget):
 
     def _take_image(self, path: FieldPath, kind: Alternative | None, image: str) -> None:
         label = f"use {Path(image).name}"
-        if kind is None:
+        if path == ("delivery",):
+            self.session.set((*path, "logo"), image, label)
+        elif kind is None:
             self.session.set((*path, "path"), image, label)
         else:
             self.session.set(path, start_value(kind, value_at(self.session.project, path), image), label)

@@ -33,6 +33,7 @@ SHAPES = {
     "sensor": "<path d='M6 6h12v12H6zM10 6v12M14 6v12M6 10h12M6 14h12M3 9h3M3 15h3M18 9h3M18 15h3'/>",
     "render": "<path d='M4 5h16v14H4zM4 16l5-5 4 4 3-3 4 4'/><circle cx='9' cy='9' r='1.2'/>",
     "extraction": "<path d='M3 19c5 0 6-14 9-14s4 14 9 14M12 3v18' /><path d='M12 3v18' stroke-dasharray='2 2.5'/>",
+    "delivery": "<path d='M6 3h12v18H6zM9 8h6M9 12h6M9 16h3'/>",
     "problem": "<path d='M12 4l9.500 16.500h-19zM12 10v5M12 17.200v.6'/>",
     "eye": "<path d='M2.5 12c4-7 15-7 19 0-4 7-15 7-19 0z'/><circle cx='12' cy='12' r='2.8'/>",
     "hidden": "<path d='M3 13c4 6 14 6 18 0M6 16l-1.5 2.5M12 17.5v3M18 16l1.5 2.5' opacity='.55'/>",

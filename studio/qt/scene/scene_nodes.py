@@ -63,5 +63,6 @@ def nodes(project: Project) -> list[Node]:
         Node(("sensor",), (), "Sensor", Unit.of("s").with_unit(project.sensor.exposure_time)),
         Node(("render",), (), "Render"),
         Node(("extraction",), (), "Extraction", project.extraction.method.replace("_", " ")),
+        Node(("delivery",), (), "Report", project.delivery.customer),
     ]
     return [Node(n.path, n.parent, n.name, n.detail, icon_name(project, n.path), n.visible) for n in found]

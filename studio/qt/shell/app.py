@@ -97,11 +97,13 @@ def start(path: Path | None) -> MainWindow:
     from PySide6.QtCore import QTimer
 
     from studio.qt.core import theme
+    from studio.qt.shell.preferring import take_units
     from studio.qt.shell.splash import Splash
     from studio.runtime.preferences import PreferencesFile, recovery_folder
 
     preferences = PreferencesFile()
     theme.apply(preferences.values.theme)
+    take_units(preferences.values)
     splash = Splash()
     splash.show()
     splash.tell("the sample")

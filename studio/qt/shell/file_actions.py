@@ -81,6 +81,7 @@ class FileActions(QObject):
         self._regular = QTimer(self, interval=round(1000 * AT_LEAST_EVERY))
         self._regular.timeout.connect(self.keep)
         self._regular.start()
+        self._keeps = True
         session.project_changed.connect(self._rest.start)
 
     @property
@@ -183,13 +184,22 @@ class FileActions(QObject):
 
     def keep(self) -> None:
         """Autosave, but not in the middle of a drag."""
-        if self.session.dragging or not self.unsaved:
+        if self.session.dragging or not (self._keeps and self.unsaved):
             return
         try:
             self.autosave.keep(self.session.document)
         except InputError as error:
             self.session.message.emit("warning", f"Autosave: {error}")
             self._regular.stop()
+
+    def keep_every(self, seconds: float | None) -> None:
+        """At least so often, while edits never rest; None: nothing is kept, and what was is dropped."""
+        self._keeps = seconds is not None
+        if seconds is None:
+            self._regular.stop()
+            self.autosave.forget()
+        else:
+            self._regular.start(round(1000 * seconds))
 
     def recover(self) -> bool:
         """After a crash: offer what it left behind. True: it was opened."""

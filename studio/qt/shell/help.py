@@ -22,6 +22,7 @@ PAGES = {
     "render": "Render",
     "develop": "Exposure and measurement",
     "results": "Results",
+    "nominal": "Deviation and section",
     "study": "Study",
     "charts": "Charts of a study",
     "calibrate": "Calibrate",

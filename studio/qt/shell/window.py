@@ -32,6 +32,7 @@ from studio.qt.shell.file_actions import FileActions
 from studio.qt.shell.help import Help, panel_with_focus
 from studio.qt.shell.memory import return_what_is_free
 from studio.qt.shell.panels import PANELS, Making, make_panels
+from studio.qt.shell.preferring import Preferring
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.status import StatusBar
 from studio.qt.shell.tour import Step, Tour
@@ -84,6 +85,7 @@ class MainWindow(QMainWindow):
         self.exports = ExportActions(self, session, self.runner, self.preferences, self.commands)
         self.measuring = MeasureActions(self, session, self.commands)
         self.calibrating = CalibrateActions(self, session, self.commands, self.panels["calibrate"])
+        self.preferring = Preferring(self)
         self.help = Help(self)
         self.tour: Tour | None = None
         self.cloud = self._make_cloud()

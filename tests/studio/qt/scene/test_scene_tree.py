@@ -64,7 +64,8 @@ class TestShowing:
         root = tree.item(())
         assert root.text(NAME) == "Step block on a linear stage"
         assert [root.child(i).text(NAME) for i in range(root.childCount())] == [
-            "Rig", "Objects", "Lights", "Environment", "Motion", "Sensor", "Render", "Extraction"]  # fmt: skip
+            "Rig", "Objects", "Lights", "Environment", "Motion", "Sensor", "Render", "Extraction",
+            "Report"]  # fmt: skip
         assert tree.item((*OBJECTS, 1)).text(NAME) == "step block"
         assert tree.item(("scene", "motion")).data(NAME, DETAIL) == "linear stage, 20 frames"
         assert tree.item((*LASERS, 0)).data(NAME, DETAIL) == "20 mW, 450 nm"

@@ -26,6 +26,7 @@ ITEMS: tuple[FieldPath, ...] = (
     ("sensor",),
     ("render",),
     ("extraction",),
+    ("delivery",),
 )
 BAR = 32
 """px of a screen's height that its own bar takes."""
@@ -100,7 +101,7 @@ def test_no_text_of_any_panel_is_cut_off(window: MainWindow, qtbot: QtBot, scree
         window.rearrange()
         window.resize(width, height - BAR)
         items = ITEMS if each.key == "setup" else ITEMS[:1]
-        for item, extra in [*((item, ()) for item in items), (ITEMS[0], ("motion", "log"))]:
+        for item, extra in [*((item, ()) for item in items), (ITEMS[0], ("motion", "log")), (ITEMS[0], ("nominal",))]:
             window.session.select(item)
             for key in extra:
                 window.show_panel(key)

@@ -1,0 +1,47 @@
+"""Whom a report is handed to, what it is of, and by which tolerance: its first pages are made of this."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from pydantic import model_validator
+
+from render.base.model import Model, quantity
+
+LONG = 120
+
+
+class Delivery(Model):
+    """Empty: the report has no pages for a customer."""
+
+    customer: str = quantity("", label="Customer", help="To whom the report is handed.", max_length=LONG)
+    author: str = quantity("", label="Author", help="Who answers for it.", max_length=LONG)
+    part: str = quantity("", label="Part", max_length=LONG)
+    part_number: str = quantity("", label="Part number", max_length=LONG)
+    order_number: str = quantity("", label="Order number", max_length=LONG)
+    text: str = quantity("", label="Text", help="What else the customer is to read.", max_length=4000)
+    logo: str = quantity(
+        "", label="Logo", help="An image in the project's folder, PNG or JPEG: its path from there.", max_length=1000
+    )
+    lower: float | None = quantity(
+        None, unit="m", label="Surface from", help="Tolerance of the surface's deviation.", ge=-1.0, le=1.0
+    )
+    upper: float | None = quantity(None, unit="m", label="Surface to", help="Its upper limit.", ge=-1.0, le=1.0)
+
+    @model_validator(mode="after")
+    def _tolerance_is_one(self) -> Self:
+        if (self.lower is None) != (self.upper is None):
+            raise ValueError("a tolerance of the surface has two limits; give lower and upper, or none of them")
+        if self.lower is not None and self.upper is not None and not self.upper > self.lower:
+            raise ValueError(f"lower is {self.lower} and upper {self.upper}; allowed: upper is above lower")
+        return self
+
+    @property
+    def is_empty(self) -> bool:
+        """Nothing is said: the report is for whoever made it."""
+        return self == Delivery()
+
+    @property
+    def has_tolerance(self) -> bool:
+        """Of the surface."""
+        return self.lower is not None and self.upper is not None

@@ -1,0 +1,130 @@
+"""The three pages for a customer: who and what, verdict and measures; where the part deviates; how it was measured."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from analysis.deviation import ABOVE, BELOW, UNDECIDED, WITHIN, verdicts
+from analysis.report.deviation_figure import DeviationMap, draw
+from analysis.report.gauge_table import MARKS
+from analysis.report.model import ReportInput
+from analysis.report.style import png_uri
+from analysis.report.units import count, degrees, micrometres, millimetres, milliwatts, percent
+from render.base.arrays import Float
+
+VERDICTS = {
+    "pass": "Within tolerance",
+    "fail": "Out of tolerance",
+    "undecided": "Not decided within the uncertainty",
+    "none": "No tolerance was given",
+}
+RULE = (
+    "By ISO 14253-1 with an expanded uncertainty of two sigma: within only what is proved to be within, "
+    "out only what is proved to be out."
+)
+
+
+def front(report: ReportInput) -> dict[str, Any] | None:
+    """What `front.html` shows; None: the report is for nobody else."""
+    told = report.delivery
+    if told.is_empty:
+        return None
+    rows = report.record.chosen().rows
+    rows = rows[rows["valid"] & np.isfinite(rows["distance"])]
+    surface = _surface(report, rows)
+    gauges = [_gauge_verdict(row) for row in report.measures]
+    wanted = [one for one in (surface["verdict"], *gauges) if one]
+    verdict = next((one for one in ("fail", "undecided", "pass") if one in wanted), "none")
+    return {
+        "logo": report.logo,
+        "who": [(label, value) for label, value in _who(report) if value],
+        "text": [line for line in told.text.splitlines() if line.strip()],
+        "verdict": verdict,
+        "verdict_text": VERDICTS[verdict],
+        "rule": RULE if verdict != "none" else "",
+        "surface": surface,
+        "map": _map(report, rows) if len(rows) else None,
+        "how": _how(report, rows),
+    }
+
+
+def _who(report: ReportInput) -> list[tuple[str, str]]:
+    told = report.delivery
+    return [
+        ("Customer", told.customer),
+        ("Part", told.part or report.title),
+        ("Part number", told.part_number),
+        ("Order number", told.order_number),
+        ("Author", told.author),
+    ]
+
+
+def _gauge_verdict(row: dict[str, Any]) -> str:
+    """One that has a tolerance and could not be measured decides nothing."""
+    if row["lower"] is None and row["upper"] is None:
+        return ""
+    return "undecided" if row["reason"] else str(row["verdict"] or "undecided")
+
+
+def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
+    """Verdict and table of the surface's deviation."""
+    told, value = report.delivery, rows["distance"]
+    if len(value) == 0:
+        return {"verdict": "undecided" if told.has_tolerance else "", "mark": "", "rows": []}
+    table = [
+        ("Points", count(len(value))),
+        ("Mean deviation", micrometres(float(value.mean()), 2)),
+        ("95 % of the points deviate less than", micrometres(float(np.percentile(np.abs(value), 95.0)))),
+    ]
+    if told.lower is None or told.upper is None:
+        return {"verdict": "", "mark": "", "rows": table}
+    judged = verdicts(value, _sigma(rows), told.lower, told.upper)
+    shares = {key: float(np.mean(judged == key)) for key in (WITHIN, UNDECIDED, ABOVE, BELOW)}
+    limits = f"{1e6 * told.lower:+.4g} / {1e6 * told.upper:+.4g}\u00a0µm"
+    table += [
+        ("Tolerance", limits),
+        ("Proved within", percent(shares[WITHIN], 2)),
+        ("Not decided", percent(shares[UNDECIDED], 2)),
+        ("Proved above", percent(shares[ABOVE], 2)),
+        ("Proved below", percent(shares[BELOW], 2)),
+    ]
+    beyond = shares[ABOVE] + shares[BELOW]
+    verdict = "fail" if beyond > 0.0 else "undecided" if shares[UNDECIDED] > 0.0 else "pass"
+    return {"verdict": verdict, "mark": MARKS[verdict], "rows": table}
+
+
+def _sigma(rows: Any) -> Float:
+    """Of a point along the normal: its chance, and the systematic part at most."""
+    return np.asarray(np.hypot(np.nan_to_num(rows["sigma_distance"]), np.nan_to_num(rows["sigma_systematic"])))
+
+
+def _map(report: ReportInput, rows: Any) -> str:
+    eye = report.scene.T_world_camera(report.record.steps[0].step)[:3, 3]
+    told = report.delivery
+    towards = eye - rows["world"].mean(axis=0)
+    return png_uri(draw(DeviationMap(rows["world"], rows["distance"], towards, told.lower, told.upper)))
+
+
+def _how(report: ReportInput, rows: Any) -> list[tuple[str, str]]:
+    """The scanner in a few lines."""
+    scene = report.scene
+    camera = scene.camera
+    lasers = ", ".join(f"{milliwatts(one.power)}, {one.wavelength_nm:g}\u00a0nm" for one in scene.lasers)
+    found = [
+        ("Frames", count(len(report.record.steps))),
+        ("Camera", f"{camera.width} × {camera.height}\u00a0px"),  # noqa: RUF001
+        ("Laser", lasers),
+    ]
+    if scene.lasers:
+        first = scene.T_camera_laser(0)
+        between = float(np.arccos(np.clip(first[2, 2], -1.0, 1.0)))
+        found += [
+            ("Baseline", millimetres(float(np.linalg.norm(first[:3, 3])))),
+            ("Angle of triangulation", degrees(between)),
+        ]
+    if len(rows):
+        sigma = _sigma(rows)
+        found.append(("Uncertainty of a point (two sigma, median)", micrometres(2.0 * float(np.median(sigma)))))
+    return found

@@ -1,0 +1,152 @@
+"""The renders of the session and those kept with the project, side by side: figures, differences, settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QFont
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QDialog,
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+)
+
+from render.base.errors import InputError
+from render.world.world import build_world
+from studio.project.date_and_time import read_out
+from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.session import Render, Session
+from studio.qt.core.widgets import text_button
+from studio.runtime.error_messages import trouble
+from studio.scan.kept_renders import Kept, figures_of, keep, kept_renders, open_kept
+from studio.scan.remarks import best
+from studio.study.side_by_side import side_by_side, write_table
+
+HINT = "Figures are followed by their difference from the first column's. Settings that all have alike are left out."
+FEWEST_PX = 150
+
+
+def as_kept(session: Session, render: Render, name: str) -> Kept:
+    """A render of the session as a column of the table."""
+    found = best(render.measurements, session.project) if render.measurements else []
+    return Kept(name, render.created, render.project, render.scanner_scale, figures_of(found))
+
+
+def keep_render(session: Session, render: Render, name: str) -> Kept:
+    """With the project. InputError: the project has no file yet, or files cannot be written."""
+    if session.document.path is None:
+        raise InputError("the project has no folder of its own yet", cure="save it first")
+    made = Kept(name, "", render.project, render.scanner_scale, as_kept(session, render, name).figures)
+    kept = keep(session.document.root, made, render.frame)
+    session.message.emit("info", f"Kept {name} in {kept.folder}")
+    return kept
+
+
+def open_render(session: Session, kept: Kept) -> Render:
+    """A kept one, in the history and shown. InputError: as of `open_kept`."""
+    root = session.document.root
+    frame = open_kept(kept, root)
+    world = build_world(kept.project.scene, root, frame.step)
+    number = max([render.number for render in session.renders], default=0) + 1
+    render = Render(number, kept.project, world, frame, name=kept.name, created=read_out(kept.created))
+    render.image_scale = kept.image_scale
+    render.source = session.project
+    session.add_render(render)
+    return render
+
+
+class RenderTable(QDialog):
+    """A column for each render."""
+
+    def __init__(self, parent: object, session: Session, shown: list[tuple[Render, str]]) -> None:
+        """shown: the session's renders with their titles, in the order of the columns."""
+        super().__init__(parent)  # type: ignore[arg-type]
+        self.session = session
+        self.setObjectName("render-table")
+        self.setWindowTitle("Renders side by side")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.own = [as_kept(session, render, name) for render, name in shown]
+        kept, self.wrong = kept_renders(session.document.root) if session.document.path is not None else ([], [])
+        self.renders = [*self.own, *kept]
+        self.rows = side_by_side(self.renders)
+        self.table = QTableWidget()
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setAlternatingRowColors(True)
+        self.table.setShowGrid(False)
+        self.open_button = text_button("Open", "The kept render of the chosen column, in the history")
+        self.export = text_button("Export as CSV…")
+        told = QLabel("\n".join([HINT, *self.wrong]), wordWrap=True)
+        told.setObjectName("muted")
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.open_button)
+        buttons.addWidget(self.export)
+        buttons.addStretch(1)
+        column = QVBoxLayout(self)
+        column.addWidget(self.table, 1)
+        column.addWidget(told)
+        column.addLayout(buttons)
+        self.resize(min(1200, 260 + FEWEST_PX * max(2, len(self.renders))), 480)
+        self.open_button.clicked.connect(self.open_chosen)
+        self.export.clicked.connect(self._ask)
+        self.table.itemSelectionChanged.connect(self._show_buttons)
+        self._fill()
+        self._show_buttons()
+
+    def chosen(self) -> Kept | None:
+        """The kept render of the column that is chosen."""
+        at = self.table.currentColumn()
+        found = self.renders[at] if 0 <= at < len(self.renders) else None
+        return found if found is not None and found.folder is not None else None
+
+    def open_chosen(self) -> None:
+        kept = self.chosen()
+        if kept is None:
+            return
+        try:
+            open_render(self.session, kept)
+        except InputError as error:
+            show_trouble(self, trouble(error, f"open {kept.name}"))
+
+    def write(self, path: Path) -> None:
+        """InputError: the file cannot be written."""
+        write_table(path, self.renders, self.rows)
+        self.session.message.emit("info", f"Wrote {path}")
+
+    def _fill(self) -> None:
+        table, bold = self.table, QFont(self.font())
+        bold.setBold(True)
+        table.setColumnCount(len(self.renders))
+        table.setRowCount(len(self.rows))
+        for k, render in enumerate(self.renders):
+            when = f"\n{read_out(render.created)}" if render.folder is not None else "\nthis session"
+            table.setHorizontalHeaderItem(k, QTableWidgetItem(render.name + when))
+        for i, row in enumerate(self.rows):
+            table.setVerticalHeaderItem(i, QTableWidgetItem(row.label))
+            for k, text in enumerate(row.cells):
+                item = QTableWidgetItem(text)
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                table.setItem(i, k, item)
+                item.setToolTip(text)
+                if row.measured:
+                    item.setFont(bold)
+        table.horizontalHeader().setMinimumSectionSize(FEWEST_PX)
+
+    def _show_buttons(self) -> None:
+        self.open_button.setEnabled(self.chosen() is not None)
+        self.export.setEnabled(bool(self.rows))
+
+    def _ask(self) -> None:
+        start = f"{self.session.project.name.replace('/', '-')} renders.csv"
+        chosen, _ = QFileDialog.getSaveFileName(self, "Export", start, "CSV table (*.csv)")
+        if not chosen:
+            return
+        try:
+            self.write(Path(chosen).with_suffix(".csv"))
+        except InputError as error:
+            show_trouble(self, trouble(error, "export the table"))

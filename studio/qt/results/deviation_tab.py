@@ -1,0 +1,257 @@
+"""How far the points that are shown are from the nominal part: what is asked, the figures, and the map in bands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QSize, Qt
+from PySide6.QtGui import QImage, QPixmap, QResizeEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QVBoxLayout,
+    QWidget,
+)
+
+from analysis.deviation import Alignment
+from analysis.report.deviation_figure import draw
+from render.base.errors import InputError
+from studio.commands.deviation import details, sentence
+from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.session import Session
+from studio.qt.core.widgets import ElidedLabel, text_button
+from studio.qt.results.shown_points import NOTHING, are_there, shown_points
+from studio.runtime.error_messages import trouble
+from studio.scan.deviation import Compared, Question, compare_cloud, map_of, write_deviation
+
+LANE = "deviation"
+ALIGNMENTS: dict[Alignment, str] = {
+    "none": "As measured",
+    "best-fit": "Best fit",
+    "3-2-1": "3-2-1, by six spots",
+}
+FILES = "Nominal part (*.step *.stp *.stl *.ply *.obj *.glb *.gltf *.off)"
+ALL = "All objects"
+MARGIN = 8
+MOST_UM = 100_000.0
+SPOTS_HINT = "x,y,z of six places on the nominal, mm, world: three, two, one; between them semicolons"
+
+
+class DeviationTab(QWidget):
+    """Asks, compares in the background, and shows."""
+
+    def __init__(self, session: Session, runner: JobRunner) -> None:
+        super().__init__()
+        self.session, self.runner = session, runner
+        self.compared: Compared | None = None
+        self.cad: Path | None = None
+        self._picture = QPixmap()
+        self.part = QComboBox()
+        self.nominal = ElidedLabel(Qt.TextElideMode.ElideLeft)
+        self.choose = text_button("File…", "A CAD file in the part's place: STEP, STL, PLY, OBJ, GLB")
+        self.as_scanned = text_button("As scanned", "The part of the scene itself is the nominal")
+        self.alignment = QComboBox()
+        for key, name in ALIGNMENTS.items():
+            self.alignment.addItem(name, key)
+        self.spots = QLineEdit()
+        self.spots.setPlaceholderText("10,5,20; 40,5,20; …")
+        self.spots.setToolTip(SPOTS_HINT)
+        self.least, self.most = _limit(-100.0), _limit(100.0)
+        self.compare_button = text_button("Compare", "", "primary")
+        self.export = text_button("Export as CSV…", "Every point, with map and figures beside it")
+        self.told = QLabel(wordWrap=True)
+        self.told.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.map = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+        self.map.setMinimumSize(1, 1)
+        self._lay_out()
+        self.choose.clicked.connect(self._choose)
+        self.as_scanned.clicked.connect(lambda: self.take_nominal(None))
+        self.alignment.currentIndexChanged.connect(self._show_rows)
+        self.compare_button.clicked.connect(self.compare)
+        self.export.clicked.connect(self._ask)
+        for signal in (session.renders_changed, session.measured):
+            signal.connect(self.refresh)
+        self.take_nominal(None)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Follow what is shown; figures of something else leave the screen."""
+        render = self.session.shown
+        names = [] if render is None else [item.name for item in render.project.scene.visible_objects]
+        wanted = [ALL, *names] if len(names) > 1 else names
+        if wanted != [self.part.itemText(i) for i in range(self.part.count())]:
+            self.part.clear()
+            self.part.addItems(wanted)
+        there = are_there(self.session)
+        self.compare_button.setEnabled(there)
+        self._show(None)
+        if not there:
+            self.told.setText(NOTHING)
+
+    def take_nominal(self, file: Path | None) -> None:
+        """A CAD file; None: the part as it was scanned."""
+        self.cad = file
+        self.nominal.setText("the part as it was scanned" if file is None else str(file))
+        self.as_scanned.setEnabled(file is not None)
+
+    def question(self) -> Question:
+        """What is asked. InputError: the spots are no places."""
+        alignment: Alignment = self.alignment.currentData()
+        lower, upper = _metres(self.least), _metres(self.most)
+        part = self.part.currentText()
+        return Question(
+            part=None if part in ("", ALL) else part,
+            cad=self.cad,
+            alignment=alignment,
+            datums=_places(self.spots.text()) if alignment == "3-2-1" else (),
+            lower=lower,
+            upper=upper,
+        )
+
+    def compare(self) -> None:
+        """In the background; the last question counts."""
+        try:
+            scene, root, read = shown_points(self.session)
+            question = self.question()
+        except InputError as error:
+            show_trouble(self.window(), trouble(error, "compare"))
+            return
+        self.told.setText("Comparing…")
+
+        def work(progress: object, cancelled: object) -> tuple[Compared, QImage]:
+            found = compare_cloud(scene, root, read(), question)
+            made = draw(map_of(found))
+            made.set_dpi(160)
+            made.canvas.draw()
+            width, height = made.canvas.get_width_height()
+            picture = QImage(made.canvas.buffer_rgba(), width, height, 4 * width, QImage.Format.Format_RGBA8888).copy()
+            return found, picture
+
+        def then(found: tuple[Compared, QImage]) -> None:
+            self._picture = QPixmap.fromImage(found[1])
+            self._show(found[0])
+
+        self.runner.run(LANE, "compare with the nominal", work, then)
+
+    def write(self, path: Path) -> None:
+        """InputError: nothing was compared, or a file cannot be written."""
+        if self.compared is None:
+            raise InputError("nothing was compared yet", cure="press Compare first")
+        files = write_deviation(self.compared, path, [] if self.cad is None else [self.cad])
+        self.session.message.emit("info", f"Wrote {', '.join(str(file) for file in files)}")
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit()
+
+    def _show(self, found: Compared | None) -> None:
+        self.compared = found
+        self.export.setEnabled(found is not None)
+        self.map.setVisible(found is not None)
+        if found is None:
+            self.map.setMinimumHeight(1)
+        if found is None:
+            self.told.setText("")
+            return
+        record = found.record
+        texts = [f"{record['points']} points: {sentence(record)}", *details(record)]
+        self.told.setText("\n".join(texts))
+        self._fit()
+
+    def _fit(self) -> None:
+        """The map as wide as the panel, at most as large as it was drawn."""
+        if self._picture.isNull() or self.compared is None:
+            return
+        ratio = self.devicePixelRatioF()
+        room = QSize(max(1, round((self.width() - 2 * MARGIN) * ratio)), self._picture.height())
+        scaled = self._picture.scaled(
+            room.boundedTo(self._picture.size()),
+            Qt.AspectRatioMode.KeepAspectRatio,
+            Qt.TransformationMode.SmoothTransformation,
+        )
+        scaled.setDevicePixelRatio(ratio)
+        self.map.setPixmap(scaled)
+        # so that the panel scrolls to it where it is low
+        self.map.setMinimumHeight(round(scaled.height() / ratio))
+
+    def _choose(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(self.window(), "Nominal part", str(self.session.document.root), FILES)
+        if chosen:
+            self.take_nominal(Path(chosen))
+
+    def _ask(self) -> None:
+        start = f"{self.session.project.name.replace('/', '-')} deviation.csv"
+        chosen, _ = QFileDialog.getSaveFileName(self.window(), "Export", start, "CSV table (*.csv)")
+        if not chosen:
+            return
+        path = Path(chosen)
+        try:
+            self.write(path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv"))
+        except InputError as error:
+            show_trouble(self.window(), trouble(error, "export the deviation"))
+
+    def _show_rows(self) -> None:
+        self.form.setRowVisible(self.spots, self.alignment.currentData() == "3-2-1")
+
+    def _lay_out(self) -> None:
+        self.form = QFormLayout()
+        files = QHBoxLayout()
+        files.addWidget(self.choose)
+        files.addWidget(self.as_scanned)
+        files.addStretch(1)
+        limits = QHBoxLayout()
+        limits.addWidget(self.least, 1)
+        limits.addWidget(QLabel("to"))
+        limits.addWidget(self.most, 1)
+        self.form.addRow("Part", self.part)
+        self.form.addRow("Nominal", self.nominal)
+        self.form.addRow("", files)
+        self.form.addRow("Alignment", self.alignment)
+        self.form.addRow("Spots", self.spots)
+        self.form.addRow("Tolerance", limits)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.compare_button)
+        buttons.addWidget(self.export)
+        buttons.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(MARGIN, MARGIN, MARGIN, MARGIN)
+        column.addLayout(self.form)
+        column.addLayout(buttons)
+        column.addWidget(self.told)
+        column.addWidget(self.map)
+        column.addStretch(1)
+        self._show_rows()
+
+
+def _limit(value: float) -> QDoubleSpinBox:
+    """um; its least value means that there is none."""
+    box = QDoubleSpinBox()
+    box.setRange(-MOST_UM, MOST_UM)
+    box.setDecimals(1)
+    box.setSuffix(" µm")
+    box.setSpecialValueText("none")
+    box.setValue(value)
+    box.setMinimumWidth(box.fontMetrics().horizontalAdvance("-1000.0 µm") + 32)
+    return box
+
+
+def _metres(limit: QDoubleSpinBox) -> float | None:
+    return None if limit.value() == limit.minimum() else 1e-6 * limit.value()
+
+
+def _places(text: str) -> list[tuple[float, float, float]]:
+    """ "1,2,3; 4,5,6" in mm as places in m. InputError: one is none."""
+    places = []
+    for part in filter(str.strip, text.split(";")):
+        try:
+            x, y, z = (1e-3 * float(number) for number in part.split(","))
+        except ValueError:
+            raise InputError("this is no place", found=part.strip(), allowed="x,y,z in mm") from None
+        places.append((x, y, z))
+    return places

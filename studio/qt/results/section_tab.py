@@ -1,0 +1,215 @@
+"""A plane through what is shown: where it cuts the true part, and the points near it, in a plot and as DXF or CSV."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QVBoxLayout,
+    QWidget,
+)
+
+from analysis.cloud import Cloud
+from analysis.report.colour import TRUTH, method_colour
+from analysis.section import Plane
+from render.base.arrays import Float, Int
+from render.base.errors import InputError
+from render.world.world import build_world
+from studio.qt.core import theme
+from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.session import Session
+from studio.qt.core.widgets import text_button
+from studio.qt.results import plots
+from studio.qt.results.shown_points import NOTHING, are_there, shown_points
+from studio.runtime.error_messages import trouble
+from studio.scan.section import Section, from_pieces, write_section
+
+LANE = "section"
+NORMALS = {"across x": (1.0, 0.0, 0.0), "across y": (0.0, 1.0, 0.0), "level (across z)": (0.0, 0.0, 1.0)}
+REST_MS = 120
+FILES = "DXF drawing (*.dxf);;CSV table (*.csv)"
+World = tuple[Cloud, Float, Int]
+
+
+class SectionTab(QWidget):
+    """Follows its plane; points and part are read once for what is shown."""
+
+    def __init__(self, session: Session, runner: JobRunner) -> None:
+        super().__init__()
+        self.session, self.runner = session, runner
+        self.section: Section | None = None
+        self._read: World | None = None
+        self.normal = QComboBox()
+        for name, normal in NORMALS.items():
+            self.normal.addItem(name, normal)
+        self.normal.addItem("by its normal", None)
+        self.own = [_box(-1.0, 1.0, value, "") for value in (1.0, 0.0, 0.0)]
+        self.through = [_box(-1e5, 1e5, 0.0, " mm") for _ in range(3)]
+        self.thickness = _box(0.001, 1000.0, 1.0, " mm")
+        self.middle = text_button("To the middle", "The plane through the middle of the points")
+        self.export = text_button("Export…", "DXF (mm, layers TRUE and MEASURED) or CSV")
+        self.told = QLabel(wordWrap=True)
+        self.view = pg.GraphicsLayoutWidget()
+        self.plot = plots.new_plot("Across / mm", "Up", "mm")
+        self.view.addItem(self.plot)
+        self.plot.setAspectLocked(True)
+        self.truth, self.dots = plots.curve(TRUTH), plots.dots(method_colour("likelihood"))
+        self.plot.addItem(self.truth)
+        self.plot.addItem(self.dots)
+        self._rest = QTimer(self, singleShot=True, interval=REST_MS)
+        self._rest.timeout.connect(self.cut)
+        self._lay_out()
+        for box in (*self.own, *self.through, self.thickness):
+            box.valueChanged.connect(self._rest.start)
+        self.normal.currentIndexChanged.connect(self._another_normal)
+        self.middle.clicked.connect(self.to_middle)
+        self.export.clicked.connect(self._ask)
+        theme.notice.changed.connect(self._repaint)
+        for signal in (session.renders_changed, session.measured):
+            signal.connect(self.refresh)
+        self._another_normal()
+        self._repaint()
+        self.refresh()
+
+    @property
+    def plane(self) -> Plane:
+        x, y, z = (1e-3 * box.value() for box in self.through)
+        normal = self.normal.currentData()
+        a, b, c = normal if normal is not None else (box.value() for box in self.own)
+        return Plane((x, y, z), (a, b, c))
+
+    def refresh(self) -> None:
+        """Something else is shown: it is read when the tab is looked at."""
+        self._read, self.section = None, None
+        self.truth.setData([], [])
+        self.dots.setData([], [])
+        there = are_there(self.session)
+        self.told.setText("" if there else NOTHING)
+        self.export.setEnabled(False)
+        if there and self.isVisible():
+            self._rest.start()
+
+    def showEvent(self, event: object) -> None:
+        super().showEvent(event)  # type: ignore[arg-type]
+        if self.section is None:
+            self._rest.start()
+
+    def to_middle(self) -> None:
+        """Of the points, by their medians."""
+        if self._read is None:
+            return
+        for box, name in zip(self.through, "xyz", strict=True):
+            box.setValue(1e3 * float(np.median(self._read[0][name])))
+
+    def cut(self) -> None:
+        """In the background; the last plane counts."""
+        try:
+            scene, root, read = shown_points(self.session)
+            plane, thickness, before = self.plane, 1e-3 * self.thickness.value(), self._read
+            _ = plane.axes
+        except InputError as error:
+            self.told.setText(str(error))
+            return
+
+        def work(progress: object, cancelled: object) -> tuple[Section, World]:
+            if before is None:
+                world = build_world(scene, root)
+                have = read(), world.vertices, world.triangles
+            else:
+                have = before
+            return from_pieces([have[0]], plane, thickness, have[1], have[2]), have
+
+        def then(found: tuple[Section, World]) -> None:
+            first = self._read is None
+            self.section, self._read = found
+            self._show()
+            if first:
+                self.to_middle()
+
+        self.runner.run(LANE, "section", work, then)
+
+    def write(self, path: Path) -> None:
+        """InputError: there is nothing, or the file cannot be written."""
+        if self.section is None:
+            raise InputError("there is no section yet")
+        write_section(self.section, path)
+        self.session.message.emit("info", f"Wrote {path}")
+
+    def _show(self) -> None:
+        made = self.section
+        assert made is not None
+        gap = np.full((1, 2), np.nan)
+        lines = np.concatenate([gap, *(piece for line in made.true for piece in (1e3 * line, gap))])
+        self.truth.setData(*lines.T, connect="finite")
+        self.dots.setData(*(1e3 * made.measured[:, :2]).T)
+        self.plot.enableAutoRange()
+        self.told.setText(f"{len(made.true)} lines of the true part, {len(made.measured)} points within the slab")
+        self.export.setEnabled(bool(made.true) or len(made.measured) > 0)
+
+    def _another_normal(self) -> None:
+        self.form.setRowVisible(self.normals, self.normal.currentData() is None)
+        self._rest.start()
+
+    def _repaint(self) -> None:
+        self.view.setBackground(theme.colours().base)
+        plots.paint(self.plot)
+
+    def _ask(self) -> None:
+        start = f"{self.session.project.name.replace('/', '-')} section.dxf"
+        chosen, kind = QFileDialog.getSaveFileName(self.window(), "Export", start, FILES)
+        if not chosen:
+            return
+        path = Path(chosen)
+        if path.suffix.lower() not in (".dxf", ".csv"):
+            path = path.with_name(path.name + (".csv" if "csv" in kind else ".dxf"))
+        try:
+            self.write(path)
+        except InputError as error:
+            show_trouble(self.window(), trouble(error, "export the section"))
+
+    def _lay_out(self) -> None:
+        self.form = QFormLayout()
+        self.normals = _row(self.own)
+        self.form.addRow("Plane", self.normal)
+        self.form.addRow("Normal", self.normals)
+        self.form.addRow("Through", _row(self.through))
+        self.form.addRow("Slab", self.thickness)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.middle)
+        buttons.addWidget(self.export)
+        buttons.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(8, 8, 8, 8)
+        column.addLayout(self.form)
+        column.addLayout(buttons)
+        column.addWidget(self.view, 1)
+        column.addWidget(self.told)
+
+
+def _box(low: float, high: float, value: float, suffix: str) -> QDoubleSpinBox:
+    box = QDoubleSpinBox()
+    box.setRange(low, high)
+    box.setDecimals(3)
+    box.setSuffix(suffix)
+    box.setValue(value)
+    box.setMinimumWidth(48)
+    return box
+
+
+def _row(boxes: list[QDoubleSpinBox]) -> QWidget:
+    held = QWidget()
+    row = QHBoxLayout(held)
+    row.setContentsMargins(0, 0, 0, 0)
+    for box in boxes:
+        row.addWidget(box, 1)
+    return held

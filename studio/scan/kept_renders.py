@@ -1,0 +1,150 @@
+"""Renders kept with the project: in its folder, by their names, with settings, figures and every bit of their light.
+
+PROJECT'S FOLDER/renders/NAME/  render.exr, render.json, project.json, and kept.json, which is written last
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from render.base.errors import InputError
+from render.base.files import atomic_write
+from render.frame import Frame
+from render.output.frame_files import read_frame, write_frame
+from studio.project.date_and_time import now
+from studio.project.input_files import check_unchanged, input_hashes
+from studio.project.project import Project
+from studio.project.strict_json import read_object
+from studio.scan.stages import Measurement
+
+FOLDER, RECORD, STEM, PROJECT = "renders", "kept.json", "render", "project.json"
+FORMAT, VERSION = "blazer-render", 1
+FIGURES = {
+    "Depth RMSE": "µm",
+    "Depth bias": "µm",
+    "Depth sigma": "µm",
+    "Off the surface, RMSE": "µm",
+    "Line RMSE": "px",
+    "Completeness": "%",
+}
+"""Name -> unit, as they are shown."""
+MOST_KEPT = 500
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A render as a row of the table."""
+
+    name: str
+    created: str
+    project: Project
+    """As it was rendered, at its image scale."""
+    image_scale: float
+    """Of the image, to the scanner's."""
+    figures: dict[str, float]
+    """By the names of `FIGURES`, in their units; NaN or missing: not measured."""
+    folder: Path | None = None
+    """None: it is in this session alone."""
+
+
+def figures_of(found: Sequence[Measurement]) -> dict[str, float]:
+    """Of a frame's measurements by one method, all its lasers together: root of the mean squares, mean of the rest."""
+    if not found:
+        return {}
+
+    def mean(values: list[float]) -> float:
+        known = [value for value in values if math.isfinite(value)]
+        return sum(known) / len(known) if known else math.nan
+
+    def root(values: list[float]) -> float:
+        return math.sqrt(mean([value**2 for value in values]))
+
+    errors = [one.errors for one in found]
+    return {
+        "Depth RMSE": 1e6 * root([one.depth_z.rmse for one in errors]),
+        "Depth bias": 1e6 * mean([one.depth_z.bias for one in errors]),
+        "Depth sigma": 1e6 * root([one.depth_z.sigma for one in errors]),
+        "Off the surface, RMSE": 1e6 * root([one.surface.rmse for one in errors]),
+        "Line RMSE": root([one.u.rmse for one in errors]),
+        "Completeness": 100.0 * mean([one.completeness for one in errors]),
+    }
+
+
+def keep(root: Path, what: Kept, frame: Frame) -> Kept:
+    """Write a render below the project's folder; gives it with its folder.
+
+    root: the project's folder, where its meshes are. InputError: the name is empty, or files cannot be written.
+    """
+    stem = re.sub(r"[^\w \-.]+", "_", what.name).strip(" .")[:80]
+    if not stem:
+        raise InputError("a render that is kept needs a name", cure="name it first")
+    folder, number = root / FOLDER / stem, 1
+    while folder.exists():
+        number += 1
+        folder = root / FOLDER / f"{stem} {number}"
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise InputError("the folder cannot be made", where=str(folder), found=error.strerror or error) from error
+    write_frame(folder, STEM, frame, None, what.project.scene, sensor=what.project.sensor)
+    with atomic_write(folder / PROJECT) as temporary:
+        temporary.write_text(what.project.to_text(), encoding="utf-8")
+    created = what.created or now()
+    record = {
+        "format": FORMAT,
+        "format_version": VERSION,
+        "name": what.name,
+        "created": created,
+        "image_scale": what.image_scale,
+        "figures": {name: value if math.isfinite(value) else None for name, value in what.figures.items()},
+        "inputs": input_hashes(what.project.scene, root),
+    }
+    with atomic_write(folder / RECORD) as temporary:
+        temporary.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return Kept(what.name, created, what.project, what.image_scale, what.figures, folder)
+
+
+def kept_renders(root: Path) -> tuple[list[Kept], list[str]]:
+    """Those of a project's folder in the order of their making, and what is wrong with others there."""
+    found, wrong = [], []
+    for record in sorted((root / FOLDER).glob(f"*/{RECORD}"))[:MOST_KEPT]:
+        try:
+            found.append(_read(record))
+        except InputError as error:
+            wrong.append(str(error))
+    return sorted(found, key=lambda one: one.created), wrong
+
+
+def open_kept(kept: Kept, root: Path) -> Frame:
+    """The light of a kept render, bit for bit. InputError: it is not there, damaged, or a mesh has changed since."""
+    if kept.folder is None:
+        raise InputError("the render was not kept", where=kept.name)
+    record = read_object(kept.folder / RECORD, "kept render")
+    inputs = record.get("inputs")
+    cure = "restore the files, or render again"
+    check_unchanged(inputs if isinstance(inputs, dict) else {}, kept.project.scene, root, cure=cure)
+    return read_frame(kept.folder / f"{STEM}.json")
+
+
+def _read(path: Path) -> Kept:
+    record: dict[str, Any] = read_object(path, "kept render")
+    if record.get("format") != FORMAT or record.get("format_version") != VERSION:
+        raise InputError("not a kept render of this version", where=str(path))
+    name, created, scale, figures = (record.get(key) for key in ("name", "created", "image_scale", "figures"))
+    if not (isinstance(name, str) and isinstance(created, str) and isinstance(figures, dict)):
+        raise InputError("a damaged kept render", where=str(path))
+    if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0.01 <= scale <= 4.0:
+        raise InputError("a damaged kept render", where=str(path))
+    numbers = {
+        key: float(value) if isinstance(value, int | float) else math.nan
+        for key, value in figures.items()
+        if key in FIGURES
+    }
+    project = Project.load(path.parent / PROJECT)
+    return Kept(name, created, project, float(scale), numbers, path.parent)

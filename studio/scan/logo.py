@@ -1,0 +1,37 @@
+"""The logo of a report: an image of the project's folder as it stands in the page. Qt-free."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from analysis.report.style import image_uri
+from render.base.errors import InputError
+from render.base.files import inside, read_bytes
+
+MOST_BYTES = 16 * 2**20
+WIDEST, TALLEST = 640, 240
+"""px in the page."""
+MOST_PIXELS = 50_000_000
+
+
+def logo_uri(name: str, root: Path) -> tuple[str, str]:
+    """data: URI of a PNG, and why there is none; both empty: no logo is named. What is transparent becomes white."""
+    if not name:
+        return "", ""
+    from PIL import Image
+
+    try:
+        data = read_bytes(inside(root, name, "delivery.logo"), MOST_BYTES, "logo")
+        opened = Image.open(io.BytesIO(data), formats=("PNG", "JPEG"))
+        if opened.width * opened.height > MOST_PIXELS:
+            raise ValueError(f"it has {opened.width} x {opened.height} px")
+        whole = opened.convert("RGBA")
+        whole.thumbnail((WIDEST, TALLEST), Image.Resampling.LANCZOS)
+        ground = Image.new("RGBA", whole.size, "white")
+        ground.alpha_composite(whole)
+        return image_uri(np.asarray(ground.convert("RGB"))), ""
+    except (InputError, OSError, ValueError, SyntaxError) as error:
+        return "", f"The logo {name} is not shown: {error}."

@@ -1,0 +1,70 @@
+"""Renders side by side: their figures with the differences from the first, and the settings in which they differ."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.report.units import digits
+from render.base.files import atomic_write
+from studio.scan.kept_renders import FIGURES, Kept
+from studio.study.changes import changes
+
+NONE = "-"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table: what it is of, and a text for each render."""
+
+    label: str
+    cells: tuple[str, ...]
+    measured: bool
+    """A figure, not a setting."""
+
+
+def side_by_side(renders: Sequence[Kept]) -> list[Row]:
+    """Figures first: "12.3 (-4.5)" is 4.5 less than the first render's; then every setting that is not the same."""
+    if not renders:
+        return []
+    first = renders[0]
+    scales = tuple(f"{one.image_scale:.3g}" for one in renders)
+    rows = [Row("Image scale", scales, False)] if len(set(scales)) > 1 else []
+    for name, unit in FIGURES.items():
+        values = [one.figures.get(name, math.nan) for one in renders]
+        if not any(map(math.isfinite, values)):
+            continue
+        cells = [_cell(value, values[0] if k else math.nan) for k, value in enumerate(values)]
+        rows.append(Row(f"{name} / {unit}", tuple(cells), True))
+    labels: dict[str, str] = {}
+    found: list[dict[str, tuple[str, str]]] = []
+    for one in renders:
+        differing = {change.field: change for change in changes(first.project, one.project)}
+        labels |= {field: change.label for field, change in differing.items()}
+        found.append({field: (change.a, change.b) for field, change in differing.items()})
+    for field, label in labels.items():
+        if field == "name":
+            continue
+        own = next(each[field][0] for each in found if field in each)
+        rows.append(Row(label, tuple(each[field][1] if field in each else own for each in found), False))
+    return rows
+
+
+def write_table(path: Path, renders: Sequence[Kept], rows: Sequence[Row]) -> None:
+    """As CSV. InputError: the file cannot be written."""
+    with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["", *(one.name for one in renders)])
+        writer.writerows([row.label, *row.cells] for row in rows)
+
+
+def _cell(value: float, first: float) -> str:
+    if not math.isfinite(value):
+        return NONE
+    if not math.isfinite(first):
+        return digits(value)
+    change = value - first
+    return f"{digits(value)} ({'+' if change > 0.0 else ''}{digits(change, 2)})"

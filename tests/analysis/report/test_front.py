@@ -1,0 +1,88 @@
+"""The pages for a customer: who, what, the verdict that follows from tolerances, and nothing where nobody is named."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from analysis.report.delivery import Delivery
+from analysis.report.front import front
+from analysis.report.model import ReportInput
+from analysis.report.write import render_page
+from tests.analysis.report.test_report import make_report
+
+
+def handed(**fields: Any) -> ReportInput:
+    return replace(make_report(), delivery=Delivery(**fields))
+
+
+def told(report: ReportInput) -> dict[str, Any]:
+    found = front(report)
+    assert found is not None
+    return found
+
+
+def gauge(verdict: str | None, reason: str = "") -> dict[str, Any]:
+    numbers = dict.fromkeys(("value", "sigma", "error", "error_in_sigmas"), 1e-3)
+    tolerance = {"nominal": 1e-3, "lower": -1e-4, "upper": 1e-4}
+    return {
+        "name": "Height", "kind": "step", "unit": "m", "step": 0, "readings": 1, "verdict": verdict, "reason": reason,
+        **numbers, **tolerance,
+    }  # fmt: skip
+
+
+def test_a_report_for_nobody_has_no_such_pages() -> None:
+    assert front(make_report()) is None
+    page = render_page(make_report())
+    assert "Measurement report" not in page and "Annex" not in page
+
+
+def test_the_pages_hold_what_was_said_once_and_as_text() -> None:
+    said = {"customer": "Ada <b> & Sons", "author": "B. Maker", "part_number": "P-17", "order_number": "4711"}
+    page = render_page(handed(**said, text="First line.\nSecond line."))
+    body = re.sub(r'src="data:[^"]*"', "", page)
+    for value in ("Ada &lt;b&gt; &amp; Sons", "B. Maker", "P-17", "4711", "First line.", "Second line."):
+        assert body.count(value) == 1, value
+    assert body.index("Measurement report") < body.index("Where the part deviates") < body.index("How it was measured")
+    assert body.index("How it was measured") < body.index("Annex: reconstruction report")
+    assert body.count("Worth noticing") == 1
+    # without a tolerance there is no verdict to be found
+    assert "No tolerance was given" in body
+
+
+@pytest.mark.parametrize(
+    ("limits", "verdict"),
+    [((-0.2, 0.2), "pass"), ((-1e-7, 1e-7), "undecided"), ((0.2, 0.4), "fail")],
+)
+def test_the_surface_s_tolerance_decides(limits: tuple[float, float], verdict: str) -> None:
+    """The wall's points scatter by millimetres about it: within 200 mm all are proved, and within 0.1 um none."""
+    found = told(handed(lower=limits[0], upper=limits[1]))
+    assert found["verdict"] in ((verdict, "fail") if verdict == "undecided" else (verdict,))
+    assert found["rule"]
+
+
+def test_the_worst_measure_decides() -> None:
+    report = handed(customer="Ada")
+    for verdicts, expected in (
+        (("pass", "pass"), "pass"),
+        (("pass", "undecided"), "undecided"),
+        (("undecided", "fail"), "fail"),
+        ((None, "pass"), "undecided"),
+    ):
+        rows = tuple(gauge(one, "" if one else "no points") for one in verdicts)
+        assert told(replace(report, measures=rows))["verdict"] == expected
+
+
+def test_a_tolerance_has_two_limits_in_order() -> None:
+    for fields in ({"lower": 0.0}, {"lower": 1e-3, "upper": -1e-3}):
+        with pytest.raises(ValidationError):
+            Delivery(**fields)
+
+
+def test_a_scan_without_points_is_told_of_as_well() -> None:
+    report = replace(make_report(found=False), delivery=Delivery(customer="Ada", lower=-1e-3, upper=1e-3))
+    assert told(report)["verdict"] == "undecided" and "Ada" in render_page(report)

@@ -1,0 +1,55 @@
+"""The table of renders: those of the session and those kept, which open again with the light that they had."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from render.base.errors import InputError
+from studio.project.document import Document
+from studio.qt.core.session import Render, Session
+from studio.qt.render.history import History, title
+from studio.qt.render.render_table import keep_render
+from tests.studio.qt.small_session import small_project, small_render
+
+
+def test_a_render_is_kept_found_again_and_opened(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "project.json"
+    project = small_project().save(file)
+    session = Session(Document(project, file))
+    history = History(session)
+    qtbot.addWidget(history)
+    history.show()
+    world, frame = small_render()
+    bits = session.project.replaced({"sensor.bits": 10})
+    session.add_render(Render(1, project, world, frame))
+    session.add_render(Render(2, bits, world, frame, name="ten bits"))
+    kept = keep_render(session, session.renders[1], title(session.renders[1]))
+    assert kept.folder == tmp_path / "renders" / "ten bits"
+    table = history.open_table()
+    headers = [table.table.horizontalHeaderItem(i).text() for i in range(table.table.columnCount())]  # type: ignore[union-attr]
+    assert [text.split("\n")[0] for text in headers] == ["Render 1", "ten bits", "ten bits"]
+    assert [row.cells[0] != row.cells[1] for row in table.rows] == [True]
+    table.table.setCurrentCell(0, 0)
+    assert not table.open_button.isEnabled()
+    table.table.setCurrentCell(0, 2)
+    assert table.open_button.isEnabled()
+    table.open_button.click()
+    assert len(session.renders) == 3 and session.shown is session.renders[2]
+    assert session.shown.name == "ten bits" and np.array_equal(
+        session.shown.frame.laser_direct[0], frame.laser_direct[0]
+    )
+    assert session.shown.project.sensor.bits == 10
+    table.write(tmp_path / "table.csv")
+    assert (tmp_path / "table.csv").read_text().startswith(",Render 1,ten bits,ten bits")
+    table.close()
+
+
+def test_a_project_without_a_file_keeps_nothing(qtbot: QtBot) -> None:
+    session = Session(Document(small_project()))
+    world, frame = small_render()
+    with pytest.raises(InputError, match="no folder"):
+        keep_render(session, Render(1, small_project(), world, frame), "one")

@@ -1,0 +1,102 @@
+"""Deviation and section in the window: what is shown is what the commands write."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QMessageBox
+from pytestqt.qtbot import QtBot
+
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Session
+from studio.qt.results.nominal_panel import NominalPanel
+from studio.scan.deviation import Question, compared
+from studio.scan.scan_folder import open_folder
+from tests.studio.scan_of_steps import small_scan
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return small_scan(tmp_path_factory.mktemp("steps"))
+
+
+@pytest.fixture
+def session(scanned: tuple[Path, Path], qtbot: QtBot) -> Iterator[Session]:
+    file, folder = scanned
+    made = Session(Document(Project.load(file), file))
+    steps = scan_steps(made)
+    steps.show(open_folder(folder))
+    qtbot.waitUntil(lambda: made.shown is not None)
+    yield made
+    steps.close()
+
+
+@pytest.fixture
+def panel(session: Session, qtbot: QtBot) -> Iterator[NominalPanel]:
+    runner = JobRunner()
+    made = NominalPanel(session, runner)
+    qtbot.addWidget(made)
+    made.resize(420, 700)
+    made.show()
+    yield made
+    runner.close()
+
+
+def test_the_figures_are_those_of_the_command(
+    panel: NominalPanel, scanned: tuple[Path, Path], tmp_path: Path, qtbot: QtBot
+) -> None:
+    tab = panel.deviation
+    assert not tab.export.isEnabled()
+    tab.alignment.setCurrentIndex(tab.alignment.findData("best-fit"))
+    tab.least.setValue(-700.0)
+    tab.most.setValue(700.0)
+    tab.compare_button.click()
+    qtbot.waitUntil(lambda: tab.compared is not None)
+    expected = compared(scanned[1], Question(alignment="best-fit", lower=-7e-4, upper=7e-4))
+    assert tab.compared is not None and tab.compared.record == expected.record
+    assert not tab.map.pixmap().isNull() and "best-fit" in tab.told.text() and tab.export.isEnabled()
+    tab.write(tmp_path / "d.csv")
+    with open(tmp_path / "d.csv", newline="") as file:
+        assert len(list(csv.DictReader(file))) == expected.record["points"]
+
+
+def test_spots_that_are_no_places_are_told(panel: NominalPanel) -> None:
+    tab = panel.deviation
+    assert not tab.spots.isVisible()
+    tab.alignment.setCurrentIndex(tab.alignment.findData("3-2-1"))
+    assert tab.spots.isVisible()
+    tab.spots.setText("1,2; 3,4,5")
+    tab.compare_button.click()
+    box = tab.window().findChild(QMessageBox, "trouble")
+    assert box is not None and tab.compared is None
+    box.close()
+
+
+def test_a_section_follows_its_plane_and_is_written(panel: NominalPanel, tmp_path: Path, qtbot: QtBot) -> None:
+    tab = panel.section
+    panel.show_tab(tab)
+    qtbot.waitUntil(lambda: tab.section is not None)
+    # begins in the middle of the points
+    qtbot.waitUntil(lambda: tab.section is not None and len(tab.section.measured) > 0)
+    tab.thickness.setValue(6.0)
+    for box, value in zip(tab.through, (0.0, 0.0, 0.0), strict=True):
+        box.setValue(value)
+    qtbot.waitUntil(lambda: tab.section is not None and tab.section.plane.point == (0.0, 0.0, 0.0))
+    made = tab.section
+    assert made is not None and made.true
+    x, _ = tab.truth.getData()
+    assert np.nanmax(x) == pytest.approx(1e3 * max(line[:, 0].max() for line in made.true))
+    tab.write(tmp_path / "cut.dxf")
+    assert (tmp_path / "cut.dxf").read_text().startswith("999\nBlazer Studio\n")
+    tab.normal.setCurrentIndex(tab.normal.count() - 1)
+    assert tab.own[0].isVisible()
+    for box in tab.own:
+        box.setValue(0.0)
+    qtbot.waitUntil(lambda: "direction" in tab.told.text())

@@ -1,0 +1,51 @@
+"""Renders side by side: what differs stands in a row, what is alike does not, and figures carry their difference."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+from studio.project.project import Project
+from studio.scan.kept_renders import Kept
+from studio.study.side_by_side import side_by_side, write_table
+
+
+def renders() -> list[Kept]:
+    one = Project.load("plane")
+    two = one.replaced({"sensor.bits": 10, "scene.rig.lasers[0].power": 0.05})
+    three = one.replaced({"scene.rig.lasers[0].power": 0.01, "name": "renamed"})
+    figures = ({"Depth RMSE": 20.0}, {"Depth RMSE": 15.5, "Line RMSE": 0.1}, {})
+    return [
+        Kept(str(i), "", each, 1.0, shown)
+        for i, (each, shown) in enumerate(zip((one, two, three), figures, strict=True))
+    ]
+
+
+def test_figures_have_their_difference_and_only_settings_that_differ_a_row() -> None:
+    rows = side_by_side(renders())
+    by_label = {row.label: row.cells for row in rows}
+    assert by_label["Depth RMSE / µm"] == ("20.0", "15.5 (-4.5)", "-")
+    assert by_label["Line RMSE / px"] == ("-", "0.100", "-")
+    bits = next(cells for label, cells in by_label.items() if label.startswith("Sensor") and "10" in cells)
+    assert bits[0] == bits[2] != bits[1]
+    (power,) = [cells for label, cells in by_label.items() if label.endswith(": Power")]
+    assert power == ("20 mW", "50 mW", "10 mW")
+    assert [row.measured for row in rows] == [True, True, False, False]
+    assert not any(row.label == "Name" for row in rows)
+
+
+def test_alike_renders_have_figures_alone_and_none_have_none() -> None:
+    one = renders()[0]
+    assert [row.measured for row in side_by_side([one, one])] == [True]
+    assert side_by_side([]) == []
+
+
+def test_renders_of_another_scale_say_so(tmp_path: Path) -> None:
+    one, *_ = renders()
+    small = Kept("small", "", one.project, 0.25, {"Depth RMSE": math.nan})
+    rows = side_by_side([one, small])
+    assert rows[0].label == "Image scale" and rows[0].cells == ("1", "0.25")
+    write_table(tmp_path / "t.csv", [one, small], rows)
+    with open(tmp_path / "t.csv", newline="", encoding="utf-8") as file:
+        assert list(csv.reader(file))[:2] == [["", "0", "small"], ["Image scale", "1", "0.25"]]
