@@ -101,4 +101,16 @@ def film(folder: Path, **options: Any) -> None:
     make_film(folder, **options)
 
 
-COMMANDS = (heightmap, deviation, section, film)
+@click.command()
+@FOLDER
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="PLY, CSV, PCD, XYZ, LAS, E57: by its end.")
+@common
+def points(folder: Path, **options: Any) -> None:
+    """The points of a scan in the format of another program; LAS and E57 need the extra "points"."""
+    require_system()
+    from studio.commands.points import convert_points
+
+    convert_points(folder, **options)
+
+
+COMMANDS = (heightmap, deviation, section, film, points)

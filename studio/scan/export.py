@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.cloud import Cloud, cloud, merge, write_csv, write_ply
+from analysis.cloud_formats import WRITERS, write_points
 from analysis.report.record import ScanRecord, record_of
 from render.base.errors import Cancelled, InputError
 from render.base.files import atomic_write
@@ -120,10 +121,13 @@ def export_image(path: Path, what: Exported) -> list[Path]:
 
 
 def export_points(path: Path, what: Exported) -> list[Path]:
-    """.ply or .csv, by the suffix: the points of all lasers by the project's method."""
+    """.ply, .csv or one of `cloud_formats`, by the suffix: the points of all lasers by the project's method."""
     _spare_inputs(what, [path])
-    write = write_csv if path.suffix.lower() == ".csv" else write_ply
-    write(path, merge(point_clouds(what)))
+    points, suffix = merge(point_clouds(what)), path.suffix.lower()
+    if suffix in WRITERS:
+        write_points(path, points)
+    else:
+        (write_csv if suffix == ".csv" else write_ply)(path, points)
     return [path]
 
 

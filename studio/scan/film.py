@@ -20,6 +20,7 @@ from render.run import never
 from studio.scan.height_map import points_of
 from studio.scan.own_files import FILM_TITLE, check_replaceable
 from studio.scan.scan_folder import ScanFolder, check_kept, open_folder
+from studio.scan.scan_results import ScanResults
 
 HEIGHT = 720
 """px of the film."""
@@ -29,6 +30,8 @@ STRIP = 40
 """px below the pictures, for what is told."""
 FONT = 0.5
 NEEDED = ("x", "y", "error_depth", "step")
+RATE = 10.0
+"""Steps a second, where nobody asks for others."""
 CODEC = "mp4v"
 
 
@@ -83,6 +86,14 @@ def write_film(
                 film.release()
             part.unlink(missing_ok=True)
     return len(images)
+
+
+def export_film(scan: ScanResults | None, path: Path, _: object = None) -> list[Path]:
+    """Of the whole scan that a frame is a step of. InputError: it is of none, or as `write_film`."""
+    if scan is None:
+        raise InputError("a single frame is no film", cure="run the scan, or open the results of one")
+    write_film(scan.found.folder, path, RATE)
+    return [path]
 
 
 class _Growing:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from analysis.cloud import UNITS, title
+from analysis.cloud_formats import MADE_BY
 from render.base.errors import InputError
 
 HEAD = 64 * 1024
@@ -116,6 +117,10 @@ def is_own(path: Path) -> bool:
         return head.startswith(EXR_MAGIC) and EXR_LAYERS.search(head) is not None
     if suffix == ".html":
         return b'<meta name="generator" content="Blazer Studio">' in head
+    if suffix in (".pcd", ".las"):
+        return MADE_BY.encode() in head[:400]
+    if suffix == ".e57":
+        return MADE_BY.encode() in _tail(path)
     if suffix == ".mp4":
         return FILM_TITLE in _tail(path)
     if suffix == ".dxf":

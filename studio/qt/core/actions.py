@@ -53,8 +53,15 @@ COMMANDS: tuple[Command | str, ...] = (
     "File/Export/-",
     Command("export_exr", "File/Export", "&Frame as EXR…", "", "", "Radiance of every light group, with the truth"),
     Command("export_png", "File/Export", "&Image as PNG…", "", "", "As the sensor sees it"),
-    Command("export_ply", "File/Export", "&Points as PLY…", "", "", "With error and scan line as attributes"),
+    Command(
+        "export_ply", "File/Export", "&Points as PLY…", "Ctrl+Shift+E", "", "With error and scan line as attributes"
+    ),
     Command("export_csv", "File/Export", "Points as &CSV…", "", "", "A table for a spreadsheet"),
+    Command("export_pcd", "File/Export", "Points as PC&D…", "", "", "For PCL and CloudCompare"),
+    Command("export_xyz", "File/Export", "Points as &XYZ…", "", "", "Coordinates alone, a line a point"),
+    Command("export_las", "File/Export", "Points as &LAS…", "", "", 'With the extra "points": laspy'),
+    Command("export_e57", "File/Export", "Points as &E57…", "", "", 'With the extra "points": pye57'),
+    Command("export_film", "File/Export", "Fil&m of the scan…", "", "", "MP4: image and points, step by step"),
     Command("export_heightmap", "File/Export", "&Height map of the scan…", "", "", "16 bit, with its scale beside it"),
     "File/Export/-",
     Command("screenshot", "File/Export", "&Screenshot of the window…", "Ctrl+Shift+P", "picture"),

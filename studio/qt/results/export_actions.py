@@ -19,6 +19,7 @@ from studio.qt.core.session import Render, Session
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress
 from studio.runtime.preferences import PreferencesFile
+from studio.scan.film import export_film
 from studio.scan.height_map import export_height_map
 from studio.scan.own_files import check_replaceable
 from studio.scan.redevelop import Development, develop_again, development, measure_again
@@ -34,6 +35,11 @@ KINDS = {
     "export_png": ("PNG image (*.png)", ".png", "image"),
     "export_ply": ("PLY points (*.ply)", ".ply", "points"),
     "export_csv": ("CSV table (*.csv)", ".csv", "points"),
+    "export_pcd": ("PCD points (*.pcd)", ".pcd", "points"),
+    "export_xyz": ("XYZ points (*.xyz)", ".xyz", "points"),
+    "export_las": ("LAS points (*.las)", ".las", "points"),
+    "export_e57": ("E57 points (*.e57)", ".e57", "points"),
+    "export_film": ("Film (*.mp4)", ".mp4", "film"),
     "export_heightmap": ("Height map, 16 bit (*.png)", ".png", "height map"),
 }
 """Command -> filter of the file dialog, suffix, what it is."""
@@ -105,12 +111,15 @@ class ExportActions(QObject):
             "image": export.export_image,
             "points": export.export_points,
             "height map": partial(export_height_map, render.scan),
+            "film": partial(export_film, render.scan),
         }
         writer = writers[kind]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
             progress(path.name, 0.0)  # how far it is, nobody knows
-            what = shown if current or kind in ("frame", "height map") else _measured(shown, how, noise, cancelled)
+            what = (
+                shown if current or kind in ("frame", "height map", "film") else _measured(shown, how, noise, cancelled)
+            )
             if kind == "height map":  # nobody was asked about the file beside the picture
                 check_replaceable([path.with_suffix(".json")])
             return export.export_unless(cancelled, writer, path, what)
@@ -150,6 +159,8 @@ class ExportActions(QObject):
 
 def _is_there(what: str, render: Render) -> bool:
     """What is exported of a render can be had."""
+    if what == "film":
+        return render.scan is not None
     if what == "height map":
         return render.scan is not None and render.scan.measured
     return what == "frame" or bool(render.images if what == "image" else render.measurements)

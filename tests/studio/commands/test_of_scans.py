@@ -174,11 +174,22 @@ def test_a_film_has_every_step_and_lasts_as_long_as_was_asked(scan: Path) -> Non
         ("section", "--through", "0,0,0", "--normal", "1,0,0", "--out", "x.dwg"),
         ("film", "--out", "x.avi"),
         ("film", "--rate", "0"),
+        ("points", "--out", "points.dat"),
     ],
 )
 def test_bad_input_is_one_message(made: Path, arguments: tuple[str, ...]) -> None:
     done = call(arguments[0], made, *arguments[1:], "--json")
     assert done.exit_code == 2 and json.loads(done.stdout)["ok"] is False
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".csv", ".pcd", ".las", ".e57"])
+def test_points_go_into_other_formats_and_replace_their_own(scan: Path, suffix: str) -> None:
+    out = scan / f"other{suffix}"
+    for _ in range(2):
+        record = told("points", scan, "--out", out)
+    assert record["points"] == len(read_ply(scan / "points.ply")["x"]) and out.stat().st_size > 100
+    out.write_text("mine")
+    assert call("points", scan, "--out", out).exit_code == 2
 
 
 def test_files_of_others_are_not_replaced(scan: Path) -> None:
