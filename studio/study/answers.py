@@ -19,7 +19,7 @@ from studio.study.bounds import Bound, bounds
 from studio.study.cells import Point, along, methods_of, search_of, searched
 from studio.study.edges import Edge, edges_of
 from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
-from studio.study.measures import MEASURES
+from studio.study.measures import measure_of
 from studio.study.ray_units import RAY_SPEED, Throughput, throughput
 from studio.study.store import Row
 from studio.study.study import Study, Sweep, with_fields
@@ -91,7 +91,7 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
     errors = [values_of(found, sweep.measure) for found in groups.values()]
     times = [seconds_of(found, sweep.time) for found in groups.values()]
     units = [rays_of(found, sweep.time) for found in groups.values()]
-    interval = mean_interval if MEASURES[sweep.measure].signed else positive_interval
+    interval = mean_interval if measure_of(sweep.measure).signed else positive_interval
     spots = tuple(
         Spot(point, method, interval(error), _median(time[np.isfinite(error)]), _median(unit[np.isfinite(error)]))
         for (point, method), error, time, unit in zip(groups, errors, times, units, strict=True)

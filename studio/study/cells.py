@@ -17,7 +17,7 @@ from analysis.study.breakdown import Search, next_values
 from render.base.errors import InputError
 from studio.project.project import MAX_SEED, Project
 from studio.study.effects import in_state
-from studio.study.study import EFFECTS_FIELD, MOST_CELLS, SEARCHES, Study, Sweep, Value, with_fields
+from studio.study.study import EFFECTS_FIELD, MOST_CELLS, SEARCHES, Study, Sweep, Value, check_part, with_fields
 
 Point = tuple[Value, ...]
 """One value for each parameter of a sweep."""
@@ -115,6 +115,8 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
     """The cells of one sweep at some points. InputError: a field or value that the project does not allow."""
     sweep = study.sweeps[number]
     base = bases[sweep.base or study.base]
+    for name in {sweep.measure, *([] if sweep.limit is None else [sweep.limit.measure])}:
+        check_part(name, base, f"sweeps[{number}]")
     where = f"sweep {sweep.name!r}"
     for point in wanted:
         values = {**study.set, **sweep.set, **{p.field: v for p, v in zip(sweep.vary, point, strict=True)}}

@@ -14,7 +14,7 @@ from studio.study.answers import Answer, Spot
 from studio.study.boundary_chart import DASHES, draw_edges
 from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
-from studio.study.measures import MEASURES, Measure
+from studio.study.measures import Measure, measure_of
 from studio.study.ray_units import MILLION, Throughput
 from studio.study.study import Parameter, Value
 
@@ -43,7 +43,7 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
 
 def places(answer: Answer) -> np.ndarray:
     """(spots, 2) where each spot stands in the chart's own units; NaN: it is not drawn."""
-    sweep, scale, spots = answer.sweep, MEASURES[answer.sweep.measure].scale, answer.spots
+    sweep, scale, spots = answer.sweep, measure_of(answer.sweep.measure).scale, answer.spots
     if sweep.chart == "map":
         found = [(*spot.point, spot.method == spots[0].method) for spot in spots]
         return np.array([(x, y) if drawn else (math.nan, math.nan) for x, y, drawn in found], dtype=np.float64)
@@ -92,7 +92,7 @@ def _axis_label(measure: Measure) -> str:
 
 def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     """A measure over the first parameter, a line for each method and each combination of the others."""
-    sweep, measure = answer.sweep, MEASURES[answer.sweep.measure]
+    sweep, measure = answer.sweep, measure_of(answer.sweep.measure)
     series: dict[tuple[Any, ...], list[Spot]] = {}
     for spot in answer.spots:
         series.setdefault((spot.method, *spot.point[1:]), []).append(spot)
@@ -137,7 +137,7 @@ def _vertical(axes: Any, answer: Answer) -> None:
 
 def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     """Error over seconds on logarithmic axes; what nothing beats is joined, the knee is ringed and named."""
-    measure = MEASURES[answer.sweep.measure]
+    measure = measure_of(answer.sweep.measure)
     methods = list(dict.fromkeys(spot.method for spot in answer.spots))
     named = len(methods) > MOST_IN_LEGEND
     varied = len({spot.point for spot in answer.spots}) > 1
@@ -213,7 +213,7 @@ def _map(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     """A measure over two parameters, of the first method, with the limit as a line where there is one."""
     import matplotlib.colors
 
-    sweep, measure = answer.sweep, MEASURES[answer.sweep.measure]
+    sweep, measure = answer.sweep, measure_of(answer.sweep.measure)
     method = answer.spots[0].method if answer.spots else ""
     spots = [spot for spot in answer.spots if spot.method == method]
     x, y = (sorted({float(spot.point[i]) for spot in spots}) for i in (0, 1))  # type: ignore[arg-type]

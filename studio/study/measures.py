@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.error import Errors
+from analysis.gauges.gauge import Gauge
+from analysis.gauges.read import Reading
 from analysis.line.result import Flag, Line, positioned
 from analysis.triangulate import Points
 from render.frame import LaserCurve
@@ -47,6 +50,37 @@ MEASURES: dict[str, Measure] = {
     "depth_per_pixel": Measure("depth of one pixel, median", "µm/px", 1e6),
     "incidence": Measure("angle from the surface's normal, to light or camera, median", "°", 180.0 / np.pi),
 }
+
+PART_MEASURES: dict[str, Measure] = {
+    "length_value": Measure("value", "mm", 1e3, signed=True),
+    "length_error": Measure("error against the truth", "µm", 1e6, signed=True),
+    "length_sigma": Measure("predicted sigma", "µm", 1e6),
+    "angle_value": Measure("value", "°", 180.0 / np.pi, signed=True),
+    "angle_error": Measure("error against the truth", "°", 180.0 / np.pi, signed=True),
+    "angle_sigma": Measure("predicted sigma", "°", 180.0 / np.pi),
+}
+"""Of the project's own measures of the part: "length_error:NAME", or "angle_error:NAME" of an angle."""
+
+
+def measure_of(name: str) -> Measure:
+    """One of MEASURES, or of the part. KeyError: it is neither."""
+    kind, colon, gauge = name.partition(":")
+    if not (colon and gauge):
+        return MEASURES[name]
+    found = PART_MEASURES[kind]
+    return replace(found, label=f"{gauge}, {found.label}")
+
+
+def part_names(gauges: Sequence[Gauge]) -> list[str]:
+    """What a study may ask of a project's measures of the part, in their order."""
+    kinds = ("value", "error", "sigma")
+    return [f"{'angle' if one.kind == 'angle' else 'length'}_{kind}:{one.name}" for one in gauges for kind in kinds]
+
+
+def of_the_part(found: Sequence[Reading]) -> dict[str, float]:
+    """The numbers by those names; NaN where there is none."""
+    numbers = [number for one in found for number in (one.value, one.error, one.sigma)]
+    return dict(zip(part_names([one.gauge for one in found]), numbers, strict=True))
 
 
 def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> dict[str, float]:

@@ -8,12 +8,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from analysis.gauges.read import read
 from render.base.errors import InputError
 from render.base.threads import Cancel
-from studio.notebook.frame import render
-from studio.notebook.measuring import compare, develop, extract, triangulate
+from studio.notebook.frame import RenderedFrame, render
+from studio.notebook.measuring import (
+    ExtractedLine,
+    PointErrors,
+    TriangulatedPoints,
+    compare,
+    develop,
+    extract,
+    triangulate,
+)
 from studio.project.project import Project
-from studio.study.measures import MEASURES, measures
+from studio.scan.gauging import profiles
+from studio.scan.stages import Measurement
+from studio.study.measures import MEASURES, measures, of_the_part
 from studio.study.ray_units import RAY_SPEED, rays_per_second
 
 Row = tuple[str, dict[str, Any], dict[str, float]]
@@ -54,7 +65,9 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
             line = extract(image, settings=project.extraction, threads=1)
             extracted = time.process_time()
             points = triangulate(line)
-            found = measures(line, points, compare(points, frame), frame.curves[task.laser])
+            errors = compare(points, frame)
+            found = measures(line, points, errors, frame.curves[task.laser])
+            found |= _of_the_part(project, frame, line, points, errors)
         except InputError as error:
             rows.append((key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
             continue
@@ -66,6 +79,18 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
         }
         rows.append((key, {**found, "reason": ""}, seconds))
     return rows
+
+
+def _of_the_part(
+    project: Project, frame: RenderedFrame, line: ExtractedLine, points: TriangulatedPoints, errors: PointErrors
+) -> dict[str, float]:
+    """The project's measures of this laser's profile."""
+    gauges = [one for one in project.measures if one.laser == points.laser and one.step in (None, frame.step)]
+    if not gauges or line.image is None:
+        return {}
+    found = Measurement(frame.step, points.laser, line.image, line, points, errors)
+    both = profiles(frame.project, frame, found)
+    return of_the_part([read(gauge, frame.step, *both) for gauge in gauges])
 
 
 def _nothing(reason: str) -> dict[str, Any]:

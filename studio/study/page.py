@@ -19,7 +19,7 @@ from studio.study.bounds import Bound
 from studio.study.budget_table import HEADER, page_rows, sentences_of, write_budgets
 from studio.study.charts import chart, field_label, shown
 from studio.study.labels import field_labels
-from studio.study.measures import MEASURES
+from studio.study.measures import measure_of
 from studio.study.store import Row
 from studio.study.study import Study, Sweep
 
@@ -87,7 +87,7 @@ def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
 
 def _limit_words(sweep: Sweep) -> str:
     assert sweep.limit is not None
-    measure = MEASURES[sweep.limit.measure]
+    measure = measure_of(sweep.limit.measure)
     limit = f"{measure.label} {'below' if sweep.limit.above else 'above'} {sweep.limit.value * measure.scale:.4g}"
     return f"{limit} {measure.unit}".rstrip()
 
@@ -108,7 +108,7 @@ def _bound_sentence(found: Bound, answer: Answer, labels: dict[str, str]) -> str
     pairs = zip(answer.sweep.vary, found.point, strict=True)
     where = ", ".join(f"{field_label(one, labels)} {shown(value)}" for one, value in pairs)
     at = f" at {where}" if len(answer.bounds) > 1 else ""
-    measure = MEASURES[answer.sweep.measure]
+    measure = measure_of(answer.sweep.measure)
     photons = f"{found.photons * measure.scale:.3g} {measure.unit}"
     speckle = "" if found.speckle is None else f", and speckle {found.speckle * measure.scale:.3g} {measure.unit}"
     return f"No method does better{at}: photon and read noise alone leave a depth sigma of {photons}{speckle}."
@@ -150,7 +150,7 @@ def _page_table(answer: Answer) -> list[list[str]]:
 
 def columns(answer: Answer) -> list[str]:
     """Headings of `table`, after those of the fields and the method."""
-    measure = MEASURES[answer.sweep.measure]
+    measure = measure_of(answer.sweep.measure)
     unit = f" ({measure.unit})" if measure.unit else ""
     columns = [f"{measure.label}{unit}", "95 % interval", "repeats", "time (s)", "time (million rays)"]
     return [*columns, "on the front"] if answer.front is not None else columns
@@ -158,7 +158,7 @@ def columns(answer: Answer) -> list[str]:
 
 def table(answer: Answer) -> list[list[str]]:
     """A row for each spot of a chart, as text: its values, method, mean, interval, repeats and seconds."""
-    scale, rows = MEASURES[answer.sweep.measure].scale, []
+    scale, rows = measure_of(answer.sweep.measure).scale, []
     for number, spot in enumerate(answer.spots):
         one = spot.measure
         row: list[Any] = [*map(shown, spot.point), method_name(spot.method), _number(one.mean * scale)]

@@ -20,7 +20,7 @@ from studio.project.project import Project
 from studio.project.ready_made import load_model, names_in
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.study.effects import STATES
-from studio.study.measures import MEASURES
+from studio.study.measures import MEASURES, PART_MEASURES, part_names
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "studies"
 MOST_VALUES, MOST_CELLS, MOST_VARIED, MOST_SWEEPS = 10_000, 1_000_000, 8, 100
@@ -229,11 +229,22 @@ def with_fields(project: Project, values: dict[str, Value], where: str) -> Proje
 
 
 def check_measure(name: str) -> None:
-    """ValueError: no such measure."""
+    """ValueError: no such measure; of the part, `check_part` asks the project."""
+    kind, colon, gauge = name.partition(":")
+    if colon and gauge and kind in PART_MEASURES:
+        return
     if name not in MEASURES:
         near = difflib.get_close_matches(name, MEASURES, n=1)
         cure = f"; did you mean {near[0]}?" if near else ""
         raise ValueError(f"there is no measure {name[:60]!r}; allowed: {', '.join(MEASURES)}{cure}")
+
+
+def check_part(name: str, project: Project, where: str) -> None:
+    """InputError: the measure is of the part, and the project has none of that name and kind."""
+    there = part_names(project.measures)
+    if ":" in name and name not in there:
+        allowed = ", ".join(there) or "none: the project has no measures of the part"
+        raise InputError("the project has no such measure of the part", where=where, found=name, allowed=allowed)
 
 
 def parts_of(path: str) -> list[str | int]:

@@ -16,7 +16,7 @@ import numpy as np
 from render.base.files import atomic_write
 from studio.project.project import Project
 from studio.study.cells import Cell, Point, cells_at, methods_of, points, searched
-from studio.study.measures import MEASURES
+from studio.study.measures import MEASURES, part_names
 from studio.study.ray_units import MILLION, RAY_SPEED
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
@@ -51,9 +51,11 @@ def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows:
     import pyarrow.csv
     import pyarrow.parquet
 
+    asked = {name for base in bases.values() for name in part_names(base.measures)}
+    numbers = [*MEASURES, *sorted(asked)]
     fields = sorted({one.field for sweep in study.sweeps for one in sweep.vary})
     columns: dict[str, list[Any]] = {
-        name: [] for name in ("sweep", "key", "method", "repeat", "seed", *fields, *MEASURES, "reason")
+        name: [] for name in ("sweep", "key", "method", "repeat", "seed", *fields, *numbers, "reason")
     }
     times: dict[str, list[Any]] = {name: [] for name in ("key", *SECONDS, RAY_UNITS)}
     cells = (measured_cells(study, number, bases, rows) for number in range(len(study.sweeps)))
@@ -65,11 +67,17 @@ def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows:
             if name == "seed":
                 column.append(cell.seed)
             else:
-                column.append(said[name] if name in said else values.get(name) if name in fields else row.get(name))
+                column.append(
+                    said[name]
+                    if name in said
+                    else values.get(name)
+                    if name in fields
+                    else row.get(name, math.nan if name in asked else None)
+                )
         for name, column in times.items():
             value = rays_of([row], "frame")[0] if name == RAY_UNITS else row.get(name, math.nan)
             column.append(cell.key if name == "key" else value)
-    tables = {"table": pa.table({k: _typed(v, k in MEASURES) for k, v in columns.items()})}
+    tables = {"table": pa.table({k: _typed(v, k in numbers) for k, v in columns.items()})}
     tables["times"] = pa.table({k: _typed(v, k != "key") for k, v in times.items()})
     written = []
     for name, suffix in (("table", "csv"), ("table", "parquet"), ("times", "csv")):

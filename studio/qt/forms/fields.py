@@ -258,12 +258,20 @@ class ChoiceField(QComboBox):
         self.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(6)
         self.invalid = False
+        self.values: list[Any] = []
+        self.offer(values)
+        self.activated.connect(lambda index: self.entered.emit(self.values[index]))
+
+    def offer(self, values: list[tuple[str, Any, str]]) -> None:
+        """Others to choose from; then the value is to be shown again."""
+        if self.values == [value for _, value, _ in values]:
+            return
+        self.clear()
         self.values = [value for _, value, _ in values]
         for i, (label, _, help) in enumerate(values):
             self.addItem(label)
             if help:
                 self.setItemData(i, help, Qt.ItemDataRole.ToolTipRole)
-        self.activated.connect(lambda index: self.entered.emit(self.values[index]))
 
     @classmethod
     def of(cls, spec: FieldSpec) -> ChoiceField:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, get_args
@@ -33,7 +34,7 @@ from studio.qt.study.field_menu import fill_field_menu
 from studio.qt.study.parameter_row import ParameterRow, kind_of
 from studio.qt.study.study_work import StudyWork
 from studio.study.draft import spec_of
-from studio.study.measures import MEASURES
+from studio.study.measures import MEASURES, measure_of, part_names
 
 SAMPLINGS = [
     ("All combinations", "grid", "Every value of one field with every value of the others"),
@@ -49,10 +50,13 @@ CHARTS = [
 TOLERANCE, SAMPLES = 0.05, 16
 
 
-def measure_choices() -> list[tuple[str, Any, str]]:
+def measure_choices(work: StudyWork, asked: Sequence[str] = ()) -> list[tuple[str, Any, str]]:
+    """Those of every run, the project's own of the part, and what is asked already."""
+    names = dict.fromkeys([*MEASURES, *part_names(work.project().measures), *asked])
+    shown = [(name, measure_of(name)) for name in names]
     return [
         (f"{one.label[:1].upper()}{one.label[1:]}" + (f" ({one.unit})" if one.unit else ""), name, "")
-        for name, one in MEASURES.items()
+        for name, one in shown
     ]
 
 
@@ -87,7 +91,7 @@ class SweepEditor(QWidget):
         self.methods_menu = QMenu(self.methods_button)
         self.methods_button.setMenu(self.methods_menu)
         self.methods = {method: self._method_action(method) for method in get_args(Method)}
-        self.measure, self.limit_of = ChoiceField(measure_choices()), ChoiceField(measure_choices())
+        self.measure, self.limit_of = (ChoiceField(measure_choices(work)) for _ in range(2))
         self.has_limit = QCheckBox("Limit")
         self.has_limit.setToolTip("A bar that a set-up has to keep: a line in the chart, and what a search looks for")
         self.side = ChoiceField([("at most", True, "Broken above"), ("at least", False, "Broken below")])
@@ -120,6 +124,9 @@ class SweepEditor(QWidget):
         more = f"{method_name(chosen[0])} and {len(chosen) - 1} more" if len(chosen) > 1 else text
         self.methods_button.setText(more)
         self.methods_button.setToolTip(text)
+        asked = [sweep.get("measure", "depth_rmse"), *([sweep["limit"]["measure"]] if sweep.get("limit") else [])]
+        for field in (self.measure, self.limit_of):
+            field.offer(measure_choices(self.work, asked))
         self.measure.show_value(sweep.get("measure", "depth_rmse"))
         self.chart.show_value(sweep.get("chart", "sweep"))
         self._show_limit()
@@ -161,7 +168,7 @@ class SweepEditor(QWidget):
         if limit is not None:
             self.limit_of.show_value(limit["measure"])
             self.side.show_value(limit.get("above", True))
-            measure = MEASURES[limit["measure"]]
+            measure = measure_of(limit["measure"])
             unit = Unit("", measure.unit, measure.scale)
             if unit != self.limit.spec.unit:
                 self.limit.spec = replace(self.limit.spec, unit=unit)

@@ -1,0 +1,72 @@
+"""A project's own measures of the part, as a study's: by name, with value, error and sigma, in table and chart."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from render.base.errors import InputError
+from studio.project.project import Project
+from studio.study.cells import next_cells
+from studio.study.measures import measure_of, part_names
+from studio.study.measuring import measure_task, tasks
+from studio.study.study import Study
+from studio.study.tables import write_tables
+
+STEP = {
+    "name": "First step",
+    "kind": "step",
+    "regions": [[-0.062, -0.05], [-0.03, -0.018]],
+    "nominal": 0.01,
+    "lower": -1e-3,
+    "upper": 1e-3,
+}
+SWEEP = {"name": "a", "vary": [{"field": "sensor.exposure_time", "values": [0.001, 0.002]}]}
+
+
+def study_of(measure: str) -> tuple[Study, dict[str, Project]]:
+    study = Study.model_validate(
+        {"base": "step_block", "sweeps": [{**SWEEP, "measure": measure}], "repeats": 3, "image_scale": 0.2,
+         "methods": ["likelihood"], "set": {"render.goal": None}}
+    )  # fmt: skip
+    base = Project.load("step_block")
+    return study, {"step_block": base.replaced({"measures": [STEP]}).in_folder(base.folder)}
+
+
+def test_every_cell_has_the_part_s_own_numbers(tmp_path: Path) -> None:
+    study, bases = study_of("length_error:First step")
+    cells = next_cells(study, bases, {})
+    rows: dict[str, Any] = {}
+    for task in tasks(cells[:2], study.image_scale, study.laser):
+        rows |= {key: {**measured, **seconds} for key, measured, seconds in measure_task(task)}
+    assert len(rows) == 2
+    for row in rows.values():
+        value, error, sigma = (row[f"length_{kind}:First step"] for kind in ("value", "error", "sigma"))
+        assert math.isfinite(value) and sigma > 0.0
+        # a block of equal steps: the truth by the same definition is a whole number of them
+        assert abs(error) < 6.0 * sigma and abs(value) > 1e-3
+    write_tables(tmp_path, study, bases, rows)
+    with open(tmp_path / "table.csv", newline="", encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    assert {float(row["length_value:First step"]) for row in table} == {
+        row["length_value:First step"] for row in rows.values()
+    }
+
+
+def test_names_say_what_is_there_and_others_are_refused() -> None:
+    study, bases = study_of("length_error:Second step")
+    with pytest.raises(InputError, match="length_error:First step"):
+        next_cells(study, bases, {})
+    assert part_names(bases["step_block"].measures) == [
+        f"length_{kind}:First step" for kind in ("value", "error", "sigma")
+    ]
+    shown = measure_of("length_error:First step")
+    assert (shown.label, shown.unit, shown.signed) == ("First step, error against the truth", "µm", True)
+    assert measure_of("depth_rmse").unit == "µm"
+    for name in ("length_error:", "volume_error:x", "depth"):
+        with pytest.raises(KeyError):
+            measure_of(name)
