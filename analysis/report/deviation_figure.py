@@ -41,8 +41,8 @@ def levels(value: Float, lower: float | None, upper: float | None) -> Float:
     if lower is None or upper is None or not upper > lower:
         limit = nice_limit(value)
         return np.linspace(-limit, limit, len(BANDS) + 1)
-    farthest = float(np.abs(value).max()) if len(value) else 0.0
-    reach = max(farthest - max(abs(lower), abs(upper)), 0.5 * (upper - lower))
+    least, most = (float(value.min()), float(value.max())) if len(value) else (lower, upper)
+    reach = max(lower - least, most - upper, 0.5 * (upper - lower)) * (1.0 + 1e-9)
     beyond = reach * np.array([0.25, 0.6, 1.0])
     return np.concatenate([lower - beyond[::-1], [lower, 0.5 * (lower + upper), upper], upper + beyond])
 
@@ -58,7 +58,9 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
     edges = levels(what.value, what.lower, what.upper)
     colours, norm = ListedColormap(list(BANDS)), BoundaryNorm(edges * 1e6, len(BANDS))
     wide, tall = np.ptp(place, axis=0) if len(place) else (1.0, 1.0)
-    height = float(np.clip(4.6 * tall / max(wide, 1e-9), 2.6, 5.6)) + 0.5
+    if tall > wide:  # lying down it is larger on a page that is wider than this is high
+        place, wide, tall = np.column_stack([place[:, 1], wide - place[:, 0]]), tall, wide
+    height = float(np.clip(4.6 * max(tall, 0.36 * wide) / max(wide, 1e-9), 2.2, 5.6)) + 0.5
     with figure(height) as made:
         drawing, bars = made.subplots(1, 2, width_ratios=(4.6, 1.5))
         kept = np.random.default_rng(seed).permutation(len(place))[:MOST_DRAWN]
@@ -66,6 +68,9 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         clipped = np.clip(what.value * 1e6, edges[0] * 1e6, edges[-1] * 1e6)
         drawing.scatter(*place[kept].T, c=clipped[kept], s=size, cmap=colours, norm=norm, linewidths=0)
         drawing.set_aspect("equal")
+        # room for the callouts about a map that is low
+        pad = 0.5 * max(0.36 * wide - tall, 0.1 * tall)
+        drawing.set_ylim(-pad, tall + pad)
         drawing.grid(False)
         drawing.set(xlabel="mm", ylabel="mm")
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
@@ -93,11 +98,12 @@ def _point_at(axes: Any, what: DeviationMap, place: Float) -> None:
     apart = 1e-3 * max(float(np.linalg.norm(high - low)) / 6.0, 1e-6)
     middle = 0.5 * (low + high)
     for number, (i, value) in enumerate(callouts(what.points, what.value, CALLOUTS, apart), 1):
-        is_narrow = high[0] - low[0] < 0.4 * (high[1] - low[1])
-        side = -1.0 if place[i, 0] > middle[0] and not is_narrow else 1.0
+        side = -1.0 if place[i, 0] > middle[0] else 1.0
+        # neighbours on a low map would cover each other on one side of it
+        over = place[i, 1] < middle[1] if high[1] - low[1] > 0.3 * (high[0] - low[0]) else number % 2 == 1
         axes.annotate(
             f"{number}: {value * 1e6:+.{_places(value)}f} µm", place[i],
-            xytext=(16.0 * side, 14.0 if place[i, 1] < middle[1] else -14.0), textcoords="offset points",
+            xytext=(16.0 * side, 22.0 if over else -22.0), textcoords="offset points",
             ha="left" if side > 0.0 else "right", va="center", fontsize=7, color=INK,
             bbox={"boxstyle": "round,pad=0.25", "fc": "white", "ec": INK, "lw": 0.5},
             arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.6}, annotation_clip=False,

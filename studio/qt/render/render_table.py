@@ -29,7 +29,7 @@ from studio.scan.remarks import best
 from studio.study.side_by_side import side_by_side, write_table
 
 HINT = "Figures are followed by their difference from the first column's. Settings that all have alike are left out."
-FEWEST_PX = 150
+FEWEST_PX = 190
 
 
 def as_kept(session: Session, render: Render, name: str) -> Kept:

@@ -1,0 +1,35 @@
+"""The deviation map: bands that follow the tolerance, and callouts at the places that deviate most."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.report.deviation_figure import BANDS, DeviationMap, draw, levels
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(-5e-5, 5e-5), (0.0, 2e-4), (1e-4, 3e-4), (None, None)])
+def test_edges_ascend_and_hold_the_tolerance_and_every_value(lower: float | None, upper: float | None) -> None:
+    value = np.random.default_rng(1).normal(scale=1e-4, size=500)
+    edges = levels(value, lower, upper)
+    assert len(edges) == len(BANDS) + 1 and np.all(np.diff(edges) > 0.0)
+    if lower is not None and upper is not None:
+        assert lower in edges and upper in edges
+        assert edges[0] <= value.min() and edges[-1] >= value.max()
+
+
+@pytest.mark.parametrize("is_tall", [False, True])
+def test_a_dent_and_a_bump_are_pointed_at_with_their_size(is_tall: bool) -> None:
+    x, y = (one.ravel() for one in np.meshgrid(np.linspace(0.0, 0.1, 200), np.linspace(0.0, 0.03, 60)))
+    value = np.zeros(len(x))
+    value[np.hypot(x - 0.02, y - 0.015) < 0.01] = -3e-4
+    value[np.hypot(x - 0.08, y - 0.015) < 0.01] = 2e-4
+    points = np.column_stack([y, x, 0.0 * x] if is_tall else [x, y, 0.0 * x])
+    made = draw(DeviationMap(points, value, UP, -5e-5, 5e-5))
+    texts = [one.get_text() for one in made.axes[0].texts]
+    assert texts == ["1: -300 µm", "2: +200 µm"]
+    # lying down, so that both maps are as wide as they can be
+    width, height = (np.ptp(made.axes[0].collections[0].get_offsets()[:, k]) for k in range(2))
+    assert width == pytest.approx(100.0, rel=1e-3) and height == pytest.approx(30.0, rel=1e-3)
