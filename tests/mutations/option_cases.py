@@ -31,6 +31,10 @@ HDR = (
     "8,2", "8", "", ",", "8,2,", "nan,1", "inf,1", "0,1", "-1,1", "1e300,1e-300", "1e308,1e-308", "1,1", "a,b", "8;2",
     "1e400,1", "5e-324,1", "8,2,0.5", "\x1b[31m,1",
 )  # fmt: skip
+PLACES = (
+    "0,0,0", "1,2", "1,2,3,4", "nan,0,0", "inf,0,0", "1e400,0,0", "0,0,-1e7", "1e-300,0,0", "1e9,0,0", ",,", "a,b,c",
+    " 1 , 2 , 3 ", "0;0;0", "0,0,1",
+)  # fmt: skip
 OUTS = (
     "out", ".", "scan", "project.json", "image.png", "fifo.ply", "loop.ply", "folder.ply", "null.png", "zero.png",
     "a/b/c", "é", "[/red]", os.fsdecode(b"\xff"), "\x1b[31m", "a\nb", "o" * 300, "", " ", "../sibling", "/dev/null",
@@ -52,8 +56,11 @@ def option(sources: Sources, place: Path, rng: Random, harm: bool) -> list[str]:
         "reconstruct": ["scan", "--out", "out"], "extract": ["image.png", "--out", "out"], "new": ["plane", "made"],
         "report": ["absent"], "twin": ["project.json", "image.png", "--out", "twin.json"],
         "heightmap": ["scan", "--out", "map.png"], "chooser": ["project.json", "--out", "out.onnx"],
+        "deviation": ["scan", "--out", "out.csv"], "points": ["scan", "--out", "out.pcd"],
+        "section": ["scan", "--through", "0,0,0", "--normal", "1,0,0", "--out", "out.dxf"],
+        "film": ["scan", "--out", "out.mp4"],
     }  # fmt: skip
-    command = rng.choices(tuple(plain), (2, 6, 2, 6, 8, 3, 1, 3, 3, 1))[0] if harm else "extract"
+    command = rng.choices(tuple(plain), (2, 6, 2, 6, 8, 3, 1, 3, 3, 1, 3, 2, 3, 2))[0] if harm else "extract"
     argv = [command, *plain[command]]
     if command == "reconstruct" and rng.random() < 0.4:
         argv[1:2] = ["image.png", "--project", "project.json"]
@@ -87,6 +94,8 @@ def _option_value(option: click.Parameter, rng: Random) -> str:
         return rng.choice(HDR)
     if option.name == "method":
         return rng.choice((*METHODS, *WORDS))
+    if option.name in ("through", "normal", "spots"):
+        return rng.choice((*PLACES, *WORDS))
     return rng.choice((*NUMBERS, *NUMBERS, *WORDS))
 
 
