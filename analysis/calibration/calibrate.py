@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,11 +12,12 @@ from analysis.calibration.checks import Halves, LensTrial, Whiteness, choose_len
 from analysis.calibration.degenerate import complaints
 from analysis.calibration.depth import DepthError, depth_error, working_volume
 from analysis.calibration.estimate import Estimate, free_parameters
+from analysis.calibration.motion import Motion, Told, started, turned_about
 from analysis.calibration.next_pose import Advice, advise
 from analysis.calibration.observations import View, gather
 from analysis.calibration.robust import Adjusted, adjust_robustly
 from analysis.calibration.start import start
-from render.base.arrays import Float
+from render.base.arrays import Bool, Float
 from render.base.errors import InputError
 
 FEWEST_FOR_CHOICE = 9
@@ -49,6 +50,8 @@ class Request:
     """m, of the working volume; None: as far as the boards were."""
     most_tilt: float = np.radians(45.0)
     known: Known | None = None
+    told: Told | None = None
+    """Of the board's motion."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,8 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
 
     InputError: too few views, or the views do not determine what is asked for; it tells what to photograph.
     """
-    seen = gather(views, np.stack([target.min(axis=0), target.max(axis=0)]))
+    extent = np.stack([target.min(axis=0), target.max(axis=0)])
+    seen = gather(views, extent)
     known = request.known
     terms, trials = request.terms, list[LensTrial]()
     guess = start(
@@ -89,7 +93,14 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         terms, trials = choose_lens(seen, guess)
         padded = np.zeros(terms)
         padded[: min(terms, 1)] = guess.distortion[: min(terms, 1)]
-        guess = Estimate(guess.intrinsics, padded, guess.warp, guess.planes, guess.rotation, guess.translation)
+        guess = replace(guess, distortion=padded)
+    if request.told is not None:
+        guess, other_end = _carried(guess, request.told, seen.names, extent)
+        views = [
+            replace(v, target=extent.sum(axis=0) - v.target) if end else v
+            for v, end in zip(views, other_end, strict=True)
+        ]
+        seen = gather(views, extent)
     prior = None if known is None else _prior(known, guess)
     try:
         adjusted = adjust_robustly(seen, guess, free_parameters(guess, warp=request.warp), prior)
@@ -136,6 +147,18 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
     return Calibrated(
         adjusted, depths, tuple(faults), halves(adjusted, usable, prior), whiteness(adjusted), tuple(trials), advice
     )
+
+
+def _carried(guess: Estimate, told: Told, names: Sequence[str], extent: Float) -> tuple[Estimate, Bool]:
+    """The guess with the motion that its poses show, and (views,) whose corners count from the other end."""
+    group, given = told.of(names)
+    empty = Motion(told.kind, group, given, np.zeros(0), np.zeros(3))
+    other_end = turned_about(empty, guess.rotation)
+    last = guess.translation + guess.rotation @ np.append(extent.sum(axis=0), 0.0)
+    rotation = np.where(other_end[:, None, None], guess.rotation @ np.diag([-1.0, -1.0, 1.0]), guess.rotation)
+    translation = np.where(other_end[:, None], last, guess.translation)
+    guess = replace(guess, rotation=rotation, translation=translation)
+    return guess.with_motion(started(told.kind, group, given, rotation, translation)), other_end
 
 
 def _prior(known: Known, guess: Estimate) -> Prior:

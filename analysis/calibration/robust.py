@@ -46,7 +46,7 @@ def adjust_robustly(seen: Observations, start: Estimate, free: Bool, prior: Prio
             break
     corner_bad, laser_bad, view_bad, told = _outliers(seen, estimate)
     kept = without_views(without(seen, corner_bad, laser_bad), view_bad)
-    estimate = replace(estimate, rotation=estimate.rotation[~view_bad], translation=estimate.translation[~view_bad])
+    estimate = estimate.of_views(~view_bad)
     solution = adjust(kept, estimate, free, prior)
     corner_scale, laser_scale = rescaled(solution, kept)
     scaled = kept.scaled(corner_scale, laser_scale)

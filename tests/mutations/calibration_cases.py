@@ -72,6 +72,9 @@ def _command(place: Path, sources: Sources, rng: Random) -> list[str]:
     what = rng.choice((["project.json"], ["project.json"], ["camera", "textures"], ["laser", "."], ["", "."]))
     argv = ["calibrate", *json_or_not(rng), *what, "--views", rng.choice(("3", "6", "nan")), "--lens", "0"]
     argv += ["--board", rng.choice(BOARDS[:3] if rng.random() < 0.7 else (*BOARDS, *WORDS))]
+    if rng.random() < 0.2:
+        (place / "motion.csv").write_bytes(damaged(b"view,position_mm,placement\na,1.5,\nb,2.5,\n", rng))
+        argv += ["--motion", rng.choice(("motion.csv", *PATHS)), "--hand", rng.choice(("camera", "board"))]
     for name in rng.sample(NAMES, rng.choice((0, 1, 2))):
         argv += [name, rng.choice(NUMBERS)]
     return [*argv, "--out", rng.choice((*OUTS, "out.json", "out.json"))]
