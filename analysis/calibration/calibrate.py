@@ -9,12 +9,13 @@ import numpy as np
 
 from analysis.calibration.adjust import Prior
 from analysis.calibration.checks import Halves, LensTrial, Whiteness, choose_lens, halves, whiteness
+from analysis.calibration.circles import centre_bias
 from analysis.calibration.degenerate import complaints
 from analysis.calibration.depth import DepthError, depth_error, working_volume
 from analysis.calibration.estimate import Estimate, free_parameters
 from analysis.calibration.motion import Motion, Told, started, turned_about
 from analysis.calibration.next_pose import Advice, advise
-from analysis.calibration.observations import View, gather
+from analysis.calibration.observations import Observations, View, gather
 from analysis.calibration.robust import Adjusted, adjust_robustly
 from analysis.calibration.start import start
 from render.base.arrays import Bool, Float
@@ -52,6 +53,8 @@ class Request:
     known: Known | None = None
     told: Told | None = None
     """Of the board's motion."""
+    circle: float = 0.0
+    """m, radius of the board's discs, whose centroids views have in place of corners; 0: corners."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,8 @@ class Calibrated:
     whiteness: Whiteness
     lens_trials: tuple[LensTrial, ...]
     advice: Advice | None
+    circle: float = 0.0
+    """As of the request."""
 
     @property
     def estimate(self) -> Estimate:
@@ -78,7 +83,7 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
     InputError: too few views, or the views do not determine what is asked for; it tells what to photograph.
     """
     extent = np.stack([target.min(axis=0), target.max(axis=0)])
-    seen = gather(views, extent)
+    seen = centroids = gather(views, extent)
     known = request.known
     terms, trials = request.terms, list[LensTrial]()
     guess = start(
@@ -88,6 +93,8 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         request.lasers,
         None if known is None else (known.intrinsics, known.distortion),
     )
+    if request.circle > 0.0:
+        seen = _centred(centroids, guess, seen.names, request.circle, seen)
     faults = complaints(views, guess, request.size, camera=known is None)
     if known is None and terms is None and len(views) >= FEWEST_FOR_CHOICE:
         terms, trials = choose_lens(seen, guess)
@@ -96,14 +103,14 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         guess = replace(guess, distortion=padded)
     if request.told is not None:
         guess, other_end = _carried(guess, request.told, seen.names, extent)
-        views = [
-            replace(v, target=extent.sum(axis=0) - v.target) if end else v
-            for v, end in zip(views, other_end, strict=True)
-        ]
-        seen = gather(views, extent)
+        ends = np.where(other_end[seen.view][:, None], extent.sum(axis=0) - seen.target, seen.target)
+        seen, centroids = replace(seen, target=ends), replace(centroids, target=ends)
     prior = None if known is None else _prior(known, guess)
     try:
         adjusted = adjust_robustly(seen, guess, free_parameters(guess, warp=request.warp), prior)
+        if request.circle > 0.0:
+            seen = _centred(centroids, adjusted.solution.estimate, adjusted.seen.names, request.circle, seen)
+            adjusted = adjust_robustly(seen, guess, free_parameters(guess, warp=request.warp), prior)
     except (InputError, np.linalg.LinAlgError) as error:
         raise InputError(
             "the views do not determine the calibration",
@@ -145,8 +152,26 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
             sigmas=typical,
         )
     return Calibrated(
-        adjusted, depths, tuple(faults), halves(adjusted, usable, prior), whiteness(adjusted), tuple(trials), advice
+        adjusted,
+        depths,
+        tuple(faults),
+        halves(adjusted, usable, prior),
+        whiteness(adjusted),
+        tuple(trials),
+        advice,
+        request.circle,
     )
+
+
+def _centred(
+    centroids: Observations, estimate: Estimate, names: tuple[str, ...], radius: float, before: Observations
+) -> Observations:
+    """The images of the discs' centres, in the views of these names as an estimate of them has it, else as before."""
+    number = np.array([names.index(name) if name in names else -1 for name in centroids.names])[centroids.view]
+    posed = number >= 0
+    pixel = before.pixel.copy()
+    pixel[posed] = centroids.pixel[posed] - centre_bias(estimate, number[posed], centroids.target[posed], radius)
+    return replace(centroids, pixel=pixel)
 
 
 def _carried(guess: Estimate, told: Told, names: Sequence[str], extent: Float) -> tuple[Estimate, Bool]:

@@ -42,13 +42,22 @@ def seen_at(points: Float, estimate: Estimate) -> Float:
 
 
 def dark_squares(board: Board, estimate: Estimate, rotation: Float, translation: Float) -> Float:
-    """(k, 4, 2) px, corners of the board's dark squares in a pose, those that can be seen."""
+    """(k, 4, 2) px, corners of the board's dark squares in a pose, those that can be seen; of discs (k, EDGE, 2)."""
+    if board.kind == "circles":
+        angle = np.arange(EDGE) * (2.0 * np.pi / EDGE)
+        around = board.target[:, None] + board.circle * np.column_stack([np.cos(angle), np.sin(angle)])
+        return _seen(around, estimate, rotation, translation)
     j, i = np.mgrid[-1 : board.rows, -1 : board.columns]
     dark = (i + j) % 2 == 0
     low = np.stack([i[dark], j[dark]], axis=1)
     four = (low[:, None, :] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])) * board.square
-    flat = np.concatenate([four, np.zeros((*four.shape[:2], 1))], axis=2).reshape(-1, 3)
-    pixel = seen_at(flat @ rotation.T + translation, estimate).reshape(-1, 4, 2)
+    return _seen(four, estimate, rotation, translation)
+
+
+def _seen(shapes: Float, estimate: Estimate, rotation: Float, translation: Float) -> Float:
+    """(k, m, 2) m on the board -> (k, m, 2) px, those that can be seen as a whole."""
+    flat = np.concatenate([shapes, np.zeros((*shapes.shape[:2], 1))], axis=2).reshape(-1, 3)
+    pixel = seen_at(flat @ rotation.T + translation, estimate).reshape(shapes.shape)
     return np.asarray(pixel[np.isfinite(pixel).all(axis=(1, 2))])
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from analysis.calibration.adjust import adjust
+from analysis.calibration.circles import centre_bias
 from analysis.calibration.observations import View, gather
 from analysis.calibration.residuals import corners, laser_points
 from analysis.calibration.start import start
@@ -79,6 +80,8 @@ def residuals(view: View, result: Calibrated, target: Float, *, dropped: bool = 
     line = np.zeros((len(along.residual), 2))
     line[np.arange(len(line)), seen.along] = along.residual
     off = corners(plain, posed).residual.reshape(-1, 2)
+    if result.circle > 0.0:
+        off = off + centre_bias(posed, seen.view, seen.target, result.circle)
     return Residuals(
         view.name, view.pixel, off, counted, seen.laser_pixel, line, part, posed.rotation[0], posed.translation[0]
     )

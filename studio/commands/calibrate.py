@@ -103,6 +103,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
             most_tilt=float(np.radians(options.most_tilt)),
             known=known,
             told=material.told,
+            circle=board.circle,
         )
         try:
             result = calibrate(material.views, board.target, request)

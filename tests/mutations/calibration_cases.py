@@ -22,6 +22,7 @@ BOARDS = (
     "checkerboard:5x4:30", "checkerboard:0x4:30mm", "checkerboard:9999x9999:1m", "checkerboard:5x4:nanmm",
     "checkerboard:5x4:30mm:30mm", "charuco:6x5:30mm:30mm", "charuco:6x5:30mm:20mm:", "charuco:6x5:30mm:20mm:legacy",
     "charuco:6x5:30mm:20mm:DICT_NONE", "charuco:200x200:30mm:20mm", "charuco:6x5:30mm:29.999mm", ":::", "checkerboard:",
+    "circles:6x5:30mm:12mm", "circles:6x5:30mm", "circles:6x5:30mm:30mm",
     "charuco:6x5:30mm:1um:DICT_ARUCO_ORIGINAL", "checkerboard:2x2:10m", "checkerboard:200x200:10um",
 )  # fmt: skip
 NAMES = ("--nearest", "--farthest", "--most-tilt", "--target-um", "--corner-sigma", "--line-sigma", "--seed")

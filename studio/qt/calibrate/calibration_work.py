@@ -322,6 +322,7 @@ class CalibrationWork(QObject):
             nearest=self.nearest,
             farthest=self.farthest,
             known=known,
+            circle=board.circle,
         )
 
         def work(progress: Progress, cancelled: Cancel) -> Solved | str:
