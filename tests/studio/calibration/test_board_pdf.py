@@ -42,7 +42,7 @@ def test_a_grid_of_discs_is_printed_to_scale(tmp_path: Path) -> None:
     page = b"".join(zlib.decompress(one) for one in re.findall(rb"stream\r?\n(.*?)endstream", path.read_bytes(), re.S))
     curves = re.findall(rb"([\d.]+) ([\d.]+) m\n((?:[\d. ]+ c\n){8})", page)
     points = [np.array([line.split()[4:6] for line in one[2].splitlines()], dtype=float) for one in curves]
-    points = [each for each in points if np.ptp(each) > 20.0 and np.ptp(each[:, 0]) > 20.0]  # letters are small
+    points = [each for each in points if 30.0 < np.ptp(each[:, 0]) < 40.0]  # letters are in units of their own
     assert len(points) == 20
     centres, widths = np.array([each.mean(axis=0) for each in points]), [np.ptp(each, axis=0) for each in points]
     np.testing.assert_allclose(widths, 12.0 / 25.4 * 72.0, rtol=1e-4)
