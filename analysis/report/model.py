@@ -20,6 +20,7 @@ from render.scene.scene import Scene
 from render.sensor.sensor import Sensor
 
 if TYPE_CHECKING:
+    from analysis.report.calibration import FoundCalibration
     from analysis.report.record import ScanRecord
 
 Tables = dict[str, dict[str, str]]
@@ -100,6 +101,8 @@ class ReportInput:
     """Date and time of the run, as it shall be printed."""
     measures: tuple[dict[str, Any], ...] = ()
     """The part's measures, as the scan's record has them."""
+    calibration: FoundCalibration | None = None
+    """With which points were made; None: camera and lasers were taken as the scene has them."""
     run: str = ""
     """What was run, for a program that reads the page: any text; empty: it is not told."""
 
