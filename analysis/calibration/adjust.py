@@ -135,6 +135,28 @@ def leverage(seen: Observations, solution: Solution, first: Index, second: Index
     return np.asarray(common + np.sum((by_pose[first] @ pose) * by_pose[second], axis=(1, 2)))
 
 
+def bending(seen: Observations, solution: Solution, prior: Prior | None = None) -> float:
+    """Rise of chi-square one standard deviation from the estimate, along what is known least, the greater of two sides.
+
+    It is 1 where residuals are linear over their parameters' errors, as the covariance supposes; far above it, the
+    valley of the cost bends away from the covariance's own longest axis.
+    """
+    used = np.nonzero(solution.free)[0]
+    if len(used) == 0:
+        return 1.0
+    normal, _, _, guess = _normal(seen, solution.estimate, solution.free, prior, None)
+    matrix, _, follow = _reduced(normal, 0.0)
+    inner = matrix[np.ix_(used, used)]
+    scale = 1.0 / np.sqrt(np.diag(inner))
+    values, vectors = np.linalg.eigh(inner * np.outer(scale, scale))
+    step = np.zeros(len(solution.free))
+    step[used] = scale * vectors[:, 0] / np.sqrt(max(values[0], SINGULAR))
+    with np.errstate(all="ignore"):
+        moved = [solution.estimate.moved(side * step, -follow @ (side * step)) for side in (1.0, -1.0)]
+        costs = [_normal(seen, there, solution.free, prior, guess)[0].cost for there in moved]
+    return max(costs) - normal.cost
+
+
 def _by_view(seen: Observations, at_corners: Linear, at_lasers: Linear, name: str) -> list[tuple[Float, Float]]:
     numbers = np.arange(seen.count + 1)
     corner, laser = 2 * np.searchsorted(seen.view, numbers), np.searchsorted(seen.laser_view, numbers)
