@@ -319,7 +319,8 @@ def calibrate(what: str, folder: Path | None, **options: Any) -> None:
 @click.option("--out", type=click.Path(path_type=Path), help="PDF file  [default: named by the board].")
 @common
 def board(board: str, **options: Any) -> None:
-    """A board as a PDF to scale: checkerboard:13x9:25mm (inner corners), charuco:14x10:25mm:18mm (squares)."""
+    """A board as a PDF to scale: checkerboard:13x9:25mm (inner corners), charuco:14x10:25mm:18mm (squares) or
+    circles:13x9:25mm:12mm (discs)."""
     require_system()
     from studio.commands.board import print_board
 

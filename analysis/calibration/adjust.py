@@ -62,7 +62,7 @@ class Solution:
 
 @dataclass(frozen=True)
 class _Normal:
-    """Normal equations, the poses' part by view."""
+    """Normal equations, the poses' part by placement of the board."""
 
     shared: Float
     mixed: Float
@@ -97,7 +97,7 @@ def adjust(seen: Observations, start: Estimate, free: Bool, prior: Prior | None 
     normal, at_corners, at_lasers, _ = _normal(seen, estimate, free, prior, guess)
     reduced, _, _ = _reduced(normal, 0.0)
     _, _, remaining = _step(normal, free, 0.0)
-    parameters = int(np.count_nonzero(free)) + 6 * seen.count
+    parameters = int(np.count_nonzero(free)) + 6 * (1 + int(estimate.group.max(initial=-1)))
     return Solution(
         estimate=estimate,
         free=free,
@@ -114,6 +114,7 @@ def view_information(seen: Observations, estimate: Estimate, start: Float | None
     """(views, p, p) what each view alone tells of the shared parameters, its pose unknown; start as `laser_points`."""
     everything = np.ones(len(estimate.shared), dtype=bool)
     normal, at_corners, at_lasers, _ = _normal(seen, estimate, everything, None, start)
+    assert len(normal.pose) == seen.count
     own = np.stack([a.T @ a + b.T @ b for a, b in _by_view(seen, at_corners, at_lasers, "by_shared")])
     return own - normal.mixed.transpose(0, 2, 1) @ np.linalg.solve(normal.pose + 1e-9 * np.eye(6), normal.mixed)
 
@@ -126,11 +127,34 @@ def leverage(seen: Observations, solution: Solution, first: Index, second: Index
     """
     normal, at_corners, _, _ = _normal(seen, solution.estimate, solution.free, None, None)
     by_pose = at_corners.by_pose.reshape(-1, 2, 6)
-    follow = np.linalg.solve(normal.pose, normal.mixed)[seen.view]
+    group = solution.estimate.group[seen.view]
+    follow = np.linalg.solve(normal.pose, normal.mixed)[group]
     by_shared = at_corners.by_shared.reshape(len(by_pose), 2, -1) - by_pose @ follow
     common = np.sum((by_shared[first] @ solution.covariance) * by_shared[second], axis=(1, 2))
-    pose = np.linalg.inv(normal.pose)[seen.view[first]]
+    pose = np.linalg.inv(normal.pose)[group[first]]
     return np.asarray(common + np.sum((by_pose[first] @ pose) * by_pose[second], axis=(1, 2)))
+
+
+def bending(seen: Observations, solution: Solution, prior: Prior | None = None) -> float:
+    """Rise of chi-square one standard deviation from the estimate, along what is known least, the greater of two sides.
+
+    It is 1 where residuals are linear over their parameters' errors, as the covariance supposes; far above it, the
+    valley of the cost bends away from the covariance's own longest axis.
+    """
+    used = np.nonzero(solution.free)[0]
+    if len(used) == 0:
+        return 1.0
+    normal, _, _, guess = _normal(seen, solution.estimate, solution.free, prior, None)
+    matrix, _, follow = _reduced(normal, 0.0)
+    inner = matrix[np.ix_(used, used)]
+    scale = 1.0 / np.sqrt(np.diag(inner))
+    values, vectors = np.linalg.eigh(inner * np.outer(scale, scale))
+    step = np.zeros(len(solution.free))
+    step[used] = scale * vectors[:, 0] / np.sqrt(max(values[0], SINGULAR))
+    with np.errstate(all="ignore"):
+        moved = [solution.estimate.moved(side * step, -follow @ (side * step)) for side in (1.0, -1.0)]
+        costs = [_normal(seen, there, solution.free, prior, guess)[0].cost for there in moved]
+    return max(costs) - normal.cost
 
 
 def _by_view(seen: Observations, at_corners: Linear, at_lasers: Linear, name: str) -> list[tuple[Float, Float]]:
@@ -148,12 +172,15 @@ def _normal(
     size = len(estimate.shared)
     shared = at_corners.by_shared.T @ at_corners.by_shared + at_lasers.by_shared.T @ at_lasers.by_shared
     right = at_corners.by_shared.T @ at_corners.residual + at_lasers.by_shared.T @ at_lasers.residual
-    mixed, pose = np.empty((seen.count, 6, size)), np.empty((seen.count, 6, 6))
-    right_pose = np.empty((seen.count, 6))
+    group = estimate.group
+    groups = 1 + int(group.max(initial=-1))
+    mixed, pose, right_pose = np.zeros((groups, 6, size)), np.zeros((groups, 6, 6)), np.zeros((groups, 6))
     by_shared, by_pose = (_by_view(seen, at_corners, at_lasers, name) for name in ("by_shared", "by_pose"))
     residual = _by_view(seen, at_corners, at_lasers, "residual")
-    for i, ((g, h), (a, b), (r, s)) in enumerate(zip(by_shared, by_pose, residual, strict=True)):
-        mixed[i], pose[i], right_pose[i] = a.T @ g + b.T @ h, a.T @ a + b.T @ b, a.T @ r + b.T @ s
+    for i, (g, h), (a, b), (r, s) in zip(group, by_shared, by_pose, residual, strict=True):
+        mixed[i] += a.T @ g + b.T @ h
+        pose[i] += a.T @ a + b.T @ b
+        right_pose[i] += a.T @ r + b.T @ s
     cost = float(at_corners.residual @ at_corners.residual + at_lasers.residual @ at_lasers.residual)
     if prior is not None:
         off = estimate.shared - prior.value

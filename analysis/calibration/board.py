@@ -1,4 +1,4 @@
-"""Calibration boards: checkerboards and ChArUco boards, and the places of their inner corners."""
+"""Calibration boards: checkerboards, ChArUco boards and circle grids, and the places of their corners or centres."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ class Board:
     """A flat board of squares, side in m; `columns` x `rows` are inner corners, where four squares meet.
 
     Origin at the first corner, x along its row. ChArUco boards carry markers of side `marker` in their white squares;
-    `legacy` is the layout of OpenCV before 4.6, which differs where the number of rows of squares is even.
+    `legacy` is the layout of OpenCV before 4.6, which differs where the number of rows of squares is even. Circle grids
+    have dark discs of diameter `marker` in place of corners, `square` from centre to centre.
     """
 
-    kind: Literal["checkerboard", "charuco"]
+    kind: Literal["checkerboard", "charuco", "circles"]
     columns: int
     rows: int
     square: float
@@ -36,6 +37,11 @@ class Board:
     def extent(self) -> Float:
         """(2, 2) m, first and last corner."""
         return np.array([[0.0, 0.0], [self.columns - 1.0, self.rows - 1.0]]) * self.square
+
+    @property
+    def circle(self) -> float:
+        """m, radius of its discs; 0 where it has none."""
+        return 0.5 * self.marker if self.kind == "circles" else 0.0
 
     @property
     def clear(self) -> float:

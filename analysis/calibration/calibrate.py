@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.calibration.adjust import Prior
 from analysis.calibration.checks import Halves, LensTrial, Whiteness, choose_lens, halves, whiteness
+from analysis.calibration.circles import centre_bias
 from analysis.calibration.degenerate import complaints
 from analysis.calibration.depth import DepthError, depth_error, working_volume
 from analysis.calibration.estimate import Estimate, free_parameters
+from analysis.calibration.motion import Motion, Told, started, turned_about
 from analysis.calibration.next_pose import Advice, advise
-from analysis.calibration.observations import View, gather
+from analysis.calibration.observations import Observations, View, gather
 from analysis.calibration.robust import Adjusted, adjust_robustly
 from analysis.calibration.start import start
-from render.base.arrays import Float
+from render.base.arrays import Bool, Float
 from render.base.errors import InputError
 
 FEWEST_FOR_CHOICE = 9
@@ -49,6 +51,10 @@ class Request:
     """m, of the working volume; None: as far as the boards were."""
     most_tilt: float = np.radians(45.0)
     known: Known | None = None
+    told: Told | None = None
+    """Of the board's motion."""
+    circle: float = 0.0
+    """m, radius of the board's discs, whose centroids views have in place of corners; 0: corners."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,8 @@ class Calibrated:
     whiteness: Whiteness
     lens_trials: tuple[LensTrial, ...]
     advice: Advice | None
+    circle: float = 0.0
+    """As of the request."""
 
     @property
     def estimate(self) -> Estimate:
@@ -74,7 +82,8 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
 
     InputError: too few views, or the views do not determine what is asked for; it tells what to photograph.
     """
-    seen = gather(views, np.stack([target.min(axis=0), target.max(axis=0)]))
+    extent = np.stack([target.min(axis=0), target.max(axis=0)])
+    seen = centroids = gather(views, extent)
     known = request.known
     terms, trials = request.terms, list[LensTrial]()
     guess = start(
@@ -84,15 +93,24 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         request.lasers,
         None if known is None else (known.intrinsics, known.distortion),
     )
+    if request.circle > 0.0:
+        seen = _centred(centroids, guess, seen.names, request.circle, seen)
     faults = complaints(views, guess, request.size, camera=known is None)
     if known is None and terms is None and len(views) >= FEWEST_FOR_CHOICE:
         terms, trials = choose_lens(seen, guess)
         padded = np.zeros(terms)
         padded[: min(terms, 1)] = guess.distortion[: min(terms, 1)]
-        guess = Estimate(guess.intrinsics, padded, guess.warp, guess.planes, guess.rotation, guess.translation)
+        guess = replace(guess, distortion=padded)
+    if request.told is not None:
+        guess, other_end = _carried(guess, request.told, seen.names, extent)
+        ends = np.where(other_end[seen.view][:, None], extent.sum(axis=0) - seen.target, seen.target)
+        seen, centroids = replace(seen, target=ends), replace(centroids, target=ends)
     prior = None if known is None else _prior(known, guess)
     try:
         adjusted = adjust_robustly(seen, guess, free_parameters(guess, warp=request.warp), prior)
+        if request.circle > 0.0:
+            seen = _centred(centroids, adjusted.solution.estimate, adjusted.seen.names, request.circle, seen)
+            adjusted = adjust_robustly(seen, guess, free_parameters(guess, warp=request.warp), prior)
     except (InputError, np.linalg.LinAlgError) as error:
         raise InputError(
             "the views do not determine the calibration",
@@ -134,8 +152,38 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
             sigmas=typical,
         )
     return Calibrated(
-        adjusted, depths, tuple(faults), halves(adjusted, usable, prior), whiteness(adjusted), tuple(trials), advice
+        adjusted,
+        depths,
+        tuple(faults),
+        halves(adjusted, usable, prior),
+        whiteness(adjusted),
+        tuple(trials),
+        advice,
+        request.circle,
     )
+
+
+def _centred(
+    centroids: Observations, estimate: Estimate, names: tuple[str, ...], radius: float, before: Observations
+) -> Observations:
+    """The images of the discs' centres, in the views of these names as an estimate of them has it, else as before."""
+    number = np.array([names.index(name) if name in names else -1 for name in centroids.names])[centroids.view]
+    posed = number >= 0
+    pixel = before.pixel.copy()
+    pixel[posed] = centroids.pixel[posed] - centre_bias(estimate, number[posed], centroids.target[posed], radius)
+    return replace(centroids, pixel=pixel)
+
+
+def _carried(guess: Estimate, told: Told, names: Sequence[str], extent: Float) -> tuple[Estimate, Bool]:
+    """The guess with the motion that its poses show, and (views,) whose corners count from the other end."""
+    group, given = told.of(names)
+    empty = Motion(told.kind, group, given, np.zeros(0), np.zeros(3))
+    other_end = turned_about(empty, guess.rotation)
+    last = guess.translation + guess.rotation @ np.append(extent.sum(axis=0), 0.0)
+    rotation = np.where(other_end[:, None, None], guess.rotation @ np.diag([-1.0, -1.0, 1.0]), guess.rotation)
+    translation = np.where(other_end[:, None], last, guess.translation)
+    guess = replace(guess, rotation=rotation, translation=translation)
+    return guess.with_motion(started(told.kind, group, given, rotation, translation)), other_end
 
 
 def _prior(known: Known, guess: Estimate) -> Prior:

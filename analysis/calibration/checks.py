@@ -63,7 +63,7 @@ def halves(adjusted: Adjusted, volumes: Sequence[Volume], prior: Prior | None = 
     for parity in (0, 1):
         bad = np.arange(seen.count) % 2 != parity
         try:
-            parts.append(adjust(without_views(seen, bad), _of_views(solution.estimate, ~bad), solution.free, prior))
+            parts.append(adjust(without_views(seen, bad), solution.estimate.of_views(~bad), solution.free, prior))
         except (InputError, np.linalg.LinAlgError):
             return None
     used = np.nonzero(solution.free)[0]
@@ -203,10 +203,10 @@ def _held_out(seen: Observations, start: Estimate, folds: int) -> tuple[Float, F
     alone = replace(_with_lines(seen, np.empty(0, dtype=np.intp)), lasers=0)
     for fold in range(folds):
         test = np.arange(seen.count) % folds == fold
-        camera = replace(_of_views(start, ~test), planes=np.zeros((0, 3)))
+        camera = replace(start.of_views(~test), planes=np.zeros((0, 3)))
         fitted = adjust(without_views(alone, test), camera, free_parameters(camera, warp=False)).estimate
         there = without_views(alone, ~test)
-        held = replace(fitted, rotation=start.rotation[test], translation=start.translation[test])
+        held = fitted.with_poses(start.rotation[test], start.translation[test])
         posed = adjust(there, held, np.zeros(len(held.shared), dtype=bool)).estimate
         squared = corners(there, posed).residual.reshape(-1, 2) ** 2
         out[test] = [squared[there.view == i].mean() for i in range(there.count)]
@@ -238,7 +238,3 @@ def _depth_from_board(seen: Observations, estimate: Estimate) -> Float:
     normal, shift = estimate.rotation[seen.laser_view, :, 2], estimate.translation[seen.laser_view]
     board = np.sum(normal * shift, axis=1) / np.sum(normal * ray, axis=1)
     return np.asarray(1.0 / np.sum(estimate.planes[seen.laser] * ray, axis=1) - board)
-
-
-def _of_views(estimate: Estimate, keep: np.ndarray) -> Estimate:
-    return replace(estimate, rotation=estimate.rotation[keep], translation=estimate.translation[keep])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.calibration.board import Board
+from analysis.calibration.circles import find_circles, refine_circles
 from analysis.calibration.corners import noise_of, refine
 from analysis.calibration.observations import View
 from analysis.line.result import Axis
@@ -35,13 +36,18 @@ def detect(image: NDArray[Any], board: Board, name: str) -> tuple[View, list[str
     """
     values = grey(image)
     shown = _eight_bit(values)
-    pixel, number = _charuco(shown, board) if board.kind == "charuco" else _checkerboard(shown, board)
+    pixel, number = {"charuco": _charuco, "checkerboard": _checkerboard, "circles": _circles}[board.kind](shown, board)
     noise = noise_of(values)
-    refined, covariance, good = refine(values, pixel, noise, board.clear)
+    if board.kind == "circles":
+        refined, covariance, good = refine_circles(values, pixel, spacing(pixel), noise)
+        dropped = "discs that are cut off or not round dropped"
+    else:
+        refined, covariance, good = refine(values, pixel, noise, board.clear)
+        dropped = "corners without a clear crossing dropped"
     notes = []
     strayed = int(np.count_nonzero(~good))
     if strayed:
-        notes.append(f"{strayed} corners without a clear crossing dropped")
+        notes.append(f"{strayed} {dropped}")
     glaring = good & _glare(image, refined)
     if glaring.any():
         notes.append(f"{int(glaring.sum())} corners in glare dropped")
@@ -71,6 +77,10 @@ def on_board(view: View, board: Board, pixel: Float, margin: float, axis: Axis =
     inside = np.all((place > least) & (place < greatest), axis=1)
     first, last = place / board.square, stepped / board.square
     back = 2.0 * first - last
+    if board.kind == "circles":
+        between = np.linspace(-1.0, 1.0, 9)[:, None, None] * (last - first) + first
+        on_disc = np.linalg.norm(between - np.rint(between), axis=2) < board.circle / board.square
+        return np.asarray(inside & (on_disc == on_disc[0]).all(axis=0))
     clear = np.all((np.floor(first) == np.floor(last)) & (np.floor(first) == np.floor(back)), axis=1)
     return np.asarray(inside & clear)
 
@@ -116,6 +126,24 @@ def _charuco(shown: NDArray[np.uint8], board: Board) -> tuple[Float, NDArray[np.
         cure = "check the dictionary and the numbers of squares; boards made before OpenCV 4.6 need the legacy layout"
         raise InputError("no ChArUco board of that kind is in the image", found=f"{seen} of its markers", cure=cure)
     return np.asarray(corners, dtype=np.float64).reshape(-1, 2), np.asarray(numbers, dtype=np.intp).ravel()
+
+
+def _circles(shown: NDArray[np.uint8], board: Board) -> tuple[Float, NDArray[np.intp]]:
+    pixel = find_circles(shown, board.columns, board.rows)
+    if pixel is None:
+        raise InputError(
+            "no circle grid of that size is in the image",
+            allowed=f"{board.columns} x {board.rows} dark discs, all of them seen",
+            cure="count the discs, and show the whole grid with a white margin",
+        )
+    return pixel, np.arange(len(pixel))
+
+
+def spacing(pixel: Float) -> Float:
+    """(n,) px to the nearest other."""
+    apart = np.linalg.norm(pixel[:, None] - pixel, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    return np.asarray(apart.min(axis=1))
 
 
 def _glare(image: NDArray[Any], corner: Float) -> Bool:

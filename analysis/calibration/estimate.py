@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from analysis.calibration import motion as carried
 from analysis.calibration.lens import NAMES
-from render.base.arrays import Float
+from analysis.calibration.motion import Motion
+from render.base.arrays import Bool, Float
 
 INTRINSICS = ("fx", "fy", "cx", "cy")
 WARP = ("warp_x", "warp_y")
@@ -34,17 +37,21 @@ class Estimate:
     """(views, 3, 3) from board to camera."""
     translation: Float
     """(views, 3) m."""
+    motion: Motion | None = None
+    """Where the board was carried from view to view; without, every view has a pose of its own."""
 
     @property
     def shared(self) -> Float:
-        """(4 + terms + 2 + 3 lasers,) all that is common to the views, in the order of `names`."""
-        return np.concatenate([self.intrinsics, self.distortion, self.warp, self.planes.ravel()])
+        """(4 + terms + 2 + 3 lasers + motion,) all that is common to the views, in the order of `names`."""
+        moved = np.empty(0) if self.motion is None else self.motion.parameters
+        return np.concatenate([self.intrinsics, self.distortion, self.warp, self.planes.ravel(), moved])
 
     @property
     def names(self) -> tuple[str, ...]:
         """Of `shared`."""
         planes = tuple(f"plane_{i}_{axis}" for i in range(len(self.planes)) for axis in "xyz")
-        return INTRINSICS + NAMES[: len(self.distortion)] + WARP + planes
+        moved = () if self.motion is None else carried.NAMES[self.motion.kind]
+        return INTRINSICS + NAMES[: len(self.distortion)] + WARP + planes + moved
 
     @property
     def camera_count(self) -> int:
@@ -56,22 +63,58 @@ class Estimate:
         start = self.camera_count + 2 + 3 * laser
         return slice(start, start + 3)
 
+    @property
+    def motion_slice(self) -> slice:
+        """Where the motion's parameters are in `shared`."""
+        start = self.camera_count + 2 + 3 * len(self.planes)
+        return slice(start, start + (0 if self.motion is None else len(self.motion.parameters)))
+
+    @property
+    def group(self) -> NDArray[np.intp]:
+        """(views,) which views share a pose that is estimated."""
+        return np.arange(len(self.rotation)) if self.motion is None else self.motion.group
+
+    def of_views(self, keep: Bool) -> Estimate:
+        """That of some views (views,)."""
+        motion = None if self.motion is None else self.motion.of_views(keep)
+        return replace(self, rotation=self.rotation[keep], translation=self.translation[keep], motion=motion)
+
+    def with_poses(self, rotation: Float, translation: Float) -> Estimate:
+        """The same shared parameters with other views, (views, 3, 3) and (views, 3), each with a pose of its own."""
+        motion = None if self.motion is None else self.motion.standing(len(rotation))
+        return replace(self, rotation=rotation, translation=translation, motion=motion)
+
+    def with_motion(self, motion: Motion) -> Estimate:
+        """The poses as near to those there are as the motion allows."""
+        return replace(self, motion=motion)._carried(*carried.placements(motion, self.rotation, self.translation))
+
+    def _carried(self, rotation: Float, translation: Float) -> Estimate:
+        """Poses of all views from those of the placements, (groups, 3, 3) and (groups, 3)."""
+        if self.motion is None:
+            return replace(self, rotation=rotation, translation=translation)
+        moves = self.motion.moves()
+        there = np.einsum("nij,nj->ni", moves.rotation, translation[self.group]) + moves.shift
+        return replace(self, rotation=moves.rotation @ rotation[self.group], translation=there)
+
     def with_shared(self, shared: Float) -> Estimate:
-        """The same poses with other shared parameters."""
-        camera = self.camera_count
-        return replace(
+        """The same poses of the placements with other shared parameters."""
+        camera, motion = self.camera_count, self.motion
+        there = replace(
             self,
             intrinsics=shared[:4],
             distortion=shared[4:camera],
             warp=shared[camera : camera + 2],
-            planes=shared[camera + 2 :].reshape(-1, 3),
+            planes=shared[camera + 2 : self.motion_slice.start].reshape(-1, 3),
+            motion=None if motion is None else replace(motion, parameters=shared[self.motion_slice]),
         )
+        return there if motion is None else there._carried(self.rotation[motion.first], self.translation[motion.first])
 
     def moved(self, shared: Float, poses: Float) -> Estimate:
-        """A step away: shared (p,) is added; poses (views, 6) turn each board in the camera frame and shift it."""
-        turned = Rotation.from_rotvec(poses[:, :3]).as_matrix() @ self.rotation
-        there = replace(self, rotation=turned, translation=self.translation + poses[:, 3:])
-        return there.with_shared(self.shared + shared)
+        """A step away: shared (p,) is added; poses (groups, 6) turn each board in the camera frame and shift it."""
+        first = slice(None) if self.motion is None else self.motion.first
+        turned = Rotation.from_rotvec(poses[:, :3]).as_matrix() @ self.rotation[first]
+        shifted = self.translation[first] + poses[:, 3:]
+        return self.with_shared(self.shared + shared)._carried(turned, shifted)
 
 
 def free_parameters(estimate: Estimate, *, warp: bool, camera: bool = True) -> np.ndarray:

@@ -113,13 +113,11 @@ def _candidates(estimate: Estimate, middle: Float, depth: tuple[float, float], m
                     turn = Rotation.from_rotvec([tilt * np.cos(side), tilt * np.sin(side), 0.0]).as_matrix()
                     rotation.append(turn)
                     translation.append(place - turn @ middle)
-    return replace(estimate, rotation=np.array(rotation), translation=np.array(translation))
+    return estimate.with_poses(np.array(rotation), np.array(translation))
 
 
 def _one(poses: Estimate, number: int) -> Estimate:
-    return replace(
-        poses, rotation=poses.rotation[number : number + 1], translation=poses.translation[number : number + 1]
-    )
+    return poses.with_poses(poses.rotation[number : number + 1], poses.translation[number : number + 1])
 
 
 def _about(
@@ -134,7 +132,7 @@ def _about(
     place = pose.rotation[0] @ middle + pose.translation[0]
     place = place + 0.1 * share * place[2] * rng.normal(size=(ABOUT, 3))
     place[:, 2] = np.clip(place[:, 2], *depth)
-    return replace(pose, rotation=turned, translation=place - turned @ middle)
+    return pose.with_poses(turned, place - turned @ middle)
 
 
 def _information(poses: Estimate, target: Float, size: tuple[int, int], sigmas: tuple[float, float]) -> Float:

@@ -3,7 +3,8 @@
 A corner: where the camera sees it less where it was found. A laser point: on its scan line, where the camera sees the
 curve in which the laser plane cuts the board, less where the line was found. With q = (x, y, 1) on the laser plane
 P = q / (m . q), that curve is  F(q) = (R^T (P - t))_z - warp = 0; together with the scan line's own equation it gives
-the two unknowns of q, and its derivatives follow from both equations (implicit function theorem).
+the two unknowns of q, and its derivatives follow from both equations (implicit function theorem). Of a board that is
+carried from view to view, P = A P0 by a motion A, derivatives are those by P0, where it was placed, and by A.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ import numpy as np
 
 from analysis.calibration.estimate import Estimate
 from analysis.calibration.lens import normalise, project
-from analysis.calibration.observations import Observations
+from analysis.calibration.motion import Moves
+from analysis.calibration.observations import Index, Observations
 from render.base.arrays import Float
 
 
 @dataclass(frozen=True)
 class Linear:
-    """Residuals (r,) with derivatives by the shared parameters (r, p) and by their own view's pose (r, 6)."""
+    """Residuals (r,) with derivatives by the shared parameters (r, p) and by their own placement's pose (r, 6)."""
 
     residual: Float
     by_shared: Float
@@ -40,6 +42,11 @@ def corners(seen: Observations, estimate: Estimate) -> Linear:
     camera = estimate.camera_count
     by_shared[:, :, :camera] = by_camera
     by_shared[:, :, camera : camera + 2] = (by_point @ rotation[:, :, 2, None]) * outward[:, None, :]
+    if estimate.motion is not None:
+        moves = estimate.motion.moves()
+        by_shared[:, :, estimate.motion_slice] = _by_motion(moves, seen.view, by_point, point)
+        back = moves.rotation[seen.view]
+        turned, by_point = np.einsum("nji,nj->ni", back, turned), by_point @ back
     by_pose = np.concatenate([-by_point @ cross_matrices(turned), by_point], axis=2)
     residual = np.einsum("nij,nj->ni", seen.whitening, pixel - seen.pixel)
     return Linear(
@@ -96,8 +103,20 @@ def _board_level(seen: Observations, estimate: Estimate, q: Float) -> tuple[Floa
     for laser in range(len(estimate.planes)):
         own = seen.laser == laser
         by_shared[own, estimate.plane_slice(laser)] = -facing[own, None] * point[own]
+    if estimate.motion is not None:
+        moves = estimate.motion.moves()
+        by_shared[:, estimate.motion_slice] = -_by_motion(moves, seen.laser_view, by_point[:, None], point)[:, 0]
+        back = moves.rotation[seen.laser_view]
+        arm, by_point = (np.einsum("nji,nj->ni", back, each) for each in (arm, by_point))
     by_pose = np.concatenate([-np.cross(arm, by_point), -by_point], axis=1)
     return level, level_q, by_shared, by_pose
+
+
+def _by_motion(moves: Moves, view: Index, by_point: Float, point: Float) -> Float:
+    """(n, k, p) of k functions of points (n, 3) of some views (n,), whose derivatives by the point are (n, k, 3)."""
+    before = np.einsum("nji,nj->ni", moves.rotation[view], point - moves.shift[view])
+    lifted = np.concatenate([before, np.ones((len(before), 1))], axis=1)
+    return np.asarray(np.einsum("nki,npij,nj->nkp", by_point, moves.derivative[view], lifted, optimize=True))
 
 
 def board_points(seen: Observations, warp: Float, target: Float) -> tuple[Float, Float]:

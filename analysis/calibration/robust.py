@@ -6,7 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.calibration.adjust import Prior, Solution, adjust, rescaled, weakest_mixture, without, without_views
+from analysis.calibration.adjust import (
+    Prior,
+    Solution,
+    adjust,
+    bending,
+    rescaled,
+    weakest_mixture,
+    without,
+    without_views,
+)
 from analysis.calibration.estimate import Estimate
 from analysis.calibration.observations import Observations
 from analysis.calibration.residuals import corners, laser_points
@@ -18,6 +27,8 @@ STRAY = 5.0
 """Standard deviations, by what is typical of all, at which a single corner or laser point is left out."""
 BAD = 4.0
 """Times the typical residual at which a view's corners, or a stripe, are bad as a whole."""
+MOST_BENT = 2.0
+"""Rise of chi-square one sigma away, 1 where errors are linear: sets whose sigmas hold have 1.0 to 1.6."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +57,7 @@ def adjust_robustly(seen: Observations, start: Estimate, free: Bool, prior: Prio
             break
     corner_bad, laser_bad, view_bad, told = _outliers(seen, estimate)
     kept = without_views(without(seen, corner_bad, laser_bad), view_bad)
-    estimate = replace(estimate, rotation=estimate.rotation[~view_bad], translation=estimate.translation[~view_bad])
+    estimate = estimate.of_views(~view_bad)
     solution = adjust(kept, estimate, free, prior)
     corner_scale, laser_scale = rescaled(solution, kept)
     scaled = kept.scaled(corner_scale, laser_scale)
@@ -57,6 +68,15 @@ def adjust_robustly(seen: Observations, start: Estimate, free: Bool, prior: Prio
             "the adjustment does not settle: its numbers would be those of a chance moment",
             where="calibration",
             found=f"least is known of a mixture of {weakest_mixture(solution.information, free, estimate.names)}",
+            cure="ask for fewer distortion terms, or photograph the board at other tilts and distances",
+        )
+    rise = bending(scaled, solution, prior)
+    if rise > MOST_BENT:
+        raise InputError(
+            "the parameters' errors are larger than any covariance of them holds for",
+            where="calibration",
+            found=f"one sigma from the best values chi-square rises by {rise:.3g} in place of 1, along a mixture of "
+            f"{weakest_mixture(solution.information, free, estimate.names)}",
             cure="ask for fewer distortion terms, or photograph the board at other tilts and distances",
         )
     return Adjusted(solution, scaled, corner_scale, laser_scale, told)

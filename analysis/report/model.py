@@ -21,6 +21,7 @@ from render.scene.scene import Scene
 from render.sensor.sensor import Sensor
 
 if TYPE_CHECKING:
+    from analysis.report.calibration import FoundCalibration
     from analysis.report.record import ScanRecord
 
 Tables = dict[str, dict[str, str]]
@@ -105,6 +106,8 @@ class ReportInput:
     """Whom it is handed to."""
     logo: str = ""
     """data: URI of a PNG; empty: none."""
+    calibration: FoundCalibration | None = None
+    """With which points were made; None: camera and lasers were taken as the scene has them."""
     run: str = ""
     """What was run, for a program that reads the page: any text; empty: it is not told."""
 

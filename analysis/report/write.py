@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.report import gauge_table, plain_picture
+from analysis.report import calibration, gauge_table, plain_picture
 from analysis.report.colour import method_colour, method_name
 from analysis.report.columns import columns, sentence_height, table_height
 from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
@@ -96,6 +96,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
             else None,
         }
     settings = [(name, list(rows.items())) for name, rows in scene_tables(report).items()]
+    calibrations = _calibrations(report, frame)
     more = len(frame.lasers) - MOST_DETAILS
     spent, spent_in_all = timing(report)
     return pictures | {
@@ -122,6 +123,8 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
         "gauge_columns": gauge_table.COLUMNS,
         "gauge_rows": [(row["name"], gauge_table.cells(row)) for row in report.measures],
         "gauge_reasons": gauge_table.reasons(list(report.measures)),
+        "calibrations": calibrations,
+        "calibration_columns": calibration.COLUMNS,
         "measure_tables": measure_tables(report),
         "measure_columns": MEASURE_COLUMNS,
         "term_tables": term_tables(report),
@@ -217,3 +220,22 @@ def write_pdf(page: str, path: Path) -> None:
     logging.getLogger("weasyprint").setLevel(logging.ERROR)
     # the page refers to nothing outside itself; if it ever did, nothing would be fetched
     HTML(string=page, url_fetcher=URLFetcher(allowed_protocols=("data",))).write_pdf(path)
+
+
+def _calibrations(report: ReportInput, frame: FrameResult) -> list[dict[str, Any]]:
+    """Of each laser, if points were made with a calibration: its table, its map and what that says."""
+    found, out = report.calibration, list[dict[str, Any]]()
+    for i, laser in enumerate(report.scene.lasers if found is not None else ()):
+        assert found is not None
+        points = [one.points for one in frame.lasers[i].extractions[:1]] if i < len(frame.lasers) else []
+        depths = np.concatenate([np.zeros(0), *(one.depth_z[one.valid] for one in points)])
+        drawn = calibration.depth_map(found, report.scene, i, depths) if i < MOST_DETAILS else None
+        out.append(
+            {
+                "name": laser.name,
+                "rows": calibration.parameter_rows(found, report.scene, i),
+                "picture": None if drawn is None else calibration.map_figure(drawn),
+                "sentence": "" if drawn is None else calibration.sentence(drawn),
+            }
+        )
+    return out

@@ -25,7 +25,7 @@ def write_board(path: Path, board: Board, paper: str | None, contrast: float = 1
     """
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from matplotlib.figure import Figure
-    from matplotlib.patches import Rectangle
+    from matplotlib.patches import Circle, Rectangle
 
     size = ((board.columns + 1) * board.square, (board.rows + 1) * board.square)
     taken = _paper(size, paper)
@@ -38,6 +38,9 @@ def write_board(path: Path, board: Board, paper: str | None, contrast: float = 1
     axes.axis("off")
     left, bottom = 0.5 * (width - size[0]), RULER + 0.5 * (height - RULER - size[1])
     ink = str(1.0 - contrast)
+    for x, y in board.target if board.kind == "circles" else ():
+        middle = (left + board.square + x, bottom + size[1] - board.square - y)
+        axes.add_patch(Circle(middle, board.circle, facecolor=ink, edgecolor="none", linewidth=0.0))
     for x, y, side in dark_squares(board):
         # pages count upwards from the bottom, boards downwards from the top
         corner = (left + x, bottom + size[1] - y - side)
@@ -51,7 +54,9 @@ def write_board(path: Path, board: Board, paper: str | None, contrast: float = 1
 
 
 def dark_squares(board: Board) -> list[tuple[float, float, float]]:
-    """x, y of the upper left corner and side, m, from the board's upper left, of all that is printed dark."""
+    """x, y of the upper left corner and side, m, from the board's upper left, of all dark squares."""
+    if board.kind == "circles":
+        return []
     if board.kind == "checkerboard":
         cells = [(x, y) for y in range(board.rows + 1) for x in range(board.columns + 1) if (x + y) % 2 == 0]
         return [(x * board.square, y * board.square, board.square) for x, y in cells]

@@ -1,4 +1,5 @@
-"""A board as a person types it: "checkerboard:13x9:25mm", "charuco:14x10:25mm:18mm:DICT_5X5_250:legacy"."""
+"""A board as a person types it: "checkerboard:13x9:25mm", "charuco:14x10:25mm:18mm:DICT_5X5_250:legacy",
+"circles:13x9:25mm:12mm"."""
 
 from __future__ import annotations
 
@@ -9,9 +10,12 @@ from render.base.errors import InputError
 
 FORM = (
     "checkerboard:COLUMNSxROWS:SIDE with inner corners, as checkerboard:13x9:25mm, or "
-    "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY][:legacy] with squares, as charuco:14x10:25mm:18mm"
+    "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY][:legacy] with squares, as charuco:14x10:25mm:18mm, or "
+    "circles:COLUMNSxROWS:SPACING:DIAMETER with dark discs, as circles:13x9:25mm:12mm"
 )
 UNITS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+WIDEST_DISC = 0.6
+"""Of the spacing: about each disc the paper's brightness is to be seen."""
 MOST = 200
 """Corners a side."""
 
@@ -20,7 +24,11 @@ def parse_board(text: str) -> Board:
     """The board. InputError: not of the form, or a size that no board has."""
     kind, *parts = text.split(":")
     counts = re.fullmatch(r"(\d{1,4})x(\d{1,4})", parts[0]) if parts else None
-    if kind not in ("checkerboard", "charuco") or counts is None or len(parts) < (2 if kind == "checkerboard" else 3):
+    if (
+        kind not in ("checkerboard", "charuco", "circles")
+        or counts is None
+        or len(parts) < (2 if kind == "checkerboard" else 3)
+    ):
         raise _refused(text)
     columns, rows = int(counts[1]), int(counts[2])
     square = _length(parts[1], text)
@@ -28,6 +36,11 @@ def parse_board(text: str) -> Board:
         if len(parts) > 2:
             raise _refused(text)
         board = Board("checkerboard", columns, rows, square)
+    elif kind == "circles":
+        diameter = _length(parts[2], text)
+        if len(parts) > 3 or not 0.1 * square <= diameter <= WIDEST_DISC * square:
+            raise _refused(text)
+        board = Board("circles", columns, rows, square, diameter)
     else:
         marker, rest = _length(parts[2], text), parts[3:]
         legacy = "legacy" in rest
@@ -47,6 +60,8 @@ def board_text(board: Board) -> str:
     side = f"{1e3 * board.square:.9g}mm"
     if board.kind == "checkerboard":
         return f"checkerboard:{board.columns}x{board.rows}:{side}"
+    if board.kind == "circles":
+        return f"circles:{board.columns}x{board.rows}:{side}:{1e3 * board.marker:.9g}mm"
     legacy = ":legacy" if board.legacy else ""
     marker = f"{1e3 * board.marker:.9g}mm"
     return f"charuco:{board.columns + 1}x{board.rows + 1}:{side}:{marker}:{board.dictionary}{legacy}"

@@ -13,6 +13,7 @@ from analysis.calibration.estimate import unit_plane, unit_plane_jacobian
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import atomic_write
+from studio.calibration.motion_file import motion_data
 from studio.project.calibration import (
     CALIBRATION_KIND,
     CALIBRATION_VERSION,
@@ -35,6 +36,7 @@ def file_data(result: Calibrated, size: tuple[int, int], board: str) -> dict[str
     camera = {"width": size[0], "height": size[1], "fx": fx, "fy": fy, "cx": cx, "cy": cy}
     covariance = solution.covariance
     planes = [unit_plane(m) for m in estimate.planes]
+    motion = motion_data(result)
     by_laser = {one.volume.laser: one.rms for one in result.depth}
     return {
         "kind": CALIBRATION_KIND,
@@ -46,6 +48,7 @@ def file_data(result: Calibrated, size: tuple[int, int], board: str) -> dict[str
         "board_warp_m": estimate.warp.tolist(),
         "planes": [plane.tolist() for plane in planes],
         "covariances": [laser_covariance(result, i).tolist() for i in range(len(planes))],
+        **({} if motion is None else {"motion": motion}),
         "checks": {
             "chi2_per_degree": solution.chi2 / max(solution.freedom, 1),
             "corner_sigma_factor": result.adjusted.corner_scale,

@@ -41,15 +41,27 @@ def seen_at(points: Float, estimate: Estimate) -> Float:
     return pixel
 
 
-def dark_squares(board: Board, estimate: Estimate, rotation: Float, translation: Float) -> Float:
-    """(k, 4, 2) px, corners of the board's dark squares in a pose, those that can be seen."""
+def dark_shapes(board: Board) -> Float:
+    """(k, 4, 2) m on the board, corners of its dark squares; of discs (k, EDGE, 2)."""
+    if board.kind == "circles":
+        angle = np.arange(EDGE) * (2.0 * np.pi / EDGE)
+        return np.asarray(board.target[:, None] + board.circle * np.column_stack([np.cos(angle), np.sin(angle)]))
     j, i = np.mgrid[-1 : board.rows, -1 : board.columns]
     dark = (i + j) % 2 == 0
     low = np.stack([i[dark], j[dark]], axis=1)
-    four = (low[:, None, :] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])) * board.square
-    flat = np.concatenate([four, np.zeros((*four.shape[:2], 1))], axis=2).reshape(-1, 3)
-    pixel = seen_at(flat @ rotation.T + translation, estimate).reshape(-1, 4, 2)
+    return np.asarray((low[:, None, :] + np.array([[0, 0], [1, 0], [1, 1], [0, 1]])) * board.square)
+
+
+def dark_squares(board: Board, estimate: Estimate, rotation: Float, translation: Float) -> Float:
+    """(k, m, 2) px, the dark shapes in a pose, those that can be seen as a whole."""
+    shapes = in_space(dark_shapes(board), rotation, translation)
+    pixel = seen_at(shapes.reshape(-1, 3), estimate).reshape(*shapes.shape[:2], 2)
     return np.asarray(pixel[np.isfinite(pixel).all(axis=(1, 2))])
+
+
+def in_space(shapes: Float, rotation: Float, translation: Float) -> Float:
+    """(k, m, 2) m on the board -> (k, m, 3) m in the camera frame."""
+    return np.asarray(shapes @ rotation[:, :2].T + translation)
 
 
 def outline(board: Board, estimate: Estimate, rotation: Float, translation: Float) -> Float:

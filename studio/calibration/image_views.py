@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.calibration.board import Board
-from analysis.calibration.detect import detect, on_board, without_corners
+from analysis.calibration.detect import detect, on_board, spacing, without_corners
 from analysis.calibration.observations import Stripe, View
 from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
@@ -148,6 +148,7 @@ def _with_lines(
     told, stripes = [], []
     own = {0: shot.board} if shot.board is not None and not shot.lasers else shot.lasers
     near = np.zeros(len(view.pixel), dtype=bool)
+    disc = spacing(view.pixel) * board.circle / board.square
     for laser, file in sorted(own.items()):
         assert file is not None
         with_line = image if file == shot.board else load_photograph(file)
@@ -159,7 +160,7 @@ def _with_lines(
             across = 0 if settings.axis == "rows" else 1
             row = np.rint(view.pixel[:, 1 - across])
             index = np.clip(np.searchsorted(pixel[:, 1 - across], row), 0, len(pixel) - 1)
-            near |= np.abs(view.pixel[:, across] - pixel[index, across]) < 10.0 + 4.0 * width
+            near |= np.abs(view.pixel[:, across] - pixel[index, across]) < 10.0 + 4.0 * width + disc
         keep = on_board(view, board, pixel, CLEAR_WIDTHS * width + 2.0, settings.axis)
         if np.count_nonzero(keep) < FEWEST_POINTS:
             told.append(f"the line of laser {laser} is not on the board; only its corners are used")

@@ -11,6 +11,7 @@ import numpy as np
 from analysis.calibration.board import Board
 from analysis.calibration.detect import FEWEST
 from analysis.calibration.estimate import Estimate
+from analysis.calibration.motion import Told
 from analysis.calibration.next_pose import Advice
 from analysis.calibration.observations import View
 from analysis.calibration.virtual import exact_view, noisy
@@ -40,6 +41,8 @@ class Material:
     """Of files that are not used, each with its path."""
     notes: tuple[str, ...] = ()
     """Of views, each with its name."""
+    told: Told | None = None
+    """Of a motion that carried the board."""
 
     def without(self, names: Collection[str]) -> Material:
         """The same without some views."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from analysis.calibration.adjust import adjust
+from analysis.calibration.circles import centre_bias
 from analysis.calibration.observations import View, gather
 from analysis.calibration.residuals import corners, laser_points
 from analysis.calibration.start import start
@@ -61,18 +62,14 @@ def residuals(view: View, result: Calibrated, target: Float, *, dropped: bool = 
     if view.name in kept.names and not dropped:
         part: Part = "used"
         number = kept.names.index(view.name)
-        posed = replace(
-            estimate,
-            rotation=estimate.rotation[number : number + 1],
-            translation=estimate.translation[number : number + 1],
-        )
+        posed = estimate.with_poses(estimate.rotation[number : number + 1], estimate.translation[number : number + 1])
         counted = kept.whitening[kept.view == number][:, 0, 0] > 0.0
     else:
         part = "dropped" if dropped else "left out"
         corners_only = gather([replace(view, stripes=())], np.stack([target.min(axis=0), target.max(axis=0)]))
         camera = (estimate.intrinsics, estimate.distortion)
         guess = start([view], (0, 0), len(estimate.distortion), 0, known=camera)
-        held = replace(estimate, rotation=guess.rotation, translation=guess.translation)
+        held = estimate.with_poses(guess.rotation, guess.translation)
         posed = adjust(corners_only, held, np.zeros(len(held.shared), dtype=bool)).estimate
     plain = replace(
         seen,
@@ -83,6 +80,8 @@ def residuals(view: View, result: Calibrated, target: Float, *, dropped: bool = 
     line = np.zeros((len(along.residual), 2))
     line[np.arange(len(line)), seen.along] = along.residual
     off = corners(plain, posed).residual.reshape(-1, 2)
+    if result.circle > 0.0:
+        off = off + centre_bias(posed, seen.view, seen.target, result.circle)
     return Residuals(
         view.name, view.pixel, off, counted, seen.laser_pixel, line, part, posed.rotation[0], posed.translation[0]
     )

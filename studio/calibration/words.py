@@ -7,6 +7,7 @@ import numpy as np
 from analysis.calibration.calibrate import Calibrated
 from analysis.calibration.estimate import unit_plane
 from analysis.calibration.next_pose import Advice
+from studio.calibration.motion_file import motion_rows
 
 SMALL_GAIN = 0.03
 """Of the depth error: what one more view should take off it to be worth while."""
@@ -30,6 +31,7 @@ def parameter_rows(result: Calibrated) -> list[tuple[str, str, str]]:
         rows.append(
             (f"laser {i}: distance mm", f"{-1e3 * d:.4f}", f"{1e3 * np.sqrt(by_d @ covariance[own, own] @ by_d):.2g}")
         )
+    rows += motion_rows(result)
     warp = 1e6 * estimate.warp
     at = estimate.camera_count
     if result.adjusted.solution.free[at]:

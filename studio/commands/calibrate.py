@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,6 +40,9 @@ class CalibrateOptions:
     corner_sigma: float
     line_sigma: float
     export: tuple[str, ...]
+    motion: Path | None
+    """Table of what carried the board."""
+    hand: str
 
 
 def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: bool, **given: Any) -> int:
@@ -50,8 +53,10 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     from analysis.calibration.calibrate import Request, calibrate
     from studio.calibration.board_text import board_text, parse_board
     from studio.calibration.calibration_file import file_data, write_calibration
+    from studio.calibration.carried import carried_views
     from studio.calibration.in_silico import true_depth_error, virtual_views
     from studio.calibration.material import Material, board_distances, with_faults
+    from studio.calibration.motion_file import motion_values
     from studio.commands.commands import load_project
 
     options = CalibrateOptions(**given)
@@ -75,7 +80,14 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
                 sigmas=(options.corner_sigma, options.line_sigma),
             )
             camera = project.scene.camera
-            material = Material(tuple(views), (camera.width, camera.height), len(project.scene.lasers))
+            sigmas = (options.corner_sigma, options.line_sigma)
+            moved = carried_views(project, board, truth, seed=options.seed, sigmas=sigmas)
+            told = None
+            if moved is not None:
+                more, truth, told = moved
+                views += more
+            size = (camera.width, camera.height)
+            material = Material(tuple(views), size, len(project.scene.lasers), told=told)
             out = options.out or Path("scan-output") / "calibration.json"
         else:
             allowed = "camera FOLDER, laser FOLDER, scanner FOLDER, or a project alone"
@@ -90,6 +102,8 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
             farthest=options.farthest,
             most_tilt=float(np.radians(options.most_tilt)),
             known=known,
+            told=material.told,
+            circle=board.circle,
         )
         try:
             result = calibrate(material.views, board.target, request)
@@ -109,6 +123,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
                 **extra,
                 "next_pose": _advice_data(result),
                 "true_depth_rms_m": None if true is None else [one for one, _ in true],
+                "true_motion": None if truth is None else motion_values(truth),
             }
         )
     else:
@@ -124,11 +139,16 @@ def _photographed(what: str, folder: Path, options: CalibrateOptions, progress: 
     from analysis.line.extract import settings_of
     from studio.calibration.image_views import shots
     from studio.calibration.material import need_a_line, photographed
+    from studio.calibration.motion_file import check_names, read_motion
 
     settings = settings_of(None, axis=options.axis, channel=options.channel)
-    with_lasers = what != "camera"
+    with_lasers, taken = what != "camera", shots(folder)
+    told = None
+    if options.motion is not None:
+        told = read_motion(options.motion, "board" if options.hand == "board" else "camera")
+        check_names(told, [shot.name for shot in taken], str(options.motion))
     found = photographed(
-        shots(folder),
+        taken,
         _board(options),
         settings,
         lasers=with_lasers,
@@ -136,7 +156,7 @@ def _photographed(what: str, folder: Path, options: CalibrateOptions, progress: 
     )
     if with_lasers:
         need_a_line(found, str(folder))
-    return found
+    return replace(found, told=told)
 
 
 def _check_options(what: str, options: CalibrateOptions) -> None:
@@ -151,6 +171,9 @@ def _check_options(what: str, options: CalibrateOptions) -> None:
         raise InputError(
             "a known camera is for the laser alone", where="--camera", found=f"calibrate {what}", cure=cure
         )
+    if what not in PARTS and options.motion is not None:
+        cure = "leave it out: a project's own motion carries a virtual board"
+        raise InputError("a table of the motion is for photographs", where="--motion", found=what, cure=cure)
     if what == "laser" and options.lens != "auto":
         cure = "leave --lens out"
         raise InputError("the known camera has its lens", where="--lens", found=options.lens, cure=cure)

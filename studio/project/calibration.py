@@ -117,14 +117,19 @@ class Calibration(Model):
         """The camera that points are made with."""
         return camera if self.camera is None else self.camera.of(camera)
 
-    def scaled(self, image_scale: float) -> Calibration:
-        """That of images with `image_scale` times the pixels a side; the camera follows by itself (`camera_of`)."""
+    def scaled(self, image_scale: float, camera: Camera) -> Calibration:
+        """That of images with `image_scale` times the pixels a side, and so of the scaled camera."""
         matrices = []
         for rows in self.covariances:
             by = np.array([image_scale] * 4 + [1.0] * (len(rows) - 4))
             matrices.append(np.array(rows) * np.outer(by, by))
         covariances = tuple(tuple(tuple(row) for row in matrix.tolist()) for matrix in matrices)
-        return self.model_copy(update={"covariances": covariances})
+        found = None
+        if self.camera is not None:
+            there = self.camera.of(camera)
+            values = {name: getattr(there, name) for name in CalibratedCamera.model_fields}
+            found = CalibratedCamera.model_validate(values)
+        return self.model_copy(update={"camera": found, "covariances": covariances})
 
 
 def check_covariance(matrix: NDArray[np.float64], name: str) -> None:

@@ -266,6 +266,18 @@ def real_views(command: Callable[..., Any]) -> Callable[..., Any]:
             help="Distortion terms.",
         ),
         click.option(
+            "--hand",
+            type=click.Choice(["camera", "board"]),
+            default="camera",
+            show_default=True,
+            help="What the robot of --motion carries.",
+        ),
+        click.option(
+            "--motion",
+            type=click.Path(path_type=Path),
+            help="CSV with view and position_mm, angle_deg, or a robot's x_mm, y_mm, z_mm, qx, qy, qz, qw.",
+        ),
+        click.option(
             "--camera", type=click.Path(path_type=Path), help="Calibration file of the camera, for laser alone."
         ),
     ):

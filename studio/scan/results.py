@@ -8,6 +8,7 @@ from contextlib import suppress
 from importlib import metadata
 
 from analysis.line.settings import Method
+from analysis.report.calibration import FoundCalibration
 from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
 from analysis.report.record import ScanRecord
 from render.base.model import Model
@@ -111,7 +112,21 @@ def report_input(
         measures=tuple(measures_record(project.measures, record.readings)),
         delivery=project.delivery,
         logo=logo,
+        calibration=_found(project),
         run=run,
+    )
+
+
+def _found(project: Project) -> FoundCalibration | None:
+    """The project's calibration as a report has it; None where points are made as the scene has it, exactly."""
+    given, scene = project.calibration, project.scene
+    if given.camera is None and given.laser_count == 0:
+        return None
+    lasers = range(len(scene.lasers))
+    return FoundCalibration(
+        given.camera_of(scene.camera),
+        tuple(given.plane(i, scene.laser_plane(i)) for i in lasers),
+        tuple(given.covariance(i) for i in lasers),
     )
 
 

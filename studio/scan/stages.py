@@ -87,7 +87,10 @@ def scaled(project: Project, image_scale: float) -> Project:
     if image_scale == 1.0:
         return project
     scene = project.scene.scaled(image_scale)
-    sensor, calibration = scaled_sensor(project.sensor, image_scale), project.calibration.scaled(image_scale)
+    sensor, calibration = (
+        scaled_sensor(project.sensor, image_scale),
+        project.calibration.scaled(image_scale, scene.camera),
+    )
     return project.model_copy(update={"scene": scene, "sensor": sensor, "calibration": calibration})
 
 

@@ -22,6 +22,7 @@ BOARDS = (
     "checkerboard:5x4:30", "checkerboard:0x4:30mm", "checkerboard:9999x9999:1m", "checkerboard:5x4:nanmm",
     "checkerboard:5x4:30mm:30mm", "charuco:6x5:30mm:30mm", "charuco:6x5:30mm:20mm:", "charuco:6x5:30mm:20mm:legacy",
     "charuco:6x5:30mm:20mm:DICT_NONE", "charuco:200x200:30mm:20mm", "charuco:6x5:30mm:29.999mm", ":::", "checkerboard:",
+    "circles:6x5:30mm:12mm", "circles:6x5:30mm", "circles:6x5:30mm:30mm",
     "charuco:6x5:30mm:1um:DICT_ARUCO_ORIGINAL", "checkerboard:2x2:10m", "checkerboard:200x200:10um",
 )  # fmt: skip
 NAMES = ("--nearest", "--farthest", "--most-tilt", "--target-um", "--corner-sigma", "--line-sigma", "--seed")
@@ -72,6 +73,9 @@ def _command(place: Path, sources: Sources, rng: Random) -> list[str]:
     what = rng.choice((["project.json"], ["project.json"], ["camera", "textures"], ["laser", "."], ["", "."]))
     argv = ["calibrate", *json_or_not(rng), *what, "--views", rng.choice(("3", "6", "nan")), "--lens", "0"]
     argv += ["--board", rng.choice(BOARDS[:3] if rng.random() < 0.7 else (*BOARDS, *WORDS))]
+    if rng.random() < 0.2:
+        (place / "motion.csv").write_bytes(damaged(b"view,position_mm,placement\na,1.5,\nb,2.5,\n", rng))
+        argv += ["--motion", rng.choice(("motion.csv", *PATHS)), "--hand", rng.choice(("camera", "board"))]
     for name in rng.sample(NAMES, rng.choice((0, 1, 2))):
         argv += [name, rng.choice(NUMBERS)]
     return [*argv, "--out", rng.choice((*OUTS, "out.json", "out.json"))]

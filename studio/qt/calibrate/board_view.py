@@ -34,6 +34,7 @@ from studio.calibration.drawings import (
 from studio.qt.calibrate.board_items import BoardItems
 from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.calibrate.depth_plot import DepthPlot
+from studio.qt.calibrate.ghost import Ghost
 from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, one_of
@@ -62,6 +63,7 @@ class BoardView(QWidget):
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.work = one_of(CalibrationWork, session)
+        one_of(Ghost, session)
         self.runner = JobRunner(self)
         self.tabs = QTabBar(expanding=False, usesScrollButtons=True, elideMode=Qt.TextElideMode.ElideRight)
         self.tabs.setDrawBase(False)

@@ -6,6 +6,7 @@ Made once for a session by `one_of`; the panels change it and follow its signals
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -315,14 +316,9 @@ class CalibrationWork(QObject):
         elif not self.virtual:
             need_a_line(material, self.source)
         known = held_camera(self.camera_file, material.size) if self.what == "laser" else None
-        request = Request(
-            material.size,
-            material.lasers,
-            self.terms if known is None else None,
-            nearest=self.nearest,
-            farthest=self.farthest,
-            known=known,
-        )
+        terms = self.terms if known is None else None
+        request = Request(material.size, material.lasers, terms, nearest=self.nearest, farthest=self.farthest)
+        request = replace(request, known=known, circle=board.circle)
 
         def work(progress: Progress, cancelled: Cancel) -> Solved | str:
             progress("adjustment", 0.0)

@@ -9,8 +9,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from PySide6.QtCore import QObject, Signal
 
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.checkpoint import RenderState
 from render.frame import Frame
@@ -115,6 +117,8 @@ class Session(QObject):
     """level ("info", "warning", "error") and text, for log and status bar."""
     document_replaced = Signal()
     """Another project was opened."""
+    ghost_changed = Signal()
+    """`ghost` is another."""
 
     def __init__(self, document: Document) -> None:
         super().__init__()
@@ -126,8 +130,15 @@ class Session(QObject):
         self.shown: Render | None = None
         self.problems: dict[FieldPath, str] = {}
         """What the live preview cannot show as it is set: by the path of the field, why."""
+        self.ghost: Float = np.zeros((0, 4, 3))
+        """(k, m, 3) m in the camera frame: dark shapes of the calibration board where it is advised to be held."""
         self.document = document
         document.listeners.append(self.project_changed.emit)
+
+    def show_ghost(self, shapes: Float) -> None:
+        """(k, m, 3), as `ghost`; none hides it."""
+        self.ghost = shapes
+        self.ghost_changed.emit()
 
     @property
     def project(self) -> Project:

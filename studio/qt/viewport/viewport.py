@@ -22,6 +22,7 @@ from studio.qt.core import theme
 from studio.qt.core.actions import VIEW_KEYS
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
+from studio.qt.viewport.board_ghost import BoardGhost
 from studio.qt.viewport.gizmo import Gizmo
 from studio.qt.viewport.view3d import View3D
 from studio.qt.viewport.viewport_bar import ViewportBar
@@ -40,6 +41,7 @@ class Viewport(QWidget):
         self.session, self.live = session, live(session)
         self.view = View3D(self)
         self.scene = ViewportScene(self.view.renderer)
+        self.ghost = BoardGhost(session, self.view)
         self.gizmo = Gizmo(session, self.live, self.view)
         self.view.tool = self.gizmo
         self.view.before_paint = self.gizmo.draw

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from analysis.calibration.adjust import adjust
+from analysis.calibration.adjust import adjust, bending
 from analysis.calibration.estimate import Estimate, free_parameters
 from analysis.calibration.lens import LENGTHS, normalise, project
 from analysis.calibration.observations import Observations, gather
@@ -126,6 +126,19 @@ def test_errors_are_as_large_as_told_and_regions_cover() -> None:
     ratio = np.sqrt(np.mean(np.square(errors), axis=0))
     assert 0.95 <= ratio.mean() <= 1.05
     assert abs(np.mean(chi2) - 1.0) < 3.0 * np.sqrt(2.0 / found.freedom / 200)
+
+
+def test_chi_square_rises_by_one_where_errors_are_linear_and_by_far_more_where_a_valley_bends() -> None:
+    there = truth(8, 12, terms=5)
+    seen = gather(noisy(views_of(there, laser_step=96), np.random.default_rng(1)))
+    found = adjust(seen, there, free_parameters(there, warp=True))
+    assert bending(seen, found) == pytest.approx(1.0, abs=0.02)
+    flat = truth(12, 12, terms=14, tilt=(5.0, 12.0), depth=(0.8, 0.9))
+    wide = np.array([1500.0, 1500.0, 1223.5, 1023.5])
+    flat = replace(flat, intrinsics=wide, translation=flat.translation * [2.0, 1.5, 0.5])
+    seen = gather(noisy(views_of(flat, laser_step=96), np.random.default_rng(1)))
+    found = adjust(seen, flat, free_parameters(flat, warp=True))
+    assert bending(seen, found) > 2.0
 
 
 def test_a_rational_lens_settles_where_its_terms_part_and_is_told_by_name_where_they_do_not() -> None:

@@ -34,6 +34,27 @@ def test_what_is_drawn_is_what_is_detected(text: str) -> None:
     assert best < 0.75
 
 
+def test_a_grid_of_discs_is_printed_to_scale(tmp_path: Path) -> None:
+    import zlib
+
+    path = tmp_path / "board.pdf"
+    assert write_board(path, parse_board("circles:5x4:30mm:12mm"), None) == "A4"
+    page = b"".join(zlib.decompress(one) for one in re.findall(rb"stream\r?\n(.*?)endstream", path.read_bytes(), re.S))
+    curves = re.findall(rb"([\d.]+) ([\d.]+) m\n((?:[\d. ]+ c\n){8})", page)
+    points = [np.array([line.split()[4:6] for line in one[2].splitlines()], dtype=float) for one in curves]
+    points = [each for each in points if 30.0 < np.ptp(each[:, 0]) < 40.0]  # letters are in units of their own
+    assert len(points) == 20
+    centres, widths = np.array([each.mean(axis=0) for each in points]), [np.ptp(each, axis=0) for each in points]
+    np.testing.assert_allclose(widths, 12.0 / 25.4 * 72.0, rtol=1e-4)
+    np.testing.assert_allclose(np.ptp(centres, axis=0), np.array([120.0, 90.0]) / 25.4 * 72.0, rtol=1e-4)
+
+
+@pytest.mark.parametrize("text", ["circles:5x4:30mm", "circles:5x4:30mm:19mm", "circles:5x4:30mm:12mm:legacy"])
+def test_discs_without_paper_about_them_are_no_grid(text: str) -> None:
+    with pytest.raises(InputError, match="not a board"):
+        parse_board(text)
+
+
 def test_the_page_is_to_scale(tmp_path: Path) -> None:
     path = tmp_path / "board.pdf"
     assert write_board(path, parse_board("checkerboard:13x9:25mm"), None) == "A3"

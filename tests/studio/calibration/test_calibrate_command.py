@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from studio.calibration.calibration_file import read_calibration
 from studio.calibration.image_views import shots
 from studio.project.project import Project
 from studio.scan.stages import triangulate_line
+from tests.analysis.calibration.test_circles import photograph, scene
 from tests.studio.calibration.photographed_boards import BOARD, scanner, write_folder
 
 VIEWS = 8
@@ -59,6 +61,22 @@ def test_photographs_of_a_scanner_give_its_camera_and_laser(folder: Path, tmp_pa
     project = Project.load(tmp_path)
     assert project.calibration.camera is not None and project.calibration.camera.fx == pytest.approx(found[0])
     assert project.calibration.covariance(0).shape == (12, 12)
+
+
+def test_photographs_of_a_grid_of_discs_give_the_camera(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    for number, (tilt, side, z) in enumerate(itertools.product((15.0, 35.0), (0.3, 2.4, 4.5), (0.55, 0.8))):
+        there = scene(tilt, side, z)
+        image = photograph(there)
+        drawn = np.clip(image + rng.normal(size=image.shape) * np.sqrt(1.0 + 0.02 * image), 0, 255)
+        cv2.imwrite(str(tmp_path / f"pose_{number}.png"), np.rint(drawn).astype(np.uint8))
+    words = ("calibrate", "camera", str(tmp_path), "--board", "circles:7x5:40mm:20mm", "--lens", "4")
+    code, told = run(*words, "--out", str(tmp_path / "out.json"))
+    assert code == 0, told
+    found = np.array([told["camera"][name] for name in ("fx", "fy", "cx", "cy")])
+    sigma = np.sqrt(np.diag(np.array(told["camera_covariance"])))
+    assert np.all(np.abs(found - there.intrinsics) < 4.0 * sigma[:4]) and sigma[0] < 2.0
+    assert told["checks"]["corner_sigma_factor"] < 1.3
 
 
 def test_the_laser_alone_is_found_with_a_camera_that_is_known(folder: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from analysis.line.result import Line
 from render.base.errors import InputError
 from studio.project.calibration import Calibration
 from studio.project.project import Project
-from studio.scan.stages import scaled, triangulate_line
+from studio.scan.stages import scaled, triangulate_line, validated
 
 SIGMAS = (0.5, 0.5, 0.2, 0.2, 1e-4, 1e-5, 1e-4, 2e-5)
 
@@ -61,6 +61,17 @@ def test_it_follows_the_scale_of_the_image() -> None:
     whole = triangulate_line(project, line_at(project, 1000.5), 0, 0)
     half = triangulate_line(small, line_at(small, 500.0), 0, 0)
     np.testing.assert_allclose(half.sigma_depth_systematic[500], whole.sigma_depth_systematic[1000:1002].mean(), 1e-4)
+
+
+def test_a_found_camera_follows_the_scale_too() -> None:
+    data = Project.load("plane").model_dump(mode="json")
+    camera = data["scene"]["rig"]["camera"]
+    found = {name: camera[name] for name in ("width", "height", "fx", "fy", "cx", "cy")}
+    data["calibration"] = {"camera": found | {"fx": found["fx"] + 4.0, "distortion": [-0.1, 0.0, 0.0, 0.0]}}
+    small = validated(scaled(Project.from_data(data, "here"), 0.25), "at a quarter")
+    camera = small.calibration.camera_of(small.scene.camera)
+    assert camera.fx - small.scene.camera.fx == pytest.approx(1.0)
+    assert camera.distortion[0] == -0.1 and camera.width == small.scene.camera.width
 
 
 @pytest.mark.parametrize(

@@ -99,6 +99,20 @@ class TestPictures:
         solved.panel.target.setValue(1e5)
         assert boards.caption.text().startswith("Enough") and len(boards.items.edge.getData()[0]) == 0
 
+    def test_the_ghost_for_the_3d_view_is_in_the_same_place(self, solved: Desk) -> None:
+        work, ghost = solved.work, solved.session.ghost
+        assert work.solved is not None and work.solved.result.advice is not None
+        advice = work.solved.result.advice
+        corners = ghost.reshape(-1, 3)
+        # its dark squares are on a plane through the middle that was advised, and about it
+        off = (corners - advice.centre) @ advice.rotation
+        assert np.abs(off[:, 2]).max() < 1e-12
+        middle = 0.5 * (off.min(axis=0) + off.max(axis=0))
+        assert np.abs(middle).max() < 1e-9 and np.ptp(off[:, 0]) == pytest.approx(14 * 0.025)
+        work.target_um = 1e6
+        work.solved_changed.emit()
+        assert len(solved.session.ghost) == 0
+
     def test_a_virtual_board_is_held_where_it_is_advised_and_depth_is_known_better(
         self, qtbot: QtBot, solved: Desk
     ) -> None:

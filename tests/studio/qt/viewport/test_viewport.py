@@ -307,3 +307,16 @@ def test_a_template_is_drawn_with_all_its_meshes(qtbot: QtBot, name: str) -> Non
     qtbot.waitUntil(lambda: not made.live.is_loading and not made._frame_soon and made.view.paints > 0)
     assert len(made.scene._meshes) == len(made.session.project.scene.visible_objects)
     made.close()
+
+
+def test_the_board_s_ghost_stands_before_the_camera(viewport: Viewport) -> None:
+    session = viewport.session
+    actor, data = viewport.ghost.shapes.actor, viewport.ghost.shapes.data
+    assert not actor.GetVisibility()
+    square = np.array([[[-0.1, -0.1, 0.5], [0.1, -0.1, 0.5], [0.1, 0.1, 0.5], [-0.1, 0.1, 0.5]]])
+    session.show_ghost(square)
+    assert actor.GetVisibility() and data.n_cells == 1
+    pose = session.project.scene.T_world_camera()
+    np.testing.assert_allclose(data.points, square[0] @ pose[:3, :3].T + pose[:3, 3], atol=1e-6)
+    session.show_ghost(np.zeros((0, 4, 3)))
+    assert not actor.GetVisibility()

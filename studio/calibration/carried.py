@@ -1,0 +1,110 @@
+"""Virtual boards that a project's own motion carries, so that its axis is found beside its truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.calibration.board import Board
+from analysis.calibration.estimate import Estimate
+from analysis.calibration.motion import Motion, Told, turntable
+from analysis.calibration.observations import View
+from analysis.calibration.virtual import exact_view, noisy
+from render.base.arrays import Float
+from render.base.pose import rotation_vector
+from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
+from studio.calibration.in_silico import LEAST_SEEN
+from studio.project.project import Project
+
+POSITIONS = 8
+"""Of the one board that is carried."""
+FEWEST_POSITIONS = 3
+LONGEST, WIDEST = 0.2, float(np.radians(40.0))
+"""m and rad to either side at most: a board is to be seen from the same side all the time."""
+LASER_STEP = 8
+
+
+def carried_views(
+    project: Project, board: Board, truth: Estimate, *, seed: int, sigmas: tuple[float, float]
+) -> tuple[list[View], Estimate, Told] | None:
+    """Views of one board at several positions, the truth with the motion, and what the axis was told.
+
+    truth: with poses of the board, in the first of which that is carried. sigmas px of corners and lines.
+    None: the project stands still, or the camera sees the board at fewer than three positions.
+    """
+    motion = true_motion(project)
+    if motion is None:
+        return None
+    size = (project.scene.camera.width, project.scene.camera.height)
+    for number in range(len(truth.rotation)):
+        for share in (1.0, 0.5, 0.25, 0.125):
+            chosen = motion if motion.kind == "hand_eye" else replace(motion, given=share * motion.given)
+            there = replace(truth, rotation=truth.rotation[[number]], translation=truth.translation[[number]])
+            there = _carried(there, chosen)
+            views = _views(there, board, size, sigmas)
+            seen = np.array([len(view.pixel) >= LEAST_SEEN * len(board.target) for view in views])
+            if seen.all() or (motion.kind == "hand_eye" and seen.sum() >= FEWEST_POSITIONS):
+                kept = np.nonzero(seen)[0]
+                rng = np.random.default_rng([seed, number])
+                told = {views[i].name: ("", np.asarray(chosen.given[i])) for i in kept}
+                return noisy([views[i] for i in kept], rng), replace(truth, motion=chosen), Told(motion.kind, told)
+    return None
+
+
+def true_motion(project: Project) -> Motion | None:
+    """The project's motion as it carries what is seen, in the camera's frame, at positions over the whole of it."""
+    moved, camera = project.scene.motion, project.scene.rig.T_world_rig.matrix
+    if isinstance(moved, NoMotion):
+        return None
+    camera = camera @ project.scene.camera.T_rig_camera.matrix
+    rotation, sign = camera[:3, :3], 1.0 if moved.moves == "objects" else -1.0
+    group = np.zeros(POSITIONS, dtype=np.intp)
+    middle = np.linspace(-0.5, 0.5, POSITIONS) * (moved.frame_count - 1)
+    if isinstance(moved, LinearStage):
+        length = float(np.linalg.norm(moved.step))
+        if length == 0.0 or moved.steps < 2:
+            return None
+        given = _within(middle * length, LONGEST)
+        return Motion("stage", group, given, sign * rotation.T @ np.array(moved.step) / length, np.eye(3)[1])
+    if isinstance(moved, Turntable):
+        if moved.angle_step == 0.0 or moved.steps < 2:
+            return None
+        axis = sign * rotation.T @ np.array(moved.axis) / np.linalg.norm(moved.axis)
+        point = rotation.T @ (np.array(moved.centre) - camera[:3, 3])
+        return turntable(group, _within(middle * moved.angle_step, WIDEST), axis, point)
+    return _hand(project, moved, camera)
+
+
+def _hand(project: Project, moved: PoseList, camera: Float) -> Motion | None:
+    some = np.unique(np.linspace(0, len(moved.poses) - 1, POSITIONS).round().astype(int))
+    poses = np.array([moved.displacement(int(i)) for i in some])
+    turned = np.array([rotation_vector(pose[:3, :3]) for pose in poses])
+    if len(some) < FEWEST_POSITIONS or np.linalg.svd(turned - turned[0], compute_uv=False)[1] < 0.2:
+        return None
+    eye = project.scene.camera.T_rig_camera.matrix
+    given = poses @ project.scene.rig.T_world_rig.matrix
+    if moved.moves == "objects":
+        eye, given = camera, np.linalg.inv(poses)
+    parameters = np.append(rotation_vector(eye[:3, :3]), eye[:3, 3])
+    return Motion("hand_eye", np.zeros(len(some), dtype=np.intp), given, parameters, np.eye(3)[1])
+
+
+def _within(given: Float, most: float) -> Float:
+    return given * min(1.0, most / max(float(np.abs(given).max()), 1e-12))
+
+
+def _carried(there: Estimate, motion: Motion) -> Estimate:
+    """The only pose of an estimate, in the first position, and those that follow from it."""
+    count = len(motion.given)
+    rotation, translation = np.repeat(there.rotation, count, axis=0), np.repeat(there.translation, count, axis=0)
+    posed = replace(there, rotation=rotation, translation=translation, motion=motion)
+    return posed.moved(np.zeros(len(posed.shared)), np.zeros((1, 6)))
+
+
+def _views(there: Estimate, board: Board, size: tuple[int, int], sigmas: tuple[float, float]) -> list[View]:
+    given = {"corner_sigma": sigmas[0], "laser_sigma": sigmas[1]}
+    names = (f"moved {i}" for i in range(len(there.rotation)))
+    return [
+        exact_view(name, there, i, board.target, size, laser_step=LASER_STEP, **given) for i, name in enumerate(names)
+    ]
