@@ -57,6 +57,12 @@ class CalibratedCamera(Model):
         scaled = found.scaled(width / self.width)
         return scaled.model_copy(update={"width": width, "height": height, "pixel_pitch": camera.pixel_pitch})
 
+    def scaled(self, image_scale: float) -> CalibratedCamera:
+        """That of images with `image_scale` times the pixels a side."""
+        names = type(self).model_fields
+        found = Camera(**{name: getattr(self, name) for name in names}).scaled(image_scale)
+        return self.model_copy(update={name: getattr(found, name) for name in names})
+
 
 class Calibration(Model):
     """What points are made with, and its covariance; as it is, camera and lasers are the scene's, and exact."""
@@ -118,13 +124,14 @@ class Calibration(Model):
         return camera if self.camera is None else self.camera.of(camera)
 
     def scaled(self, image_scale: float) -> Calibration:
-        """That of images with `image_scale` times the pixels a side; the camera follows by itself (`camera_of`)."""
+        """That of images with `image_scale` times the pixels a side."""
         matrices = []
         for rows in self.covariances:
             by = np.array([image_scale] * 4 + [1.0] * (len(rows) - 4))
             matrices.append(np.array(rows) * np.outer(by, by))
         covariances = tuple(tuple(tuple(row) for row in matrix.tolist()) for matrix in matrices)
-        return self.model_copy(update={"covariances": covariances})
+        camera = None if self.camera is None else self.camera.scaled(image_scale)
+        return self.model_copy(update={"camera": camera, "covariances": covariances})
 
 
 def check_covariance(matrix: NDArray[np.float64], name: str) -> None:

@@ -15,7 +15,9 @@ import numpy as np
 from analysis.study.boundary import Lattice, Node, next_nodes
 from analysis.study.breakdown import Search, next_values
 from render.base.errors import InputError
+from render.sensor.sensor import Sensor
 from studio.project.project import MAX_SEED, Project
+from studio.study.boards import Boards, boards_of
 from studio.study.effects import in_state
 from studio.study.study import EFFECTS_FIELD, MOST_CELLS, SEARCHES, Study, Sweep, Value, with_fields
 
@@ -39,7 +41,11 @@ class Cell:
     key: str
     """Names the measurement by what decides it: the same in every study, shard and machine."""
     render_key: str
-    """Cells with the same one differ only in sensor, laser power or method."""
+    """Cells with the same one differ only in sensor, laser power, method or boards."""
+    boards: Boards | None = None
+    """What the cell calibrates on; None: it takes the scene's camera and lasers."""
+    assumed: Sensor | None = None
+    """What line extraction takes the sensor to be, where an effect of it is off; None: what it is."""
 
     @property
     def project(self) -> Project:
@@ -120,16 +126,17 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
         values = {**study.set, **sweep.set, **{p.field: v for p, v in zip(sweep.vary, point, strict=True)}}
         state = values.pop(EFFECTS_FIELD, None)
         varied = with_fields(base, values, where)
+        boards, assumed = boards_of(values, where), None
         if state is not None:
-            varied = in_state(varied, str(state))
-        names = _Names(varied.in_folder(base.folder), study.image_scale)
+            whole, varied = varied, in_state(varied, str(state))
+            assumed = whole.sensor if varied.sensor != whole.sensor else None
+        names = _Names(varied.in_folder(base.folder), study.image_scale, boards, assumed)
         seeds = [(varied.seed + repeat) % (MAX_SEED + 1) for repeat in range(study.repeats)]
         shared = [names.render_key(seed) for seed in seeds] if varied.render.goal is None else None
         for method, (repeat, seed) in itertools.product(methods_of(study, sweep), enumerate(seeds)):
             key = names.key(method, seed)
-            yield Cell(
-                number, point, method, repeat, seed, names.project, key, key if shared is None else shared[repeat]
-            )
+            render_key = key if shared is None else shared[repeat]
+            yield Cell(number, point, method, repeat, seed, names.project, key, render_key, boards, assumed)
 
 
 def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Shard = WHOLE) -> list[Cell]:
@@ -199,7 +206,7 @@ def _repeats(
 class _Names:
     """Keys of a point's cells. What the point decides is put into words once: a study may have a million cells."""
 
-    def __init__(self, project: Project, image_scale: float) -> None:
+    def __init__(self, project: Project, image_scale: float, boards: Boards | None, assumed: Sensor | None) -> None:
         self.project = project
         data = {**project.model_dump(mode="json"), "image_scale": image_scale}
         del data["name"], data["schema_version"]
@@ -210,6 +217,10 @@ class _Names:
         self.light = {**self.whole, "scene": _words({**data["scene"], "rig": rig})}
         self.light["axis"] = _words(self.extraction["axis"])
         del self.light["sensor"], self.light["extraction"]
+        if boards is not None:
+            self.whole["boards"] = _words(boards.model_dump(mode="json"))
+        if assumed is not None:
+            self.whole["assumed"] = _words(assumed.model_dump(mode="json"))
 
     def key(self, method: str, seed: int) -> str:
         extraction = _words({**self.extraction, "method": method})

@@ -162,7 +162,7 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
             _note(axes, f"knee, {front.knee_probability[front.knee]:.0%} sure", place, INK, 7.0, (9, -11))
     for bound in answer.bounds:
         _bound(axes, bound, len(answer.bounds) > 1, measure)
-    what = "frame" if answer.sweep.time == "frame" else "line's extraction"
+    what = {"frame": "frame", "line": "line's extraction", "calibration": "calibration"}[answer.sweep.time]
     axes.set(xscale="log", yscale="log", xlabel=f"processor time of a {what} (s)", ylabel=_axis_label(measure))
     if answer.throughput is not None:
         _rays(axes, answer.throughput, answer.sweep.time == "frame")
@@ -205,6 +205,8 @@ def _roomy(axes: Any) -> None:
     """At least a factor of two to see along a logarithmic axis, so that small differences do not look like large."""
     for get, put in ((axes.get_xlim, axes.set_xlim), (axes.get_ylim, axes.set_ylim)):
         low, high = get()
+        if not low > 0.0:
+            continue  # nothing is drawn along it
         widen = max(1.0, math.sqrt(2.0 * low / high))
         put(low / widen, high * widen)
 

@@ -45,8 +45,21 @@ MEASURES: dict[str, Measure] = {
     "signal": Measure("peak, median", "e-"),
     "line_width": Measure("line width, median sigma", "px"),
     "depth_per_pixel": Measure("depth of one pixel, median", "µm/px", 1e6),
+    "calibration_rmse": Measure("depth error by the calibration, RMS over its volume", "µm", 1e6),
+    "calibration_predicted": Measure("the same, as the calibration tells it", "µm", 1e6),
+    "plane_angle": Measure("angle of the laser plane to the true one", "mrad", 1e3),
+    "focal_error": Measure("focal length off by", "px"),
+    "principal_error": Measure("principal point off by", "px"),
+    "reprojection_rmse": Measure("reprojection error, RMS", "px"),
     "incidence": Measure("angle from the surface's normal, to light or camera, median", "°", 180.0 / np.pi),
 }
+
+
+CALIBRATION_MEASURES = (
+    *("calibration_rmse", "calibration_predicted", "plane_angle"),
+    *("focal_error", "principal_error", "reprojection_rmse"),
+)
+"""Of cells that calibrate; NaN of others."""
 
 
 def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> dict[str, float]:
@@ -78,6 +91,7 @@ def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> d
         "visible_rows": errors.truth_rows / rows,
         "signal": _median(line.amplitude[found]),
         "line_width": _median(line.width[found]),
+        **dict.fromkeys(CALIBRATION_MEASURES, float("nan")),
         "depth_per_pixel": _median(np.abs(points.gradient[points.valid, 2])),
         "incidence": _median(np.maximum(curve.laser_angle, curve.camera_angle)),
     }

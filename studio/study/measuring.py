@@ -4,19 +4,35 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from render.base.errors import InputError
+from render.base.model import Model
 from render.base.threads import Cancel
+from render.sensor.sensor import Sensor
 from studio.notebook.frame import render
-from studio.notebook.measuring import compare, develop, extract, triangulate
+from studio.notebook.measuring import DevelopedImage, compare, develop, extract, triangulate
 from studio.project.project import Project
+from studio.scan.stages import scaled_sensor
+from studio.study.boards import Boards
+from studio.study.calibrating import calibrated
 from studio.study.measures import MEASURES, measures
 from studio.study.ray_units import RAY_SPEED, rays_per_second
+from studio.study.tables import CALIBRATING
 
 Row = tuple[str, dict[str, Any], dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Work:
+    """One cell, as text: its key, and its project, boards and assumed sensor in JSON; empty where there is none."""
+
+    key: str
+    project: str
+    boards: str
+    assumed: str
 
 
 @dataclass(frozen=True)
@@ -27,8 +43,7 @@ class Task:
     """Where the base project's meshes and textures are."""
     image_scale: float
     laser: int
-    cells: tuple[tuple[str, str], ...]
-    """Key and project, JSON, of each."""
+    cells: tuple[Work, ...]
 
 
 def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
@@ -38,25 +53,29 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
     nothing) is a row of NaN with the `reason`; the rest of a study goes on.
     """
     rows: list[Row] = []
-    projects = [Project.from_text(text).in_folder(Path(task.folder)) for _, text in task.cells]
+    projects = [Project.from_text(cell.project).in_folder(Path(task.folder)) for cell in task.cells]
     before = time.process_time()
     try:
         frame = render(projects[0], image_scale=task.image_scale, threads=1, cancelled=cancelled)
     except InputError as error:
-        return [(key, _nothing(str(error)), {}) for key, _ in task.cells]
+        return [(cell.key, _nothing(str(error)), {}) for cell in task.cells]
     rendering = time.process_time() - before
-    for (key, _), project in zip(task.cells, projects, strict=True):
+    for cell, project in zip(task.cells, projects, strict=True):
         started = time.process_time()
         try:
             power = project.scene.lasers[task.laser].power
             image = develop(frame, laser=task.laser, sensor=project.sensor, power=power, threads=1)
             developed = time.process_time()
+            if cell.assumed:
+                image = as_if(image, Sensor.model_validate_json(cell.assumed))
             line = extract(image, settings=project.extraction, threads=1)
             extracted = time.process_time()
-            points = triangulate(line)
+            made = None if not cell.boards else calibrated(project, Boards.model_validate_json(cell.boards), task.laser)
+            with_it = None if made is None else project.model_copy(update={"calibration": made.calibration})
+            points = triangulate(line, project=with_it)
             found = measures(line, points, compare(points, frame), frame.curves[task.laser])
         except InputError as error:
-            rows.append((key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
+            rows.append((cell.key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
             continue
         seconds = {
             "seconds_render": rendering,
@@ -64,12 +83,30 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
             "seconds_extract": extracted - developed,
             RAY_SPEED: rays_per_second(),
         }
-        rows.append((key, {**found, "reason": ""}, seconds))
+        if made is not None:
+            found |= made.measures
+            seconds[CALIBRATING] = made.seconds
+        rows.append((cell.key, {**found, "reason": ""}, seconds))
     return rows
 
 
 def _nothing(reason: str) -> dict[str, Any]:
     return {**{name: float("nan") for name in MEASURES}, "reason": reason}
+
+
+def as_if(image: DevelopedImage, assumed: Sensor) -> DevelopedImage:
+    """The image for line extraction that takes it to be of another sensor, at full image scale, with as many DN.
+
+    Its weights, and with them what every other effect does, stay as they are where one effect is off.
+    """
+    sensor = scaled_sensor(assumed, image.frame.image_scale)
+    finer = 2.0 ** (image.bits - sensor.bits)
+    project = image.project.model_copy(update={"sensor": sensor})
+    return replace(image, gain=sensor.dn_per_electron * finer, read_noise=sensor.read_noise, project=project)
+
+
+def _text(given: Model | None) -> str:
+    return "" if given is None else given.model_dump_json()
 
 
 def warm_up(project: Project) -> None:
@@ -91,7 +128,7 @@ def tasks(cells: Sequence[Any], image_scale: float, laser: int) -> list[Task]:
             str(group[0].project.folder.resolve()),
             image_scale,
             laser,
-            tuple((cell.key, cell.project.to_text()) for cell in group),
+            tuple(Work(cell.key, cell.project.to_text(), _text(cell.boards), _text(cell.assumed)) for cell in group),
         )
         for group in groups.values()
     ]

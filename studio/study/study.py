@@ -19,6 +19,7 @@ from render.base.model import Model, quantity
 from studio.project.project import Project
 from studio.project.ready_made import load_model, names_in
 from studio.project.templates import DESCRIPTIONS, template_folder
+from studio.study.boards import of_project
 from studio.study.effects import STATES
 from studio.study.measures import MEASURES
 
@@ -108,8 +109,10 @@ class Sweep(Model):
         help="sweep: a measure over the first parameter. speed: a measure over processor time. map: over two. budget: "
         "what each effect makes of the depth error.",
     )
-    time: Literal["frame", "line"] = quantity(
-        "frame", label="Time", help="Of a chart of speed: the whole frame, or finding the line in its image."
+    time: Literal["frame", "line", "calibration"] = quantity(
+        "frame",
+        label="Time",
+        help="Of a chart of speed: the whole frame, finding the line in its image, or calibrating on the boards.",
     )
     measure: str = quantity("depth_rmse", label="Measure")
     limit: Limit | None = None
@@ -221,9 +224,12 @@ def base_project(name: str, root: Path) -> Project:
 
 
 def with_fields(project: Project, values: dict[str, Value], where: str) -> Project:
-    """The project with fields at their paths replaced. InputError: no such field, or a value that it does not allow."""
+    """The project with fields at their paths replaced, those of the boards left out.
+
+    InputError: no such field, or a value that it does not allow.
+    """
     data = project.model_dump(mode="json")
-    for path, value in values.items():
+    for path, value in of_project(values).items():
         _set(data, path, value, where)
     return Project.from_data(data, where).in_folder(project.folder)
 
