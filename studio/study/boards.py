@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Literal
+from typing import Literal, TypeVar
 
 from pydantic import ValidationError, field_validator
 
@@ -17,6 +17,7 @@ from render.base.model import Model, quantity
 from studio.calibration.board_text import parse_board
 from studio.project.validation_messages import input_error
 
+V = TypeVar("V")
 PREFIX = "boards."
 """Of the paths in a study that are of the boards, and not of the project."""
 
@@ -54,6 +55,6 @@ def boards_of(values: Mapping[str, object], where: str) -> Boards | None:
         raise input_error(error, Boards, given, f"{where}, {PREFIX[:-1]}") from None
 
 
-def of_project(values: Mapping[str, object]) -> dict[str, object]:
+def of_project(values: Mapping[str, V]) -> dict[str, V]:
     """The others, which are fields of the project."""
     return {name: value for name, value in values.items() if not name.startswith(PREFIX)}

@@ -19,6 +19,7 @@ from render.sensor.sensor import Sensor
 from studio.project.project import MAX_SEED, Project
 from studio.study.boards import Boards, boards_of
 from studio.study.effects import in_state
+from studio.study.kept import KEPT
 from studio.study.study import EFFECTS_FIELD, MOST_CELLS, SEARCHES, Study, Sweep, Value, with_fields
 
 Point = tuple[Value, ...]
@@ -46,6 +47,8 @@ class Cell:
     """What the cell calibrates on; None: it takes the scene's camera and lasers."""
     assumed: Sensor | None = None
     """What line extraction takes the sensor to be, where an effect of it is off; None: what it is."""
+    kept: str = ""
+    """What is kept of it for a chart: one of `kept.KEPT`."""
 
     @property
     def project(self) -> Project:
@@ -134,9 +137,10 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
         seeds = [(varied.seed + repeat) % (MAX_SEED + 1) for repeat in range(study.repeats)]
         shared = [names.render_key(seed) for seed in seeds] if varied.render.goal is None else None
         for method, (repeat, seed) in itertools.product(methods_of(study, sweep), enumerate(seeds)):
-            key = names.key(method, seed)
+            kept = sweep.chart if sweep.chart in KEPT and repeat == 0 else ""
+            key = names.key(method, seed, kept)
             render_key = key if shared is None else shared[repeat]
-            yield Cell(number, point, method, repeat, seed, names.project, key, render_key, boards, assumed)
+            yield Cell(number, point, method, repeat, seed, names.project, key, render_key, boards, assumed, kept)
 
 
 def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Shard = WHOLE) -> list[Cell]:
@@ -222,9 +226,9 @@ class _Names:
         if assumed is not None:
             self.whole["assumed"] = _words(assumed.model_dump(mode="json"))
 
-    def key(self, method: str, seed: int) -> str:
-        extraction = _words({**self.extraction, "method": method})
-        return _hashed(_object({**self.whole, "extraction": extraction, "seed": _words(seed)}))
+    def key(self, method: str, seed: int, kept: str) -> str:
+        words = {**self.whole, "extraction": _words({**self.extraction, "method": method}), "seed": _words(seed)}
+        return _hashed(_object({**words, "kept": _words(kept)} if kept else words))
 
     def render_key(self, seed: int) -> str:
         """Of a render without a goal: with one, light is rendered for what one sensor measures."""

@@ -10,6 +10,8 @@ from analysis.error import Errors
 from analysis.line.result import Flag, Line, positioned
 from analysis.triangulate import Points
 from render.frame import LaserCurve
+from render.scene.scene import Scene
+from studio.study.round_bodies import facet_error
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ MEASURES: dict[str, Measure] = {
     "focal_error": Measure("focal length off by", "px"),
     "principal_error": Measure("principal point off by", "px"),
     "reprojection_rmse": Measure("reprojection error, RMS", "px"),
+    "facet_error": Measure("facets off the round body, RMS along the line", "µm", 1e6),
     "incidence": Measure("angle from the surface's normal, to light or camera, median", "°", 180.0 / np.pi),
 }
 
@@ -62,7 +65,7 @@ CALIBRATION_MEASURES = (
 """Of cells that calibrate; NaN of others."""
 
 
-def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> dict[str, float]:
+def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve, scene: Scene) -> dict[str, float]:
     """One number for each of MEASURES, NaN where there is none. curve: the exact line of the same laser."""
     rows = len(line.u)
     first = line.flag[:, 0]
@@ -93,6 +96,7 @@ def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> d
         "line_width": _median(line.width[found]),
         **dict.fromkeys(CALIBRATION_MEASURES, float("nan")),
         "depth_per_pixel": _median(np.abs(points.gradient[points.valid, 2])),
+        "facet_error": facet_error(scene, curve),
         "incidence": _median(np.maximum(curve.laser_angle, curve.camera_angle)),
     }
 

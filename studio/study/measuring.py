@@ -18,6 +18,8 @@ from studio.project.project import Project
 from studio.scan.stages import scaled_sensor
 from studio.study.boards import Boards
 from studio.study.calibrating import calibrated
+from studio.study.kept import ROW as KEPT_ROW
+from studio.study.kept import picture, profile
 from studio.study.measures import MEASURES, measures
 from studio.study.ray_units import RAY_SPEED, rays_per_second
 from studio.study.tables import CALIBRATING
@@ -27,12 +29,16 @@ Row = tuple[str, dict[str, Any], dict[str, float]]
 
 @dataclass(frozen=True)
 class Work:
-    """One cell, as text: its key, and its project, boards and assumed sensor in JSON; empty where there is none."""
+    """One cell, as text: its key, its project, boards and assumed sensor in JSON, and what of it is kept.
+
+    Empty where there is none.
+    """
 
     key: str
     project: str
     boards: str
     assumed: str
+    kept: str
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,10 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
             made = None if not cell.boards else calibrated(project, Boards.model_validate_json(cell.boards), task.laser)
             with_it = None if made is None else project.model_copy(update={"calibration": made.calibration})
             points = triangulate(line, project=with_it)
-            found = measures(line, points, compare(points, frame), frame.curves[task.laser])
+            errors, curve = compare(points, frame), frame.curves[task.laser]
+            found: dict[str, Any] = dict(measures(line, points, errors, curve, frame.project.scene))
+            if cell.kept:
+                found[KEPT_ROW] = profile(points, errors, curve) if cell.kept == "profile" else picture(image)
         except InputError as error:
             rows.append((cell.key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
             continue
@@ -128,7 +137,10 @@ def tasks(cells: Sequence[Any], image_scale: float, laser: int) -> list[Task]:
             str(group[0].project.folder.resolve()),
             image_scale,
             laser,
-            tuple(Work(cell.key, cell.project.to_text(), _text(cell.boards), _text(cell.assumed)) for cell in group),
+            tuple(
+                Work(cell.key, cell.project.to_text(), _text(cell.boards), _text(cell.assumed), cell.kept)
+                for cell in group
+            ),
         )
         for group in groups.values()
     ]

@@ -14,6 +14,7 @@ from studio.project.project import Project
 from studio.study.boards import Boards
 from studio.study.calibrating import calibrated
 from studio.study.cells import cells_at, points
+from studio.study.draft import board_fields, path_text, spec_of, suggested
 from studio.study.labels import field_labels
 from studio.study.measures import CALIBRATION_MEASURES
 from studio.study.measuring import measure_task, tasks
@@ -93,3 +94,18 @@ def test_boards_are_no_field_of_the_project_and_have_their_own_label() -> None:
     project = Project.load("plane")
     assert with_fields(project, {"boards.views": 3}, "here") == project
     assert field_labels([project], ["boards.views"]) == {"boards.views": "Views of the board"}
+
+
+def test_the_window_offers_what_can_be_varied_of_the_boards() -> None:
+    project = Project.load("plane")
+    fields = dict(board_fields())
+    views = spec_of(project, "boards.views")
+    assert views is not None and views.kind == "integer" and fields["boards", "views"] == views
+    assert spec_of(project, "boards.nothing") is None
+    for path, spec in fields.items():
+        parameter = suggested(path_text(path), spec)
+        sweep = {"name": "boards", "vary": [parameter]}
+        study = Study.model_validate({"base": "plane", "repeats": 3, "sweeps": [sweep]})
+        assert len(list(cells_at(study, 0, study.bases(Path(".")), points(study.sweeps[0])))) == 3 * len(
+            points(study.sweeps[0])
+        )
