@@ -47,6 +47,8 @@ class Cell:
     """What the cell calibrates on; None: it takes the scene's camera and lasers."""
     assumed: Sensor | None = None
     """What line extraction takes the sensor to be, where an effect of it is off; None: what it is."""
+    again: bool = False
+    """The render is likely to be asked for again: the next step of a search may share it."""
     kept: str = ""
     """What is kept of it for a chart: one of `kept.KEPT`."""
 
@@ -136,11 +138,14 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
         names = _Names(varied.in_folder(base.folder), study.image_scale, boards, assumed)
         seeds = [(varied.seed + repeat) % (MAX_SEED + 1) for repeat in range(study.repeats)]
         shared = [names.render_key(seed) for seed in seeds] if varied.render.goal is None else None
+        again = sweep.sampling in SEARCHES and shared is not None
         for method, (repeat, seed) in itertools.product(methods_of(study, sweep), enumerate(seeds)):
             kept = sweep.chart if sweep.chart in KEPT and repeat == 0 else ""
             key = names.key(method, seed, kept)
             render_key = key if shared is None else shared[repeat]
-            yield Cell(number, point, method, repeat, seed, names.project, key, render_key, boards, assumed, kept)
+            yield Cell(
+                number, point, method, repeat, seed, names.project, key, render_key, boards, assumed, again, kept
+            )
 
 
 def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Shard = WHOLE) -> list[Cell]:

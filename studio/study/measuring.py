@@ -12,7 +12,7 @@ from render.base.errors import InputError
 from render.base.model import Model
 from render.base.threads import Cancel
 from render.sensor.sensor import Sensor
-from studio.notebook.frame import render
+from studio.notebook.frame import RenderedFrame, render
 from studio.notebook.measuring import DevelopedImage, compare, develop, extract, triangulate
 from studio.project.project import Project
 from studio.scan.stages import scaled_sensor
@@ -22,6 +22,7 @@ from studio.study.kept import ROW as KEPT_ROW
 from studio.study.kept import picture, profile
 from studio.study.measures import MEASURES, measures
 from studio.study.ray_units import RAY_SPEED, rays_per_second
+from studio.study.render_cache import forget, rendered
 from studio.study.tables import CALIBRATING
 
 Row = tuple[str, dict[str, Any], dict[str, float]]
@@ -50,6 +51,8 @@ class Task:
     image_scale: float
     laser: int
     cells: tuple[Work, ...]
+    again: str = ""
+    """What the render is kept by for later tasks; empty: it is not."""
 
 
 def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
@@ -60,12 +63,17 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
     """
     rows: list[Row] = []
     projects = [Project.from_text(cell.project).in_folder(Path(task.folder)) for cell in task.cells]
-    before = time.process_time()
-    try:
+
+    def make() -> tuple[RenderedFrame, float]:
+        before = time.process_time()
         frame = render(projects[0], image_scale=task.image_scale, threads=1, cancelled=cancelled)
+        return frame, time.process_time() - before
+
+    try:
+        kept_by = (task.again, task.folder, task.image_scale)
+        frame, rendering = rendered(kept_by, make) if task.again else make()
     except InputError as error:
         return [(cell.key, _nothing(str(error)), {}) for cell in task.cells]
-    rendering = time.process_time() - before
     for cell, project in zip(task.cells, projects, strict=True):
         started = time.process_time()
         try:
@@ -120,6 +128,7 @@ def _text(given: Model | None) -> str:
 
 def warm_up(project: Project) -> None:
     """Compile or load the kernels that measuring takes, so that no cell's seconds hold them."""
+    forget()
     rays_per_second()
     small = project.model_copy(update={"render": project.render.model_copy(update={"laser_error": 0.3})})
     frame = render(small, image_scale=0.05, threads=1)
@@ -141,6 +150,7 @@ def tasks(cells: Sequence[Any], image_scale: float, laser: int) -> list[Task]:
                 Work(cell.key, cell.project.to_text(), _text(cell.boards), _text(cell.assumed), cell.kept)
                 for cell in group
             ),
+            group[0].render_key if group[0].again else "",
         )
         for group in groups.values()
     ]
