@@ -55,11 +55,16 @@ class Broken:
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """What each effect makes of the depth error, by one method: of its bias, m, and of its variance, m^2."""
+    """What each effect makes of the depth error, by one method: of its bias, m, and of its variance, m^2.
+
+    Of the rows that are measured right; the others are counted.
+    """
 
     method: str
     bias: Budget
     variance: Budget
+    wrong_rows: float = 0.0
+    """Of those to be seen, with all effects."""
 
 
 @dataclass(frozen=True)
@@ -172,9 +177,11 @@ def _budgets(sweep: Sweep, study: Study, bases: Mapping[str, Project], groups: G
         if any(len(states.get(state, ())) < study.repeats for state in needed):
             continue
 
-        bias = {state: values_of(states[state], "depth_bias") for state in needed}
-        variance = {state: values_of(states[state], "depth_sigma") ** 2 for state in needed}
-        found.append(ErrorBudget(method, _made(bias, effects), _made(variance, effects)))
+        # one row that takes a ghost for the line would make more of the variance than all effects together
+        bias = {state: values_of(states[state], "depth_bias_right") for state in needed}
+        variance = {state: values_of(states[state], "depth_sigma_right") ** 2 for state in needed}
+        wrong = mean_interval(values_of(states[TOTAL], "wrong_rows")).mean
+        found.append(ErrorBudget(method, _made(bias, effects), _made(variance, effects), wrong))
     return tuple(found)
 
 

@@ -29,6 +29,8 @@ MEASURES: dict[str, Measure] = {
     "depth_bias": Measure("depth bias", "µm", 1e6, signed=True),
     "depth_sigma": Measure("depth sigma", "µm", 1e6),
     "depth_robust_sigma": Measure("depth sigma, robust", "µm", 1e6),
+    "depth_bias_right": Measure("depth bias of the rows measured right", "µm", 1e6, signed=True),
+    "depth_sigma_right": Measure("depth sigma of the rows measured right", "µm", 1e6),
     "depth_p95": Measure("depth error, 95 % below", "µm", 1e6),
     "depth_predicted_sigma": Measure("predicted depth sigma, median", "µm", 1e6),
     "depth_coverage": Measure("depth errors within 2 predicted sigma", "%", 100.0),
@@ -72,11 +74,14 @@ def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve, scen
     visible = max(errors.truth_rows, 1)
     wrong = np.unique(points.index[errors.outlier]).size
     found = line.valid
+    right = errors.depth[np.isfinite(errors.depth) & ~errors.outlier]
     return {
         "depth_rmse": errors.depth_z.rmse,
         "depth_bias": errors.depth_z.bias,
         "depth_sigma": errors.depth_z.sigma,
         "depth_robust_sigma": errors.depth_z.robust_sigma,
+        "depth_bias_right": float(right.mean()) if len(right) else float("nan"),
+        "depth_sigma_right": float(right.std()) if len(right) else float("nan"),
         "depth_p95": errors.depth_z.p95,
         "depth_predicted_sigma": _median(points.sigma_depth[points.valid]),
         "depth_coverage": errors.depth_z.coverage,

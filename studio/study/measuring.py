@@ -117,9 +117,9 @@ def as_if(image: DevelopedImage, assumed: Sensor) -> DevelopedImage:
     Its weights, and with them what every other effect does, stay as they are where one effect is off.
     """
     sensor = scaled_sensor(assumed, image.frame.image_scale)
-    finer = 2.0 ** (image.bits - sensor.bits)
+    gain = image.gain * image.project.sensor.full_well / sensor.full_well  # a full well is as many DN
     project = image.project.model_copy(update={"sensor": sensor})
-    return replace(image, gain=sensor.dn_per_electron * finer, read_noise=sensor.read_noise, project=project)
+    return replace(image, gain=gain, read_noise=sensor.read_noise, project=project)
 
 
 def _text(given: Model | None) -> str:
