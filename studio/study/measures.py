@@ -10,8 +10,6 @@ from analysis.error import Errors
 from analysis.line.result import Flag, Line, positioned
 from analysis.triangulate import Points
 from render.frame import LaserCurve
-from render.scene.scene import Scene
-from studio.study.round_bodies import facet_error
 
 
 @dataclass(frozen=True)
@@ -67,8 +65,11 @@ CALIBRATION_MEASURES = (
 """Of cells that calibrate; NaN of others."""
 
 
-def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve, scene: Scene) -> dict[str, float]:
-    """One number for each of MEASURES, NaN where there is none. curve: the exact line of the same laser."""
+def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> dict[str, float]:
+    """One number for each of MEASURES, NaN where there is none, or the scene or calibration would have to be known.
+
+    curve: the exact line of the same laser.
+    """
     rows = len(line.u)
     first = line.flag[:, 0]
     visible = max(errors.truth_rows, 1)
@@ -99,9 +100,8 @@ def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve, scen
         "visible_rows": errors.truth_rows / rows,
         "signal": _median(line.amplitude[found]),
         "line_width": _median(line.width[found]),
-        **dict.fromkeys(CALIBRATION_MEASURES, float("nan")),
+        **dict.fromkeys((*CALIBRATION_MEASURES, "facet_error"), float("nan")),
         "depth_per_pixel": _median(np.abs(points.gradient[points.valid, 2])),
-        "facet_error": facet_error(scene, curve),
         "incidence": _median(np.maximum(curve.laser_angle, curve.camera_angle)),
     }
 

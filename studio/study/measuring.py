@@ -23,6 +23,7 @@ from studio.study.kept import picture, profile
 from studio.study.measures import MEASURES, measures
 from studio.study.ray_units import RAY_SPEED, rays_per_second
 from studio.study.render_cache import forget, rendered
+from studio.study.round_bodies import facet_error
 from studio.study.tables import CALIBRATING
 
 Row = tuple[str, dict[str, Any], dict[str, float]]
@@ -88,7 +89,8 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
             with_it = None if made is None else project.model_copy(update={"calibration": made.calibration})
             points = triangulate(line, project=with_it)
             errors, curve = compare(points, frame), frame.curves[task.laser]
-            found: dict[str, Any] = dict(measures(line, points, errors, curve, frame.project.scene))
+            found: dict[str, Any] = dict(measures(line, points, errors, curve))
+            found["facet_error"] = facet_error(frame.project.scene, curve)
             if cell.kept:
                 found[KEPT_ROW] = profile(points, errors, curve) if cell.kept == "profile" else picture(image)
         except InputError as error:
