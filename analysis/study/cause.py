@@ -10,7 +10,8 @@ LOST = 0.02
 STEEPER = 2.0
 """Times that the cosine of the angle of incidence has shrunk where a surface is grazed."""
 COARSER = 1.5
-"""Times that the depth of one pixel has grown where camera and laser hardly see from two sides."""
+"""Times that the depth of one pixel has grown where camera and laser hardly see from two sides, or that the depth error
+by the calibration has, whose boards then tell too little."""
 WIDER = 1.5
 """A line so many times as wide as before is out of focus, or too wide."""
 DIMMER = 2.0
@@ -40,7 +41,7 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
         return "grazing"
     if worst in ("starved", "saturated"):
         return worst
-    coarser = _times(good, bad, "depth_per_pixel")
+    coarser = max(_times(good, bad, name) for name in ("depth_per_pixel", "calibration_rmse"))
     if worst == "less precise" and coarser > max(COARSER, _times(good, bad, "position_rmse")):
         return "degenerate"
     if _times(good, bad, "line_width") > WIDER:

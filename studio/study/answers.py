@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,11 @@ from studio.study.bounds import Bound, bounds
 from studio.study.cells import Point, along, methods_of, search_of, searched
 from studio.study.edges import Edge, edges_of
 from studio.study.effects import NONE, ONLY, TOTAL, WITHOUT, effects_of
-from studio.study.measures import measure_of
+from studio.study.kept import ROW as KEPT_ROW
+from studio.study.measures import MEASURES, measure_of
 from studio.study.ray_units import RAY_SPEED, Throughput, throughput
 from studio.study.store import Row
-from studio.study.study import Study, Sweep, with_fields
+from studio.study.study import Reference, Study, Sweep, with_fields
 from studio.study.tables import grouped, rays_of, seconds_of, values_of
 
 Groups = dict[tuple[Point, str], list[Row]]
@@ -53,11 +55,25 @@ class Broken:
 
 @dataclass(frozen=True)
 class ErrorBudget:
-    """What each effect makes of the depth error, by one method: of its bias, m, and of its variance, m^2."""
+    """What each effect makes of the depth error, by one method: of its bias, m, and of its variance, m^2.
+
+    Of the rows that are measured right; the others are counted.
+    """
 
     method: str
     bias: Budget
     variance: Budget
+    wrong_rows: float = 0.0
+    """Of those to be seen, with all effects."""
+
+
+@dataclass(frozen=True)
+class KeptCell:
+    """The first repeat of a point by one method, and what was kept of it (`studio.study.kept`)."""
+
+    point: Point
+    method: str
+    content: Any
 
 
 @dataclass(frozen=True)
@@ -78,6 +94,10 @@ class Answer:
     """Of a chart of speed; None: of rows that were measured before it was."""
     edges: tuple[Edge, ...] = ()
     """Of a boundary, by method."""
+    kept: tuple[KeptCell, ...] = ()
+    """Of a chart of profiles or pictures."""
+    beside: tuple[tuple[Reference, Interval], ...] = ()
+    """Figures of others, and what is measured there."""
 
 
 def answers(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Answer]:
@@ -91,9 +111,14 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
     errors = [values_of(found, sweep.measure) for found in groups.values()]
     times = [seconds_of(found, sweep.time) for found in groups.values()]
     units = [rays_of(found, sweep.time) for found in groups.values()]
-    interval = mean_interval if measure_of(sweep.measure).signed else positive_interval
     spots = tuple(
-        Spot(point, method, interval(error), _median(time[np.isfinite(error)]), _median(unit[np.isfinite(error)]))
+        Spot(
+            point,
+            method,
+            _interval(sweep.measure, error),
+            _median(time[np.isfinite(error)]),
+            _median(unit[np.isfinite(error)]),
+        )
         for (point, method), error, time, unit in zip(groups, errors, times, units, strict=True)
     )
     front = bootstrapped_front(times, errors) if sweep.chart == "speed" and spots else None
@@ -106,7 +131,22 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
         bounds(study, sweep, bases, list(dict.fromkeys(spot.point for spot in spots))),
         _throughput(study, sweep, bases, groups),
         edges_of(study, number, bases, rows),
+        tuple(KeptCell(*at, row[KEPT_ROW]) for at, found in groups.items() for row in found if row.get(KEPT_ROW)),
+        _beside(sweep, methods_of(study, sweep)[0], groups),
     )
+
+
+def _interval(measure: str, values: np.ndarray) -> Interval:
+    return (mean_interval if measure_of(measure).signed else positive_interval)(values)
+
+
+def _beside(sweep: Sweep, first: str, groups: Groups) -> tuple[tuple[Reference, Interval], ...]:
+    found = []
+    for one in sweep.references:
+        rows = groups.get((one.point, one.method or first))
+        if rows:
+            found.append((one, _interval(one.measure, values_of(rows, one.measure))))
+    return tuple(found)
 
 
 def _throughput(study: Study, sweep: Sweep, bases: Mapping[str, Project], groups: Groups) -> Throughput | None:
@@ -137,9 +177,11 @@ def _budgets(sweep: Sweep, study: Study, bases: Mapping[str, Project], groups: G
         if any(len(states.get(state, ())) < study.repeats for state in needed):
             continue
 
-        bias = {state: values_of(states[state], "depth_bias") for state in needed}
-        variance = {state: values_of(states[state], "depth_sigma") ** 2 for state in needed}
-        found.append(ErrorBudget(method, _made(bias, effects), _made(variance, effects)))
+        # one row that takes a ghost for the line would make more of the variance than all effects together
+        bias = {state: values_of(states[state], "depth_bias_right") for state in needed}
+        variance = {state: values_of(states[state], "depth_sigma_right") ** 2 for state in needed}
+        wrong = mean_interval(values_of(states[TOTAL], "wrong_rows")).mean
+        found.append(ErrorBudget(method, _made(bias, effects), _made(variance, effects), wrong))
     return tuple(found)
 
 
@@ -173,5 +215,5 @@ def _broken(
 
 
 def _means(rows: list[Row]) -> dict[str, float]:
-    names = [name for name, value in rows[0].items() if not isinstance(value, str)]
+    names = [name for name in MEASURES if name in rows[0]]
     return {name: mean_interval(values_of(rows, name)).mean for name in names}

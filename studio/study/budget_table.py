@@ -74,6 +74,8 @@ def _sentences(found: ErrorBudget) -> Iterator[str]:
         f"{name}: sigma {math.sqrt(total) * 1e6:.3g} µm; most of its variance is made by {made}. "
         f"Bias {bias.mean * 1e6:+.3g} µm ({_interval(bias, 1e6)})."
     )
+    if found.wrong_rows > 0.0:
+        yield f"{found.wrong_rows:.2%} of the rows are measured wrong, by more than a pixel, and left out of all this."
     yield (
         f"Effects that meet make {found.variance.interaction.mean / total:+.0%} of the variance, "
         f"half of which counts for each."

@@ -15,8 +15,11 @@ import numpy as np
 from analysis.study.boundary import Lattice, Node, next_nodes
 from analysis.study.breakdown import Search, next_values
 from render.base.errors import InputError
+from render.sensor.sensor import Sensor
 from studio.project.project import MAX_SEED, Project
+from studio.study.boards import Boards, boards_of
 from studio.study.effects import in_state
+from studio.study.kept import KEPT
 from studio.study.study import EFFECTS_FIELD, MOST_CELLS, SEARCHES, Study, Sweep, Value, check_part, with_fields
 
 Point = tuple[Value, ...]
@@ -39,7 +42,15 @@ class Cell:
     key: str
     """Names the measurement by what decides it: the same in every study, shard and machine."""
     render_key: str
-    """Cells with the same one differ only in sensor, laser power or method."""
+    """Cells with the same one differ only in sensor, laser power, method or boards."""
+    boards: Boards | None = None
+    """What the cell calibrates on; None: it takes the scene's camera and lasers."""
+    assumed: Sensor | None = None
+    """What line extraction takes the sensor to be, where an effect of it is off; None: what it is."""
+    again: bool = False
+    """The render is likely to be asked for again: the next step of a search may share it."""
+    kept: str = ""
+    """What is kept of it for a chart: one of `kept.KEPT`."""
 
     @property
     def project(self) -> Project:
@@ -122,15 +133,20 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
         values = {**study.set, **sweep.set, **{p.field: v for p, v in zip(sweep.vary, point, strict=True)}}
         state = values.pop(EFFECTS_FIELD, None)
         varied = with_fields(base, values, where)
+        boards, assumed = boards_of(values, where), None
         if state is not None:
-            varied = in_state(varied, str(state))
-        names = _Names(varied.in_folder(base.folder), study.image_scale)
+            whole, varied = varied, in_state(varied, str(state))
+            assumed = whole.sensor if varied.sensor != whole.sensor else None
+        names = _Names(varied.in_folder(base.folder), study.image_scale, boards, assumed)
         seeds = [(varied.seed + repeat) % (MAX_SEED + 1) for repeat in range(study.repeats)]
         shared = [names.render_key(seed) for seed in seeds] if varied.render.goal is None else None
+        again = sweep.sampling in SEARCHES and shared is not None
         for method, (repeat, seed) in itertools.product(methods_of(study, sweep), enumerate(seeds)):
-            key = names.key(method, seed)
+            kept = sweep.chart if sweep.chart in KEPT and repeat == 0 else ""
+            key = names.key(method, seed, kept)
+            render_key = key if shared is None else shared[repeat]
             yield Cell(
-                number, point, method, repeat, seed, names.project, key, key if shared is None else shared[repeat]
+                number, point, method, repeat, seed, names.project, key, render_key, boards, assumed, again, kept
             )
 
 
@@ -201,7 +217,7 @@ def _repeats(
 class _Names:
     """Keys of a point's cells. What the point decides is put into words once: a study may have a million cells."""
 
-    def __init__(self, project: Project, image_scale: float) -> None:
+    def __init__(self, project: Project, image_scale: float, boards: Boards | None, assumed: Sensor | None) -> None:
         self.project = project
         data = {**project.model_dump(mode="json"), "image_scale": image_scale}
         del data["name"], data["schema_version"]
@@ -212,10 +228,14 @@ class _Names:
         self.light = {**self.whole, "scene": _words({**data["scene"], "rig": rig})}
         self.light["axis"] = _words(self.extraction["axis"])
         del self.light["sensor"], self.light["extraction"]
+        if boards is not None:
+            self.whole["boards"] = _words(boards.model_dump(mode="json"))
+        if assumed is not None:
+            self.whole["assumed"] = _words(assumed.model_dump(mode="json"))
 
-    def key(self, method: str, seed: int) -> str:
-        extraction = _words({**self.extraction, "method": method})
-        return _hashed(_object({**self.whole, "extraction": extraction, "seed": _words(seed)}))
+    def key(self, method: str, seed: int, kept: str) -> str:
+        words = {**self.whole, "extraction": _words({**self.extraction, "method": method}), "seed": _words(seed)}
+        return _hashed(_object({**words, "kept": _words(kept)} if kept else words))
 
     def render_key(self, seed: int) -> str:
         """Of a render without a goal: with one, light is rendered for what one sensor measures."""

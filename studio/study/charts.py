@@ -14,11 +14,15 @@ from studio.study.answers import Answer, Spot
 from studio.study.boundary_chart import DASHES, draw_edges
 from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
+from studio.study.kept import KEPT
+from studio.study.kept_charts import pictures_figure, profile_figure
 from studio.study.measures import Measure, measure_of
 from studio.study.ray_units import MILLION, Throughput
 from studio.study.study import Parameter, Value
 
 MARKERS = "osD^vP*X<>"
+ONE_METHOD = ("#d55e00", "#0b6e8a", "#8a5aa8", "#009e73", "#b58900", "#3d5a80")
+"""Of series by one method, which has but one colour."""
 MOST_IN_LEGEND = 5
 """Methods; more are named at their marks."""
 
@@ -27,6 +31,8 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
     """A matplotlib figure of one sweep. labels: of the fields, with their units."""
     if answer.sweep.chart == "budget":
         return budget_figure(answer.budgets[0])
+    if answer.sweep.chart in KEPT:
+        return (profile_figure if answer.sweep.chart == "profile" else pictures_figure)(answer, shown)
     draw = {"sweep": _sweep, "speed": _speed, "map": _boundary if answer.edges else _map}[answer.sweep.chart]
     with figure(3.4) as made:
         axes = made.subplots()
@@ -44,6 +50,8 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
 def places(answer: Answer) -> np.ndarray:
     """(spots, 2) where each spot stands in the chart's own units; NaN: it is not drawn."""
     sweep, scale, spots = answer.sweep, measure_of(answer.sweep.measure).scale, answer.spots
+    if sweep.chart in KEPT:
+        return np.full((len(spots), 2), math.nan)
     if sweep.chart == "map":
         found = [(*spot.point, spot.method == spots[0].method) for spot in spots]
         return np.array([(x, y) if drawn else (math.nan, math.nan) for x, y, drawn in found], dtype=np.float64)
@@ -104,13 +112,18 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         spots = sorted(spots, key=lambda one: one.point[0] if numbers else names.index(one.point[0]))  # type: ignore[arg-type,return-value]
         x = np.array([spot.point[0] if numbers else names.index(spot.point[0]) for spot in spots], dtype=np.float64)
         mean, low, high = _bands(spots, measure)
-        label = ", ".join([method_name(key[0]), *map(shown, key[1:])])
+        others = [f"{field_label(p, labels)} {shown(v)}" for p, v in zip(sweep.vary[1:], key[1:], strict=True)]
+        one_method = len({name for name, *_ in series}) == 1 and len(series) > 1
+        label = ", ".join(others if one_method else [method_name(key[0]), *others])
         style: dict[str, Any] = {
-            "color": method_colour(key[0]),
+            "color": ONE_METHOD[number % len(ONE_METHOD)] if one_method else method_colour(key[0]),
             "marker": MARKERS[number % len(MARKERS)],
             "ls": DASHES[number % len(DASHES)],
+            # what lies on what is drawn before shows as a ring around it
+            "ms": 4 if number == 0 else 6,
+            "mfc": None if number == 0 else "none",
         }
-        axes.errorbar(x, mean, yerr=np.abs([mean - low, high - mean]), ms=4, lw=1.2, capsize=2, label=label, **style)
+        axes.errorbar(x, mean, yerr=np.abs([mean - low, high - mean]), lw=1.2, capsize=2, label=label, **style)
     if sweep.limit is not None and sweep.limit.measure == sweep.measure:
         axes.axhline(sweep.limit.value * measure.scale, color=INK, lw=0.8, ls=(0, (6, 2)))
     for found in answer.broken:
@@ -118,6 +131,12 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         if ended.ending == "found":
             axes.axvspan(ended.low, ended.high, color=method_colour(found.method), alpha=0.3, lw=0)
             axes.axvline(ended.value, color=method_colour(found.method), lw=1, ls=":")
+    for reference, _ in answer.beside:
+        value = reference.point[0]
+        if reference.measure == sweep.measure and (numbers or value in names):
+            place = float(value) if numbers else names.index(value), reference.value * measure.scale  # type: ignore[arg-type]
+            axes.plot(*place, "D", ms=6, mfc="none", mec=INK)
+            _note(axes, reference.label, place, INK, 6.5, (7, -2))
     if numbers:
         axes.set_xscale("log" if sweep.vary[0].spacing == "logarithmic" else "linear")
     else:
@@ -130,8 +149,10 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
 def _vertical(axes: Any, answer: Answer) -> None:
     """Logarithmic where errors span more than one power of ten."""
     means = np.array([spot.measure.mean for spot in answer.spots])
-    positive = means[np.isfinite(means) & (means > 0.0)]
-    if answer.sweep.measure.endswith(("rmse", "sigma", "p95")) and len(positive) and np.ptp(np.log10(positive)) > 1.0:
+    theirs = [one.value for one, _ in answer.beside if one.measure == answer.sweep.measure]
+    positive = np.append(means[np.isfinite(means) & (means > 0.0)], theirs)
+    errors = answer.sweep.measure.endswith(("rmse", "sigma", "p95", "angle", "error"))
+    if errors and len(positive) and positive.min() > 0.0 and np.ptp(np.log10(positive)) > 1.0:
         axes.set_yscale("log")
 
 
@@ -162,7 +183,7 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
             _note(axes, f"knee, {front.knee_probability[front.knee]:.0%} sure", place, INK, 7.0, (9, -11))
     for bound in answer.bounds:
         _bound(axes, bound, len(answer.bounds) > 1, measure)
-    what = "frame" if answer.sweep.time == "frame" else "line's extraction"
+    what = {"frame": "frame", "line": "line's extraction", "calibration": "calibration"}[answer.sweep.time]
     axes.set(xscale="log", yscale="log", xlabel=f"processor time of a {what} (s)", ylabel=_axis_label(measure))
     if answer.throughput is not None:
         _rays(axes, answer.throughput, answer.sweep.time == "frame")
@@ -205,6 +226,8 @@ def _roomy(axes: Any) -> None:
     """At least a factor of two to see along a logarithmic axis, so that small differences do not look like large."""
     for get, put in ((axes.get_xlim, axes.set_xlim), (axes.get_ylim, axes.set_ylim)):
         low, high = get()
+        if not low > 0.0:
+            continue  # nothing is drawn along it
         widen = max(1.0, math.sqrt(2.0 * low / high))
         put(low / widen, high * widen)
 

@@ -9,12 +9,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from studio.editing.forms import FieldSpec, describe_item, field_path
+from studio.editing.forms import FieldSpec, describe, describe_item, field_path
 from studio.editing.linked_fields import DERIVED
 from studio.editing.units import Unit
 from studio.project.document import FieldPath
 from studio.project.project import Project
 from studio.project.validation_messages import input_error
+from studio.study.boards import PREFIX, Boards
 from studio.study.study import Study, Value, parts_of
 
 Data = dict[str, Any]
@@ -95,6 +96,8 @@ def suggested(field: str, spec: FieldSpec) -> Data:
 def spec_of(project: Project, field: str) -> FieldSpec | None:
     """What a field of the project is: label, unit, limits and present value. None: no field of one value is there."""
     path = tuple(parts_of(field))
+    if field.startswith(PREFIX):
+        return dict(board_fields()).get(path)
     for above in range(1, 4):  # a part of a pose stands three below what has it
         try:
             found = dict(fields_of(project, path[:-above]))
@@ -103,6 +106,12 @@ def spec_of(project: Project, field: str) -> FieldSpec | None:
         if path in found:
             return found[path]
     return None
+
+
+def board_fields() -> list[tuple[FieldPath, FieldSpec]]:
+    """What a study can vary of its calibration, beside the fields of the project."""
+    owner = PREFIX.removesuffix(".")
+    return [((owner, spec.name), spec) for spec in describe(Boards()) if spec.kind in VALUES]
 
 
 def varying(path: FieldPath, spec: FieldSpec) -> list[tuple[FieldPath, FieldSpec]]:

@@ -14,7 +14,7 @@ from studio.study.cells import cells_at, check_size, lattice_of, methods_of, nex
 from studio.study.measuring import measure_task, tasks, warm_up
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
-from studio.study.tables import SECONDS, measured_cells
+from studio.study.tables import CALIBRATING, SECONDS, measured_cells
 
 ROW_BYTES, CHART_BYTES = 2500, 250_000
 """On disk: of a cell in the store and the tables, and of a sweep's chart alone and in the page."""
@@ -94,4 +94,4 @@ def _known(study: Study, number: int, bases: Mapping[str, Project], rows: Mappin
 
 
 def _split(seconds: Mapping[str, float]) -> Costs:
-    return seconds[SECONDS[0]], sum(seconds[name] for name in SECONDS[1:])
+    return seconds[SECONDS[0]], sum(seconds[name] for name in SECONDS[1:]) + seconds.get(CALIBRATING, 0.0)

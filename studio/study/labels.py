@@ -8,20 +8,24 @@ from typing import Any
 from pydantic import BaseModel
 
 from studio.project.project import Project
+from studio.study.boards import PREFIX, Boards
 from studio.study.study import parts_of
 
 
 def field_labels(bases: Iterable[Project], fields: Iterable[str]) -> dict[str, str]:
     """Label and unit of each field by its path; what no project has keeps its path."""
-    projects, found = list(bases), {}
+    projects, found = list(bases), dict[str, str]()
     for path in fields:
-        labels = [label for project in projects if (label := _label(project, path))]
+        boards = path.startswith(PREFIX)
+        owners: list[BaseModel] = [Boards()] if boards else list(projects)
+        inside = path.removeprefix(PREFIX)
+        labels = [label for owner in owners if (label := _label(owner, inside))]
         found[path] = labels[0] if labels else path
     return found
 
 
-def _label(project: Project, path: str) -> str:
-    place: Any = project
+def _label(owner: BaseModel, path: str) -> str:
+    place: Any = owner
     label = ""
     for part in parts_of(path):
         if isinstance(place, BaseModel) and part in type(place).model_fields:

@@ -30,6 +30,8 @@ MEASURES: dict[str, Measure] = {
     "depth_bias": Measure("depth bias", "µm", 1e6, signed=True),
     "depth_sigma": Measure("depth sigma", "µm", 1e6),
     "depth_robust_sigma": Measure("depth sigma, robust", "µm", 1e6),
+    "depth_bias_right": Measure("depth bias of the rows measured right", "µm", 1e6, signed=True),
+    "depth_sigma_right": Measure("depth sigma of the rows measured right", "µm", 1e6),
     "depth_p95": Measure("depth error, 95 % below", "µm", 1e6),
     "depth_predicted_sigma": Measure("predicted depth sigma, median", "µm", 1e6),
     "depth_coverage": Measure("depth errors within 2 predicted sigma", "%", 100.0),
@@ -48,6 +50,13 @@ MEASURES: dict[str, Measure] = {
     "signal": Measure("peak, median", "e-"),
     "line_width": Measure("line width, median sigma", "px"),
     "depth_per_pixel": Measure("depth of one pixel, median", "µm/px", 1e6),
+    "calibration_rmse": Measure("depth error by the calibration, RMS over its volume", "µm", 1e6),
+    "calibration_predicted": Measure("the same, as the calibration tells it", "µm", 1e6),
+    "plane_angle": Measure("angle of the laser plane to the true one", "mrad", 1e3),
+    "focal_error": Measure("focal length off by", "px"),
+    "principal_error": Measure("principal point off by", "px"),
+    "reprojection_rmse": Measure("reprojection error, RMS", "px"),
+    "facet_error": Measure("facets off the round body, RMS along the line", "µm", 1e6),
     "incidence": Measure("angle from the surface's normal, to light or camera, median", "°", 180.0 / np.pi),
 }
 
@@ -83,18 +92,31 @@ def of_the_part(found: Sequence[Reading]) -> dict[str, float]:
     return dict(zip(part_names([one.gauge for one in found]), numbers, strict=True))
 
 
+CALIBRATION_MEASURES = (
+    *("calibration_rmse", "calibration_predicted", "plane_angle"),
+    *("focal_error", "principal_error", "reprojection_rmse"),
+)
+"""Of cells that calibrate; NaN of others."""
+
+
 def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> dict[str, float]:
-    """One number for each of MEASURES, NaN where there is none. curve: the exact line of the same laser."""
+    """One number for each of MEASURES, NaN where there is none, or the scene or calibration would have to be known.
+
+    curve: the exact line of the same laser.
+    """
     rows = len(line.u)
     first = line.flag[:, 0]
     visible = max(errors.truth_rows, 1)
     wrong = np.unique(points.index[errors.outlier]).size
     found = line.valid
+    right = errors.depth[np.isfinite(errors.depth) & ~errors.outlier]
     return {
         "depth_rmse": errors.depth_z.rmse,
         "depth_bias": errors.depth_z.bias,
         "depth_sigma": errors.depth_z.sigma,
         "depth_robust_sigma": errors.depth_z.robust_sigma,
+        "depth_bias_right": float(right.mean()) if len(right) else float("nan"),
+        "depth_sigma_right": float(right.std()) if len(right) else float("nan"),
         "depth_p95": errors.depth_z.p95,
         "depth_predicted_sigma": _median(points.sigma_depth[points.valid]),
         "depth_coverage": errors.depth_z.coverage,
@@ -112,6 +134,7 @@ def measures(line: Line, points: Points, errors: Errors, curve: LaserCurve) -> d
         "visible_rows": errors.truth_rows / rows,
         "signal": _median(line.amplitude[found]),
         "line_width": _median(line.width[found]),
+        **dict.fromkeys((*CALIBRATION_MEASURES, "facet_error"), float("nan")),
         "depth_per_pixel": _median(np.abs(points.gradient[points.valid, 2])),
         "incidence": _median(np.maximum(curve.laser_angle, curve.camera_angle)),
     }

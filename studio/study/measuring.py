@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from analysis.gauges.read import read
 from render.base.errors import InputError
+from render.base.model import Model
 from render.base.threads import Cancel
+from render.sensor.sensor import Sensor
 from studio.notebook.frame import RenderedFrame, render
 from studio.notebook.measuring import (
+    DevelopedImage,
     ExtractedLine,
     PointErrors,
     TriangulatedPoints,
@@ -23,11 +26,32 @@ from studio.notebook.measuring import (
 )
 from studio.project.project import Project
 from studio.scan.gauging import profiles
-from studio.scan.stages import Measurement
+from studio.scan.stages import Measurement, scaled_sensor
+from studio.study.boards import Boards
+from studio.study.calibrating import calibrated
+from studio.study.kept import ROW as KEPT_ROW
+from studio.study.kept import picture, profile
 from studio.study.measures import MEASURES, measures, of_the_part
 from studio.study.ray_units import RAY_SPEED, rays_per_second
+from studio.study.render_cache import forget, rendered
+from studio.study.round_bodies import facet_error
+from studio.study.tables import CALIBRATING
 
 Row = tuple[str, dict[str, Any], dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Work:
+    """One cell, as text: its key, its project, boards and assumed sensor in JSON, and what of it is kept.
+
+    Empty where there is none.
+    """
+
+    key: str
+    project: str
+    boards: str
+    assumed: str
+    kept: str
 
 
 @dataclass(frozen=True)
@@ -38,8 +62,9 @@ class Task:
     """Where the base project's meshes and textures are."""
     image_scale: float
     laser: int
-    cells: tuple[tuple[str, str], ...]
-    """Key and project, JSON, of each."""
+    cells: tuple[Work, ...]
+    again: str = ""
+    """What the render is kept by for later tasks; empty: it is not."""
 
 
 def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
@@ -49,27 +74,39 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
     nothing) is a row of NaN with the `reason`; the rest of a study goes on.
     """
     rows: list[Row] = []
-    projects = [Project.from_text(text).in_folder(Path(task.folder)) for _, text in task.cells]
-    before = time.process_time()
-    try:
+    projects = [Project.from_text(cell.project).in_folder(Path(task.folder)) for cell in task.cells]
+
+    def make() -> tuple[RenderedFrame, float]:
+        before = time.process_time()
         frame = render(projects[0], image_scale=task.image_scale, threads=1, cancelled=cancelled)
+        return frame, time.process_time() - before
+
+    try:
+        kept_by = (task.again, task.folder, task.image_scale)
+        frame, rendering = rendered(kept_by, make) if task.again else make()
     except InputError as error:
-        return [(key, _nothing(str(error)), {}) for key, _ in task.cells]
-    rendering = time.process_time() - before
-    for (key, _), project in zip(task.cells, projects, strict=True):
+        return [(cell.key, _nothing(str(error)), {}) for cell in task.cells]
+    for cell, project in zip(task.cells, projects, strict=True):
         started = time.process_time()
         try:
             power = project.scene.lasers[task.laser].power
             image = develop(frame, laser=task.laser, sensor=project.sensor, power=power, threads=1)
             developed = time.process_time()
+            if cell.assumed:
+                image = as_if(image, Sensor.model_validate_json(cell.assumed))
             line = extract(image, settings=project.extraction, threads=1)
             extracted = time.process_time()
-            points = triangulate(line)
-            errors = compare(points, frame)
-            found = measures(line, points, errors, frame.curves[task.laser])
+            made = None if not cell.boards else calibrated(project, Boards.model_validate_json(cell.boards), task.laser)
+            with_it = None if made is None else project.model_copy(update={"calibration": made.calibration})
+            points = triangulate(line, project=with_it)
+            errors, curve = compare(points, frame), frame.curves[task.laser]
+            found: dict[str, Any] = dict(measures(line, points, errors, curve))
+            found["facet_error"] = facet_error(frame.project.scene, curve)
             found |= _of_the_part(project, frame, line, points, errors)
+            if cell.kept:
+                found[KEPT_ROW] = profile(points, errors, curve) if cell.kept == "profile" else picture(image)
         except InputError as error:
-            rows.append((key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
+            rows.append((cell.key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
             continue
         seconds = {
             "seconds_render": rendering,
@@ -77,7 +114,10 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
             "seconds_extract": extracted - developed,
             RAY_SPEED: rays_per_second(),
         }
-        rows.append((key, {**found, "reason": ""}, seconds))
+        if made is not None:
+            found |= made.measures
+            seconds[CALIBRATING] = made.seconds
+        rows.append((cell.key, {**found, "reason": ""}, seconds))
     return rows
 
 
@@ -97,8 +137,24 @@ def _nothing(reason: str) -> dict[str, Any]:
     return {**{name: float("nan") for name in MEASURES}, "reason": reason}
 
 
+def as_if(image: DevelopedImage, assumed: Sensor) -> DevelopedImage:
+    """The image for line extraction that takes it to be of another sensor, at full image scale, with as many DN.
+
+    Its weights, and with them what every other effect does, stay as they are where one effect is off.
+    """
+    sensor = scaled_sensor(assumed, image.frame.image_scale)
+    gain = image.gain * image.project.sensor.full_well / sensor.full_well  # a full well is as many DN
+    project = image.project.model_copy(update={"sensor": sensor})
+    return replace(image, gain=gain, read_noise=sensor.read_noise, project=project)
+
+
+def _text(given: Model | None) -> str:
+    return "" if given is None else given.model_dump_json()
+
+
 def warm_up(project: Project) -> None:
     """Compile or load the kernels that measuring takes, so that no cell's seconds hold them."""
+    forget()
     rays_per_second()
     small = project.model_copy(update={"render": project.render.model_copy(update={"laser_error": 0.3})})
     frame = render(small, image_scale=0.05, threads=1)
@@ -116,7 +172,11 @@ def tasks(cells: Sequence[Any], image_scale: float, laser: int) -> list[Task]:
             str(group[0].project.folder.resolve()),
             image_scale,
             laser,
-            tuple((cell.key, cell.project.to_text()) for cell in group),
+            tuple(
+                Work(cell.key, cell.project.to_text(), _text(cell.boards), _text(cell.assumed), cell.kept)
+                for cell in group
+            ),
+            group[0].render_key if group[0].again else "",
         )
         for group in groups.values()
     ]

@@ -18,8 +18,12 @@ from studio.study.boundary_table import edge_rows, edge_sentences, write_edges
 from studio.study.bounds import Bound
 from studio.study.budget_table import HEADER, page_rows, sentences_of, write_budgets
 from studio.study.charts import chart, field_label, shown
+from studio.study.kept import KEPT
 from studio.study.labels import field_labels
 from studio.study.measures import measure_of
+from studio.study.references import HEADER as BESIDE_HEADER
+from studio.study.references import Beside, beside, write_references
+from studio.study.references import page_rows as page_rows_beside
 from studio.study.store import Row
 from studio.study.study import Study, Sweep
 
@@ -34,6 +38,8 @@ def write_page(
     for number, answer in enumerate(found):
         if not answer.spots or (answer.sweep.chart == "budget" and not answer.budgets):
             continue  # nothing is known of it yet
+        if answer.sweep.chart in KEPT and not answer.kept:
+            continue
         made = chart(answer, labels)
         picture = io.BytesIO()
         made.savefig(picture, format="png", dpi=160)
@@ -52,8 +58,12 @@ def write_page(
         write_budgets(folder, answer.budgets, number + 1)
         write_bounds(folder, answer, number + 1)
         write_edges(folder, answer, number + 1)
+    theirs = beside(found)
+    write_references(folder, theirs)
     content = {
         "study": study,
+        "beside_header": BESIDE_HEADER,
+        "beside": page_rows_beside(theirs),
         "parts": parts,
         "cells": len(rows),
         "repeats": study.repeats,
@@ -82,6 +92,9 @@ def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
             f"More time pays most up to {where} by {method_name(spot.method)}: the knee of the front, in "
             f"{front.knee_probability[front.knee]:.0%} of the resamples."
         )
+    for reference, ours in answer.beside:
+        ((label, theirs, mean, interval, count),) = page_rows_beside([Beside(answer.sweep.name, reference, ours)])
+        said.append(f"{label}: {theirs}; here {mean} ({interval}, {count} repeats).")
     return said
 
 

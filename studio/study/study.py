@@ -19,6 +19,7 @@ from render.base.model import Model, quantity
 from studio.project.project import Project
 from studio.project.ready_made import load_model, names_in
 from studio.project.templates import DESCRIPTIONS, template_folder
+from studio.study.boards import of_project
 from studio.study.effects import STATES
 from studio.study.measures import MEASURES, PART_MEASURES, part_names
 
@@ -84,6 +85,21 @@ class Limit(Model):
         return self
 
 
+class Reference(Model):
+    """What others say of a point: a paper's figure, or a data sheet's."""
+
+    label: str = quantity(label="What", min_length=1, max_length=100)
+    measure: str = quantity(label="Measure")
+    value: float = quantity(label="Value", help="In the SI unit of the measure.")
+    point: tuple[Value, ...] = quantity(label="Point", help="A value for each field that is varied.")
+    method: Method | None = quantity(None, label="Method", help="None: the first.")
+
+    @model_validator(mode="after")
+    def _is_known(self) -> Self:
+        check_measure(self.measure)
+        return self
+
+
 class Sweep(Model):
     """One chart's worth of runs: some parameters varied, all else as the study has it."""
 
@@ -102,17 +118,21 @@ class Sweep(Model):
     samples: int = quantity(64, label="Samples", help="Of sobol.", ge=2, le=65536)
     tolerance: float = quantity(0.01, label="Tolerance", help="Of bisection, as a share of the range.", gt=1e-6, le=0.5)
     methods: tuple[Method, ...] = Field(default=(), description="In place of the study's.")
-    chart: Literal["sweep", "speed", "map", "budget"] = quantity(
+    chart: Literal["sweep", "speed", "map", "budget", "profile", "pictures"] = quantity(
         "sweep",
         label="Chart",
         help="sweep: a measure over the first parameter. speed: a measure over processor time. map: over two. budget: "
-        "what each effect makes of the depth error.",
+        "what each effect makes of the depth error. profile: positions, depths and their errors along the line. "
+        "pictures: the images, side by side.",
     )
-    time: Literal["frame", "line"] = quantity(
-        "frame", label="Time", help="Of a chart of speed: the whole frame, or finding the line in its image."
+    time: Literal["frame", "line", "calibration"] = quantity(
+        "frame",
+        label="Time",
+        help="Of a chart of speed: the whole frame, finding the line in its image, or calibrating on the boards.",
     )
     measure: str = quantity("depth_rmse", label="Measure")
     limit: Limit | None = None
+    references: tuple[Reference, ...] = quantity((), label="Figures of others", max_length=100)
 
     @model_validator(mode="after")
     def _effects_are_all(self) -> Self:
@@ -145,6 +165,8 @@ class Sweep(Model):
             raise ValueError("bisection looks for one limit along one parameter; allowed: one in vary, and a limit")
         if self.sampling == "boundary" and (len(self.vary) != 2 or self.limit is None):
             raise ValueError("a boundary is of one limit in a map of two parameters; allowed: two in vary, and a limit")
+        if any(len(one.point) != len(self.vary) for one in self.references):
+            raise ValueError("a reference is of no point; allowed: a value for each field that is varied")
         if self.chart == "map" and len(self.vary) != 2:
             raise ValueError(f"a map has two parameters; found {len(self.vary)}; allowed: two in vary")
         return self
@@ -221,9 +243,12 @@ def base_project(name: str, root: Path) -> Project:
 
 
 def with_fields(project: Project, values: dict[str, Value], where: str) -> Project:
-    """The project with fields at their paths replaced. InputError: no such field, or a value that it does not allow."""
+    """The project with fields at their paths replaced, those of the boards left out.
+
+    InputError: no such field, or a value that it does not allow.
+    """
     data = project.model_dump(mode="json")
-    for path, value in values.items():
+    for path, value in of_project(values).items():
         _set(data, path, value, where)
     return Project.from_data(data, where).in_folder(project.folder)
 

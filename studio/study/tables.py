@@ -21,6 +21,8 @@ from studio.study.ray_units import MILLION, RAY_SPEED
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
 
+CALIBRATING = "seconds_calibrate"
+"""Of a row whose cell calibrates; no part of its frame."""
 SECONDS = ("seconds_render", "seconds_develop", "seconds_extract")
 RAY_UNITS = "ray_units"
 """Of times.csv: million rays that the machine could have traced in the frame's seconds."""
@@ -57,7 +59,7 @@ def write_tables(folder: Path, study: Study, bases: Mapping[str, Project], rows:
     columns: dict[str, list[Any]] = {
         name: [] for name in ("sweep", "key", "method", "repeat", "seed", *fields, *numbers, "reason")
     }
-    times: dict[str, list[Any]] = {name: [] for name in ("key", *SECONDS, RAY_UNITS)}
+    times: dict[str, list[Any]] = {name: [] for name in ("key", *SECONDS, CALIBRATING, RAY_UNITS)}
     cells = (measured_cells(study, number, bases, rows) for number in range(len(study.sweeps)))
     for cell, row in chain.from_iterable(cells):
         sweep = study.sweeps[cell.sweep]
@@ -111,8 +113,8 @@ def grouped(
 
 
 def seconds_of(rows: list[Row], time: str) -> np.ndarray:
-    """(repeats,) processor seconds: of the whole "frame", or of finding the "line"."""
-    parts = SECONDS if time == "frame" else SECONDS[-1:]
+    """(repeats,) processor seconds: of the whole "frame", of finding the "line", or of the "calibration"."""
+    parts = {"frame": SECONDS, "line": SECONDS[-1:], "calibration": (CALIBRATING,)}[time]
     return np.array([sum(row.get(part, math.nan) for part in parts) for row in rows])
 
 

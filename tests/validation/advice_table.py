@@ -1,6 +1,7 @@
 """The cheaper project of each template: what it changes in depth on fresh seeds, and the share of seconds it takes.
 
 python -m tests.validation.advice_table --scale 0.1 plane sphere   # no names: every template
+python -m tests.validation.advice_table --full                     # beside the full model, without a goal in depth
 
 The bar: bias and sigma within 3 % on 8 seeds that had no say in the choice, shown by intervals that lie within it, and
 at most a third of the seconds on at least five templates. A small scale has few rows, so that intervals may be too wide
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from analysis.study.intervals import Interval
 from studio.project.project import Project
@@ -26,6 +28,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("templates", nargs="*", metavar="template", help=", ".join(DESCRIPTIONS))
     parser.add_argument("--scale", type=float, default=0.2)
+    parser.add_argument("--rows", type=int, help="of the image, about its middle, at scale 1")
+    parser.add_argument("--full", action="store_true", help="errors of the image in place of the goal in depth")
     parser.add_argument("--workers", type=int, default=1)
     given = parser.parse_args()
     question = Question(image_scale=given.scale, engine=Engine(given.workers))
@@ -33,12 +37,22 @@ def main() -> None:
     shown = third = 0
     for name in given.templates or DESCRIPTIONS:
         with tempfile.TemporaryDirectory() as folder:
-            found = advise(Project.load(name), question, Path(folder))
+            found = advise(changed(Project.load(name), full=given.full, rows=given.rows), question, Path(folder))
         print(f"{name:16s}  {row(found, question.within)}", flush=True)
         proof = found.proved
         shown += proof is not None
         third += proof is not None and proof.found.seconds <= THIRD * proof.found.seconds_before
     print(f"{shown} proved, {third} of them at a third of the seconds or less; image scale {given.scale:g}")
+
+
+def changed(project: Project, *, full: bool, rows: int | None) -> Project:
+    """The project that is asked about."""
+    values: dict[str, Any] = {"render.goal": None} if full else {}
+    if rows is not None:
+        camera = project.scene.camera
+        middle = camera.cy - 0.5 * (camera.height - rows)
+        values |= {"scene.rig.camera.height": rows, "scene.rig.camera.cy": middle}
+    return project.replaced(values).in_folder(project.folder)
 
 
 def row(found: Advice, within: float) -> str:

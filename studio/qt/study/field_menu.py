@@ -1,4 +1,4 @@
-"""A menu of every field of the project that a study can vary, by what of the scene it belongs to."""
+"""A menu of every field of the project that a study can vary, by what of the scene it belongs to; and of its boards."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QMenu
 from studio.project.project import Project
 from studio.qt.core.session import Session
 from studio.qt.scene.scene_nodes import nodes
-from studio.study.draft import fields_of
+from studio.study.draft import board_fields, fields_of
 
 
 def fill_field_menu(menu: QMenu, session: Session, project: Project) -> None:
@@ -29,3 +29,6 @@ def fill_field_menu(menu: QMenu, session: Session, project: Project) -> None:
             part = next((str(one).replace("_", " ") for one in reversed(path[:-1]) if isinstance(one, str)), "")
             name = spec.label if names.count(spec.label) == 1 else f"{spec.label} ({part})"
             below.addAction(name, partial(session.vary_asked.emit, path, spec)).setToolTip(spec.help)
+    below = menu.addMenu("Calibration")
+    for path, spec in board_fields():
+        below.addAction(spec.label, partial(session.vary_asked.emit, path, spec)).setToolTip(spec.help)

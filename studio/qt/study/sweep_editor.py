@@ -46,6 +46,8 @@ CHARTS = [
     ("Over the first field", "sweep", "A line for each method and each combination of the other fields"),
     ("Over processor time", "speed", "What more accuracy costs, with the front and its knee"),
     ("Map of two fields", "map", "Of the first method, with the limit as a line"),
+    ("The line itself", "profile", "Positions, depths and their errors along the line, of the first repeat"),
+    ("Images", "pictures", "Side by side, of the first repeat and method"),
 ]
 TOLERANCE, SAMPLES = 0.05, 16
 

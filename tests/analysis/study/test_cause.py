@@ -8,7 +8,7 @@ from analysis.study.cause import cause
 
 GOOD = {
     "visible_rows": 1.0, "no_peak_rows": 0.01, "saturated_rows": 0.0, "wrong_rows": 0.0, "false_rows": 0.0,
-    "unmeasured_rows": 0.01, "line_width": 1.5, "signal": 1000.0,
+    "unmeasured_rows": 0.01, "line_width": 1.5, "signal": 1000.0, "position_rmse": 0.1, "calibration_rmse": 1e-5,
 }  # fmt: skip
 
 
@@ -22,6 +22,8 @@ GOOD = {
         ({"unmeasured_rows": 0.5}, "not measurable"),
         ({"line_width": 4.0}, "out of focus or too wide"),
         ({"signal": 100.0}, "starved"),
+        ({"calibration_rmse": 1e-4}, "degenerate"),
+        ({"calibration_rmse": 1e-4, "position_rmse": 2.0}, "less precise"),
         ({}, "less precise"),
     ],
 )

@@ -12,14 +12,18 @@ import pytest
 from click.testing import CliRunner
 
 import main
+import studio as blazer
+from analysis.study.budget import budget
 from render.base.errors import InputError
 from render.material.material import Lambertian, Subsurface
 from studio.notebook.frame import render
 from studio.notebook.measuring import develop
 from studio.project.project import Project
 from studio.runtime.workers import Engine
-from studio.study.answers import answers
+from studio.study.answers import ErrorBudget, answers
+from studio.study.budget_table import sentences_of
 from studio.study.effects import EFFECTS, STATES, effects_of, in_state
+from studio.study.measuring import as_if
 from studio.study.runner import run_study
 from studio.study.store import Store, described
 from studio.study.study import Study
@@ -128,3 +132,25 @@ def test_a_budget_that_cannot_be_is_refused(tmp_path: Path, change: dict[str, An
 def test_a_laser_that_is_not_there_is_told(tmp_path: Path) -> None:
     done = CliRunner().invoke(main.cli, ["budget", "assets/projects/plane", "--laser", "3", "--out", str(tmp_path)])
     assert done.exit_code == 2 and "--laser" in done.stderr and "0 to 0" in done.stderr
+
+
+def test_line_extraction_takes_the_sensor_to_be_what_it_is_whatever_is_off() -> None:
+    """Electrons, read noise and pattern are those of the sensor; what the other sensor drew stays in the numbers."""
+    project = Project.load("plane")
+    frame = blazer.render(project.replaced(DATA["set"]), image_scale=0.05)
+    quiet = in_state(project, "without shot noise")
+    quiet = in_state(quiet, "without quantisation")
+    plain = blazer.develop(frame, sensor=project.sensor, noise=False)
+    seen = as_if(blazer.develop(frame, sensor=quiet.sensor, noise=False), project.sensor)
+    assert seen.bits == 16 and seen.read_noise == plain.read_noise == project.sensor.read_noise
+    assert seen.project.sensor == plain.project.sensor
+    # half a number of 12 bits and one of 16, of rounding
+    assert np.max(np.abs(seen.electrons - plain.electrons)) <= 0.501 / plain.gain + 0.5 / seen.gain
+
+
+def test_a_row_that_takes_a_ghost_for_the_line_is_counted_and_makes_no_budget() -> None:
+    small = {"shot noise": np.full(4, 1e-10)}
+    found = budget(np.full(4, 2e-10), np.full(4, 1e-10), small, {"shot noise": np.full(4, 2e-10)})
+    said = sentences_of([ErrorBudget("likelihood", found, found, wrong_rows=0.004)])
+    assert any("0.40% of the rows are measured wrong" in one for one in said)
+    assert not any("measured wrong" in one for one in sentences_of([ErrorBudget("likelihood", found, found)]))
