@@ -67,7 +67,11 @@ def noise_of(image: Float) -> Float:
     levels of brightness, as edges fill the tails only, gives the line.
     """
     kernel = np.array([[1.0, -2.0, 1.0], [-2.0, 4.0, -2.0], [1.0, -2.0, 1.0]]) / 6.0
-    high = np.abs(cv2.filter2D(image, cv2.CV_64F, kernel))[1:-1, 1:-1].ravel()
+    high = cv2.filter2D(image, cv2.CV_64F, kernel)[1:-1, 1:-1].ravel()
+    if np.array_equal(image, np.rint(image)):
+        # differences of whole numbers are sixths: spread over their sixth, their median is not one of a few values
+        high += np.random.default_rng(0).uniform(-1.0 / 12.0, 1.0 / 12.0, high.size)
+    high = np.abs(high)
     level = cv2.blur(image, (5, 5))[1:-1, 1:-1].ravel()
     edges = np.unique(np.quantile(level, np.linspace(0.0, 1.0, 9)))
     group = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, max(len(edges) - 2, 0))

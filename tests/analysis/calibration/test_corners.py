@@ -102,3 +102,14 @@ def test_the_line_is_taken_between_the_edges_of_squares() -> None:
     np.testing.assert_array_equal(on_board(view, CHECKERS, np.array([middle, edge, off]), 5.0), [True, False, False])
     upper = 0.5 * (truth[0] + truth[1]) + [0.0, 3.0]
     np.testing.assert_array_equal(on_board(view, CHECKERS, np.array([edge, upper]), 5.0, "columns"), [True, False])
+
+
+def test_noise_of_whole_numbers_is_told_where_a_board_fills_the_image() -> None:
+    """A median of second differences alone is one of a few values there: it told 7 to 15 % too much."""
+    random, side = np.random.default_rng(5), np.arange(600)
+    board = np.where((side[:, None] // 60 + side[None] // 60) % 2 == 0, 60.0, 170.0)
+    light = cv2.GaussianBlur(board, (0, 0), 0.8)
+    image = np.rint(light + random.normal(size=light.shape) * np.sqrt(0.3 + 0.025 * light))
+    offset, gain = noise_of(image)
+    for level in (60.0, 170.0):
+        assert offset + gain * level == pytest.approx(0.3 + 1.0 / 12.0 + 0.025 * level, rel=0.05)
