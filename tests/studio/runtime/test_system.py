@@ -119,10 +119,11 @@ def test_a_program_in_a_folder_whose_name_is_not_text_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import main
+    from studio.runtime import command_line
 
     reason = system.why_not_in_this_folder("/opt/\udcff/blazer")
     assert reason is not None and "UTF-8" in reason and system.why_not_in_this_folder() is None
-    monkeypatch.setattr(main, "why_not_in_this_folder", lambda: reason)
+    monkeypatch.setattr(command_line, "why_not_in_this_folder", lambda: reason)
     with pytest.raises(SystemExit, match="2"):
         main.cli(["inspect"])
     assert "\\udcff/blazer" in capsys.readouterr().err
