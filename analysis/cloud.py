@@ -240,21 +240,18 @@ def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
 
     InputError: the file cannot be written.
     """
+    import pyarrow  # it takes longer to load than a small table to write, and only who writes one needs it
+    from pyarrow.csv import WriteOptions
+    from pyarrow.csv import write_csv as write_table
+
     _, parts = _parts(points)
     first = next(parts)
-    header = [title(name) for name in first]
-    with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerow(header)
+    header, options = [title(name) for name in first], WriteOptions(include_header=False)
+    with atomic_write(path) as temporary, open(temporary, "wb") as file:
+        file.write(f"{','.join(header)}\n".encode())
         for part in chain([first], parts):
-            # numbers need no quotes, which a writer of csv would look for
-            file.writelines(f"{','.join(cells)}\r\n" for cells in zip(*map(_text_cells, part.values()), strict=True))
-
-
-def _text_cells(column: Column) -> list[str]:
-    cells = list(map(repr, column.tolist()))
-    for i in np.flatnonzero(np.isnan(column)).tolist() if column.dtype.kind == "f" else ():
-        cells[i] = ""
-    return cells
+            columns = {name: pyarrow.array(column, from_pandas=True) for name, column in part.items()}
+            write_table(pyarrow.table(columns), file, options)
 
 
 def read_csv(path: Path | str) -> Cloud:
