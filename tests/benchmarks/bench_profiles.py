@@ -62,7 +62,8 @@ def main() -> int:
     stages = {stage: spent for stage, spent in result.manifest["seconds"].items() if spent > 0.02 * seconds}
     print(f"{frames} profiles: {seconds:.1f} s, {processor:.1f} processor s, {frames / seconds:.2f} a second")
     print("    " + ", ".join(f"{stage} {spent:.1f} s" for stage, spent in stages.items()))
-    print(f"memory in the first tenth {tenth:.0f} MB, at most {last:.0f} MB")
+    when = held.index(last) / len(held)
+    print(f"memory in the first tenth {tenth:.0f} MB, at most {last:.0f} MB, at {when:.0%} of the time")
     return 0 if seconds <= BAR_SECONDS * frames / 1000 and last <= (1.0 + BAR) * tenth else 1
 
 
