@@ -36,12 +36,21 @@ class DeviationMap:
     """Limits of the tolerance; None: none are given."""
 
 
+FALSE = 0.01
+"""Share of the points on either side that may be false: beyond twice the distance to all others there is no band."""
+
+
 def levels(value: Float, lower: float | None, upper: float | None) -> Float:
     """(9,) edges of the bands, m: two within the tolerance about its middle, three beyond each of its limits."""
     if lower is None or upper is None or not upper > lower:
         limit = nice_limit(value)
         return np.linspace(-limit, limit, len(BANDS) + 1)
-    least, most = (float(value.min()), float(value.max())) if len(value) else (lower, upper)
+    least, most = lower, upper
+    if len(value):
+        # false points lie anywhere: they are in the outermost bands, and do not say how far these reach
+        low, middle, high = np.quantile(value, [FALSE, 0.5, 1.0 - FALSE]).tolist()
+        least = max(float(value.min()), middle - 2.0 * (middle - low))
+        most = min(float(value.max()), middle + 2.0 * (high - middle))
     reach = max(lower - least, most - upper, 0.5 * (upper - lower)) * (1.0 + 1e-9)
     beyond = reach * np.array([0.25, 0.6, 1.0])
     return np.concatenate([lower - beyond[::-1], [lower, 0.5 * (lower + upper), upper], upper + beyond])

@@ -20,6 +20,13 @@ def test_edges_ascend_and_hold_the_tolerance_and_every_value(lower: float | None
         assert edges[0] <= value.min() and edges[-1] >= value.max()
 
 
+def test_a_few_false_points_far_away_leave_the_bands_where_the_others_are() -> None:
+    value = np.random.default_rng(1).normal(scale=1e-5, size=5000)
+    value[:25] = -0.8
+    edges = levels(value, -5e-5, 5e-5)
+    assert edges[0] == pytest.approx(-1e-4, rel=0.01) and edges[-1] == pytest.approx(1e-4, rel=0.01)
+
+
 @pytest.mark.parametrize("is_tall", [False, True])
 def test_a_dent_and_a_bump_are_pointed_at_with_their_size(is_tall: bool) -> None:
     x, y = (one.ravel() for one in np.meshgrid(np.linspace(0.0, 0.1, 200), np.linspace(0.0, 0.03, 60)))
