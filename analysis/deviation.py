@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from analysis.distance import nearest_triangle, signed_distance
+from analysis.distance import nearest_triangle, signed_distance, triangle_normals
 from render.base.arrays import Float, Int
 from render.base.errors import InputError
 from render.base.pose import rotation_matrix, transform_points
@@ -45,7 +45,6 @@ class Aligned:
     """Points that it follows from."""
     held: int
     """Freedoms, of 6, that the surface tells; the others stay as they were measured."""
-    rounds: int
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def deviations(
     points: Float, camera_centres: Float, vertices: Float, triangles: Int, aligned: Aligned | None = None
 ) -> Deviations:
     """Of (m, 3) finite points, each seen from its own centre (m, 3); aligned: None for points as they are."""
-    aligned = Aligned(np.eye(4), 0, 0, 0) if aligned is None else aligned
+    aligned = Aligned(np.eye(4), 0, 0) if aligned is None else aligned
     moved = transform_points(aligned.motion, points)
     value, nearest = signed_distance(moved, vertices, triangles, transform_points(aligned.motion, camera_centres))
     return Deviations(moved, value, nearest, aligned)
@@ -84,7 +83,7 @@ def best_fit(points: Float, vertices: Float, triangles: Int) -> Aligned:
     if len(points) < FEWEST:
         raise InputError("so few points fit no surface", found=len(points), allowed=f"at least {FEWEST}")
     motion, used, held = np.eye(4), len(points), 0
-    for i in range(ROUNDS):
+    for _ in range(ROUNDS):
         moved = transform_points(motion, points)
         distance, normal = _to_planes(moved, vertices, triangles)
         middle = float(np.median(distance))
@@ -94,8 +93,8 @@ def best_fit(points: Float, vertices: Float, triangles: Int) -> Aligned:
         step, held, largest = _step(moved[here], normal[here], distance[here])
         motion = step @ motion
         if largest < STILL:
-            return Aligned(motion, used, held, i + 1)
-    return Aligned(motion, used, held, ROUNDS)
+            return Aligned(motion, used, held)
+    return Aligned(motion, used, held)
 
 
 def three_two_one(
@@ -111,9 +110,9 @@ def three_two_one(
         raise InputError("3-2-1 needs six spots", found=len(datums), allowed="three, two and one")
     spots = np.asarray(datums, dtype=np.float64)
     facet = nearest_triangle(spots, vertices, triangles)
-    normals = _normals(vertices, triangles, facet)
+    normals = triangle_normals(vertices, triangles, facet)
     motion, used = np.eye(4), 0
-    for i in range(ROUNDS):
+    for _ in range(ROUNDS):
         moved = transform_points(motion, points)
         tree = cKDTree(moved)
         means, middles, used = np.zeros(6), np.zeros((6, 3)), 0
@@ -132,12 +131,12 @@ def three_two_one(
             raise InputError("the six spots leave the part free to move", found=found, cure=cure)
         motion = step @ motion
         if largest < STILL:
-            return Aligned(motion, used, held, i + 1)
-    return Aligned(motion, used, 6, ROUNDS)
+            return Aligned(motion, used, held)
+    return Aligned(motion, used, 6)
 
 
 def verdicts(value: Float, sigma: Float, lower: float, upper: float) -> Verdicts:
-    """(m,) by ISO 14253-1 with U = 2 sigma, as of `Gauge.verdict`: proved within, proved beyond, or undecided."""
+    """(m,) by ISO 14253-1 with U = 2 sigma: proved within, proved beyond, or undecided; NaN counts as 0."""
     uncertainty = 2.0 * np.nan_to_num(sigma)
     found = np.full(len(value), UNDECIDED, dtype=np.int8)
     found[(value - uncertainty >= lower) & (value + uncertainty <= upper)] = WITHIN
@@ -181,7 +180,7 @@ def _to_planes(points: Float, vertices: Float, triangles: Int) -> tuple[Float, F
     import trimesh
 
     facet = nearest_triangle(points, vertices, triangles)
-    normal = _normals(vertices, triangles, facet)
+    normal = triangle_normals(vertices, triangles, facet)
     away = points - trimesh.triangles.closest_point(vertices[triangles[facet]], points)
     along = np.einsum("ij,ij->i", away, normal)
     length = np.linalg.norm(away, axis=1)
@@ -201,10 +200,3 @@ def _step(points: Float, normal: Float, distance: Float) -> tuple[Float, int, fl
     step[:3, :3] = rotation_matrix(np.asarray(twist[:3] / size, dtype=np.float64))
     step[:3, 3] = middle + twist[3:] - step[:3, :3] @ middle
     return step, int(rank), float(np.linalg.norm(twist[:3]) + np.linalg.norm(twist[3:]))
-
-
-def _normals(vertices: Float, triangles: Int, facet: NDArray[np.int64]) -> Float:
-    """(m, 3) unit normals of facets."""
-    a, b, c = np.moveaxis(vertices[triangles[facet]], 1, 0)
-    cross = np.cross(b - a, c - a)
-    return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))

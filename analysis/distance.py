@@ -110,3 +110,14 @@ def _segment(points: Float, start: Float, end: Float) -> Float:
     squared = np.einsum("ij,ij->i", along, along)
     t = np.einsum("ij,ij->i", points - start, along) / np.where(squared > 0.0, squared, 1.0)
     return np.asarray(np.linalg.norm(points - start - np.clip(t, 0.0, 1.0)[:, None] * along, axis=1))
+
+
+def triangle_normals(vertices: Float, triangles: NDArray[np.int32], which: NDArray[np.int64]) -> Float:
+    """(m, 3) unit normals of triangles, NaN for -1."""
+    normals = np.full((len(which), 3), np.nan)
+    here = which >= 0
+    corners = vertices[triangles[which[here]]]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(cross, axis=1, keepdims=True)
+    normals[here] = cross / np.where(length > 0.0, length, np.nan)
+    return normals

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.distance import signed_distance
+from analysis.distance import signed_distance, triangle_normals
 from analysis.line.result import Line
 from analysis.measures import Measures, measure, outliers
 from analysis.triangulate import Points
@@ -90,9 +90,8 @@ def compare(
     if len(triangles):
         check_finite("errors", off_the_surface=distance[points.valid])
 
-    per_pixel = np.abs(
-        np.einsum("ij,ij->i", points.gradient @ T_world_camera[:3, :3].T, _normals(vertices, triangles, nearest))
-    )
+    normals = triangle_normals(vertices, triangles, nearest)
+    per_pixel = np.abs(np.einsum("ij,ij->i", points.gradient @ T_world_camera[:3, :3].T, normals))
     step = np.linalg.norm(points.gradient, axis=1)
     wrong = outliers(position, 1.0, MATCH_SIGMAS * line.width[points.index, points.rank])
     where = points.index, points.rank
@@ -134,14 +133,3 @@ def match(index: Index, position: Float, true_index: NDArray[np.int32], true_pos
         if found[p] < 0 and not taken[c]:
             found[p], taken[c] = c, True
     return found
-
-
-def _normals(vertices: Float, triangles: NDArray[np.int32], which: NDArray[np.int64]) -> Float:
-    """(m, 3) unit normals of triangles, NaN for -1."""
-    normals = np.full((len(which), 3), np.nan)
-    here = which >= 0
-    corners = vertices[triangles[which[here]]]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(cross, axis=1, keepdims=True)
-    normals[here] = cross / np.where(length > 0.0, length, np.nan)
-    return normals

@@ -98,8 +98,13 @@ class Estimate:
 
     def with_shared(self, shared: Float) -> Estimate:
         """The same poses of the placements with other shared parameters."""
+        there, motion = self._sharing(shared), self.motion
+        return there if motion is None else there._carried(self.rotation[motion.first], self.translation[motion.first])
+
+    def _sharing(self, shared: Float) -> Estimate:
+        """Other shared parameters, and what the boards are carried to as it was."""
         camera, motion = self.camera_count, self.motion
-        there = replace(
+        return replace(
             self,
             intrinsics=shared[:4],
             distortion=shared[4:camera],
@@ -107,14 +112,13 @@ class Estimate:
             planes=shared[camera + 2 : self.motion_slice.start].reshape(-1, 3),
             motion=None if motion is None else replace(motion, parameters=shared[self.motion_slice]),
         )
-        return there if motion is None else there._carried(self.rotation[motion.first], self.translation[motion.first])
 
     def moved(self, shared: Float, poses: Float) -> Estimate:
         """A step away: shared (p,) is added; poses (groups, 6) turn each board in the camera frame and shift it."""
         first = slice(None) if self.motion is None else self.motion.first
         turned = Rotation.from_rotvec(poses[:, :3]).as_matrix() @ self.rotation[first]
         shifted = self.translation[first] + poses[:, 3:]
-        return self.with_shared(self.shared + shared)._carried(turned, shifted)
+        return self._sharing(self.shared + shared)._carried(turned, shifted)
 
 
 def free_parameters(estimate: Estimate, *, warp: bool, camera: bool = True) -> np.ndarray:

@@ -105,11 +105,12 @@ class Motion:
     def _turntable(self, angle: Float) -> Moves:
         normal, point = self.axis()
         sine, versine = np.sin(angle)[:, None, None], (1.0 - np.cos(angle))[:, None, None]
-        rotation = np.eye(3) * (1.0 - versine) + sine * _cross(normal) + versine * np.outer(normal, normal)
+        about = cross_matrices(normal[None])[0]
+        rotation = np.eye(3) * (1.0 - versine) + sine * about + versine * np.outer(normal, normal)
         derivative = np.zeros((len(angle), 4, 3, 4))
         for i, change in enumerate(self.axis_derivative()):
             both = np.outer(change, normal)
-            derivative[:, i, :, :3] = sine * _cross(change) + versine * (both + both.T)
+            derivative[:, i, :, :3] = sine * cross_matrices(change[None])[0] + versine * (both + both.T)
             derivative[:, i, :, 3] = -derivative[:, i, :, :3] @ point
         derivative[:, 2:, :, 3] = (np.eye(3) - rotation)[:, :, self.across].transpose(0, 2, 1)
         return Moves(rotation, point - rotation @ point, derivative)
@@ -252,7 +253,7 @@ def _hand_eye(motion: Float, parameters: Float) -> Moves:
     arm = turn @ shift + motion[:, :3, 3] - shift
     derivative = np.zeros((len(motion), 6, 3, 4))
     for i, change in enumerate(_left_jacobian(parameters[:3]).T):
-        skew = _cross(change)
+        skew = cross_matrices(change[None])[0]
         derivative[:, i, :, :3] = eye.T @ (turn @ skew - skew @ turn) @ eye
         derivative[:, i, :, 3] = -(arm @ skew.T) @ eye
     derivative[:, 3:, :, 3] = (eye.T @ (turn - np.eye(3))).transpose(0, 2, 1)
@@ -261,12 +262,17 @@ def _hand_eye(motion: Float, parameters: Float) -> Moves:
 
 def _left_jacobian(turn: Float) -> Float:
     """(3, 3) J with exp(turn + d) = exp(J d) exp(turn) to first order."""
-    angle, skew = float(np.linalg.norm(turn)), _cross(turn)
+    angle, skew = float(np.linalg.norm(turn)), cross_matrices(turn[None])[0]
     if angle < 1e-6:
         return np.asarray(np.eye(3) + 0.5 * skew)
     first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
     return np.asarray(np.eye(3) + first * skew + second * skew @ skew)
 
 
-def _cross(a: Float) -> Float:
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+def cross_matrices(vectors: Float) -> Float:
+    """(n, 3) a -> (n, 3, 3) [a]x, with [a]x b = a x b."""
+    out = np.zeros((len(vectors), 3, 3))
+    x, y, z = vectors.T
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -z, y, -x
+    out[:, 1, 0], out[:, 2, 0], out[:, 2, 1] = z, -y, x
+    return out

@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.calibration.estimate import Estimate
 from analysis.calibration.lens import normalise, project
-from analysis.calibration.motion import Moves
+from analysis.calibration.motion import Moves, cross_matrices
 from analysis.calibration.observations import Index, Observations
 from render.base.arrays import Float
 
@@ -123,12 +123,3 @@ def board_points(seen: Observations, warp: Float, target: Float) -> tuple[Float,
     """(n, 2) places on the board -> (n, 3) m in the board's frame, and (n, 2) height a metre of each warp."""
     outward = 1.0 - ((target - seen.centre) / seen.half) ** 2
     return np.concatenate([target, (outward @ warp)[:, None]], axis=1), outward
-
-
-def cross_matrices(vectors: Float) -> Float:
-    """(n, 3) a -> (n, 3, 3) [a]x, with [a]x b = a x b."""
-    out = np.zeros((len(vectors), 3, 3))
-    x, y, z = vectors.T
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -z, y, -x
-    out[:, 1, 0], out[:, 2, 0], out[:, 2, 1] = z, -y, x
-    return out

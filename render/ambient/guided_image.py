@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from render.ambient.guided_interpolation import NOTHING, grid_of, interpolate, likeness, seen_at
+from render.ambient.guided_interpolation import NOTHING, SEEN, grid_of, interpolate, likeness, seen_at
 from render.ambient.path_tracer import CameraPaths
 from render.base.arrays import Bool, Float, Float32, Int
 from render.run import Run
@@ -60,7 +60,7 @@ def guided_image(grid: LightGrid, paths: CameraPaths, height: int, places: Place
     image = np.empty((height * width, 3), np.float32)
     nodes, across = grid_of(width, height, SPACING)
     item = np.empty(len(nodes), np.int32)
-    facing = np.empty((len(nodes), 9), np.float32)
+    facing = np.empty((len(nodes), SEEN), np.float32)
 
     def look(pixels: Int, seen_item: tuple[Float32, Int] | None, start: int, stop: int) -> None:
         some = pixels[start:stop]

@@ -5,17 +5,15 @@ Light and errors are each frame's own. What is taught only guides, as what earli
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from render.base.arrays import Bool, Float, Float32
 from render.importance import Importance
 from render.laser_indirect.accumulator import PASSES_A_WAVE, Accumulator
 from render.laser_indirect.guiding import Guide
-from render.laser_indirect.line_goal import CONFIDENCE
+from render.laser_indirect.line_goal import margin_of
 from render.laser_indirect.line_paths import PathDemand
 from render.laser_indirect.photon_emission import FAN_BINS, UNIFORM_FRACTION, FanDistribution
 
@@ -51,8 +49,9 @@ class ReflectedLesson:
         if found.line is None or not found.waves or found.line.out_of_reach:
             return None
         freedom = (PASSES_A_WAVE - 1) * sum(SIZES) ** 2 / sum(size**2 for size in SIZES)
-        margin = math.sqrt(0.5 * freedom / float(gammaincinv(0.5 * freedom, 1.0 - CONFIDENCE)))
-        needed = found.paths * (margin * found.line_deviation / AIMED_AT) ** 2 / (sum(SIZES) * PASSES_A_WAVE)
+        needed = (
+            found.paths * (margin_of(freedom) * found.line_deviation / AIMED_AT) ** 2 / (sum(SIZES) * PASSES_A_WAVE)
+        )
         # as many times more of the light paths as a pass has beyond its size
         size = needed * found.size * found.growth / found.next_paths
         return cls(

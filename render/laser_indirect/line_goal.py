@@ -159,10 +159,9 @@ class LineErrors:
 
     @property
     def margin(self) -> float:
-        """What the deviation is at most, over that which passes tell, with `CONFIDENCE`: by chi-square with the
-        degrees of freedom of the waves' spreads, weighed as they are (Welch 1947; Satterthwaite 1946)."""
-        freedom = self.measured**2 / self.squares
-        return math.sqrt(0.5 * freedom / float(gammaincinv(0.5 * freedom, 1.0 - CONFIDENCE)))
+        """`margin_of` the degrees of freedom of the waves' spreads, weighed as they are (Welch 1947; Satterthwaite
+        1946)."""
+        return margin_of(self.measured**2 / self.squares)
 
     def error(self, weights: float) -> float:
         """Deviation that the lines have at most, with `CONFIDENCE`, over the allowed one; as `deviation`."""
@@ -216,6 +215,11 @@ class LineErrors:
         found.squares = squares
         found.out_of_reach, found.worst_rise = bool(out_of_reach), found._worst_rise()
         return found
+
+
+def margin_of(freedom: float) -> float:
+    """What a deviation is at most, over one told by so many degrees of freedom, with `CONFIDENCE`: by chi-square."""
+    return math.sqrt(0.5 * freedom / float(gammaincinv(0.5 * freedom, 1.0 - CONFIDENCE)))
 
 
 @dataclass(frozen=True)

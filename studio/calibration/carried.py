@@ -31,20 +31,22 @@ def carried_views(
     """Views of one board at several positions, the truth with the motion, and what the axis was told.
 
     truth: with poses of the board, in the first of which that is carried. sigmas px of corners and lines.
-    None: the project stands still, or the camera sees the board at fewer than three positions.
+    None: the project stands still, or the camera sees the board at too few positions.
     """
     motion = true_motion(project)
     if motion is None:
         return None
     size = (project.scene.camera.width, project.scene.camera.height)
+    # of a hand the positions that are seen do, of an axis all are to be seen, over less of it if need be
+    by_hand = motion.kind == "hand_eye"
     for number in range(len(truth.rotation)):
-        for share in (1.0, 0.5, 0.25, 0.125):
-            chosen = motion if motion.kind == "hand_eye" else replace(motion, given=share * motion.given)
+        for share in (1.0,) if by_hand else (1.0, 0.5, 0.25, 0.125):
+            chosen = motion if by_hand else replace(motion, given=share * motion.given)
             there = replace(truth, rotation=truth.rotation[[number]], translation=truth.translation[[number]])
             there = _carried(there, chosen)
             views = _views(there, board, size, sigmas)
             seen = np.array([len(view.pixel) >= LEAST_SEEN * len(board.target) for view in views])
-            if seen.all() or (motion.kind == "hand_eye" and seen.sum() >= FEWEST_POSITIONS):
+            if seen.all() or (by_hand and seen.sum() >= FEWEST_POSITIONS):
                 kept = np.nonzero(seen)[0]
                 rng = np.random.default_rng([seed, number])
                 told = {views[i].name: ("", np.asarray(chosen.given[i])) for i in kept}

@@ -17,7 +17,7 @@ from render.base.files import atomic_write
 from render.world.world import build_world
 from studio.scan.height_map import points_of
 from studio.scan.own_files import SECTION_COLUMNS, check_replaceable
-from studio.scan.scan_folder import ScanFolder, open_folder
+from studio.scan.scan_folder import open_folder
 
 TRUE, MEASURED = "TRUE", "MEASURED"
 """Layers of the drawing, and what a row of the table is of."""
@@ -31,7 +31,6 @@ class Section:
     """m; places are as of `Plane.local`."""
 
     plane: Plane
-    thickness: float
     true: list[Float]
     """Polylines (n, 2) of the part as it was scanned."""
     measured: Float
@@ -46,12 +45,7 @@ def take_section(folder: Path, plane: Plane, thickness: float) -> Section:
     """Of a results folder. InputError: it is none, has no points, or the plane meets neither part nor points."""
     found = open_folder(folder)
     world = build_world(found.project.scene, found.root)
-    return section_of(found, plane, thickness, world.vertices, world.triangles)
-
-
-def section_of(found: ScanFolder, plane: Plane, thickness: float, vertices: Float, triangles: Int) -> Section:
-    """As `take_section`, of a world that was read: (v, 3), (t, 3) at step 0."""
-    made = from_pieces(_pieces(found.folder), plane, thickness, vertices, triangles)
+    made = from_pieces(_pieces(found.folder), plane, thickness, world.vertices, world.triangles)
     if not made.true and len(made.measured) == 0:
         cure = "put the plane through the part"
         raise InputError("the plane meets neither the part nor a point", where=str(plane.point), cure=cure)
@@ -74,7 +68,7 @@ def from_pieces(pieces: list[Cloud], plane: Plane, thickness: float, vertices: F
             "the section has too many points", found=len(together), allowed=f"at most {MOST_POINTS}", cure=cure
         )
     true = cut(vertices, triangles, plane)
-    return Section(plane, thickness, true, together[:, :3], together[:, 3], together[:, 4], together[:, 5])
+    return Section(plane, true, together[:, :3], together[:, 3], together[:, 4], together[:, 5])
 
 
 def write_section(made: Section, path: Path, reads: Sequence[Path] = ()) -> Path:

@@ -15,14 +15,12 @@ from studio.study.boundary_chart import DASHES, draw_edges
 from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
 from studio.study.kept import KEPT
-from studio.study.kept_charts import pictures_figure, profile_figure
+from studio.study.kept_charts import SERIES, pictures_figure, profile_figure
 from studio.study.measures import Measure, measure_of
 from studio.study.ray_units import MILLION, Throughput
 from studio.study.study import Parameter, Value
 
 MARKERS = "osD^vP*X<>"
-ONE_METHOD = ("#d55e00", "#0b6e8a", "#8a5aa8", "#009e73", "#b58900", "#3d5a80")
-"""Of series by one method, which has but one colour."""
 MOST_IN_LEGEND = 5
 """Methods; more are named at their marks."""
 
@@ -116,7 +114,7 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         one_method = len({name for name, *_ in series}) == 1 and len(series) > 1
         label = ", ".join(others if one_method else [method_name(key[0]), *others])
         style: dict[str, Any] = {
-            "color": ONE_METHOD[number % len(ONE_METHOD)] if one_method else method_colour(key[0]),
+            "color": SERIES[number % len(SERIES)] if one_method else method_colour(key[0]),
             "marker": MARKERS[number % len(MARKERS)],
             "ls": DASHES[number % len(DASHES)],
             # what lies on what is drawn before shows as a ring around it

@@ -16,6 +16,7 @@ from studio.study.measures import measure_of
 from studio.study.study import Value
 
 SERIES = ("#d55e00", "#0b6e8a", "#8a5aa8", "#009e73", "#b58900", "#3d5a80")
+"""Of cells, and of series by one method, which has but one colour."""
 MARKS = "x+1|_."
 MOST = len(SERIES)
 REACH = 8.0
@@ -37,10 +38,10 @@ def profile_figure(answer: Answer, shown: Shown) -> Any:
             if number == 0:
                 for axes, name, scale in ((panels[0], "true_position", 1.0), (panels[1], "true_depth", 1e3)):
                     true = scale * np.array(found[name])
-                    label = "truth" if number == 0 and axes is panels[0] else None
+                    label = "truth" if axes is panels[0] else None
                     axes.plot(true, found["true_line"], "o", ms=3.5, mew=0, color=TRUTH, alpha=0.6, label=label)
-                    room = ROOM * max(float(np.ptp(true)), 1e-6) if len(true) else 1.0
                     if len(true):
+                        room = ROOM * max(float(np.ptp(true)), 1e-6)
                         axes.set_xlim(true.min() - room, true.max() + room)
             words = [method_name(one.method), *(map(shown, one.point) if several else ())]
             known = np.abs(error[np.isfinite(error)])

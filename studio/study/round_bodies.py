@@ -5,24 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from render.base.arrays import Float
+from render.base.pose import transform_points
 from render.frame import LaserCurve
 from render.scene.scene import Scene
 from render.scene.shape import Cylinder, Sphere
 
 
-def facet_error(scene: Scene, curve: LaserCurve, step: int = 0) -> float:
+def facet_error(scene: Scene, curve: LaserCurve) -> float:
     """RMS over the exact line of the distance to its spheres and cylinders, m; NaN: it crosses none of them.
 
     Along the body's normal: a sphere of n segments around has facets of at most R (1 - cos(pi / n)) and their like
     along the other direction below it.
     """
-    world = _moved(curve.point, scene.T_world_camera(step))
+    world = transform_points(scene.T_world_camera(0), curve.point)
     off: list[Float] = []
     for number, item in enumerate(scene.visible_objects):
         if not isinstance(item.shape, Sphere | Cylinder):
             continue
-        pose = np.asarray(np.linalg.inv(scene.T_world_object(item, step)), dtype=np.float64)
-        own = _moved(world[curve.object_id == number], pose)
+        pose = np.asarray(np.linalg.inv(scene.T_world_object(item, 0)), dtype=np.float64)
+        own = transform_points(pose, world[curve.object_id == number])
         radius = item.shape.radius * item.scale
         if isinstance(item.shape, Sphere):
             off.append(np.linalg.norm(own, axis=1) - radius)
@@ -31,7 +32,3 @@ def facet_error(scene: Scene, curve: LaserCurve, step: int = 0) -> float:
             off.append(np.hypot(own[side, 0], own[side, 1]) - radius)
     found = np.concatenate(off) if off else np.empty(0)
     return float(np.sqrt(np.mean(found**2))) if len(found) else float("nan")
-
-
-def _moved(points: Float, pose: Float) -> Float:
-    return np.asarray(points @ pose[:3, :3].T + pose[:3, 3])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -10,6 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
+    QFileDialog,
     QLabel,
     QListWidget,
     QListWidgetItem,
@@ -18,7 +20,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from studio.runtime.error_messages import Trouble
+from render.base.errors import InputError
+from studio.runtime.error_messages import Trouble, trouble
 
 Answer = Literal["save", "discard", "cancel"]
 
@@ -126,3 +129,15 @@ def about(parent: QWidget, version: str) -> None:
 def suggested(folder: str, name: str) -> str:
     """A path to begin a file dialog with."""
     return str(Path(folder or Path.home()) / name)
+
+
+def export_csv(parent: QWidget, name: str, what: str, write: Callable[[Path], None]) -> None:
+    """Ask where, `name` being proposed, and write there; what: cannot be done, if it cannot."""
+    chosen, _ = QFileDialog.getSaveFileName(parent, "Export", f"{name.replace('/', '-')}.csv", "CSV table (*.csv)")
+    if not chosen:
+        return
+    path = Path(chosen)
+    try:
+        write(path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv"))
+    except InputError as error:
+        show_trouble(parent, trouble(error, f"export {what}"))

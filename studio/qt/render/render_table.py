@@ -9,7 +9,6 @@ from PySide6.QtGui import QFont
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QDialog,
-    QFileDialog,
     QHBoxLayout,
     QLabel,
     QTableWidget,
@@ -20,7 +19,7 @@ from PySide6.QtWidgets import (
 from render.base.errors import InputError
 from render.world.world import build_world
 from studio.project.date_and_time import read_out
-from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import text_button
 from studio.runtime.error_messages import trouble
@@ -71,9 +70,9 @@ class RenderTable(QDialog):
         self.setObjectName("render-table")
         self.setWindowTitle("Renders side by side")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.own = [as_kept(session, render, name) for render, name in shown]
+        own = [as_kept(session, render, name) for render, name in shown]
         kept, self.wrong = kept_renders(session.document.root) if session.document.path is not None else ([], [])
-        self.renders = [*self.own, *kept]
+        self.renders = [*own, *kept]
         self.rows = side_by_side(self.renders)
         self.table = QTableWidget()
         self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
@@ -142,11 +141,4 @@ class RenderTable(QDialog):
         self.export.setEnabled(bool(self.rows))
 
     def _ask(self) -> None:
-        start = f"{self.session.project.name.replace('/', '-')} renders.csv"
-        chosen, _ = QFileDialog.getSaveFileName(self, "Export", start, "CSV table (*.csv)")
-        if not chosen:
-            return
-        try:
-            self.write(Path(chosen).with_suffix(".csv"))
-        except InputError as error:
-            show_trouble(self, trouble(error, "export the table"))
+        export_csv(self, f"{self.session.project.name} renders", "the table", self.write)

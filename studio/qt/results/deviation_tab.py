@@ -22,7 +22,7 @@ from analysis.deviation import Alignment
 from analysis.report.deviation_figure import draw
 from render.base.errors import InputError
 from studio.commands.deviation import details, sentence
-from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import ElidedLabel, text_button
@@ -186,15 +186,7 @@ class DeviationTab(QWidget):
             self.take_nominal(Path(chosen))
 
     def _ask(self) -> None:
-        start = f"{self.session.project.name.replace('/', '-')} deviation.csv"
-        chosen, _ = QFileDialog.getSaveFileName(self.window(), "Export", start, "CSV table (*.csv)")
-        if not chosen:
-            return
-        path = Path(chosen)
-        try:
-            self.write(path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv"))
-        except InputError as error:
-            show_trouble(self.window(), trouble(error, "export the deviation"))
+        export_csv(self.window(), f"{self.session.project.name} deviation", "the deviation", self.write)
 
     def _show_rows(self) -> None:
         self.form.setRowVisible(self.spots, self.alignment.currentData() == "3-2-1")

@@ -5,15 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QLabel, QPushButton, QTableWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QTableWidgetItem, QVBoxLayout, QWidget
 
 from render.base.errors import InputError
-from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.dialogs import export_csv
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
 from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.plots import PointedPlots
-from studio.runtime.error_messages import trouble
 from studio.scan.region import Region, export_region, region_table
 from studio.scan.result_series import ErrorView
 from studio.scan.stages import Measurement
@@ -91,15 +90,7 @@ class RegionTab(QWidget):
         self.session.message.emit("info", f"Wrote {path}: {count} points, {self.region.title}")
 
     def _ask(self) -> None:
-        start = f"{self.session.project.name.replace('/', '-')} region.csv"
-        chosen, _ = QFileDialog.getSaveFileName(self.window(), "Export", start, "CSV table (*.csv)")
-        if not chosen:
-            return
-        path = Path(chosen)
-        try:
-            self.write(path if path.suffix.lower() == ".csv" else path.with_name(f"{path.name}.csv"))
-        except InputError as error:
-            show_trouble(self.window(), trouble(error, "export the region"))
+        export_csv(self.window(), f"{self.session.project.name} region", "the region", self.write)
 
     def _tell(self) -> None:
         there = self.region is not None
