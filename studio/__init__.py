@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from render.scene.shape import StepBlock as StepBlock
     from render.scene.shape import VGroove as VGroove
     from render.scene.shape import WeldTee as WeldTee
+    from render.scene.wear import Wear as Wear
     from render.sensor.sensor import BandPass as BandPass
     from render.sensor.sensor import Sensor as Sensor
     from render.sensor.sensor import SpectralCurve as SpectralCurve
@@ -90,6 +91,7 @@ _HOMES = {
     "render.scene.scene": "Rig Scene SceneObject",
     "render.scene.settings": "RenderSettings",
     "render.scene.shape": "Box Cylinder MeshFile Plane Sphere StepBlock VGroove WeldTee",
+    "render.scene.wear": "Wear",
     "render.sensor.sensor": "BandPass Sensor SpectralCurve",
     "studio.notebook.frame": "RenderedFrame render",
     "studio.notebook.measuring": "DevelopedImage ExtractedLine PointErrors TriangulatedPoints "

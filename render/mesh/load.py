@@ -22,9 +22,11 @@ from render.mesh.texture import MAX_PIXELS, load_texture
 from render.mesh.trimesh_reader import EXTENSIONS, SideFiles, read_parts
 from render.mesh.vertex_normals import corner_normals
 from render.mesh.watertight import closed_outward
+from render.mesh.wear import worn
 from render.mesh.weld_tee import weld_tee_mesh
 from render.scene.scene import SceneObject
 from render.scene.shape import UNITS, MeshFile, Parametric, Sphere, WeldTee
+from render.scene.wear import Wear
 
 MAX_EXTENT = 1e4
 """Largest distance of a vertex from its origin, m: beyond it float32 rays lose the micrometres."""
@@ -46,9 +48,7 @@ def load_mesh(item: SceneObject, root: Path) -> Mesh:
     if isinstance(item.shape, MeshFile):
         mesh = _from_file(item, item.shape, Path(root), where, filled)
     else:
-        mesh = _made(item.shape, item.crease_angle, where if filled else "")
-        if item.scale != 1.0:
-            mesh = dataclasses.replace(mesh, vertices=mesh.vertices * item.scale)
+        mesh = _made(item.shape, item.scale, item.wear, item.crease_angle, where, filled)
         _check_size(mesh.vertices, where)
     material = item.material.base if isinstance(item.material, Blend) else item.material
     albedo = material.albedo
@@ -117,18 +117,23 @@ def unit_warning(mesh: Mesh, item: SceneObject) -> str | None:
 
 
 @lru_cache(maxsize=8)
-def _made(shape: Parametric, crease_angle: float, filled: str) -> Mesh:
-    """filled: name of an object whose material needs a closed surface; empty: it does not."""
+def _made(shape: Parametric, scale: float, wear: Wear | None, crease_angle: float, where: str, filled: bool) -> Mesh:
+    """filled: its material needs a closed surface."""
     mesh = weld_tee_mesh(shape) if isinstance(shape, WeldTee) else primitive_mesh(shape)
-    mesh = closed_outward(mesh, f"{filled}: shape") if filled else mesh
+    mesh = closed_outward(mesh, f"{where}: shape") if filled else mesh
+    unit = mesh.vertices
+    if scale != 1.0:
+        mesh = dataclasses.replace(mesh, vertices=unit * scale)
+    if isinstance(shape, Sphere) and crease_angle > 0.0 and wear is None:
+        # the exact normals of the sphere, from which the mean over facets differs
+        return dataclasses.replace(mesh, normals=(unit / shape.radius)[mesh.triangles].astype(np.float32))
+    return _shaded(mesh if wear is None else worn(mesh, wear, where), crease_angle)
+
+
+def _shaded(mesh: Mesh, crease_angle: float) -> Mesh:
     if crease_angle == 0.0:
         return mesh
-    if isinstance(shape, Sphere):
-        # the exact normals of the sphere, from which the mean over facets differs
-        normals = (mesh.vertices / shape.radius)[mesh.triangles].astype(np.float32)
-    else:
-        normals = corner_normals(mesh.vertices, mesh.triangles, crease_angle)
-    return dataclasses.replace(mesh, normals=normals)
+    return dataclasses.replace(mesh, normals=corner_normals(mesh.vertices, mesh.triangles, crease_angle))
 
 
 @lru_cache(maxsize=8)
@@ -153,7 +158,7 @@ def _from_file(item: SceneObject, shape: MeshFile, root: Path, where: str, fille
     colours = isinstance(material.albedo, FromMesh)
     factor = UNITS[shape.unit] * item.scale
     version = state.st_mtime_ns, state.st_size
-    mesh = _read(path, Path(root), where, factor, colours, shape.sha256, item.crease_angle, filled, version)
+    mesh = _read(path, Path(root), where, factor, colours, shape.sha256, item.wear, item.crease_angle, filled, version)
     warning = unit_warning(mesh, item)
     if warning and shape.unit == "m" and item.scale == 1.0:
         cure = 'if it really is in metres, say so with unit "cm" and scale 100'
@@ -169,6 +174,7 @@ def _read(  # noqa: PLR0913
     factor: float,
     colours: bool,
     expected_sha256: str | None,
+    wear: Wear | None,
     crease_angle: float,
     filled: bool,
     version: object,
@@ -211,7 +217,8 @@ def _read(  # noqa: PLR0913
         normals,
         smooth_normals=any(part.normals is not None for part in parts),
     )
-    return closed_outward(mesh, where) if filled else mesh
+    mesh = closed_outward(mesh, where) if filled else mesh
+    return mesh if wear is None else _shaded(worn(mesh, wear, where), crease_angle)
 
 
 def _check_size(vertices: NDArray[np.float64], where: str) -> None:

@@ -18,6 +18,7 @@ from render.material.material import Lambertian, Material
 from render.scene.lights import Environment, Light
 from render.scene.motion import Motion, NoMotion
 from render.scene.shape import Shape
+from render.scene.wear import Wear
 
 Array = NDArray[np.float64]
 
@@ -47,6 +48,7 @@ class SceneObject(Model):
         ge=0,
         le=math.pi,
     )
+    wear: Wear | None = quantity(None, label="Wear", help="Dents and scratches.")
     visible: bool = quantity(True, label="Visible", help="Hidden objects are neither drawn nor measured.")
 
 
