@@ -28,6 +28,8 @@ PAGES = {
     "calibrate": "Calibrate",
     "boards": "Camera image of a calibration",
     "calibration": "Result of a calibration",
+    "recipe": "Dataset",
+    "contact": "Contact sheet of a dataset",
     "motion": "Motion",
     "files": "Projects and files",
     "log": "Messages",

@@ -36,6 +36,8 @@ PANELS = (
     Panel("nominal", "Deviation and section", "studio.qt.results.nominal_panel", "NominalPanel", True),
     Panel("study", "Study", "studio.qt.study.study_panel", "StudyPanel", True),
     Panel("charts", "Charts", "studio.qt.study.charts_panel", "ChartsPanel", True),
+    Panel("recipe", "Dataset", "studio.qt.dataset.recipe_panel", "RecipePanel", True),
+    Panel("contact", "Contact sheet", "studio.qt.dataset.contact_panel", "ContactPanel"),
     Panel("calibrate", "Views", "studio.qt.calibrate.calibrate_panel", "CalibratePanel", True),
     Panel("boards", "Camera image", "studio.qt.calibrate.board_view", "BoardView"),
     Panel("calibration", "Calibration", "studio.qt.calibrate.result_panel", "CalibrationPanel"),

@@ -1,4 +1,4 @@
-"""The main window: panels in docks, five workspaces, menus, toolbar and status bar over one session."""
+"""The main window: panels in docks, six workspaces, menus, toolbar and status bar over one session."""
 
 from __future__ import annotations
 

@@ -55,6 +55,7 @@ RENDERING = (
 MEASURING = (Column(LEFT, 0.42, (("camera", 1.0),)), Column(BOTTOM, 0.5, (("results", 1.0),)))
 STUDYING = (Column(LEFT, 0.32, (("study", 1.0),)), Column(RIGHT, 0.68, (("charts", 1.0),)))
 CALIBRATING = (Column(BOTTOM, 1.0, (("calibrate", 0.25), ("boards", 0.46), ("calibration", 0.29))),)
+LABELLING = (Column(LEFT, 0.4, (("recipe", 1.0),)), Column(RIGHT, 0.6, (("contact", 1.0),)))
 QUESTION = "Many runs with one question: what a value changes, and where methods break"
 WORKSPACES = (
     Workspace("setup", "Set up", "Place and design: camera, lasers, objects", True, SETTING_UP, True),
@@ -62,6 +63,7 @@ WORKSPACES = (
     Workspace("measure", "Measure", "Line, points and their error", True, MEASURING, False),
     Workspace("study", "Study", QUESTION, False, STUDYING, True),
     Workspace("calibrate", "Calibrate", "Camera and lasers from photographs of a board", False, CALIBRATING, True),
+    Workspace("dataset", "Dataset", "Labelled images of drawn scenes, by the thousand", False, LABELLING, True),
 )
 """In the order of the switch; the 3D view takes what the columns leave."""
 

@@ -1,0 +1,1 @@
+"""The Dataset workspace: a recipe of labelled images and its contact sheet."""

@@ -1,0 +1,129 @@
+"""The contact sheet: the first scenes of the recipe, small, as they become ready, each with its exact line."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QHelpEvent, QHideEvent, QImage, QPainter, QPaintEvent, QShowEvent
+from PySide6.QtWidgets import QLabel, QSizePolicy, QToolTip, QVBoxLayout, QWidget
+
+from studio.dataset.contact_sheet import Picture
+from studio.qt.core.session import Session, one_of
+from studio.qt.dataset.dataset_work import DatasetWork
+
+GAP = 6
+LINE = QColor("#e69f00")
+LINE_WIDTH = 1.5
+
+
+class ContactPanel(QWidget):
+    """The sheet, and what is to say about it."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.work = one_of(DatasetWork, session)
+        self.sheet = Sheet(self.work)
+        self.told = QLabel(wordWrap=True)
+        self.told.setObjectName("muted")
+        self.problem = QLabel(wordWrap=True)
+        self.problem.setObjectName("error")
+        self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 8, 8, 8)
+        layout.addWidget(self.problem)
+        layout.addWidget(self.sheet, 1)
+        layout.addWidget(self.told)
+        self.work.pictures_changed.connect(self._follow)
+        self._follow()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self.work.look()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        self.work.watched = False
+        super().hideEvent(event)
+
+    def _follow(self) -> None:
+        work = self.work
+        self.problem.setText(work.problem)
+        self.problem.setVisible(bool(work.problem))
+        anew = sum(len(picture.rejected) for picture in work.pictures.values())
+        drawn = f"{len(work.pictures)} of {work.shown} scenes"
+        again = f"; {anew} were drawn anew, as they showed no line" if anew else ""
+        self.told.setText(f"{drawn}{again}. The exact line is drawn on the upper half.")
+        self.sheet.update()
+
+
+class Sheet(QWidget):
+    """The pictures in rows that fill the widget."""
+
+    def __init__(self, work: DatasetWork) -> None:
+        super().__init__()
+        self.work = work
+        self.setMinimumSize(240, 160)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setAccessibleName("Contact sheet")
+
+    def sizeHint(self) -> QSize:
+        return QSize(720, 480)
+
+    def place(self, number: int) -> QRectF:
+        """Where the picture of a scene stands."""
+        picture = next(iter(self.work.pictures.values()), None)
+        height, width = picture.values.shape if picture is not None else (5, 6)
+        columns = self._columns(width / height)
+        cell = (self.width() - GAP * (columns - 1)) / columns
+        row, column = divmod(number, columns)
+        return QRectF(column * (cell + GAP), row * (cell * height / width + GAP), cell, cell * height / width)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for number in range(self.work.shown):
+            place = self.place(number)
+            picture = self.work.pictures.get(number)
+            if picture is None:
+                painter.fillRect(place, self.palette().alternateBase())
+            else:
+                _paint(painter, place, picture)
+
+    def event(self, event: QEvent) -> bool:
+        if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
+            for number, picture in self.work.pictures.items():
+                if self.place(number).contains(QPointF(event.pos())):
+                    anew = f"; drawn anew: {', '.join(picture.rejected)}" if picture.rejected else ""
+                    QToolTip.showText(event.globalPos(), f"scene {number}{anew}", self)
+                    return True
+        return super().event(event)
+
+    def _columns(self, aspect: float) -> int:
+        """As few as let all pictures fit into the height."""
+        for columns in range(1, self.work.shown + 1):
+            rows = -(-self.work.shown // columns)
+            cell = (self.width() - GAP * (columns - 1)) / columns
+            if rows * cell / aspect + GAP * (rows - 1) <= self.height():
+                return columns
+        return self.work.shown
+
+
+def _paint(painter: QPainter, place: QRectF, picture: Picture) -> None:
+    grey = np.ascontiguousarray(255.0 * np.clip(picture.values, 0.0, 1.0), dtype=np.uint8)
+    height, width = grey.shape
+    image = QImage(grey.data, width, height, width, QImage.Format.Format_Grayscale8)
+    painter.drawImage(place, image)
+    painter.save()
+    painter.translate(place.topLeft())
+    painter.scale(place.width() / width, place.height() / height)
+    pen = painter.pen()
+    pen.setColor(LINE)
+    pen.setWidthF(LINE_WIDTH)
+    pen.setCosmetic(True)
+    painter.setPen(pen)
+    for curve in picture.curves:
+        upper = slice(0, len(curve.index) // 2)  # the other half shows the line itself
+        along, position = curve.index[upper] + 0.5, curve.position[upper] + 0.5  # centres of pixels, from their corner
+        x, y = (position, along) if curve.axis == "rows" else (along, position)
+        painter.drawPoints([QPointF(*pair) for pair in zip(x.tolist(), y.tolist(), strict=True)])
+    painter.restore()

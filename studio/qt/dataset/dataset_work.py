@@ -1,0 +1,239 @@
+"""The dataset of a session: its recipe, the pictures of its first scenes, and the work in the background.
+
+Made once for a session by `one_of`; the panels change it and follow its signals.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from render.base.errors import InputError
+from render.base.files import atomic_write
+from render.base.threads import Cancel
+from studio.dataset.contact_sheet import Picture, pictures
+from studio.dataset.folder import images_in
+from studio.dataset.recipe import Recipe, base_of
+from studio.dataset.run import Result, Wanted, make_dataset
+from studio.project.project import Project
+from studio.project.strict_json import pretty
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.session import Session
+from studio.runtime.jobs import Job, Progress, State
+from studio.runtime.workers import Engine
+from studio.study.folder_run import in_window
+
+LANE = "dataset"
+"""A dataset takes hours: renders go on beside it."""
+REST_MS = 400
+"""Without a change before the scenes are drawn anew."""
+SHOWN = 24
+"""Scenes on the live sheet."""
+FIRST = "primitives"
+
+
+class DatasetWork(QObject):
+    """Never asks a person anything: what cannot be done is told in `problem`."""
+
+    _ready = Signal(object, object)
+    recipe_changed = Signal()
+    pictures_changed = Signal()
+    """`pictures`, or `problem`, is another one."""
+    state_changed = Signal()
+    """It runs, or no longer; the folder or the number of scenes is another one."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.session = session
+        self.engine = Engine()
+        self.jobs: JobRunner | None = None
+        """The window's, for what its status bar tells of."""
+        self.unseen = JobRunner(self)
+        """The pictures."""
+        self.watched = False
+        """Someone looks at them."""
+        self.name = FIRST
+        self.recipe, self.root = Recipe.load(FIRST)
+        self.base: Project | None = None
+        """The recipe's base project; None: it cannot be read."""
+        self.scenes = 100
+        self.shown = SHOWN
+        self.folder: Path | None = None
+        self.pictures: dict[int, Picture] = {}
+        """Of `recipe` as it is, by their numbers, as far as they are ready."""
+        self.drawing = False
+        self.problem = ""
+        """Why the scenes cannot be drawn, or the run could not go on."""
+        self.job: Job[Result | str] | None = None
+        self._stale = True
+        self._rest = QTimer(self, singleShot=True, interval=REST_MS)
+        self._rest.timeout.connect(self.draw)
+        self._ready.connect(self._take_picture)
+        self._read_base()
+
+    def attach(self, jobs: JobRunner) -> None:
+        """Work is done by the window's runner."""
+        self.jobs = jobs
+        jobs.cancelled.connect(self._end)
+        jobs.failed.connect(self._end)
+
+    @property
+    def running(self) -> bool:
+        return self.job is not None
+
+    def load(self, path: Path | str) -> None:
+        """A recipe's file, or a ready-made one by its name."""
+        try:
+            recipe, root = Recipe.load(path)
+        except InputError as error:
+            self._tell(in_window(error))
+            return
+        self.name, self.root, self.folder = Path(path).stem, root, None
+        self._change(recipe)
+        self.state_changed.emit()
+
+    def set_range(self, number: int, low: float, high: float) -> None:
+        """Another range of a field that is drawn."""
+        self._replace(number, {"low": low, "high": high})
+
+    def set_recipe(self, **values: object) -> None:
+        """Another seed, or number of images of each scene."""
+        self._checked({**self.recipe.model_dump(), **values})
+
+    def look(self) -> None:
+        """Someone looks: draw the scenes if they are not those of the recipe."""
+        self.watched = True
+        if self._stale:
+            self._rest.start()
+
+    def draw(self) -> None:
+        """The first scenes of the recipe, one by one as they are ready."""
+        recipe, root, count, ready = self.recipe, self.root, self.shown, partial(self._ready.emit, self.recipe)
+
+        def work(progress: Progress, cancelled: Cancel) -> str:
+            try:
+                for picture in pictures(recipe, root, count, cancelled):
+                    ready(picture)
+                    progress("scenes", (picture.number + 1) / count)
+            except InputError as error:
+                return in_window(error)
+            return ""
+
+        self._stale, self.drawing = False, True
+        self.pictures = {}
+        self._tell("")
+        self.unseen.run("pictures", "contact sheet", work, self._end_drawing, interrupt=True)
+
+    def save(self, file: Path) -> bool:
+        """Write the recipe's file; False: told in `problem`, nothing is written."""
+        data = self.recipe.model_dump(mode="json", exclude_defaults=True)
+        try:
+            with atomic_write(file) as temporary:
+                temporary.write_text(pretty({"schema_version": 1, **data}) + "\n", encoding="utf-8")
+        except InputError as error:
+            self._tell(in_window(error))
+            return False
+        self.session.message.emit("info", f"Saved the recipe: {file}")
+        return True
+
+    def choose_folder(self, folder: Path) -> None:
+        """Where the images go; a dataset of this recipe that is there is gone on with."""
+        self.folder = folder
+        self.state_changed.emit()
+
+    def choose_count(self, scenes: int) -> None:
+        self.scenes = scenes
+        self.state_changed.emit()
+
+    def made(self) -> int:
+        """Images that the folder holds whole."""
+        return len(images_in(self.folder)) if self.folder is not None and self.folder.is_dir() else 0
+
+    def start(self) -> None:
+        """Make what is missing in the folder."""
+        if self.running or self.folder is None or self.jobs is None:
+            return
+        recipe, root, folder, wanted, engine = self.recipe, self.root, self.folder, Wanted(self.scenes), self.engine
+
+        def work(progress: Progress, cancelled: Cancel) -> Result | str:
+            try:
+                return make_dataset(
+                    recipe, root, wanted, folder, engine=engine, cancelled=cancelled,
+                    progress=lambda done, known: progress(f"scene {done} of {known}", done / max(known, 1)),
+                )  # fmt: skip
+            except InputError as error:
+                return in_window(error)
+
+        self._tell("")
+        self.job = self.jobs.run(LANE, "dataset", work, self._take_end)
+        self.state_changed.emit()
+
+    def stop(self) -> None:
+        """What is made stays; `start` goes on from there."""
+        if self.job is not None:
+            self.job.cancel()
+            self.state_changed.emit()
+
+    def close(self) -> None:
+        self._rest.stop()
+        self.unseen.close()
+
+    def _replace(self, number: int, values: dict[str, object]) -> None:
+        draws = [one.model_dump() for one in self.recipe.draw]
+        draws[number].update(values)
+        self._checked({**self.recipe.model_dump(), "draw": draws})
+
+    def _checked(self, data: dict[str, object]) -> None:
+        from pydantic import ValidationError
+
+        from studio.project.validation_messages import input_error
+
+        try:
+            recipe = Recipe.model_validate(data)
+        except ValidationError as error:
+            self._tell(in_window(input_error(error, Recipe, data, self.recipe.name)))
+            return
+        if recipe != self.recipe:
+            self._change(recipe)
+
+    def _change(self, recipe: Recipe) -> None:
+        self.recipe, self._stale = recipe, True
+        self._read_base()
+        self.recipe_changed.emit()
+        if self.watched:
+            self._rest.start()
+
+    def _read_base(self) -> None:
+        try:
+            self.base = base_of(self.recipe, self.root)
+        except InputError:  # told by the pictures, which need it as well
+            self.base = None
+
+    def _take_picture(self, recipe: Recipe, picture: Picture) -> None:
+        if recipe is self.recipe:
+            self.pictures[picture.number] = picture
+            self.pictures_changed.emit()
+
+    def _end_drawing(self, problem: str) -> None:
+        self.drawing = False
+        self._tell(problem)
+
+    def _take_end(self, ended: Result | str) -> None:
+        self._end(self.job)
+        if isinstance(ended, str):
+            self._tell(ended)
+        else:
+            self.session.message.emit("info", f"The dataset is done: {ended.images} images in {self.folder}")
+
+    def _end(self, job: object) -> None:
+        if job is self.job and isinstance(job, Job):
+            self.job = None
+            if job.state is State.CANCELLED:
+                self.session.message.emit("info", f"The dataset was stopped; Go on continues it: {self.folder}")
+            self.state_changed.emit()
+
+    def _tell(self, problem: str) -> None:
+        self.problem = problem
+        self.pictures_changed.emit()

@@ -1,0 +1,221 @@
+"""The recipe of a dataset: what is drawn and from where, how many images, and run, stop, go on."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QScrollArea,
+    QSizePolicy,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from studio.dataset.field_names import field_name
+from studio.dataset.images import images_of
+from studio.dataset.recipe import MOST_VARIANTS, ready_made
+from studio.editing.forms import PLAIN
+from studio.qt.core.jobs import JobRunner, time_left
+from studio.qt.core.session import Session, one_of
+from studio.qt.core.widgets import ElidedLabel, flush, text_button, thin_bar
+from studio.qt.dataset.dataset_work import DatasetWork
+from studio.qt.dataset.draw_row import DrawRow
+from studio.runtime.jobs import Job
+
+NARROWEST = 320
+"""px; every row has room for its range then."""
+FILES = "Recipes (*.json);;All files (*)"
+
+
+class RecipePanel(QWidget):
+    """What a person does about a dataset; its pictures have a panel of their own."""
+
+    def __init__(self, session: Session, runner: JobRunner, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.session, self.runner = session, runner
+        self.work = one_of(DatasetWork, session)
+        self.work.attach(runner)
+        self.name = ElidedLabel()
+        self.files = text_button("Recipe", "Ready-made recipes and files")
+        menu = QMenu(self.files)
+        menu.aboutToShow.connect(partial(self._fill_files, menu))
+        self.files.setMenu(menu)
+        self.about = QLabel(wordWrap=True)
+        self.about.setObjectName("muted")
+        self.rows: list[DrawRow] = []
+        self.scenes = QSpinBox(minimum=1, maximum=10_000_000, value=self.work.scenes)
+        self.scenes.setToolTip("Each is rendered once")
+        self.images = QSpinBox(minimum=1, maximum=MOST_VARIANTS)
+        self.images.setToolTip("Photographs of each scene: they share its light and draw the sensor anew")
+        self.seed = QSpinBox(minimum=0, maximum=2**31 - 1)
+        self.seed.setToolTip("Decides every scene and every image")
+        self.told = QLabel(wordWrap=True)
+        self.folder = ElidedLabel(Qt.TextElideMode.ElideMiddle)
+        self.folder.setObjectName("muted")
+        self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.choose = text_button("Folder…", "Where the images go; a dataset that is there goes on")
+        self.run = text_button("Run…", name="primary")
+        self.stop = text_button("Stop", "What is made stays")
+        self.bar = thin_bar()
+        self.stage = QLabel()
+        self.stage.setObjectName("muted")
+        self._lay_out()
+        self._connect()
+        self.refresh()
+        self._show_state()
+
+    def refresh(self) -> None:
+        """Follow the recipe."""
+        recipe = self.work.recipe
+        self.name.setText(recipe.name)
+        self.about.setText(recipe.about)
+        for box, value in ((self.images, recipe.images), (self.seed, recipe.seed)):
+            box.blockSignals(True)
+            box.setValue(min(value, box.maximum()))
+            box.blockSignals(False)
+        fields = [(one.field, one.kind) for one in recipe.draw]
+        if [(row.draw.field, row.draw.kind) for row in self.rows] != fields:
+            self._make_rows()
+            return
+        for row, draw in zip(self.rows, recipe.draw, strict=True):
+            row.follow(draw)
+
+    def ask_and_run(self) -> None:
+        """Ask for a folder where there is none yet, then run or go on."""
+        if self.work.folder is None and not self.ask_folder():
+            return
+        self.work.start()
+
+    def ask_folder(self) -> bool:
+        """False: none was chosen."""
+        chosen = QFileDialog.getExistingDirectory(self, "Folder for the images", self._place())
+        if chosen:
+            self.work.choose_folder(Path(chosen))
+        return bool(chosen)
+
+    def _make_rows(self) -> None:
+        for row in self.rows:
+            self.inside.removeWidget(row)
+            row.deleteLater()
+        base = self.work.base
+        self.rows = [
+            DrawRow(draw, *((draw.field, PLAIN) if base is None else field_name(base, draw.field)))
+            for draw in self.work.recipe.draw
+        ]
+        for number, row in enumerate(self.rows):
+            row.chosen.connect(partial(self.work.set_range, number))
+            self.inside.insertWidget(number, row)
+
+    def _fill_files(self, menu: QMenu) -> None:
+        menu.clear()
+        for name in ready_made():
+            menu.addAction(name.replace("_", " ").capitalize(), partial(self.work.load, name))
+        menu.addSeparator()
+        menu.addAction("Open a recipe…", self._open)
+        menu.addAction("Save the recipe…", self._save)
+
+    def _open(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileName(self, "Open a recipe", self._place(), FILES)
+        if chosen:
+            self.work.load(Path(chosen))
+
+    def _save(self) -> None:
+        suggestion = str(Path(self._place()) / f"{self.work.name}.json")
+        chosen, _ = QFileDialog.getSaveFileName(self, "Save the recipe", suggestion, FILES)
+        if chosen:
+            self.work.save(Path(chosen))
+
+    def _place(self) -> str:
+        path = self.session.document.path
+        return str(path.parent if path is not None else Path.home())
+
+    def _connect(self) -> None:
+        work = self.work
+        for box in (self.scenes, self.images, self.seed):
+            box.setKeyboardTracking(False)
+        self.scenes.valueChanged.connect(work.choose_count)
+        self.images.valueChanged.connect(lambda count: work.set_recipe(images=count))
+        self.seed.valueChanged.connect(lambda seed: work.set_recipe(seed=seed))
+        self.choose.clicked.connect(lambda: self.ask_folder())
+        self.run.clicked.connect(self.ask_and_run)
+        self.stop.clicked.connect(work.stop)
+        work.recipe_changed.connect(self.refresh)
+        for changed in (work.recipe_changed, work.state_changed):
+            changed.connect(self._show_state)
+        self.runner.progress.connect(self._tell_progress)
+
+    def _tell_progress(self, job: Job[object]) -> None:
+        if job is self.work.job:
+            self.bar.setValue(round(1000 * job.done))
+            self.stage.setText("stopping" if job.cancel_asked else f"{job.stage}   {time_left(job.seconds_left)}")
+
+    def _show_state(self) -> None:
+        work = self.work
+        running, job, there = work.running, work.job, work.made()
+        images = work.scenes * images_of(work.recipe, len(work.base.scene.lasers) if work.base is not None else 1)
+        self.told.setText(f"{images} images of {work.scenes} scenes" + (f"; {there} are there" if there else ""))
+        self.run.setVisible(not running)
+        self.run.setText("Run…" if work.folder is None else "Go on" if there else "Run")
+        self.stop.setVisible(running)
+        self.stop.setEnabled(job is not None and not job.cancel_asked)
+        for widget in (self.choose, self.files, self.scenes, self.images, self.seed):
+            widget.setEnabled(not running)
+        for row in self.rows:
+            row.setEnabled(not running)
+        for shown in (self.bar, self.stage):
+            shown.setVisible(running)
+        if not running:
+            self.bar.setValue(0)
+            self.stage.clear()
+        self.folder.setText(str(work.folder) if work.folder is not None else "no folder yet")
+
+    def _lay_out(self) -> None:
+        head = QHBoxLayout()
+        head.addWidget(self.name, 1)
+        head.addWidget(self.files)
+        page = QWidget()
+        self.inside = QVBoxLayout(page)
+        self.inside.setContentsMargins(8, 4, 8, 4)
+        self.inside.addStretch(1)
+        area = QScrollArea(widgetResizable=True)
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area.setWidget(page)
+        area.setMinimumWidth(NARROWEST)
+        top = QVBoxLayout()
+        top.setContentsMargins(8, 8, 8, 4)
+        top.addLayout(head)
+        top.addWidget(self.about)
+        counts = QFormLayout()
+        counts.addRow("Scenes", self.scenes)
+        counts.addRow("Images of each", self.images)
+        counts.addRow("Seed", self.seed)
+        where = QHBoxLayout()
+        where.addWidget(self.folder, 1)
+        where.addWidget(self.choose)
+        buttons = QHBoxLayout()
+        for button in (self.run, self.stop):
+            buttons.addWidget(button)
+        buttons.addStretch(1)
+        foot = QVBoxLayout()
+        foot.setContentsMargins(8, 4, 8, 8)
+        foot.setSpacing(4)
+        foot.addLayout(counts)
+        foot.addWidget(self.told)
+        foot.addLayout(where)
+        foot.addWidget(self.bar)
+        foot.addWidget(self.stage)
+        foot.addLayout(buttons)
+        layout = flush(QVBoxLayout(self))
+        layout.addLayout(top)
+        layout.addWidget(area, 1)
+        layout.addLayout(foot)

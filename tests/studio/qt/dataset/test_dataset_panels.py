@@ -1,0 +1,146 @@
+"""The Dataset workspace: a recipe opened, its ranges dragged, its scenes looked at, its images made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtWidgets import QFileDialog
+from pytestqt.qtbot import QtBot
+
+from studio.dataset.recipe import Draw, Recipe, ready_made
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.live_preview import live
+from studio.qt.core.session import Session, one_of
+from studio.qt.dataset.contact_panel import ContactPanel
+from studio.qt.dataset.dataset_work import DatasetWork
+from studio.qt.dataset.recipe_panel import RecipePanel
+from studio.runtime.workers import Engine
+from tests.studio.qt.small_session import small_session
+
+SMALL = Recipe(
+    name="small",
+    base="plane",
+    image_scale=0.05,
+    images=2,
+    set={"render.transport": "direct", "render.laser_error": 0.05, "render.ambient_samples": 1},
+    draw=(
+        Draw(field="scene.objects[0].T_world_object.rotation[0]", low=-0.3, high=0.3),
+        Draw(field="scene.rig.lasers[0].power", kind="logarithmic", low=0.002, high=0.05),
+        Draw(field="sensor.speckle", kind="choice", values=("off", "polarised")),
+    ),
+)
+
+
+class Desk:
+    """The panels of the workspace with a recipe of few and small scenes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.session: Session = small_session()
+        self.runner = JobRunner(self.session)
+        self.work = one_of(DatasetWork, self.session)
+        self.work.engine, self.work.shown = Engine(workers=1), 3
+        self.file = folder / "small.json"
+        self.file.write_text(SMALL.model_dump_json())
+        self.panel, self.sheet = RecipePanel(self.session, self.runner), ContactPanel(self.session)
+        self.work.load(self.file)
+
+    @property
+    def ready(self) -> bool:
+        return not self.work.drawing and len(self.work.pictures) == self.work.shown
+
+    def close(self) -> None:
+        for panel in (self.panel, self.sheet):
+            panel.close()
+        self.work.close()
+        self.runner.close()
+        live(self.session).close()
+
+
+@pytest.fixture
+def desk(qtbot: QtBot, tmp_path: Path) -> Iterator[Desk]:
+    made = Desk(tmp_path)
+    for widget in (made.panel, made.sheet):
+        qtbot.addWidget(widget)
+        widget.resize(600, 600)
+        widget.show()
+    qtbot.waitExposed(made.sheet)
+    yield made
+    made.close()
+
+
+def test_every_ready_made_recipe_has_a_row_for_each_field(desk: Desk) -> None:
+    for name in ready_made():
+        desk.work.load(name)
+        assert not desk.work.problem
+        assert [row.draw.field for row in desk.panel.rows] == [one.field for one in desk.work.recipe.draw]
+        assert desk.panel.name.text() == desk.work.recipe.name
+
+
+def test_rows_say_what_has_the_field_and_its_unit(desk: Desk) -> None:
+    rotation, power, speckle = desk.panel.rows
+    assert rotation.name.text() == "plane: Rotation vector x" and rotation.boxes[1].text() == "17.2 deg"
+    assert power.name.text() == "laser: Power" and power.boxes[0].suffix() == " mW"
+    assert not speckle.boxes  # one of several things has no range
+
+
+def test_dragged_ranges_are_those_of_the_scenes(desk: Desk, qtbot: QtBot) -> None:
+    qtbot.waitUntil(lambda: desk.ready)
+    before = desk.work.pictures[0].curves[0].position
+    slider = desk.panel.rows[0].slider
+    low, high = slider.value()
+    slider.setValue((low, low + (high - low) // 4))
+    draw = desk.work.recipe.draw[0]
+    assert draw.low == -0.3 and draw.high == pytest.approx(-0.15, abs=2e-3)
+    qtbot.waitUntil(lambda: desk.ready and desk.work.pictures[0].curves[0].position is not before)
+    assert len(desk.work.pictures[0].curves[0].position) and not desk.work.problem
+
+
+def test_a_range_that_cannot_be_is_told_and_changes_nothing(desk: Desk) -> None:
+    low, high = desk.panel.rows[0].boxes
+    low.setValue(30.0)
+    low.editingFinished.emit()
+    assert "low below high" in desk.work.problem and not desk.sheet.problem.isHidden()
+    assert desk.work.recipe == SMALL
+    assert high.value() > 17.0
+
+
+def test_pictures_stand_side_by_side_within_the_sheet(desk: Desk, qtbot: QtBot) -> None:
+    qtbot.waitUntil(lambda: desk.ready)
+    places = [desk.sheet.sheet.place(k) for k in range(desk.work.shown)]
+    assert all(desk.sheet.sheet.rect().toRectF().adjusted(-1, -1, 1, 1).contains(place) for place in places)
+    assert not any(places[k].intersects(other) for k in range(3) for other in places[k + 1 :])
+
+
+def test_images_are_made_stopped_and_gone_on_with(desk: Desk, qtbot: QtBot, tmp_path: Path,
+                                                 monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
+    folder = tmp_path / "images"
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(folder))
+    desk.panel.scenes.setValue(2)
+    desk.panel.ask_and_run()
+    qtbot.waitUntil(lambda: not desk.work.running)
+    assert desk.work.made() == 4 and not desk.work.problem
+    assert desk.panel.told.text() == "4 images of 2 scenes; 4 are there"
+    desk.panel.scenes.setValue(3)
+    assert desk.panel.run.text() == "Go on"
+    desk.panel.ask_and_run()
+    qtbot.waitUntil(lambda: not desk.work.running)
+    assert desk.work.made() == 6
+
+
+def test_a_folder_of_another_recipe_is_told(desk: Desk, qtbot: QtBot, tmp_path: Path) -> None:
+    desk.work.choose_folder(tmp_path)  # which holds the recipe's file
+    desk.work.start()
+    qtbot.waitUntil(lambda: not desk.work.running)
+    assert "not empty" in desk.work.problem
+    assert desk.file.read_text() == SMALL.model_dump_json()
+
+
+def test_a_saved_recipe_is_what_was_shown(desk: Desk, tmp_path: Path) -> None:
+    desk.work.set_range(0, -0.1, 0.2)
+    desk.panel.images.setValue(5)
+    file = tmp_path / "mine.json"
+    assert desk.work.save(file)
+    assert Recipe.load(file)[0] == desk.work.recipe
+    assert (desk.work.recipe.images, desk.work.recipe.draw[0].high) == (5, 0.2)
