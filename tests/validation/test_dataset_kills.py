@@ -1,0 +1,49 @@
+"""Fifty kills at random moments of a dataset: what is left goes on to the bytes of one that was not killed."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.studio.dataset.test_images import RECIPE, contents
+
+pytestmark = pytest.mark.validation
+
+ROOT = Path(__file__).resolve().parents[2]
+KILLS, SEED, SCENES = 50, 7, 12
+
+
+def test_a_dataset_killed_fifty_times_is_the_same_bytes(tmp_path: Path) -> None:
+    file, chance = tmp_path / "recipe.json", random.Random(SEED)
+    file.write_text(RECIPE.model_dump_json())
+
+    def command(out: Path) -> list[str]:
+        words = ["dataset", file, "--count", SCENES, "--out", out, "--workers", 2, "--quiet"]
+        return [sys.executable, str(ROOT / "main.py"), *map(str, words)]
+
+    subprocess.run(command(tmp_path / "whole"), check=True, capture_output=True, timeout=900)
+    whole = contents(tmp_path / "whole")
+    killed, folder = 0, 0
+    while killed < KILLS:
+        out = tmp_path / f"out{folder}"
+        while killed < KILLS:
+            process = subprocess.Popen(
+                command(out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+            )
+            try:
+                process.wait(timeout=chance.uniform(0.5, 15.0))
+                break  # it came to its end
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+                killed += 1
+        done = subprocess.run(command(out), capture_output=True, text=True, timeout=900)
+        assert done.returncode == 0, done.stderr
+        assert contents(out) == whole
+        folder += 1
