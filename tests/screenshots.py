@@ -33,6 +33,7 @@ README = {
     "measure_light": "measure.png",
     "study_light": "study_window.png",
     "calibrate_light": "calibrate_window.png",
+    "dataset_light": "dataset_window.png",
 }
 README_WIDTH = 1120
 LASER, OBJECT = ("scene", "rig", "lasers", 0), ("scene", "objects", 0)
@@ -42,7 +43,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--readme", action="store_true")
-    parser.add_argument("--only", choices=["study", "calibrate"], help="of one workspace alone")
+    parser.add_argument("--only", choices=["study", "calibrate", "dataset"], help="of one workspace alone")
     parser.add_argument("--scale", type=float, default=0.5, help="image scale of the render")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
@@ -92,8 +93,11 @@ def take(folder: Path, scale: float, readme: bool, results: Path, *, only: str |
         window.tour.end()
     session = window.session
     if only != "study":
-        shoot_calibration(window, wait, shoot)
-    if only == "calibrate":
+        if only != "dataset":
+            shoot_calibration(window, wait, shoot)
+        if only != "calibrate":
+            shoot_dataset(window, wait, shoot)
+    if only in ("calibrate", "dataset"):
         window.files.count_as_saved(session.project)
         window.close()
         app.processEvents()
@@ -153,6 +157,20 @@ def take(folder: Path, scale: float, readme: bool, results: Path, *, only: str |
     window.files.count_as_saved(window.session.project)
     window.close()
     app.processEvents()
+
+
+def shoot_dataset(window: MainWindow, wait: Callable[[Callable[[], bool]], None], shoot: Callable[[str], None]) -> None:
+    """A ready-made recipe with its first scenes."""
+    from studio.qt.core.session import one_of
+    from studio.qt.dataset.dataset_work import DatasetWork
+
+    work = one_of(DatasetWork, window.session)
+    work.load("stairs")
+    window.switch_to("dataset")
+    wait(lambda: len(work.pictures) == work.shown)
+    for theme in ("dark", "light"):
+        window.choose_theme(theme)
+        shoot(f"dataset_{theme}")
 
 
 def shoot_calibration(
