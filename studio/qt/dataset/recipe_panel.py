@@ -105,6 +105,7 @@ class RecipePanel(QWidget):
     def _make_rows(self) -> None:
         for row in self.rows:
             self.inside.removeWidget(row)
+            row.hide()  # it goes when the events have been dealt with, and would stand over the new ones until then
             row.deleteLater()
         base = self.work.base
         self.rows = [

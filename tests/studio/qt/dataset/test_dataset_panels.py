@@ -15,6 +15,7 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
 from studio.qt.dataset.contact_panel import ContactPanel
 from studio.qt.dataset.dataset_work import DatasetWork
+from studio.qt.dataset.draw_row import DrawRow
 from studio.qt.dataset.recipe_panel import RecipePanel
 from studio.runtime.workers import Engine
 from tests.studio.qt.small_session import small_session
@@ -70,12 +71,15 @@ def desk(qtbot: QtBot, tmp_path: Path) -> Iterator[Desk]:
     made.close()
 
 
-def test_every_ready_made_recipe_has_a_row_for_each_field(desk: Desk) -> None:
+def test_every_ready_made_recipe_has_a_row_for_each_field(desk: Desk, qtbot: QtBot) -> None:
     for name in ready_made():
         desk.work.load(name)
         assert not desk.work.problem
         assert [row.draw.field for row in desk.panel.rows] == [one.field for one in desk.work.recipe.draw]
         assert desk.panel.name.text() == desk.work.recipe.name
+        qtbot.waitUntil(lambda: not any(row.isHidden() for row in desk.panel.rows))
+        shown = [row for row in desk.panel.findChildren(DrawRow) if not row.isHidden()]
+        assert len(shown) == len(desk.panel.rows)
 
 
 def test_rows_say_what_has_the_field_and_its_unit(desk: Desk) -> None:
