@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -95,6 +96,8 @@ class Frame:
     """How well each light group is known that has begun: of each laser, then ambient light."""
     seconds: dict[str, float] = field(default_factory=dict)
     """Wall time by stage."""
+    foretold: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    """Processor seconds by light group, as its pilot on this machine foretells them; of those that have had one."""
     warnings: tuple[str, ...] = field(default=(), kw_only=True)
     """What may make a sensible picture of the wrong thing (`render.world.material_checks`)."""
     counts: Counts = field(default_factory=dict)

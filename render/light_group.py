@@ -5,6 +5,7 @@ To add one: section 11 of `render/README.md`.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Generic, Protocol, TypeVar
 
@@ -57,6 +58,11 @@ class LightGroup(Protocol, Generic[P]):
         """What a pilot finds, where `measures`. frame: with the groups before it. Raises Cancelled."""
         return {}
 
+    def foretold(self, pilot_seconds: float, scene: Scene) -> float:
+        """Processor seconds of this light in a frame that is rendered for the line, about: by those of its
+        pilot, which are part of them."""
+        return 0.0
+
     def plan(self, shares: Shares | None, world: World, scene: Scene, settings: RenderSettings) -> P:
         """What is computed, given what a pilot found; None: there was none."""
 
@@ -67,11 +73,30 @@ class LightGroup(Protocol, Generic[P]):
 
 def chosen_plan(
     group: LightGroup[P], placed: PlacedScene, settings: RenderSettings, frame: Frame, run: Run = Run()
-) -> P:
-    """The plan of one frame by itself, after a pilot where there is to be one. Raises Cancelled."""
-    measures = group.measures(placed.scene, settings)
-    shares = group.measured(placed, settings, frame, run) if measures else None
-    return group.plan(shares, placed.world, placed.scene, settings)
+) -> tuple[P, float]:
+    """The plan of one frame by itself, after a pilot where there is to be one, and the processor seconds that this
+    foretells; 0: none did. Raises Cancelled."""
+    if not group.measures(placed.scene, settings):
+        return group.plan(None, placed.world, placed.scene, settings), 0.0
+    shares, seconds = timed_pilot(group, placed, settings, frame, run)
+    chosen = group.plan(shares, placed.world, placed.scene, settings)
+    return chosen, seconds_of(group, chosen, seconds, frame, placed.scene)
+
+
+def seconds_of(group: LightGroup[P], plan: P, pilot_seconds: float, frame: Frame, scene: Scene) -> float:
+    """Processor seconds that a pilot foretells; 0: none are left, or nothing is known of what the image is the goal
+    of."""
+    if frame.importance is None or not any(step.computed for step in plan.steps):
+        return 0.0
+    return group.foretold(pilot_seconds, scene)
+
+
+def timed_pilot(
+    group: LightGroup[P], placed: PlacedScene, settings: RenderSettings, frame: Frame, run: Run
+) -> tuple[Shares, float]:
+    """What a pilot finds, and its processor seconds. Raises Cancelled."""
+    began = time.process_time()
+    return group.measured(placed, settings, frame, run), time.process_time() - began
 
 
 def has_work(group: LightGroup[P], scene: Scene, settings: RenderSettings) -> bool:

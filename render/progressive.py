@@ -91,7 +91,9 @@ def frames(
         plan = expected_plan(scene, settings)
         if scan is not None:
             plan = replace(plan, pilot_steps=scan.pilot_steps, frame_count=scan.frame_count)
-        frame = Frame(step, (), None, (), None, plan, warnings=scene_warnings(world, scene, step))
+        warnings = scene_warnings(world, scene, step)
+        known = {} if scan is None else scan.foretold
+        frame = Frame(step, (), None, (), None, plan, warnings=warnings, foretold=known)
         rays = _rays(world, run.cancelled)
     look: Float32 | None = None
     follows = run.lessons is not None and run.lessons.given
@@ -107,7 +109,12 @@ def frames(
             later = sum(other.parts(scene) for other in waiting[i + 1 :])
             part = replace(run, progress=report, later=later)
             seen = frame if look is None or frame.ambient is not None else replace(frame, ambient=look)
-            chosen = chosen_plan(product, placed, settings, seen, part) if scan is None else scan.plans[product.group]
+            if scan is None:
+                chosen, foretold = chosen_plan(product, placed, settings, seen, part)
+                if foretold > 0.0:
+                    frame = replace(frame, foretold={**frame.foretold, product.group: foretold})
+            else:
+                chosen = scan.plans[product.group]
             frame = replace(frame, plan=frame.plan.with_steps(product.group, chosen.steps))
             for estimate in product.estimates(placed, settings, chosen, replace(seen, plan=frame.plan), part):
                 frame = frame.with_estimate(product.field, estimate)

@@ -6,13 +6,13 @@ Frames that decide alone would differ where a share is about the negligible one,
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from render.frame import Frame
-from render.light_group import LightGroup, Shares
+from render.light_group import LightGroup, Shares, seconds_of, timed_pilot
 from render.plan import GroupPlan
 from render.products import PRODUCTS, QUICK, ambient_look, expected_plan
 from render.run import Run, ignore
@@ -34,6 +34,8 @@ class ScanPlan:
     pilot_steps: tuple[int, ...] = ()
     """Steps of the scan on which pilots decided."""
     frame_count: int = 1
+    foretold: Mapping[str, float] = field(default_factory=dict)
+    """Processor seconds of a frame by light group, as the pilots tell (`LightGroup.foretold`)."""
 
     @property
     def mark(self) -> str:
@@ -60,21 +62,24 @@ def plan_scan(
         return None
     deciding = [product for product in PRODUCTS if product.measures(scene, settings)]
     found: dict[str, list[Shares]] = {product.group: [] for product in deciding}
+    foretold = dict.fromkeys(found, 0.0)
     for i, step in enumerate(steps if deciding else ()):
         part = run.between(i / len(steps), (i + 1) / len(steps))
-        for group, shares in _pilots(deciding, PlacedScene(world(step), scene, step), settings, part).items():
+        for group, (shares, spent) in _pilots(deciding, PlacedScene(world(step), scene, step), settings, part).items():
             found[group].append(shares)
+            foretold[group] += spent / len(steps)
     plans = {
         product.group: product.plan(_largest(found.get(product.group, [])), world(0), scene, settings)
         for product in PRODUCTS
     }
-    return ScanPlan(plans, steps if deciding else (), scene.frame_count)
+    told = {group: seconds for group, seconds in foretold.items() if seconds > 0.0}
+    return ScanPlan(plans, steps if deciding else (), scene.frame_count, told)
 
 
 def _pilots(
     deciding: list[LightGroup[Any]], placed: PlacedScene, settings: RenderSettings, run: Run
-) -> dict[str, Shares]:
-    """What the pilots find on one step."""
+) -> dict[str, tuple[Shares, float]]:
+    """What the pilots find on one step, and the seconds that they foretell; 0: none."""
     quiet = replace(run, progress=ignore)
     frame = Frame(placed.step, (), None, (), None)
     for estimate in QUICK.estimates(placed, settings, GroupPlan(()), frame, quiet):
@@ -84,7 +89,11 @@ def _pilots(
         expected = replace(frame, ambient=look, plan=expected_plan(placed.scene, settings))
         frame = replace(frame, importance=run.goal(expected))
     run.progress(0.5)
-    found = {product.group: product.measured(placed, settings, frame, quiet) for product in deciding}
+    found = {}
+    for product in deciding:
+        shares, seconds = timed_pilot(product, placed, settings, frame, quiet)
+        chosen = product.plan(shares, placed.world, placed.scene, settings)
+        found[product.group] = shares, seconds_of(product, chosen, seconds, frame, placed.scene)
     run.progress(1.0)
     return found
 

@@ -6,7 +6,7 @@ Everything here follows from the fields of `render.plan`; nothing reads a senten
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from render.importance import LINES_KNOWN
 from render.plan import GroupQuality, Plan, ThinLens, TransportStep, line_noise
@@ -38,6 +38,11 @@ def noise_text(of_sigma: float, depth: float | None) -> str:
     return f"{of_sigma:.2g} sigma" if depth is None else f"{of_sigma:.2g} sigma, {depth * 1e6:.2g} um"
 
 
+def seconds_text(seconds: float) -> str:
+    """What a pilot foretells, as roughly as it does."""
+    return f"about {float(f'{seconds:.1g}'):g} s of the processor"
+
+
 def sentences(plan: Plan) -> tuple[list[str], list[str]]:
     """What is computed, and what is left out, each with its reason."""
     found = list(_all(plan))
@@ -49,6 +54,11 @@ def sentences(plan: Plan) -> tuple[list[str], list[str]]:
 def plan_lines(plan: Plan) -> list[str]:
     """The same in the order of the plan, one line each."""
     return [*plan.text, *(text if computed else f"left out: {text}" for computed, text in _all(plan))]
+
+
+def foretold_lines(foretold: Mapping[str, float]) -> list[str]:
+    """What the light groups will take, as their pilots foretell."""
+    return [f"{NAMES[group]} light: {seconds_text(seconds)}, by its pilot" for group, seconds in foretold.items()]
 
 
 def quality_lines(quality: tuple[GroupQuality, ...]) -> list[tuple[str, str]]:
@@ -64,9 +74,14 @@ def quality_lines(quality: tuple[GroupQuality, ...]) -> list[tuple[str, str]]:
     return lines
 
 
-def stage_note(stage: str, quality: tuple[GroupQuality, ...]) -> str:
-    """The quality of the groups that are made in a stage of the render, on one line; empty: there is none yet."""
-    return "; ".join(quality_text(one) for one in quality if STAGES[one.group] == stage)
+def stage_note(stage: str, quality: tuple[GroupQuality, ...], foretold: Mapping[str, float] | None = None) -> str:
+    """The quality of the groups that are made in a stage of the render, on one line; empty: there is none yet.
+
+    foretold: processor seconds by light group.
+    """
+    notes = [quality_text(one) for one in quality if STAGES[one.group] == stage]
+    notes += [seconds_text(seconds) for group, seconds in (foretold or {}).items() if STAGES[group] == stage]
+    return "; ".join(notes)
 
 
 def group_name(quality: GroupQuality) -> str:

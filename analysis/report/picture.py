@@ -23,8 +23,9 @@ if TYPE_CHECKING:  # the process that draws needs none of what these stand on
     from analysis.report.view import SceneView, View
     from render.base.arrays import Float
 
-SIZE = (2400, 1500)
-MARGIN = 24
+SIZE = (1800, 1125)
+"""px: a little finer than the pages show it; without a graphics card the time goes with their number."""
+MARGIN = 18
 """px left around a cropped picture."""
 TIME_LIMIT = 60.0
 """s; drawing takes 3. Without a graphics card a mesh of millions takes longer, but not this long."""
@@ -137,30 +138,30 @@ def draw_scene(job: Any, path: Path) -> None:
     centre, corners = job["frustum"][0], job["frustum"][1:]
     size = 0.16 * float(np.linalg.norm(corners[0] - centre))
     for corner in corners:
-        plotter.add_mesh(pv.Line(centre, corner), color=ACCENT, line_width=3, opacity=0.5)
+        plotter.add_mesh(pv.Line(centre, corner), color=ACCENT, line_width=2.25, opacity=0.5)
     body = centre + 0.16 * (corners - centre)
     pyramid = pv.PolyData.from_regular_faces(
         np.concatenate([centre[None], body]), np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
     )
     plotter.add_mesh(pyramid, color=ACCENT, opacity=0.85, ambient=0.5)
     around = np.concatenate([corners, corners[:1]])
-    plotter.add_mesh(pv.MultipleLines(around), color=ACCENT, line_width=3, opacity=0.5)
+    plotter.add_mesh(pv.MultipleLines(around), color=ACCENT, line_width=2.25, opacity=0.5)
     # beside the apex, away from what it looks at
     labels, places = ["camera"], [centre - 0.04 * (corners.mean(axis=0) - centre)]
     for i, colour in enumerate(job["colours"]):
         emitter = job["emitters"][i]
-        plotter.add_mesh(pv.Sphere(0.11 * size, emitter), color=colour, ambient=0.6)
-        plotter.add_mesh(pv.MultipleLines(job[f"edges{i}"]), color=colour, line_width=3, opacity=0.6)
+        plotter.add_mesh(pv.Sphere(radius=0.11 * size, center=emitter), color=colour, ambient=0.6)
+        plotter.add_mesh(pv.MultipleLines(job[f"edges{i}"]), color=colour, line_width=2.25, opacity=0.6)
         if len(job[f"faces{i}"]):
             sheet = pv.PolyData.from_regular_faces(job[f"sheet{i}"], job[f"faces{i}"])
             plotter.add_mesh(sheet, color=colour, opacity=0.22, lighting=False)
         if len(job[f"curve{i}"]):
             segments = job[f"curve{i}"].reshape(-1, 3)
-            plotter.add_mesh(pv.line_segments_from_points(segments), color=colour, line_width=10, lighting=False)
+            plotter.add_mesh(pv.line_segments_from_points(segments), color=colour, line_width=7.5, lighting=False)
         labels.append("laser" if len(job["colours"]) == 1 else f"laser {i + 1}")
         places.append(emitter - 0.04 * (job[f"edges{i}"][[0, 2]].mean(axis=0) - emitter))
     plotter.add_point_labels(
-        np.array(places), labels, font_size=38, text_color=INK, shape=None, show_points=False, always_visible=True
+        np.array(places), labels, font_size=28, text_color=INK, shape=None, show_points=False, always_visible=True
     )
     plotter.renderer.ResetCameraClippingRange()
     _write(plotter, path)
@@ -182,7 +183,7 @@ def draw_cloud(job: Any, path: Path) -> None:
         dense = len(job["cloud"]) > 20_000
         plotter.add_mesh(
             points, scalars="error", cmap=DIVERGING, clim=(-limit, limit), nan_color="#f0c000", show_scalar_bar=False,
-            point_size=5 if dense else 11, render_points_as_spheres=True, lighting=False,
+            point_size=4 if dense else 8, render_points_as_spheres=True, lighting=False,
         )  # fmt: skip
     plotter.renderer.ResetCameraClippingRange()
     _write(plotter, path)

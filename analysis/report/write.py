@@ -50,7 +50,7 @@ def write_report(folder: Path | str, report: ReportInput, drawing: Drawing | Non
     The HTML holds all its pictures and refers to nothing outside itself. InputError: a file cannot be written.
     """
     with Drawing() if drawing is None else drawing as process:
-        page = _page(report, process, meanwhile=_prepare_pdf)
+        page = _page(report, process, meanwhile=prepare_report)
     html, pdf = Path(folder) / "report.html", Path(folder) / "report.pdf"
     with atomic_write(html) as temporary:
         temporary.write_text(page, encoding="utf-8")
@@ -205,8 +205,9 @@ def _repeat(report: ReportInput) -> list[tuple[str, str]]:
     return [*seed, *report.versions.items()]
 
 
-def _prepare_pdf() -> None:
+def prepare_report() -> None:
     """What takes long to load, which it does while something else is waited for."""
+    import matplotlib.backends.backend_agg  # noqa: F401
     import weasyprint  # noqa: F401
 
 

@@ -103,7 +103,7 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
     film = PixelSamples(held)
     film.add(paths, held, np.full((len(held), 2), HELD_OUT_SAMPLES, np.int32), run.between(0.0, 0.1))
     while True:
-        seen = _seen_grid(paths, height, block, run.threads)
+        seen = seen_grid(paths, height, block, run.threads)
         grid, across = seen.pixels, seen.across
         part = run.between(0.1, 0.5)
         film.extend(grid)
@@ -155,7 +155,7 @@ def _errors(
         return noise, noise
     truth = film.means(held).astype(np.float64)
     apart = _light_grid(film, paths, height, grid, apart=True)
-    halves = radiance_at(apart, paths, held, _own_places(paths), threads).reshape(-1, 2, 3)
+    halves = radiance_at(apart, paths, held, own_places(paths), threads).reshape(-1, 2, 3)
     image = halves.mean(axis=1)
     power = float(np.sum(truth[:, 0] * truth[:, 1]))
     if power <= 0.0:
@@ -194,7 +194,7 @@ def _tile_means(values: Float32, points: int) -> Float32:
     return np.asarray(sums(values) / sums(np.ones_like(values)), np.float32)
 
 
-def _seen_grid(paths: CameraPaths, height: int, block: int, threads: int | None) -> SeenGrid:
+def seen_grid(paths: CameraPaths, height: int, block: int, threads: int | None) -> SeenGrid:
     """The points of a grid, with what is seen there where it is interpolated: with more than a pixel between them."""
     pixels, across = grid_of(paths.view.width, height, block)
     if block == 1:
@@ -246,7 +246,7 @@ def radiance_at(
     return out
 
 
-def _own_places(paths: CameraPaths) -> Places:
+def own_places(paths: CameraPaths) -> Places:
     return lambda pixels, seen, item: places_of(pixels, paths.view.width)
 
 
@@ -257,4 +257,4 @@ def _image(
     if grid.block == 1:
         return film.means(grid.pixels).mean(axis=1).reshape(height, paths.view.width, 3), None
     known = _light_grid(film, paths, height, grid, apart=False)
-    return guided_image(known, paths, height, _own_places(paths), run), known
+    return guided_image(known, paths, height, own_places(paths), run), known

@@ -40,9 +40,12 @@ class LightGrid:
     light: Float32
     """As `render.ambient.guided_interpolation.interpolate` takes them."""
 
-    def at(self, places: Float, seen: Float32, item: Int, out: Float32) -> None:
-        """Radiance -> out (n, c) at rows and columns (n, 2), where (n, SEEN) and (n,) is seen."""
-        interpolate(places, self.shape, self.block, seen, item, (self.seen, self.item, self.light), out)
+    def at(self, places: Float, seen: Float32, item: Int, out: Float32) -> Float32:
+        """Radiance -> out (n, c) at rows and columns (n, 2), where (n, SEEN) and (n,) is seen; how well (n,) of each
+        the grid knows it, at most 1."""
+        fit = np.empty(len(places), np.float32)
+        interpolate(places, self.shape, self.block, seen, item, (self.seen, self.item, self.light), out, fit)
+        return fit
 
 
 Places = Callable[[Int, Float32, Int], Float]

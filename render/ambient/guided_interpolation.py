@@ -159,8 +159,10 @@ def interpolate(
     item: Int,
     grid: tuple[Float32, Int, Float32],
     out: Float32,
+    fit: Float32,
 ) -> None:
-    """Rows and columns (n, 2) of an image of shape (h, w) -> out (n, c) radiance, c as in `smooth_grid`.
+    """Rows and columns (n, 2) of an image of shape (h, w) -> out (n, c) radiance, c as in `smooth_grid`, and fit (n,):
+    at most 1, how well what is seen there speaks for the place.
 
     What is beyond the image is as at its edge. seen, item: of the places; grid: the same of its points, which are
     `block` pixels apart, and their light.
@@ -186,6 +188,7 @@ def interpolate(
             weight += w
             for c in range(total.shape[0]):
                 total[c] += w * light[q, c]
+        fit[r] = weight
         for c in range(total.shape[0]):
             out[r, c] = total[c] / weight * (seen[r, c % 3] + DARK) if item[r] != NO_RAY else 0.0
 

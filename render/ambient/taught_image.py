@@ -20,13 +20,15 @@ from render.ambient.coarse_image import (
     HELD_OUT_SAMPLES,
     HELD_OUT_SHARE,
     CoarseImage,
+    own_places,
     radiance_at,
 )
-from render.ambient.guided_image import guided_image, places_of
+from render.ambient.guided_image import Places, guided_image, places_of
+from render.ambient.mended_image import mended_grid
 from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import CameraPaths
 from render.ambient.pixel_samples import PixelSamples
-from render.base.arrays import Float, Float32, Int
+from render.base.arrays import Bool, Float, Float32, Int
 from render.base.pose import invert
 from render.run import Run
 from render.world.placed import PlacedScene
@@ -49,8 +51,8 @@ def taken_over(lesson: CoarseLesson, placed: PlacedScene, paths: CameraPaths, ru
     """The image as this frame has it, with paths of random numbers of their own; None: it is too far off. Raises
     Cancelled.
 
-    Pixel by pixel, or where that is too far off place by place: the light of the grid's points where their image shows
-    what this one sees.
+    Pixel by pixel; where that is too far off place by place: the light of the grid's points where their image shows
+    what this one sees; and where that is as well, with samples of what it does not show.
     """
     coarse, camera = lesson.coarse, placed.camera
     if lesson.placed.camera != camera:
@@ -61,10 +63,24 @@ def taken_over(lesson: CoarseLesson, placed: PlacedScene, paths: CameraPaths, ru
     halves = film.means().astype(np.float64)
     radiance, square = coarse.radiance, _square(coarse.radiance.reshape(-1, 3)[pixels], halves)
     if square > COARSE_ERROR**2 and coarse.grid is not None and lesson.placed.world is placed.world:
-        places = partial(_places_before, lesson.placed, placed.world.rays.centre)
-        square = _square(radiance_at(coarse.grid, paths, pixels, places), halves)
+        shown = partial(_shown_before, lesson.placed, placed.world.rays.centre)
+
+        def where_it_was(pixels: Int, seen: Float32, item: Int) -> Float:
+            return shown(pixels, seen, item)[0]
+
+        places: Places = where_it_was
+        found = radiance_at(coarse.grid, paths, pixels, places)
+        grid, square = coarse.grid, _square(found, halves)
+        if square > COARSE_ERROR**2:
+            mended = mended_grid(coarse.grid, paths, camera.height, shown, film, run)
+            if mended is None:
+                return None
+            (grid, new), places = mended, own_places(paths)
+            # what the image was made of does not tell how far it is off
+            apart = ~np.isin(pixels, new)
+            square = _square(radiance_at(grid, paths, pixels[apart], places), halves[apart])
         if square <= COARSE_ERROR**2:
-            radiance = guided_image(coarse.grid, paths, camera.height, places, run)
+            radiance = guided_image(grid, paths, camera.height, places, run)
     if square > COARSE_ERROR**2:
         return None
     # where it is worse than where it comes from is not known, so that it may be so everywhere
@@ -91,14 +107,16 @@ def _square(image: Float32, halves: Float) -> float:
     return max(off, 0.0) / power if power > 0.0 else math.inf
 
 
-def _places_before(before: PlacedScene, centre: Float, pixels: Int, seen: Float32, item: Int) -> Float:
-    """(n, 2) rows and columns at which another frame's camera has what is seen at some pixels; what is infinitely far,
-    or where it has no image, is where it was."""
+def _shown_before(before: PlacedScene, centre: Float, pixels: Int, seen: Float32, item: Int) -> tuple[Float, Bool]:
+    """(n, 2) rows and columns at which another frame's camera has what is seen at some pixels, and whether they are in
+    its image; what is infinitely far, or what it has no image of, is where it was."""
     to_camera = invert(before.T_world_camera)
     points = seen[:, 6:9].astype(np.float64) @ to_camera[:3, :3].T + (to_camera[:3, :3] @ centre + to_camera[:3, 3])
     place, there = before.camera.project(points)
-    there &= item >= 0
-    return np.where(there[:, None], place[:, ::-1], places_of(pixels, before.camera.width))
+    near = item >= 0
+    place = np.where((there & near)[:, None], place[:, ::-1], places_of(pixels, before.camera.width))
+    inside = np.all((place >= -0.5) & (place <= np.array([before.camera.height, before.camera.width]) - 0.5), axis=1)
+    return place, inside & (there | ~near)
 
 
 def _drawn(pixels: int, run: Run) -> Int:

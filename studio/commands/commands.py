@@ -124,17 +124,18 @@ def scan_into(
     from studio.commands.noise_tables import print_foreseen
 
     quality: tuple[GroupQuality, ...] = ()
+    foretold: Mapping[str, float] = {}
 
     def refined(frame: Frame) -> None:
-        nonlocal quality
-        quality = frame.quality
+        nonlocal quality, foretold
+        quality, foretold = frame.quality, frame.foretold
 
     if not quiet:
         scene = project.scene if options.at_scale else project.scene.scaled(options.image_scale)
         plan = expected_plan(scene, project.render)
         print_plan(plan_lines(plan), to_errors=True)
     frames = min(options.steps or project.scene.frame_count, project.scene.frame_count)
-    with stage_progress(quiet, lambda stage: stage_note(stage, quality), frames=frames) as progress:
+    with stage_progress(quiet, lambda stage: stage_note(stage, quality, foretold), frames=frames) as progress:
         listener = Listener(progress, foreseen=(lambda noise: None) if quiet else print_foreseen, refined=refined)
         return run_scan(project, root, out=folder, options=options, listener=listener, source=source)
 

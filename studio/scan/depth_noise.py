@@ -38,8 +38,10 @@ class DepthNoise:
     """What `allowed` came to in the first frame; None: its light was rendered for the image, or is not known."""
     reached_m: float | None = None
     """Of depth_z, in a median row."""
+    foretold_seconds: float | None = None
+    """Processor seconds of this light, of all lasers and frames, as the scan's pilots foretell them; None: none did."""
     seconds: float | None = None
-    """Wall time of this light, of all lasers and frames."""
+    """Wall time of the same."""
 
 
 def foreseen_noise(project: Project, root: Path, threads: int | None = None) -> tuple[DepthNoise, ...]:
@@ -63,6 +65,13 @@ def foreseen_noise(project: Project, root: Path, threads: int | None = None) -> 
                 foreseen = None if sigma is None else allowed * sigma
                 found.append(DepthNoise(laser=laser.name, group=group, allowed=allowed, foreseen_m=foreseen))
     return tuple(found)
+
+
+def with_foretold(foreseen: Iterable[DepthNoise], frame: Mapping[str, float], frames: int) -> tuple[DepthNoise, ...]:
+    """With the seconds of so many frames; frame: processor seconds of one, by light group."""
+    return tuple(
+        replace(one, foretold_seconds=frame[one.group] * frames) if one.group in frame else one for one in foreseen
+    )
 
 
 def reached_noise(

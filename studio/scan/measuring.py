@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -74,6 +75,7 @@ class Measuring:
         for one, passing in ready:
             if len(self.record.steps) == self._last:
                 self._drawing = Drawing()
+                threading.Thread(target=_prepare_report, name="report", daemon=True).start()
             shown = len(self.record.steps) in self._shown
             result = measure_frame(
                 self._project,
@@ -159,6 +161,13 @@ class Measuring:
         self._points.close()
         if self._drawing is not None:
             self._drawing.stop()
+
+
+def _prepare_report() -> None:
+    """Load what a report stands on, which takes most of a second."""
+    from analysis.report.write import prepare_report
+
+    prepare_report()
 
 
 def _bound(notes: Counter[str]) -> None:

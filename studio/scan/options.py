@@ -53,7 +53,7 @@ class Listener:
     progress: StageProgress = silent
     cancelled: Cancel = never
     foreseen: Callable[[tuple[DepthNoise, ...]], None] = lambda noise: None
-    """Hears before anything is rendered of the noise that rendering may add to the depth."""
+    """Hears, before anything but pilots is rendered, of the noise that rendering may add to the depth."""
     refined: Callable[[Frame], None] = lambda frame: None
     """Hears of every frame as it gets better."""
     measured: Callable[[FrameResult], None] = lambda result: None

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from analysis.report.record import ScanRecord
 from render.base.errors import InputError
+from render.frame import Frame
 from render.output.frame_files import read_frame
 from render.world.material_checks import scene_warnings
 from render.world.world import build_world
@@ -61,12 +64,14 @@ def _measured(
     with clock.stage("loading meshes"), cautions.listening():
         first = build_world(project.scene, root, 0)
     aimed = False
-    with closing(Measuring(project, out, clock, threads, len(found.frames), report=report)) as measuring:
+    with (
+        closing(Measuring(project, out, clock, threads, len(found.frames), report=report)) as measuring,
+        closing(_read_ahead(found)) as frames,
+    ):
         for n in clock.frames(len(found.frames)):
             path = found.frames[n]
             with clock.stage("reading frames"):
-                scan_folder.check_frame(found, path)
-                frame = read_frame(path)
+                frame = next(frames)
             if not 0 <= frame.step < project.scene.frame_count:
                 allowed = f"0 to {project.scene.frame_count - 1}"
                 raise InputError(
@@ -107,6 +112,23 @@ def _measured(
         "extraction": measured["extraction"],
         "seconds": clock.seconds,
     }
+
+
+def _read_ahead(found: scan_folder.ScanFolder) -> Generator[Frame, None, None]:
+    """The scan's frames in their order, each read while the one before it is measured. InputError: as `read_frame`, or
+    a frame is of another project."""
+
+    def read(path: Path) -> Frame:
+        scan_folder.check_frame(found, path)
+        return read_frame(path)
+
+    with ThreadPoolExecutor(1, "frame reader") as reader:
+        coming = reader.submit(read, found.frames[0]) if found.frames else None
+        for path in (*found.frames[1:], None):
+            if coming is not None:
+                frame = coming.result()
+                coming = None if path is None else reader.submit(read, path)
+                yield frame
 
 
 def _run_text(found: scan_folder.ScanFolder, how: Development, record: ScanRecord) -> str:

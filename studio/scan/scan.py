@@ -19,7 +19,7 @@ from studio.project.input_files import input_hashes
 from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions
-from studio.scan.depth_noise import foreseen_noise, noise_records, reached_noise
+from studio.scan.depth_noise import foreseen_noise, noise_records, reached_noise, with_foretold
 from studio.scan.frame_writer import FrameWriter
 from studio.scan.frames_ahead import rendered_frames
 from studio.scan.gauging import measures_record
@@ -109,8 +109,12 @@ def run_scan(
             warm_up(chain(*needed(project)), listener.progress, listener.cancelled)
         with clock.stage("noise in depth"):
             foreseen = foreseen_noise(project, root, options.threads)
+        scan = Scan(begun, clock, options, listener.refined)
+        scan = replace(scan, plan=_plan(scan, first))
+        if scan.plan is not None:
+            foreseen = with_foretold(foreseen, scan.plan.foretold, count)
         listener.foreseen(foreseen)
-        _take_frames(Scan(begun, clock, options, listener.refined), first, count, written, measuring)
+        _take_frames(scan, first, count, written, measuring)
         result: dict[str, Any] = {
             "name": project.name,
             "created": now(),
@@ -184,7 +188,6 @@ def _check_options(options: ScanOptions) -> None:
 
 def _take_frames(scan: Scan, first: World, count: int, written: Written, measuring: Measuring | None) -> None:
     """Render, write and measure one frame after the other; `first`: the world of step 0."""
-    scan = replace(scan, plan=_plan(scan, first))
     with FrameWriter(scan) as writer, closing(rendered_frames(scan, first, count)) as frames:
         for _ in scan.clock.frames(count):
             found = next(frames)

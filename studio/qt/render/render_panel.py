@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.report.light_text import plan_lines, quality_lines
+from analysis.report.light_text import foretold_lines, plan_lines, quality_lines
 from render.base.threads import Cancel
 from render.checkpoint import RenderState
 from render.frame import Frame
@@ -388,4 +388,5 @@ def plan_text(plan: Plan) -> str:
 
 def error_text(render: Render) -> str:
     """Error so far of every light group, and what it is to become."""
-    return "<br>".join(f"{escape(name)}: {escape(text)}" for name, text in quality_lines(render.frame.quality))
+    known = [f"{escape(name)}: {escape(text)}" for name, text in quality_lines(render.frame.quality)]
+    return "<br>".join([*known, *map(escape, foretold_lines(render.frame.foretold))])

@@ -134,7 +134,7 @@ def test_a_refined_frame_and_a_rendered_one_are_the_same(threads):
 
 def plan_of(scene, world, **settings):
     dark = Frame(0, (), None, (), None)
-    return chosen_plan(AmbientLight(), PlacedScene(world, scene), RenderSettings(**settings), dark)
+    return chosen_plan(AmbientLight(), PlacedScene(world, scene), RenderSettings(**settings), dark)[0]
 
 
 def onward_share(world, scene):

@@ -207,16 +207,21 @@ def test_light_over_a_texture_is_interpolated_as_light():
     assert len(grid) == across * 7 and {0, width - 1, width * height - 1} <= set(grid.tolist())
     light = np.empty((len(grid), 3), np.float32)
     smooth_grid(across, seen[grid], item[grid], radiance[grid], light)
-    out = np.empty_like(radiance)
-    interpolate(places_of(pixels, width), (height, width), block, seen, item, (seen[grid], item[grid], light), out)
+    out, fit = np.empty_like(radiance), np.empty(len(pixels), np.float32)
+    interpolate(places_of(pixels, width), (height, width), block, seen, item, (seen[grid], item[grid], light), out, fit)
     # the neighbours of a point of the grid, of other albedos, count in proportion to these
     assert np.sqrt(np.mean((out / radiance - 1.0) ** 2)) < 0.03
+    assert fit == pytest.approx(1.0)
     # and no light passes from one object to the next
     item[column > 30] = 1
     radiance[column > 30] = 0.0
     smooth_grid(across, seen[grid], item[grid], radiance[grid], light)
-    interpolate(places_of(pixels, width), (height, width), block, seen, item, (seen[grid], item[grid], light), out)
+    interpolate(places_of(pixels, width), (height, width), block, seen, item, (seen[grid], item[grid], light), out, fit)
     assert np.abs(out[column > 30]).max() < 0.01 * radiance.max()
+    # what speaks for a place is the share of its own object's points in it, which lie at columns 24 and 32
+    across_cell = (column - 24) / 8
+    share = np.where(column > 30, across_cell, 1.0 - across_cell)
+    assert fit == pytest.approx(np.where((column > 24) & (column < 32), share, 1.0), abs=1e-5)
 
 
 def test_no_light_of_the_sky_leaks_onto_a_dark_body_nor_its_own_into_the_sky():

@@ -159,7 +159,7 @@ def test_the_plan_follows_what_the_pilot_measures():
     def plan(meshes, materials, **settings):
         scene, parts = setting(meshes, materials)
         frame = Frame(0, (direct_image(*parts).radiance,), None, (), None)
-        return chosen_plan(IndirectLight(), PlacedScene(parts[0], scene), RenderSettings(**settings), frame)
+        return chosen_plan(IndirectLight(), PlacedScene(parts[0], scene), RenderSettings(**settings), frame)[0]
 
     flat = plan([plane_mesh((0, 0, 1), 0.9)], [Conductor()])
     first = flat.steps[0]
