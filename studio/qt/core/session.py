@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from PySide6.QtCore import QObject, Signal
 
+from analysis.section import Plane
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.checkpoint import RenderState
@@ -87,6 +88,17 @@ class Render:
         return not self.cell and is_stale(self.source or self.project, now)
 
 
+@dataclass(frozen=True)
+class ShownSection:
+    """The plane of the section as the 3D view has it; m, world frame."""
+
+    plane: Plane
+    corners: Float
+    """(4, 3) of the sheet that stands for it."""
+    true: list[Float]
+    """Polylines (n, 3) of the part."""
+
+
 class Session(QObject):
     """The state of the desktop, in one place."""
 
@@ -119,6 +131,8 @@ class Session(QObject):
     """Another project was opened."""
     ghost_changed = Signal()
     """`ghost` is another."""
+    section_changed = Signal()
+    """`section` is another."""
 
     def __init__(self, document: Document) -> None:
         super().__init__()
@@ -132,8 +146,16 @@ class Session(QObject):
         """What the live preview cannot show as it is set: by the path of the field, why."""
         self.ghost: Float = np.zeros((0, 4, 3))
         """(k, m, 3) m in the camera frame: dark shapes of the calibration board where it is advised to be held."""
+        self.section: ShownSection | None = None
+        """What the panel of the section shows in 3D, and the 3D view moves; None: nothing."""
         self.document = document
         document.listeners.append(self.project_changed.emit)
+
+    def show_section(self, section: ShownSection | None) -> None:
+        """None hides it."""
+        if section is not self.section:
+            self.section = section
+            self.section_changed.emit()
 
     def show_ghost(self, shapes: Float) -> None:
         """(k, m, 3), as `ghost`; none hides it."""
