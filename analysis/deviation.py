@@ -136,8 +136,8 @@ def three_two_one(
 
 
 def verdicts(value: Float, sigma: Float, lower: float, upper: float) -> Verdicts:
-    """(m,) by ISO 14253-1 with U = 2 sigma: proved within, proved beyond, or undecided; NaN counts as 0."""
-    uncertainty = 2.0 * np.nan_to_num(sigma)
+    """(m,) by ISO 14253-1 with U = 2 sigma: proved within, proved beyond, or undecided, as where sigma is NaN."""
+    uncertainty = 2.0 * sigma
     found = np.full(len(value), UNDECIDED, dtype=np.int8)
     found[(value - uncertainty >= lower) & (value + uncertainty <= upper)] = WITHIN
     found[value + uncertainty < lower] = BELOW

@@ -69,14 +69,23 @@ class Render:
         """Of the image, to the scanner's."""
         return self.image_scale if self.scan is None else self.scan.image_scale
 
+    @property
+    def refining(self) -> bool:
+        """More of its light is to come by itself."""
+        return not self.final and self.state is None
+
     def developed_by(self, now: Project) -> Project:
         """The project, at full scale, by whose sensor, power and extraction it is developed and measured."""
         return self.source if self.cell and self.source is not None else now
 
     def is_measured(self, how: Development) -> bool:
         """Images and measurements are of the present frame, developed like this."""
-        made = [self.made_from.get(what) for what in ("images", "measurements")]
-        return all(one is not None and one[0] is self.frame and one[1] == how for one in made)
+        return self.has("images", how) and self.has("measurements", how)
+
+    def has(self, what: str, how: Development) -> bool:
+        """ "images" or "measurements" of the present frame, developed like this."""
+        made = self.made_from.get(what)
+        return made is not None and made[0] is self.frame and made[1] == how
 
     def repeatable(self, now: Project) -> bool:
         """A run of its first step gives the same images: those of a step follow the scan's plan, a cell its study's."""

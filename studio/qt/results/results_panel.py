@@ -81,7 +81,10 @@ class ResultsPanel(QWidget):
         self.laser = QComboBox()
         self.error = QComboBox()
         self.error.addItems([view.title for view in ERROR_VIEWS])
-        self.error.setToolTip("Which error the plots, the histogram and the table show")
+        self.error.setToolTip(
+            "Which error plots, histogram and table show: measured minus true; of depth and surface positive is too far "
+            "from the camera"
+        )
         self.switches = QHBoxLayout()
         self.switches.setSpacing(2)
         self.reading = QLabel()

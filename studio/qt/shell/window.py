@@ -48,8 +48,6 @@ TALL = ("render", "develop")
 """Panels that scroll."""
 TRIM_MS = 1000
 """From opening another project until the memory of the former one is given back."""
-SMALL = 0.25
-"""Image scale of the first look."""
 SWITCH = {each.key: "render_workspace" if each.key == "render" else each.key for each in WORKSPACES}
 """Workspace -> command."""
 
@@ -125,22 +123,10 @@ class MainWindow(QMainWindow):
             self._called.add(key)
         self.show_panel(key)
 
-    def render_small(self) -> None:
-        """A quick render of what is open, for a first look."""
-        if self.session.renders or self.runner.busy:
-            return
-        panel, session = self.panels["render"], self.session
-
-        def enough() -> None:
-            shown = session.shown
-            if shown is None or shown.image_scale != SMALL or shown.final:
-                session.measured.disconnect(enough)
-            elif shown.frame.ambient is not None:
-                session.measured.disconnect(enough)
-                panel.keep()  # type: ignore[attr-defined]
-
-        session.measured.connect(enough)
-        panel.start(SMALL)  # type: ignore[attr-defined]
+    def render_first(self) -> None:
+        """Of what is open, as large as the scanner's image: its first figures are true ones."""
+        if not self.session.renders and not self.runner.busy:
+            self.panels["render"].start(1.0)  # type: ignore[attr-defined]
 
     def choose_theme(self, choice: theme.Choice) -> None:
         theme.apply(choice)

@@ -144,7 +144,7 @@ class ErrorCloud(QObject):
         view = self.error_view
         if view.kind == "position":
             return np.asarray(self._pixel_errors[i] if not self._of_scan else np.full(len(one["x"]), np.nan))
-        return np.asarray(one["error_depth" if view.kind == "depth" else "error_distance"] * view.scale)
+        return np.asarray(one["error_depth" if view.kind == "depth" else "error_surface"] * view.scale)
 
     def _mark(self) -> None:
         render, hovered = self.session.shown, self.session.hovered

@@ -51,7 +51,7 @@ def column(path: Path, name: str) -> np.ndarray:
 
 def test_against_the_part_as_scanned_deviations_are_the_scan_s_own_distances(scan: Path) -> None:
     record = told("deviation", scan, "--lower=-700", "--upper", 700)
-    own = read_ply(scan / "points.ply")["error_distance"]
+    own = -read_ply(scan / "points.ply")["error_surface"]
     assert np.allclose(column(scan / "deviation.csv", "deviation_m"), own, rtol=0.0, atol=1e-9)
     assert record["rms"] == pytest.approx(float(np.sqrt(np.mean(own**2))), rel=1e-9)
     assert sum(record["verdicts"].values()) == len(own) and record["verdict"] == "fail"
