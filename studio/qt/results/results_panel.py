@@ -82,8 +82,8 @@ class ResultsPanel(QWidget):
         self.error = QComboBox()
         self.error.addItems([view.title for view in ERROR_VIEWS])
         self.error.setToolTip(
-            "Which error plots, histogram and table show: measured minus true; of depth and surface positive is too far "
-            "from the camera"
+            "Which error plots, histogram and table show: measured minus true; of depth and surface positive is too "
+            "far from the camera"
         )
         self.switches = QHBoxLayout()
         self.switches.setSpacing(2)
