@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
 from analysis.section import Plane
@@ -108,6 +109,18 @@ class ShownSection:
     """Polylines (n, 3) of the part."""
 
 
+@dataclass(frozen=True)
+class ShownDeviation:
+    """Points by their deviation from a nominal part, as the 3D view colours them."""
+
+    points: Float
+    """(n, 3) m, where the objects are at step 0."""
+    value: Float
+    """(n,) m."""
+    row: NDArray[np.int32]
+    step: NDArray[np.int32]
+
+
 class Session(QObject):
     """The state of the desktop, in one place."""
 
@@ -140,6 +153,8 @@ class Session(QObject):
     """Another project was opened."""
     ghost_changed = Signal()
     """`ghost` is another."""
+    deviation_changed = Signal()
+    """`deviation` is another."""
     section_changed = Signal()
     """`section` is another."""
 
@@ -157,8 +172,16 @@ class Session(QObject):
         """(k, m, 3) m in the camera frame: dark shapes of the calibration board where it is advised to be held."""
         self.section: ShownSection | None = None
         """What the panel of the section shows in 3D, and the 3D view moves; None: nothing."""
+        self.deviation: ShownDeviation | None = None
+        """What the panel of the deviation shows in 3D; None: nothing."""
         self.document = document
         document.listeners.append(self.project_changed.emit)
+
+    def show_deviation(self, deviation: ShownDeviation | None) -> None:
+        """None hides it."""
+        if deviation is not self.deviation:
+            self.deviation = deviation
+            self.deviation_changed.emit()
 
     def show_section(self, section: ShownSection | None) -> None:
         """None hides it."""

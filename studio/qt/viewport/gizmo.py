@@ -41,8 +41,8 @@ class Gizmo(HandleTool):
         self.view.redraw()
 
     def frame(self) -> Frame | None:
-        if self.target is None:
-            return None
+        if self.target is None or self.session.section is not None:
+            return None  # two sets of handles would lie over each other
         T = self.target.T_world_item
         return self.standing(T[:3, 3], T[:3, :3].copy() if self.local else np.eye(3))
 
