@@ -59,9 +59,9 @@ ERROR_VIEWS = (
 
 UNCERTAINTY = "Bias known to"
 MEASURED = (
+    ("RMSE", "rmse"),
     ("Bias", "bias"),
     ("Sigma", "sigma"),
-    ("RMSE", "rmse"),
     ("Robust sigma", "robust_sigma"),
     ("95 % within", "p95"),
 )
@@ -124,17 +124,21 @@ def histogram(error: Float, limit: float) -> tuple[Float, Float]:
 
 
 def table(found: list[Measurement], view: ErrorView) -> list[tuple[str, str, list[float]]]:
-    """Rows of the table of measures: name, unit, a value for each measurement (NaN: there is none)."""
-    rows: list[tuple[str, str, list[float]]] = [
-        ("Points", "", [float(one.points.valid.sum()) for one in found]),
-        ("Completeness", "%", [100.0 * one.errors.completeness for one in found]),
-        ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
-    ]
+    """Rows of the table of measures: name, unit, a value for each measurement (NaN: there is none).
+
+    Errors first: on a low screen the rest is scrolled.
+    """
+    rows: list[tuple[str, str, list[float]]] = []
     of = [measures(one.errors, view.kind) for one in found]
     for name, attribute in MEASURED:
         rows.append((name, view.unit, [view.scale * getattr(one, attribute) for one in of]))
         if attribute == "bias":
             rows.append((UNCERTAINTY, view.unit, [bias_uncertainty(one, view) for one in found]))
+    rows += [
+        ("Points", "", [float(one.points.valid.sum()) for one in found]),
+        ("Completeness", "%", [100.0 * one.errors.completeness for one in found]),
+        ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
+    ]
     rows.append(("Outliers", "%", [100.0 * one.outlier_rate for one in of]))
     rows.append(("Within 2 sigma", "%", [100.0 * one.coverage for one in of]))
     return rows

@@ -93,14 +93,15 @@ class ScanResults:
         rows = [row for row in rows if row.get("laser") == name and isinstance(row.get("method"), str)]
         figures = [_figures(row, view.kind) for row in rows]
         points = [_number(row, "points") for row in rows]
-        found: list[tuple[str, str, list[float]]] = [
+        found: list[tuple[str, str, list[float]]] = []
+        for title, key in MEASURED:
+            values = [_sigma(each) if key == "sigma" else _number(each, key) for each in figures]
+            found.append((title, view.unit, [view.scale * value for value in values]))
+        found += [
             ("Points", "", points),
             ("Completeness", "%", [100.0 * _number(row, "completeness") for row in rows]),
             ("False scan lines", "", [_number(row, "false_scan_lines") for row in rows]),
         ]
-        for title, key in MEASURED:
-            values = [_sigma(each) if key == "sigma" else _number(each, key) for each in figures]
-            found.append((title, view.unit, [view.scale * value for value in values]))
         shares = [_number(row, "outliers") / n if n else math.nan for row, n in zip(rows, points, strict=True)]
         found.append(("Outliers", "%", [100.0 * share for share in shares]))
         return [row["method"] for row in rows], found

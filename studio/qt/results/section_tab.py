@@ -69,6 +69,7 @@ class SectionTab(QWidget):
         self.in_view.setChecked(True)
         self.told = QLabel(wordWrap=True)
         self.view = pg.GraphicsLayoutWidget()
+        self.view.setMinimumHeight(120)
         self.plot = plots.new_plot("Across / mm", "Up", "mm")
         self.view.addItem(self.plot)
         self.plot.setAspectLocked(True)

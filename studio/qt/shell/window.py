@@ -36,7 +36,17 @@ from studio.qt.shell.preferring import Preferring
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.status import StatusBar
 from studio.qt.shell.tour import Step, Tour
-from studio.qt.shell.workspaces import WORKSPACES, arrange, remembered, restore, sealed, share_out, unsealed, workspace
+from studio.qt.shell.workspaces import (
+    WORKSPACES,
+    arrange,
+    hide_stray_tabs,
+    remembered,
+    restore,
+    sealed,
+    share_out,
+    unsealed,
+    workspace,
+)
 from studio.qt.study.cell_opener import CellOpener
 from studio.qt.viewport.error_cloud import ErrorCloud
 from studio.runtime.error_messages import trouble
@@ -223,6 +233,7 @@ class MainWindow(QMainWindow):
         results, motion = self.panels["results"], self.panels["motion"]
         results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
         results.scan_bar.scope_changed.connect(made.show_all_steps)  # type: ignore[attr-defined]
+        made.pressed.connect(results.pin)  # type: ignore[attr-defined]
         motion.began.connect(made.begin_scan)  # type: ignore[attr-defined]
         motion.grew.connect(made.grow)  # type: ignore[attr-defined]
         return made
@@ -268,6 +279,7 @@ class MainWindow(QMainWindow):
             "arrange": self.rearrange,
             "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
             "render": session.render_asked.emit,
+            "expose": self.panels["develop"].expose,  # type: ignore[attr-defined]
             "pause": self.status.toggle_pause,
             "cancel": self.status.cancel_work,
             "scan": self._scan,
@@ -352,6 +364,7 @@ class MainWindow(QMainWindow):
             self.resize(self.size().boundedTo(size))  # the last workspace's columns may have made it grow
         if not self._restore_panels():
             share_out(self, self.docks, workspace(self.workspace))
+        hide_stray_tabs(self)
 
     def _send_back(self) -> None:
         while self._called:

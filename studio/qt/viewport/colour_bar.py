@@ -18,6 +18,8 @@ TIP = (
 REACH_PX = 9
 """From an end of the bar at which the mouse has hold of it."""
 LEFT, TOP, WIDTH, BELOW = 14, 34, 14, 36
+NARROW = 480
+"""px of a view of which a bar of the usual size would hide too much."""
 
 
 class ColourBar(QWidget):
@@ -163,5 +165,6 @@ class ColourBar(QWidget):
 
     def _place(self) -> None:
         if (view := self.parentWidget()) is not None:
-            self.resize(128, min(208, view.height() - 24))
-            self.move(view.width() - self.width() - 12, view.height() - self.height() - 12)
+            tall = 208 if view.width() > NARROW else 150
+            self.resize(128 if view.width() > NARROW else 112, min(tall, view.height() - 24))
+            self.move(view.width() - self.width() - 6, view.height() - self.height() - 6)

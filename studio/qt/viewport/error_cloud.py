@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtGui import QColor
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
@@ -33,6 +33,9 @@ RIM = (0.16, 0.18, 0.21)
 
 class ErrorCloud(QObject):
     """Follows the shown render, or a running scan. Shown while it fits the scene, and always on `pinned`."""
+
+    pressed = Signal(int)
+    """The scan line of the point that is clicked."""
 
     def __init__(self, session: Session, view: View3D) -> None:
         super().__init__(view)
@@ -63,6 +66,7 @@ class ErrorCloud(QObject):
         self.bar.unit_chosen.connect(self._draw)
         self.bar.height_chosen.connect(self.colour_by_height)
         view.hovered.connect(self._hover)
+        view.takes_click = self._click
         session.hover_changed.connect(self._mark)
         session.project_changed.connect(self._show_or_hide)
         session.step_changed.connect(self._follow_step)
@@ -217,14 +221,27 @@ class ErrorCloud(QObject):
 
     def _hover(self, x: float, y: float) -> None:
         """The scan line of the point under the mouse, if there is one."""
+        row = self._row_at(x, y)
+        if row is not None:
+            self.session.hover(row)
+
+    def _click(self, x: float, y: float) -> bool:
+        """A click on a point keeps its scan line, and does not mean the part below it."""
+        row = self._row_at(x, y)
+        if row is not None:
+            self.pressed.emit(row)
+        return row is not None
+
+    def _row_at(self, x: float, y: float) -> int | None:
         if not self.visible:
-            return
+            return None
         apart = self.view.eye.project(self.points, self.view.pixels) - np.array([x, y])
         squared = np.einsum("ij,ij->i", apart, apart)
         if np.isfinite(squared).any():
             nearest = int(np.nanargmin(squared))
             if squared[nearest] < NEAR_PX**2:
-                self.session.hover(int(self.rows[nearest]))
+                return int(self.rows[nearest])
+        return None
 
 
 def _point_actor(size: float) -> tuple[pv.PolyData, vtkActor]:

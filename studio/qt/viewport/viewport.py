@@ -86,7 +86,8 @@ class Viewport(QWidget):
         """Bring an item, or everything, into the middle of the view."""
         self._leave()
         eye = self.view.eye
-        low, high = self.scene.bounds(self.live.look, path)
+        # the first view is of what is measured; who asks for everything gets the lamps as well
+        low, high = self.scene.bounds(self.live.look, path, lamps=not self._frame_soon and not path)
         self.view.look_from(eye.framed(low, high, self.view.pixels))
 
     def look_along(self, name: str) -> None:
@@ -203,9 +204,9 @@ class Viewport(QWidget):
         self.scene.draw(look, self.session.selection, settled=settled)
         self.bar.tell_spacing(self.scene.spacing)
         if self._frame_soon:
-            self._frame_soon = self.live.is_loading
             self.view.look_from(replace(self.view.eye, rotation=turntable(*STANDARD["iso"])))
             self.frame()
+            self._frame_soon = self.live.is_loading
         if self.scene.through:
             self._follow_through()
         self.view.redraw()
