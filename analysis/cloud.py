@@ -35,7 +35,7 @@ UNITS = {
     "sigma_depth_systematic": "m",
     "correlation_length": "rows",
     "error_depth": "m",
-    "error_distance": "m",
+    "error_surface": "m",
     "sheet_bias": "px",
     "u": "px",
     "v": "px",
@@ -44,8 +44,8 @@ UNITS = {
     "step": "",
 }
 INTEGERS = ("row", "laser", "step")
-FORMER = {"sigma": "sigma_random"}
-"""Columns of older files, by what they are called now."""
+FORMER = {"sigma": ("sigma_random", 1.0), "error_distance": ("error_surface", -1.0)}
+"""Columns of older files, by what they are called now, and the factor: the distance was positive towards the camera."""
 MAX_BYTES = 2**32
 PLY_TYPES = {
     "char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
@@ -81,7 +81,7 @@ def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: S
         "sigma_depth_systematic": np.hypot(points.sigma_depth_systematic[here], gradient[:, 2] * sheet),
         "correlation_length": points.correlation_length[here],
         "error_depth": nan if errors is None else errors.depth[here],
-        "error_distance": nan if errors is None else errors.distance[here],
+        "error_surface": nan if errors is None else errors.off_surface[here],
         "sheet_bias": nan if errors is None else errors.sheet_bias[here],
         "u": points.pixel[here, 0],
         "v": points.pixel[here, 1],
@@ -201,7 +201,13 @@ def ply_pieces(path: Path | str, rows: int = PART) -> Iterator[Cloud]:
 
 def _columns(table: NDArray[Any]) -> Cloud:
     kinds = {name: np.float64 if table[name].dtype.kind == "f" else np.int32 for name in table.dtype.names or ()}
-    return {FORMER.get(name, name): table[name].astype(kind) for name, kind in kinds.items()}
+    cells: Cloud = {}
+    for name, kind in kinds.items():
+        now, factor = FORMER.get(name, (name, 1.0))
+        cells[now] = np.asarray(table[name].astype(kind))
+        if factor != 1.0:
+            cells[now] *= factor
+    return cells
 
 
 def _ply_header(file: BinaryIO, where: str) -> tuple[int, np.dtype[Any]]:
@@ -256,7 +262,7 @@ def write_csv(path: Path | str, points: Mapping[str, Column] | SpooledCloud) -> 
 
 def read_csv(path: Path | str) -> Cloud:
     """Inverse of `write_csv`. InputError: a cell is no number, or a row is short."""
-    names = {title(name): name for name in UNITS} | {f"{name}_m": now for name, now in FORMER.items()}
+    names = {title(name): (name, 1.0) for name in UNITS} | {f"{name}_m": now for name, now in FORMER.items()}
     data = read_bytes(Path(path), MAX_BYTES, "table")
     try:
         header, *rows = list(csv.reader(io.StringIO(data.decode("utf-8"), newline=""))) or [[]]
@@ -265,13 +271,13 @@ def read_csv(path: Path | str) -> Cloud:
         raise InputError("the table cannot be read", where=str(path), found=found) from None
     cells: Cloud = {}
     for i, heading in enumerate(header):
-        name = names.get(heading, heading)
+        name, factor = names.get(heading, (heading, 1.0))
         try:
             texts = [row[i] for row in rows]
             if name in INTEGERS:
                 cells[name] = np.array(texts, dtype=np.int32)
             else:
-                cells[name] = np.array([text or "nan" for text in texts], dtype=np.float64)
+                cells[name] = factor * np.array([text or "nan" for text in texts], dtype=np.float64)
         except (ValueError, IndexError, OverflowError):
             kind = "whole numbers" if name in INTEGERS else "numbers"
             raise InputError(

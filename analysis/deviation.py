@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from analysis.distance import nearest_triangle, signed_distance, triangle_normals
 from render.base.arrays import Float, Int
 from render.base.errors import InputError
-from render.base.pose import rotation_matrix, transform_points
+from render.base.pose import invert, rotation_matrix, transform_points
 
 Alignment = Literal["none", "best-fit", "3-2-1"]
 ROUNDS = 60
@@ -111,17 +111,16 @@ def three_two_one(
     spots = np.asarray(datums, dtype=np.float64)
     facet = nearest_triangle(spots, vertices, triangles)
     normals = triangle_normals(vertices, triangles, facet)
-    motion, used = np.eye(4), 0
+    motion, used, tree = np.eye(4), 0, cKDTree(points)
     for _ in range(ROUNDS):
-        moved = transform_points(motion, points)
-        tree = cKDTree(moved)
         means, middles, used = np.zeros(6), np.zeros((6, 3)), 0
-        for k, around in enumerate(tree.query_ball_point(spots, radius)):
+        # the spots go to the points, whose tree stays as it is
+        for k, around in enumerate(tree.query_ball_point(transform_points(invert(motion), spots), radius)):
             if not around:
                 where = "{:.3f}, {:.3f}, {:.3f} mm".format(*(1e3 * spots[k]))
                 cure = "choose a spot that the camera sees, or a larger radius"
                 raise InputError(f"the spot {HELD_BY[k]} has no points", where=where, cure=cure)
-            middles[k] = moved[around].mean(axis=0)
+            middles[k] = transform_points(motion, points[around].mean(axis=0))
             means[k] = normals[k] @ (middles[k] - spots[k])
             used += len(around)
         step, held, largest = _step(middles, normals, means)
@@ -136,8 +135,8 @@ def three_two_one(
 
 
 def verdicts(value: Float, sigma: Float, lower: float, upper: float) -> Verdicts:
-    """(m,) by ISO 14253-1 with U = 2 sigma: proved within, proved beyond, or undecided; NaN counts as 0."""
-    uncertainty = 2.0 * np.nan_to_num(sigma)
+    """(m,) by ISO 14253-1 with U = 2 sigma: proved within, proved beyond, or undecided, as where sigma is NaN."""
+    uncertainty = 2.0 * sigma
     found = np.full(len(value), UNDECIDED, dtype=np.int8)
     found[(value - uncertainty >= lower) & (value + uncertainty <= upper)] = WITHIN
     found[value + uncertainty < lower] = BELOW

@@ -1,4 +1,7 @@
-"""The error of every point against the exact truth: along the scan line, in depth, and normal to the surface."""
+"""The error of every point against the exact truth: along the scan line, in depth, and normal to the surface.
+
+Both errors in metres have one sign: measured minus true along the ray from the camera, positive is too far.
+"""
 
 from __future__ import annotations
 
@@ -32,10 +35,11 @@ class Errors:
     """Error along the scan line (u on axis "rows"), px."""
     depth: Float
     """Error of `depth_z`, m: positive is too far from the camera."""
-    distance: Float
-    """Signed distance from the mesh, m: positive is on the camera's side. Also where no truth is matched."""
-    sigma_distance: Float
-    """Standard deviation of `distance`, m, predicted from sigma_u."""
+    off_surface: Float
+    """Distance from the mesh, m: positive is too far from the camera, behind the surface it sees. Also where no truth
+    is matched."""
+    sigma_off_surface: Float
+    """Standard deviation of `off_surface`, m, predicted from sigma_u."""
     sheet_bias: Float
     """Part of `position`, px, that the sheet's width explains on curved surfaces and at edges, from the truth."""
     outlier: NDArray[np.bool_]
@@ -45,7 +49,7 @@ class Errors:
     depth_z: Measures
     """Measures of `depth`, m."""
     surface: Measures
-    """Measures of `distance`, m."""
+    """Measures of `off_surface`, m."""
     truth_rows: int
     """Scan lines on which the camera can see the line."""
     valid_rows: int
@@ -85,10 +89,11 @@ def compare(
     sheet_bias[matched] = curve.sheet_bias[truth[matched]]
     position[matched] = along[matched] - curve.position[truth[matched]]
     depth[matched] = points.depth_z[matched] - curve.depth_z[truth[matched]]
-    distance, nearest = signed_distance(points.world, vertices, triangles, T_world_camera[:3, 3])
+    before, nearest = signed_distance(points.world, vertices, triangles, T_world_camera[:3, 3])
+    off_surface = -before
     check_finite("errors", along_the_line=position[matched], in_depth=depth[matched])
     if len(triangles):
-        check_finite("errors", off_the_surface=distance[points.valid])
+        check_finite("errors", off_the_surface=off_surface[points.valid])
 
     normals = triangle_normals(vertices, triangles, nearest)
     per_pixel = np.abs(np.einsum("ij,ij->i", points.gradient @ T_world_camera[:3, :3].T, normals))
@@ -101,13 +106,13 @@ def compare(
         truth=truth,
         position=position,
         depth=depth,
-        distance=distance,
-        sigma_distance=per_pixel * points.sigma_pixel,
+        off_surface=off_surface,
+        sigma_off_surface=per_pixel * points.sigma_pixel,
         sheet_bias=sheet_bias,
         outlier=wrong,
         u=measure(position, points.sigma_pixel, 1.0, *where),
         depth_z=measure(depth, points.sigma_depth, np.abs(points.gradient[:, 2]), *where),
-        surface=measure(distance, per_pixel * points.sigma_pixel, step, *where),
+        surface=measure(off_surface, per_pixel * points.sigma_pixel, step, *where),
         truth_rows=len(truth_rows),
         valid_rows=len(valid_rows),
         measured_rows=len(np.unique(points.index[matched & ~wrong])),

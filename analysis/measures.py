@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,11 @@ Mask = NDArray[np.bool_]
 
 MAD_TO_SIGMA = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
+MAD_EFFICIENCY = 0.3675
+"""Of the median absolute deviation of normal errors, against their standard deviation (Rousseeuw and Croux, J. Am.
+Stat. Assoc. 88, 1993)."""
+FEWEST = 4
+"""Points whose errors have a spread worth telling."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +103,35 @@ def shared_rows(length: Float, count: int) -> Float:
     """
     r = np.clip((length - 1.0) / (length + 1.0), 0.0, 1.0 - 1e-9)
     return np.asarray(length - 2.0 * r * (1.0 - r**count) / (count * (1.0 - r) ** 2))
+
+
+def error_statistics(error: Float, index: NDArray[np.intp], length: float) -> tuple[tuple[float, float], ...]:
+    """Mean, RMSE and robust sigma of (n,) errors on scan lines `index`, n >= 4, each with its sigma.
+
+    Neighbours err alike over `length` scan lines, or over more where the errors themselves say so: with a correlation
+    that falls by r from line to line the mean is of n (1 - r) / (1 + r) independent ones, the mean square, whose
+    correlation falls by r^2, of n (1 - r^2) / (1 + r^2) (Bartlett, J. R. Stat. Soc. B 8, 1946).
+    """
+    count, nobody = len(error), np.full(len(error), np.nan)
+    found = measure(error, nobody, np.inf, index, np.zeros(count, dtype=np.intp))
+    r = max((length - 1.0) / (length + 1.0), found.autocorrelation if math.isfinite(found.autocorrelation) else 0.0)
+    r = min(max(r, 0.0), 1.0 - 1e-9)
+    of_mean = float(shared_rows(np.array((1.0 + r) / (1.0 - r)), count)) / count
+    of_square = float(shared_rows(np.array((1.0 + r**2) / (1.0 - r**2)), count)) / count
+    spread = found.sigma * math.sqrt(count / (count - 1))
+    sigma_rmse = float(np.std(error**2)) * math.sqrt(of_square) / (2.0 * found.rmse) if found.rmse > 0.0 else 0.0
+    sigma_robust = found.robust_sigma * math.sqrt(of_square / (2.0 * MAD_EFFICIENCY))
+    return (
+        (found.bias, spread * math.sqrt(of_mean)),
+        (found.rmse, sigma_rmse),
+        (found.robust_sigma, sigma_robust),
+    )
+
+
+def median_length(length: Float) -> float:
+    """Of (n,) lengths of correlation, scan lines; 1 where none is known."""
+    known = length[np.isfinite(length)]
+    return float(np.median(known)) if len(known) else 1.0
 
 
 def means(

@@ -44,6 +44,16 @@ class Plane:
         """(n, 3) m -> across, up, and how far off the plane."""
         return np.asarray((points - np.asarray(self.point)) @ self.axes.T)
 
+    def world(self, local: Float) -> Float:
+        """(n, 2) or (n, 3) m of its own axes -> (n, 3)."""
+        return np.asarray(np.asarray(self.point) + local @ self.axes[: local.shape[1]])
+
+    def sheet(self, low: Float, high: Float) -> Float:
+        """(4, 3) corners of the least rectangle of it, along its axes, before and behind which the box (3,) (3,) is."""
+        corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), axis=-1).reshape(-1, 3)
+        (left, down), (right, up) = (edge(self.local(corners)[:, :2], axis=0) for edge in (np.min, np.max))
+        return self.world(np.array([[left, down], [right, down], [right, up], [left, up]]))
+
 
 def cut(vertices: Float, triangles: Int, plane: Plane) -> list[Float]:
     """Polylines (n, 2) across and up, m, in which a plane cuts (v, 3), (t, 3); closed ones end where they begin.
@@ -51,7 +61,6 @@ def cut(vertices: Float, triangles: Int, plane: Plane) -> list[Float]:
     By VTK's cutter, whose pieces are joined where they meet.
     """
     import pyvista
-    from vtkmodules.vtkFiltersCore import vtkCleanPolyData, vtkStripper
 
     if len(triangles) == 0:
         return []
@@ -61,15 +70,7 @@ def cut(vertices: Float, triangles: Int, plane: Plane) -> list[Float]:
     lines = mesh.slice(normal=(0.0, 0.0, 1.0), origin=(0.0, 0.0, 0.0), generate_triangles=False)
     if lines.n_cells == 0:
         return []
-    clean, stripper = vtkCleanPolyData(), vtkStripper()
-    clean.SetInputData(lines)
-    clean.ToleranceIsAbsoluteOn()
-    clean.SetAbsoluteTolerance(1e-9)
-    stripper.SetInputConnection(clean.GetOutputPort())
-    stripper.JoinContiguousSegmentsOn()
-    stripper.SetMaximumLength(10_000_000)
-    stripper.Update()
-    joined = pyvista.wrap(stripper.GetOutput())
+    joined = lines.clean(tolerance=1e-9, absolute=True).strip(join=True, max_length=10_000_000)
     places = np.asarray(joined.points, dtype=np.float64)[:, :2]
     cells, at, made = np.asarray(joined.lines), 0, []
     while at < len(cells):

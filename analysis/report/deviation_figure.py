@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from analysis.deviation import callouts
 from analysis.report.colour import INK, MUTED
 from analysis.report.error_figures import nice_limit
+from analysis.report.labels import label_places
 from analysis.report.style import figure
 from render.base.arrays import Float
 
@@ -19,6 +20,7 @@ BANDS = ("#2166ac", "#67a9cf", "#d1e5f0", "#a6d96a", "#a6d96a", "#fddbc7", "#ef8
 """Below the tolerance in blue, within in green, above in red: also told apart by their lightness."""
 MOST_DRAWN = 120_000
 CALLOUTS = 5
+LABEL_PT = 7.0
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,6 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         drawing.set(xlabel="mm", ylabel="mm")
         drawing.xaxis.set_major_locator(MaxNLocator(max(1, min(8, round(8.0 * wide / max(tall, 1e-9)))), integer=True))
         drawing.set_title("Deviation from the nominal surface")
-        _point_at(drawing, what, place)
         fine = np.linspace(edges[0], edges[-1], 49) * 1e6
         counts, _ = np.histogram(clipped, fine)
         middle = (fine[1:] + fine[:-1]) / 2.0
@@ -95,6 +96,8 @@ def draw(what: DeviationMap, seed: int = 0) -> Any:
         bars.axhline(0.0, color=MUTED, lw=0.6)
         bars.set(ylabel="deviation (µm), + too much", xlabel="points", ylim=(fine[0], fine[-1]))
         bars.set_title("Bands")
+        made.canvas.draw()  # where things are is known from here on
+        _point_at(drawing, what, place)
         made.canvas.draw()
         return made
 
@@ -105,16 +108,17 @@ def _point_at(axes: Any, what: DeviationMap, place: Float) -> None:
         return
     low, high = place.min(axis=0), place.max(axis=0)
     apart = 1e-3 * max(float(np.linalg.norm(high - low)) / 6.0, 1e-6)
-    middle = 0.5 * (low + high)
-    for number, (i, value) in enumerate(callouts(what.points, what.value, CALLOUTS, apart), 1):
-        side = -1.0 if place[i, 0] > middle[0] else 1.0
-        # neighbours on a low map would cover each other on one side of it
-        over = place[i, 1] < middle[1] if high[1] - low[1] > 0.3 * (high[0] - low[0]) else number % 2 == 1
+    found = callouts(what.points, what.value, CALLOUTS, apart)
+    texts = [f"{i}: {value * 1e6:+.{_places(value)}f} µm" for i, (_, value) in enumerate(found, 1)]
+    px = axes.figure.dpi / 72.0  # of a typographic point
+    anchors = axes.transData.transform(place[[i for i, _ in found]].reshape(-1, 2))
+    sizes = px * np.array([(LABEL_PT * (0.58 * len(text) + 1.0), 1.9 * LABEL_PT) for text in texts]).reshape(-1, 2)
+    box = axes.get_window_extent()
+    middles = label_places(anchors, sizes, np.array([box.x0, box.y0]), np.array([box.x1, box.y1]), 3.0 * px)
+    for (i, _), text, offset in zip(found, texts, (middles - anchors) / px, strict=True):
         axes.annotate(
-            f"{number}: {value * 1e6:+.{_places(value)}f} µm", place[i],
-            xytext=(16.0 * side, 22.0 if over else -22.0), textcoords="offset points",
-            ha="left" if side > 0.0 else "right", va="center", fontsize=7, color=INK,
-            bbox={"boxstyle": "round,pad=0.25", "fc": "white", "ec": INK, "lw": 0.5},
+            text, place[i], xytext=tuple(offset.tolist()), textcoords="offset points", ha="center", va="center",
+            fontsize=LABEL_PT, color=INK, bbox={"boxstyle": "round,pad=0.25", "fc": "white", "ec": INK, "lw": 0.5},
             arrowprops={"arrowstyle": "-", "color": INK, "lw": 0.6}, annotation_clip=False,
         )  # fmt: skip
 

@@ -77,7 +77,7 @@ def error_map_figure(path: Path, error: Float, limit: float, sigma: float) -> st
             normal *= len(finite) * (edges[1] - edges[0]) / (sigma * 1e6 * np.sqrt(2 * np.pi))
             histogram.plot(normal, middle, color=INK, lw=0.9)
         histogram.axhline(0, color=TRUTH, lw=1.2)
-        histogram.set(ylabel="signed distance (µm), + towards the camera", xlabel="points", ylim=(edges[0], edges[-1]))
+        histogram.set(ylabel="surface error (µm), + is too far", xlabel="points", ylim=(edges[0], edges[-1]))
         histogram.set_title("Distribution and scale")
         return png_uri(made)
 

@@ -32,7 +32,7 @@ def front(report: ReportInput) -> dict[str, Any] | None:
     if told.is_empty:
         return None
     rows = report.record.chosen().rows
-    rows = rows[rows["valid"] & np.isfinite(rows["distance"])]
+    rows = rows[rows["valid"] & np.isfinite(rows["off_surface"])]
     surface = _surface(report, rows)
     gauges = [_gauge_verdict(row) for row in report.measures]
     wanted = [one for one in (surface["verdict"], *gauges) if one]
@@ -70,7 +70,7 @@ def _gauge_verdict(row: dict[str, Any]) -> str:
 
 def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
     """Verdict and table of the surface's deviation."""
-    told, value = report.delivery, rows["distance"]
+    told, value = report.delivery, -rows["off_surface"]
     if len(value) == 0:
         return {"verdict": "undecided" if told.has_tolerance else "", "mark": "", "rows": []}
     table = [
@@ -96,15 +96,15 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
 
 
 def _sigma(rows: Any) -> Float:
-    """Of a point along the normal: its chance, and the systematic part at most."""
-    return np.asarray(np.hypot(np.nan_to_num(rows["sigma_distance"]), np.nan_to_num(rows["sigma_systematic"])))
+    """Of a point along the normal: its chance, NaN if it is not known, and the systematic part at most."""
+    return np.asarray(np.hypot(rows["sigma_off_surface"], np.nan_to_num(rows["sigma_systematic"])))
 
 
 def _map(report: ReportInput, rows: Any) -> str:
     eye = report.scene.T_world_camera(report.record.steps[0].step)[:3, 3]
     told = report.delivery
     towards = eye - rows["world"].mean(axis=0)
-    return png_uri(draw(DeviationMap(rows["world"], rows["distance"], towards, told.lower, told.upper)))
+    return png_uri(draw(DeviationMap(rows["world"], -rows["off_surface"], towards, told.lower, told.upper)))
 
 
 def _how(report: ReportInput, rows: Any) -> list[tuple[str, str]]:

@@ -218,7 +218,7 @@ def profile_figure(laser: LaserResult, T_camera_laser: Float) -> str:
         profile.set(ylabel="from the laser (mm)")
         profile.set_title("Profile in the plane of the laser sheet")
         profile.legend(loc="best", markerscale=5)
-        signed, sigma = first.errors.distance * 1e6, first.errors.sigma_distance * 1e6
+        signed, sigma = first.errors.off_surface * 1e6, first.errors.sigma_off_surface * 1e6
         limit = robust_limit([signed])
         order = np.argsort(found[:, 1])
         error.fill_between(found[order, 1], -2 * sigma[order], 2 * sigma[order], color=BAND, lw=0, label=BAND_LABEL)

@@ -168,7 +168,7 @@ def draw_scene(job: Any, path: Path) -> None:
 
 
 def draw_cloud(job: Any, path: Path) -> None:
-    """Measured points coloured by their signed distance, over the objects."""
+    """Measured points coloured by their error normal to the surface, over the objects."""
     import pyvista as pv
 
     plotter = _plotter(job, "cloud_view", SLATE, 1.0)

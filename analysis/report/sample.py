@@ -24,8 +24,8 @@ Rows = NDArray[np.void]
 ROW = np.dtype(
     [
         ("index", "i8"), ("rank", "i4"), ("flag", "u1"), ("valid", "?"), ("width", "f8"), ("world", "f8", 3),
-        ("position", "f8"), ("depth", "f8"), ("distance", "f8"), ("sheet_bias", "f8"),
-        ("sigma_position", "f8"), ("sigma_depth", "f8"), ("sigma_distance", "f8"),
+        ("position", "f8"), ("depth", "f8"), ("off_surface", "f8"), ("sheet_bias", "f8"),
+        ("sigma_position", "f8"), ("sigma_depth", "f8"), ("sigma_off_surface", "f8"),
         ("pixel_depth", "f8"), ("pixel_distance", "f8"), ("sigma_systematic", "f8"), ("alike", "f8"), ("shared", "f8"),
     ]
 )  # fmt: skip
@@ -51,10 +51,10 @@ def rows_of(extraction: Extraction, scene: Scene, step: int) -> Rows:
     rows["index"], rows["rank"], rows["valid"] = points.index, points.rank, points.valid
     rows["flag"], rows["width"] = line.flag[points.index, points.rank], line.width[points.index, points.rank]
     rows["world"] = at_first_step(points.world, scene, step)
-    rows["position"], rows["depth"], rows["distance"] = errors.position, errors.depth, errors.distance
+    rows["position"], rows["depth"], rows["off_surface"] = errors.position, errors.depth, errors.off_surface
     rows["sheet_bias"] = errors.sheet_bias
     rows["sigma_position"], rows["sigma_depth"] = points.sigma_pixel, points.sigma_depth
-    rows["sigma_distance"] = errors.sigma_distance
+    rows["sigma_off_surface"] = errors.sigma_off_surface
     rows["sigma_systematic"] = points.sigma_depth_systematic
     rows["alike"] = 1.0 if line.length_apart is None else line.length_apart[points.index, points.rank]
     shared = 0.0 if line.shared_u is None else line.shared_u[points.index, points.rank]

@@ -57,7 +57,7 @@ class Sums:
     false_rows: int = 0
     position: Moments = field(default_factory=Moments)
     depth: Moments = field(default_factory=Moments)
-    distance: Moments = field(default_factory=Moments)
+    off_surface: Moments = field(default_factory=Moments)
 
     def add(self, extraction: Extraction) -> None:
         points, errors = extraction.points, extraction.errors
@@ -70,7 +70,7 @@ class Sums:
         self.false_rows += errors.false_rows
         self.position.add(errors.position, points.sigma_pixel)
         self.depth.add(errors.depth, points.sigma_depth)
-        self.distance.add(errors.distance, errors.sigma_distance)
+        self.off_surface.add(errors.off_surface, errors.sigma_off_surface)
 
     def merge(self, other: Sums) -> None:
         self.method = self.method or other.method
@@ -82,4 +82,4 @@ class Sums:
         self.false_rows += other.false_rows
         self.position.merge(other.position)
         self.depth.merge(other.depth)
-        self.distance.merge(other.distance)
+        self.off_surface.merge(other.off_surface)

@@ -82,7 +82,7 @@ def total(chosen: Chosen) -> Total:
         method=sums.method,
         u=all_of(position_measures(rows), sums.position),
         depth_z=all_of(depth_measures(rows), sums.depth),
-        surface=all_of(distance_measures(rows), sums.distance),
+        surface=all_of(surface_measures(rows), sums.off_surface),
         points=sums.points,
         outliers=sums.outliers,
         truth_rows=sums.truth_rows,
@@ -116,9 +116,9 @@ def depth_measures(rows: Rows) -> Measures:
     return measure(rows["depth"], rows["sigma_depth"], rows["pixel_depth"], rows["index"], rows["rank"])
 
 
-def distance_measures(rows: Rows) -> Measures:
-    """Measures of the signed distance from the surface, m."""
-    return measure(rows["distance"], rows["sigma_distance"], rows["pixel_distance"], rows["index"], rows["rank"])
+def surface_measures(rows: Rows) -> Measures:
+    """Measures of the error normal to the surface, m."""
+    return measure(rows["off_surface"], rows["sigma_off_surface"], rows["pixel_distance"], rows["index"], rows["rank"])
 
 
 def _exact(found: Measures, moments: Moments) -> Measures:

@@ -88,10 +88,10 @@ def scene_view(report: ReportInput, frame: FrameResult) -> SceneView:
 
 
 def cloud_view(report: ReportInput) -> tuple[View, Float, Float]:
-    """The sample's points, where the objects are at step 0, with their signed distance: view, (m, 3) m, (m,) m."""
+    """The sample's points, where the objects are at step 0, with their surface error: view, (m, 3) m, (m,) m."""
     rows = report.record.chosen().rows
     rows = rows[rows["valid"]]
-    cloud, error = rows["world"], rows["distance"]
+    cloud, error = rows["world"], rows["off_surface"]
     if len(cloud) > MOST_POINTS:
         kept = np.linspace(0, len(cloud) - 1, MOST_POINTS).astype(np.intp)
         cloud, error = cloud[kept], error[kept]

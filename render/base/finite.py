@@ -51,3 +51,8 @@ def _total(values: NDArray[np.floating]) -> float:
     map_chunks(work, len(rows), step)
     with np.errstate(invalid="ignore", over="ignore"):
         return float(sums.sum())
+
+
+def known(value: float) -> float | None:
+    """For a file of JSON, which has no NaN."""
+    return value if math.isfinite(value) else None

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.report.gauge_table import PLAIN
-from analysis.report.units import micrometres
+from analysis.report.units import micrometres, percent
 from studio.runtime.streams import print_json
 from studio.scan.deviation import Question, compared, write_deviation
 
@@ -43,13 +43,18 @@ def tell_deviation(folder: Path, **options: Any) -> None:
 
 def sentence(record: dict[str, Any]) -> str:
     """The deviations in one line."""
-    size = f"mean {micrometres(record['mean'])}, rms {micrometres(record['rms'])}"
-    return f"{size}, {micrometres(record['least'])} to {micrometres(record['largest'])}"
+    spread = f"robust sigma {micrometres(record['robust_sigma'])}, 95 % within {micrometres(record['p95'])}"
+    return f"median {micrometres(record['median'])}, {spread}"
 
 
 def details(record: dict[str, Any]) -> list[str]:
     """How it was aligned, and what the tolerance says."""
-    told = []
+    size = f"Mean {micrometres(record['mean'])}, rms {micrometres(record['rms'])}"
+    told = [f"{size}, {micrometres(record['least'])} to {micrometres(record['largest'])}"]
+    if record["share_false"]:
+        rest = micrometres(record["rms_without_false"])
+        false = f"{percent(record['share_false'], 2)} of the points are false, 6 robust sigma from the median"
+        told.append(f"{false}: rms {rest} without them")
     if record["alignment"] != "none":
         shift = ", ".join(f"{round(1e3 * value, 4) + 0.0:+.4f}" for value in record["shift"])
         turn = math.degrees(record["turn"])
@@ -58,6 +63,7 @@ def details(record: dict[str, Any]) -> list[str]:
     counts = record["verdicts"]
     if counts is not None:
         shares = ", ".join(f"{counts[name]} {name}" for name in ("within", "undecided", "above", "below"))
+        told.append(f"{percent(record['share_beyond'], 2)} of the points are out of the tolerance's band")
         told.append(f"{MARKS[record['verdict']]} by ISO 14253-1 with two sigma: {shares}")
     if record["median_sigma"] is not None:
         told.append(f"A point's own sigma is {micrometres(record['median_sigma'])} at most (median)")

@@ -72,11 +72,13 @@ def offered(frame: Frame, eye: Eye, handle: Handle) -> bool:
     return math.sqrt(max(1.0 - along * along, 0.0)) > EDGE_ON if handle.kind == "axis" else along > EDGE_ON
 
 
-def handle_at(frame: Frame, eye: Eye, x: float, y: float, size: tuple[int, int]) -> Handle | None:
+def handle_at(
+    frame: Frame, eye: Eye, x: float, y: float, size: tuple[int, int], handles: tuple[Handle, ...] = HANDLES
+) -> Handle | None:
     """The handle under the mouse: a line that it touches, else the square it is in, else the nearest line in reach."""
     mouse = np.array([x, y])
     best, line, square = REACH_PX, None, None
-    for handle in HANDLES:
+    for handle in handles:
         if not offered(frame, eye, handle):
             continue
         if handle.kind == "plane":

@@ -17,6 +17,7 @@ from analysis.cloud import Cloud, at_first_step, merge, ply_pieces
 from analysis.deviation import (
     ABOVE,
     BELOW,
+    FAR,
     UNDECIDED,
     WITHIN,
     Aligned,
@@ -30,11 +31,13 @@ from analysis.deviation import (
     verdicts,
 )
 from analysis.distance import nearest_triangle
+from analysis.measures import robust_sigma
 from analysis.report.deviation_figure import DeviationMap, draw
 from analysis.report.style import DPI
 from render.base.arrays import Float, Int
 from render.base.errors import InputError
 from render.base.files import atomic_write
+from render.base.finite import known
 from render.base.pose import transform_points
 from render.mesh.load import load_mesh
 from render.scene.scene import Scene, SceneObject
@@ -92,6 +95,9 @@ class Compared:
     def record(self) -> dict[str, Any]:
         """What is told of it, SI units."""
         value, aligned = self.found.value, self.found.aligned
+        median = float(np.median(value))
+        robust = robust_sigma(value)
+        false = np.abs(value - median) > FAR * robust
         shift, turn = turn_and_shift(aligned.motion, self.found.points)
         counts = None
         if self.verdicts is not None:
@@ -115,7 +121,12 @@ class Compared:
             "least": float(value.min()),
             "largest": float(value.max()),
             "p95": float(np.percentile(np.abs(value), 95.0)),
-            "median_sigma": _known(float(np.nanmedian(self.sigma)) if np.isfinite(self.sigma).any() else math.nan),
+            "median": median,
+            "robust_sigma": robust,
+            "share_false": float(false.mean()),
+            "rms_without_false": float(np.sqrt((value[~false] ** 2).mean())),
+            "share_beyond": _share_beyond(value, self.question),
+            "median_sigma": known(float(np.nanmedian(self.sigma)) if np.isfinite(self.sigma).any() else math.nan),
             "lower": self.question.lower,
             "upper": self.question.upper,
             "verdicts": counts,
@@ -265,5 +276,10 @@ def _verdict(counts: dict[str, int] | None) -> str | None:
     return "fail" if counts["below"] + counts["above"] else "undecided" if counts["undecided"] else "pass"
 
 
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _share_beyond(value: Float, question: Question) -> float | None:
+    """Of the points out of the band of the tolerance, whatever their sigma; None: there is none."""
+    if question.lower is None and question.upper is None:
+        return None
+    lower = -math.inf if question.lower is None else question.lower
+    upper = math.inf if question.upper is None else question.upper
+    return float(np.mean((value < lower) | (value > upper)))

@@ -101,7 +101,7 @@ class _Growing:
 
     def __init__(self, points: Cloud) -> None:
         self.order = np.argsort(points["step"], kind="stable")
-        self.points = points
+        self.step = points["step"][self.order]
         self.done = 0
         self.canvas = np.full((HEIGHT, HEIGHT, 3), GROUND, dtype=np.uint8)
         place = np.column_stack([points["x"], points["y"]])
@@ -116,7 +116,7 @@ class _Growing:
 
     def until(self, step: int) -> NDArray[np.uint8]:
         """With the points of all steps up to this one."""
-        end = int(np.searchsorted(self.points["step"][self.order], step, side="right"))
+        end = int(np.searchsorted(self.step, step, side="right"))
         new = self.order[self.done : end]
         for right in range(self.size):
             for down in range(self.size):

@@ -14,6 +14,7 @@ from analysis.cloud import Cloud, merge, ply_pieces
 from analysis.height_map import HeightMap, encoded, height_map
 from render.base.errors import InputError
 from render.base.files import atomic_write
+from render.base.finite import known
 from studio.scan.own_files import check_replaceable
 from studio.scan.scan_results import ScanResults
 
@@ -91,10 +92,10 @@ def _written(made: HeightMap, path: Path, beside: Path, source: Path) -> Written
         "valid": int(np.count_nonzero(numbers)),
         "points": made.points,
         "sigma": {
-            "points": _known(made.sigma_points),
-            "cells": _known(made.sigma_cells),
-            "cells_over_points": _known(made.sigma_cells / made.sigma_points if made.sigma_points > 0.0 else math.nan),
-            "correlation_of_neighbours": _known(made.correlation),
+            "points": known(made.sigma_points),
+            "cells": known(made.sigma_cells),
+            "cells_over_points": known(made.sigma_cells / made.sigma_points if made.sigma_points > 0.0 else math.nan),
+            "correlation_of_neighbours": known(made.correlation),
             "quantisation": scale / math.sqrt(12.0),
         },
     }
@@ -127,7 +128,3 @@ def sigma_sentence(record: dict[str, Any]) -> str:
         f"({1e6 * sigma['cells']:.3g} of {1e6 * sigma['points']:.3g} um){together}; "
         f"16 bits add {1e6 * sigma['quantisation']:.2g} um."
     )
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None

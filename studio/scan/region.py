@@ -11,20 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cloud import cloud, write_csv
-from analysis.measures import measure, shared_rows
-from render.base.arrays import Float
+from analysis.measures import FEWEST, error_statistics, median_length
 from render.base.errors import InputError
 from render.scene.scene import Scene
 from studio.project.input_files import input_files
 from studio.scan.own_files import check_not_read
 from studio.scan.result_series import ErrorView, error_values, measured_series
 from studio.scan.stages import Measurement
-
-FEWEST = 4
-"""Points whose errors have a spread worth telling."""
-MAD_EFFICIENCY = 0.3675
-"""Of the median absolute deviation of normal errors, against their standard deviation (Rousseeuw and Croux, J. Am.
-Stat. Assoc. 88, 1993)."""
 
 
 @dataclass(frozen=True)
@@ -75,33 +68,8 @@ def _figures(here: NDArray[np.bool_], found: Measurement, view: ErrorView) -> li
     known = here & np.isfinite(error)
     if np.count_nonzero(known) < FEWEST:
         return [str(np.count_nonzero(here)), "-", "-", "-"]
-    lengths = points.correlation_length[known]
-    length = float(np.median(lengths[np.isfinite(lengths)])) if np.isfinite(lengths).any() else 1.0
-    figures = error_statistics(error[known], points.index[known], length)
+    figures = error_statistics(error[known], points.index[known], median_length(points.correlation_length[known]))
     return [str(np.count_nonzero(here)), *(_with_sigma(*pair) for pair in figures)]
-
-
-def error_statistics(error: Float, index: NDArray[np.intp], length: float) -> tuple[tuple[float, float], ...]:
-    """Mean, RMSE and robust sigma of (n,) errors on scan lines `index`, n >= 4, each with its sigma.
-
-    Neighbours err alike over `length` scan lines, or over more where the errors themselves say so: with a correlation
-    that falls by r from line to line the mean is of n (1 - r) / (1 + r) independent ones, the mean square, whose
-    correlation falls by r^2, of n (1 - r^2) / (1 + r^2) (Bartlett, J. R. Stat. Soc. B 8, 1946).
-    """
-    count, nobody = len(error), np.full(len(error), np.nan)
-    found = measure(error, nobody, np.inf, index, np.zeros(count, dtype=np.intp))
-    r = max((length - 1.0) / (length + 1.0), found.autocorrelation if math.isfinite(found.autocorrelation) else 0.0)
-    r = min(max(r, 0.0), 1.0 - 1e-9)
-    of_mean = float(shared_rows(np.array((1.0 + r) / (1.0 - r)), count)) / count
-    of_square = float(shared_rows(np.array((1.0 + r**2) / (1.0 - r**2)), count)) / count
-    spread = found.sigma * math.sqrt(count / (count - 1))
-    sigma_rmse = float(np.std(error**2)) * math.sqrt(of_square) / (2.0 * found.rmse) if found.rmse > 0.0 else 0.0
-    sigma_robust = found.robust_sigma * math.sqrt(of_square / (2.0 * MAD_EFFICIENCY))
-    return (
-        (found.bias, spread * math.sqrt(of_mean)),
-        (found.rmse, sigma_rmse),
-        (found.robust_sigma, sigma_robust),
-    )
 
 
 def _with_sigma(value: float, sigma: float) -> str:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.error import Errors
-from analysis.measures import Measures
+from analysis.measures import FEWEST, Measures, error_statistics, median_length
 from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.frame import LaserCurve
@@ -52,15 +52,16 @@ class ErrorView:
 
 ERROR_VIEWS = (
     ErrorView("depth", "Depth error", "µm", 1e6),
-    ErrorView("surface", "Distance to surface", "µm", 1e6),
+    ErrorView("surface", "Surface error", "µm", 1e6),
     ErrorView("position", "Line position error", "px", 1.0),
 )
 
 
+UNCERTAINTY = "Bias known to"
 MEASURED = (
+    ("RMSE", "rmse"),
     ("Bias", "bias"),
     ("Sigma", "sigma"),
-    ("RMSE", "rmse"),
     ("Robust sigma", "robust_sigma"),
     ("95 % within", "p95"),
 )
@@ -90,7 +91,7 @@ def measured_series(measurement: Measurement, scene: Scene) -> Series:
 
 def error_values(errors: Errors, view: ErrorView) -> Float:
     """(m,) measured minus true, in the view's unit."""
-    values = {"depth": errors.depth, "surface": errors.distance, "position": errors.position}[view.kind]
+    values = {"depth": errors.depth, "surface": errors.off_surface, "position": errors.position}[view.kind]
     return np.asarray(values * view.scale)
 
 
@@ -123,18 +124,35 @@ def histogram(error: Float, limit: float) -> tuple[Float, Float]:
 
 
 def table(found: list[Measurement], view: ErrorView) -> list[tuple[str, str, list[float]]]:
-    """Rows of the table of measures: name, unit, a value for each measurement (NaN: there is none)."""
-    rows: list[tuple[str, str, list[float]]] = [
+    """Rows of the table of measures: name, unit, a value for each measurement (NaN: there is none).
+
+    Errors first: on a low screen the rest is scrolled.
+    """
+    rows: list[tuple[str, str, list[float]]] = []
+    of = [measures(one.errors, view.kind) for one in found]
+    for name, attribute in MEASURED:
+        rows.append((name, view.unit, [view.scale * getattr(one, attribute) for one in of]))
+        if attribute == "bias":
+            rows.append((UNCERTAINTY, view.unit, [bias_uncertainty(one, view) for one in found]))
+    rows += [
         ("Points", "", [float(one.points.valid.sum()) for one in found]),
         ("Completeness", "%", [100.0 * one.errors.completeness for one in found]),
         ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
     ]
-    of = [measures(one.errors, view.kind) for one in found]
-    for name, attribute in MEASURED:
-        rows.append((name, view.unit, [view.scale * getattr(one, attribute) for one in of]))
     rows.append(("Outliers", "%", [100.0 * one.outlier_rate for one in of]))
     rows.append(("Within 2 sigma", "%", [100.0 * one.coverage for one in of]))
     return rows
+
+
+def bias_uncertainty(found: Measurement, view: ErrorView) -> float:
+    """Twice the standard deviation of the mean error, in the view's unit, as neighbouring scan lines err alike; NaN: of
+    too few errors."""
+    error, points = error_values(found.errors, view), found.points
+    known = np.isfinite(error)
+    if np.count_nonzero(known) < FEWEST:
+        return math.nan
+    length = median_length(points.correlation_length[known])
+    return 2.0 * error_statistics(error[known], points.index[known], length)[0][1]
 
 
 def _series(index: Float, position: Float, depth: Float, points: Float, scene: Scene, laser: int) -> Series:

@@ -30,12 +30,14 @@ from studio.scan.stages import scaled, step_world
 LARGEST = 1e12
 MOST_FILES = 50
 """Project files of a folder that are looked at for the one that was scanned."""
-COLUMNS = {"depth": "error_depth", "surface": "error_distance"}
+COLUMNS = {"depth": "error_depth", "surface": "error_surface"}
 """Kind of error -> the column of the points that holds it; the error in the image is not among them."""
 NEEDED = {name: "i" if name in INTEGERS else "f" for name in ("x", "y", "z", *INTEGERS, *COLUMNS.values())}
 """Columns without which points cannot be shown, and their kind of number."""
-FIGURES = {"depth": "depth_m", "surface": "surface_m", "position": "line_px"}
+FIGURES = {"depth": "depth_m", "surface": "surface_error_m", "position": "line_px"}
 """Kind of error -> its entry in a row of the manifest's results."""
+FORMER_SURFACE = "surface_m"
+"""The surface's in older manifests: positive is towards the camera there."""
 
 
 @dataclass(frozen=True)
@@ -89,17 +91,17 @@ class ScanResults:
         written = self.found.manifest.get("results")
         rows = [row for row in written if isinstance(row, dict)] if isinstance(written, list) else []
         rows = [row for row in rows if row.get("laser") == name and isinstance(row.get("method"), str)]
-        errors = [row.get(FIGURES[view.kind]) for row in rows]
-        figures = [error if isinstance(error, dict) else {} for error in errors]
+        figures = [_figures(row, view.kind) for row in rows]
         points = [_number(row, "points") for row in rows]
-        found: list[tuple[str, str, list[float]]] = [
+        found: list[tuple[str, str, list[float]]] = []
+        for title, key in MEASURED:
+            values = [_sigma(each) if key == "sigma" else _number(each, key) for each in figures]
+            found.append((title, view.unit, [view.scale * value for value in values]))
+        found += [
             ("Points", "", points),
             ("Completeness", "%", [100.0 * _number(row, "completeness") for row in rows]),
             ("False scan lines", "", [_number(row, "false_scan_lines") for row in rows]),
         ]
-        for title, key in MEASURED:
-            values = [_sigma(each) if key == "sigma" else _number(each, key) for each in figures]
-            found.append((title, view.unit, [view.scale * value for value in values]))
         shares = [_number(row, "outliers") / n if n else math.nan for row, n in zip(rows, points, strict=True)]
         found.append(("Outliers", "%", [100.0 * share for share in shares]))
         return [row["method"] for row in rows], found
@@ -203,6 +205,14 @@ def _number(row: dict[str, Any], key: str) -> float:
     """NaN: it is no number, or none that a table can show."""
     value = row.get(key)
     return float(value) if isinstance(value, int | float) and abs(value) < LARGEST else math.nan
+
+
+def _figures(row: dict[str, Any], kind: str) -> dict[str, Any]:
+    """Of a kind of error; nothing where there is none."""
+    found, former = row.get(FIGURES[kind]), row.get(FORMER_SURFACE)
+    if kind == "surface" and found is None and isinstance(former, dict):
+        return {**former, "bias": -_number(former, "bias")}
+    return found if isinstance(found, dict) else {}
 
 
 def _sigma(figures: dict[str, Any]) -> float:

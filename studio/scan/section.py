@@ -107,14 +107,13 @@ def _write_dxf(made: Section, path: Path) -> None:
 
 
 def _write_csv(made: Section, path: Path) -> None:
-    axes, origin = made.plane.axes, np.asarray(made.plane.point)
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(SECTION_COLUMNS)
         for number, line in enumerate(made.true):
-            for place, world in zip(line.tolist(), (origin + line @ axes[:2]).tolist(), strict=True):
+            for place, world in zip(line.tolist(), made.plane.world(line).tolist(), strict=True):
                 writer.writerow(["true", number, *place, *world, 0.0, "", "", ""])
-        worlds = (origin + made.measured @ axes).tolist()
+        worlds = made.plane.world(made.measured).tolist()
         rest = zip(made.sigma.tolist(), made.step.tolist(), made.row.tolist(), strict=True)
         for place, world, numbers in zip(made.measured.tolist(), worlds, rest, strict=True):
             sigma, step, row = ("" if value != value else value for value in numbers)

@@ -42,7 +42,7 @@ def _figures(found: Total) -> dict[str, Any]:
         "sampled_scan_lines": found.lines_kept,
         "line_px": _error(found.u),
         "depth_m": _error(found.depth_z),
-        "surface_m": _error(found.surface),
+        "surface_error_m": _error(found.surface),
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -71,7 +72,7 @@ def test_what_the_truth_predicts_of_the_sheet_is_systematic_and_of_photographs_n
     points = some_points(70)
     bias = np.where(np.arange(70) % 2 == 0, np.nan, 0.3)
     nothing = np.full(70, np.nan)
-    errors = SimpleNamespace(sheet_bias=bias, depth=nothing, distance=nothing)
+    errors = SimpleNamespace(sheet_bias=bias, depth=nothing, off_surface=nothing)
     told, alone = cloud(points, errors, 0, 0), cloud(points, None, 0, 0)
     moved = 0.3 * np.abs(points.gradient[points.valid])
     unknown = np.isnan(bias[points.valid])
@@ -103,7 +104,7 @@ def test_the_table_names_its_units(tmp_path):
     write_csv(tmp_path / "p.csv", cloud(some_points(3), None, 0, 0))
     assert (tmp_path / "p.csv").read_text().splitlines()[0] == (
         "x_m,y_m,z_m,sigma_random_m,sigma_systematic_m,sigma_depth_random_m,sigma_depth_systematic_m,"
-        "correlation_length_rows,error_depth_m,error_distance_m,sheet_bias_px,u_px,v_px,row,laser,step"
+        "correlation_length_rows,error_depth_m,error_surface_m,sheet_bias_px,u_px,v_px,row,laser,step"
     )
 
 
@@ -184,3 +185,14 @@ def test_a_cloud_on_disk_is_written_as_the_same_cloud_in_memory(tmp_path, monkey
 def test_a_cloud_without_points_on_disk_has_its_columns(tmp_path):
     write_ply(tmp_path / "p.ply", SpooledCloud(tmp_path))
     assert {name: len(column) for name, column in read_ply(tmp_path / "p.ply").items()} == dict.fromkeys(UNITS, 0)
+
+
+def test_distances_of_older_files_turn_their_sign(tmp_path: Path) -> None:
+    """They were positive towards the camera; what is read is positive away from it, as the depth error is."""
+    now = np.array([1e-5, -2e-5, np.nan])
+    old = {"x": now, "error_distance": -now}
+    write_ply(tmp_path / "old.ply", old)
+    (tmp_path / "old.csv").write_text("x_m,error_distance_m\n" + "".join(f"0,{-v!r}\n" for v in now[:2].tolist()))
+    for found, count in ((read_ply(tmp_path / "old.ply"), 3), (read_csv(tmp_path / "old.csv"), 2)):
+        assert "error_distance" not in found
+        np.testing.assert_array_equal(found["error_surface"], now[:count])

@@ -68,10 +68,16 @@ def test_e57_is_read_by_its_own_library(points: Cloud, tmp_path: Path) -> None:
     assert np.allclose(read["intensity"], points["error_depth"], rtol=np.finfo(np.float32).eps, atol=0.0)
 
 
-@pytest.mark.parametrize("suffix", [*WRITERS, ".dat"])
-def test_nothing_and_other_suffixes_are_refused(suffix: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError):
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_nothing_is_refused(suffix: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no points to write"):
         write_points(tmp_path / f"p{suffix}", merge([]))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_suffix_is_refused_with_those_there_are(points: Cloud, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.pcd, \.xyz, \.las, \.e57"):
+        write_points(tmp_path / "p.dat", points)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -135,3 +135,5 @@ def test_a_tolerance_is_proved_by_twice_the_sigma() -> None:
     value = np.array([0.0, 0.9, 1.0, 1.1, 1.3, -1.3, -1.05])
     found = verdicts(value, np.full(7, 0.1), -1.0, 1.0)
     assert found.tolist() == [WITHIN, UNDECIDED, UNDECIDED, UNDECIDED, ABOVE, BELOW, UNDECIDED]
+    unknown = verdicts(value, np.full(7, np.nan), -1.0, 1.0)
+    assert set(unknown.tolist()) == {UNDECIDED}, "what has no sigma proves nothing"

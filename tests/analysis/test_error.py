@@ -77,9 +77,9 @@ def test_noise_and_bias_come_out_as_they_went_in():
     assert errors.u.robust_sigma == pytest.approx(0.1, rel=4 * 1.17 / math.sqrt(2048))
     assert errors.depth_z.sigma == pytest.approx(errors.u.sigma * dz_du, rel=1e-3)
     assert errors.depth_z.bias == pytest.approx(-errors.u.bias * dz_du, rel=2e-2)  # farther right is nearer
-    # the wall faces the camera: the distance off it is the depth error, towards the camera positive
-    assert np.allclose(errors.distance, -errors.depth, atol=1e-12)
-    assert np.allclose(errors.sigma_distance, points.sigma_depth, rtol=1e-9)
+    # the wall faces the camera: the error off it is the depth error, of the same sign
+    assert np.allclose(errors.off_surface, errors.depth, atol=1e-12)
+    assert np.allclose(errors.sigma_off_surface, points.sigma_depth, rtol=1e-9)
     assert abs(errors.u.autocorrelation) < 4 / math.sqrt(2048)
     assert errors.u.rmse**2 == pytest.approx(errors.u.bias**2 + errors.u.sigma**2)
 

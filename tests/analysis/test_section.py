@@ -61,3 +61,18 @@ def test_axes_are_orthonormal_and_places_come_back(normal: tuple[float, float, f
 def test_a_plane_without_direction_is_refused() -> None:
     with pytest.raises(InputError, match="direction"):
         _ = Plane((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)).axes
+
+
+def test_the_sheet_is_the_shadow_of_a_box_on_the_plane() -> None:
+    low, high = np.array([-0.01, 0.02, 0.0]), np.array([0.03, 0.05, 0.04])
+    plane = Plane((0.5, 0.0, 0.0), (1.0, 0.0, 0.0))
+    assert np.allclose(
+        plane.sheet(low, high), [(0.5, y, z) for y, z in ((0.02, 0), (0.05, 0), (0.05, 0.04), (0.02, 0.04))]
+    )
+    # a plane aslant meets a rectangle that holds every corner
+    turned = Plane((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
+    across, up = turned.local(turned.sheet(low, high))[:, :2].T
+    corners = np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    shadow = turned.local(corners)
+    assert (across.min(), across.max()) == pytest.approx((shadow[:, 0].min(), shadow[:, 0].max()))
+    assert (up.min(), up.max()) == pytest.approx((shadow[:, 1].min(), shadow[:, 1].max()))

@@ -110,6 +110,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("presets", "Scene", "&Presets"),
     Command("motion", "Scene", "M&otion"),
     Command("render", "Render", "&Render", "F5", "render", "Render the frame with the settings of the Render panel"),
+    Command("expose", "Render", "Automatic &exposure", "F4", "", "The line's brightest pixels nearly full"),
     Command("pause", "Render", "&Pause or go on", "F9", "pause"),
     Command("cancel", "Render", "&Cancel", "Shift+F5", "cancel", "Stop what is being computed"),
     "Render/-",

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Signal
 
+from analysis.section import Plane
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.checkpoint import RenderState
@@ -68,14 +70,23 @@ class Render:
         """Of the image, to the scanner's."""
         return self.image_scale if self.scan is None else self.scan.image_scale
 
+    @property
+    def refining(self) -> bool:
+        """More of its light is to come by itself."""
+        return not self.final and self.state is None
+
     def developed_by(self, now: Project) -> Project:
         """The project, at full scale, by whose sensor, power and extraction it is developed and measured."""
         return self.source if self.cell and self.source is not None else now
 
     def is_measured(self, how: Development) -> bool:
         """Images and measurements are of the present frame, developed like this."""
-        made = [self.made_from.get(what) for what in ("images", "measurements")]
-        return all(one is not None and one[0] is self.frame and one[1] == how for one in made)
+        return self.has("images", how) and self.has("measurements", how)
+
+    def has(self, what: str, how: Development) -> bool:
+        """ "images" or "measurements" of the present frame, developed like this."""
+        made = self.made_from.get(what)
+        return made is not None and made[0] is self.frame and made[1] == how
 
     def repeatable(self, now: Project) -> bool:
         """A run of its first step gives the same images: those of a step follow the scan's plan, a cell its study's."""
@@ -85,6 +96,29 @@ class Render:
     def is_stale(self, now: Project) -> bool:
         """The scene has changed since, in a way that developing cannot follow; what a study measured stays as it is."""
         return not self.cell and is_stale(self.source or self.project, now)
+
+
+@dataclass(frozen=True)
+class ShownSection:
+    """The plane of the section as the 3D view has it; m, world frame."""
+
+    plane: Plane
+    corners: Float
+    """(4, 3) of the sheet that stands for it."""
+    true: list[Float]
+    """Polylines (n, 3) of the part."""
+
+
+@dataclass(frozen=True)
+class ShownDeviation:
+    """Points by their deviation from a nominal part, as the 3D view colours them."""
+
+    points: Float
+    """(n, 3) m, where the objects are at step 0."""
+    value: Float
+    """(n,) m."""
+    row: NDArray[np.int32]
+    step: NDArray[np.int32]
 
 
 class Session(QObject):
@@ -119,6 +153,10 @@ class Session(QObject):
     """Another project was opened."""
     ghost_changed = Signal()
     """`ghost` is another."""
+    deviation_changed = Signal()
+    """`deviation` is another."""
+    section_changed = Signal()
+    """`section` is another."""
 
     def __init__(self, document: Document) -> None:
         super().__init__()
@@ -132,8 +170,24 @@ class Session(QObject):
         """What the live preview cannot show as it is set: by the path of the field, why."""
         self.ghost: Float = np.zeros((0, 4, 3))
         """(k, m, 3) m in the camera frame: dark shapes of the calibration board where it is advised to be held."""
+        self.section: ShownSection | None = None
+        """What the panel of the section shows in 3D, and the 3D view moves; None: nothing."""
+        self.deviation: ShownDeviation | None = None
+        """What the panel of the deviation shows in 3D; None: nothing."""
         self.document = document
         document.listeners.append(self.project_changed.emit)
+
+    def show_deviation(self, deviation: ShownDeviation | None) -> None:
+        """None hides it."""
+        if deviation is not self.deviation:
+            self.deviation = deviation
+            self.deviation_changed.emit()
+
+    def show_section(self, section: ShownSection | None) -> None:
+        """None hides it."""
+        if section is not self.section:
+            self.section = section
+            self.section_changed.emit()
 
     def show_ghost(self, shapes: Float) -> None:
         """(k, m, 3), as `ghost`; none hides it."""

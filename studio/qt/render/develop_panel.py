@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import get_args
@@ -44,6 +45,8 @@ from studio.scan.stages import Measurement
 OF_A_CELL = "This is a cell of a study, as it was measured; the settings above are for the project's own renders."
 REST_MS = 120
 """Without a change before the lines are measured: while something is dragged, new images come first."""
+RESTED = 3.0
+"""Times what developing and measuring took, until a render that goes on is looked at again: it has the processor."""
 
 
 class DevelopPanel(QWidget):
@@ -60,6 +63,11 @@ class DevelopPanel(QWidget):
         self._told_of: Render | None = None
         """The render that brightness and measures are of."""
         self._to_measure: tuple[Render, Frame, Development, list[Image], tuple[Method, ...]] | None = None
+        self._measured: list[Image] | None = None
+        """Images that were measured last: of these, other methods are not asked again."""
+        self._began = self._free_at = 0.0
+        self._later = QTimer(self, singleShot=True)
+        self._later.timeout.connect(self.refresh)
         self._rest = QTimer(self)
         self._rest.setSingleShot(True)
         self._rest.setInterval(REST_MS)
@@ -105,13 +113,14 @@ class DevelopPanel(QWidget):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self._rest.stop()
+        self._later.stop()
         self.runner.close()
         super().closeEvent(event)
 
     @property
     def busy(self) -> bool:
         """What was asked for is not all done yet."""
-        return self.runner.busy or self._rest.isActive()
+        return self.runner.busy or self._rest.isActive() or self._later.isActive()
 
     def chosen(self) -> tuple[Method, ...]:
         """The methods to measure by; the own one first: of the project, or of the study's cell that is shown."""
@@ -151,7 +160,7 @@ class DevelopPanel(QWidget):
     def _connect(self) -> None:
         session = self.session
         session.project_changed.connect(self._project_changed)
-        session.renders_changed.connect(self.refresh)
+        session.renders_changed.connect(self._another_frame)
         self.exposure.changed.connect(self._setter(("sensor", "exposure_time"), "exposure"))
         self.gain.changed.connect(self._setter(("sensor", "gain"), "gain"))
         for field in (self.exposure, self.gain):
@@ -261,9 +270,18 @@ class DevelopPanel(QWidget):
             field.released.connect(self._end_merge)
             self._power_rows.addWidget(field)
 
+    def _another_frame(self) -> None:
+        """Of a render that goes on the next light waits, so that looking at it does not take longer than it does."""
+        render, wait = self.session.shown, self._free_at - time.perf_counter()
+        if render is None or render is not self._told_of or not render.refining or wait <= 0.0:
+            self.refresh()
+        elif not self._later.isActive():
+            self._later.start(math.ceil(1e3 * wait))
+
     def refresh(self) -> None:
         """Develop and measure the shown render; what is asked for meanwhile is done once, with the latest values."""
-        render = self.session.shown
+        self._later.stop()
+        self._began, render = time.perf_counter(), self.session.shown
         if render is not self._told_of:
             self._told_of = render
             for label in (self.told, self.table, self.noted):
@@ -274,7 +292,8 @@ class DevelopPanel(QWidget):
             self.runner.cancel("measure")
             self.told.setText("Render the scene, then change these as often as you like.")
             return
-        frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()
+        # of light that is still to come the project's own method tells enough, and takes no time from the render
+        frame, noise, methods = render.frame, self.noise.isChecked(), self.chosen()[: 1 if render.refining else None]
         how = development(render.project, render.developed_by(self.session.project), render.image_scale)
         names = [laser.name for laser in render.project.scene.lasers]
 
@@ -295,7 +314,10 @@ class DevelopPanel(QWidget):
 
         self._rest.stop()
         self.runner.cancel("measure")
-        self.runner.run("develop", "developing", work, then)
+        if self.runner.job("develop") is None and render.noise == noise and render.has("images", how):
+            then(render.images)  # the light that came last was all there was to come
+        else:
+            self.runner.run("develop", "developing", work, then)
 
     def _take_images(
         self, render: Render, made_from: tuple[Frame, Development], images: list[Image], seconds: float, told: str
@@ -313,11 +335,17 @@ class DevelopPanel(QWidget):
         self._to_measure = None
         world = render.world
 
+        known = render.measurements if images is self._measured else {}
+
         def work(progress: Progress, cancelled: Cancel) -> dict[str, list[Measurement]]:
-            return measure_again(frame, world, how, images, methods, cancelled=cancelled)
+            missing = tuple(method for method in methods if method not in known)
+            found = {**known, **measure_again(frame, world, how, images, missing, cancelled=cancelled)}
+            return {method: found[method] for method in methods if method in found}
 
         def then(found: dict[str, list[Measurement]]) -> None:
-            render.measurements, render.made_from["measurements"] = found, (frame, how)
+            render.measurements, render.made_from["measurements"], self._measured = found, (frame, how), images
+            now = time.perf_counter()
+            self._free_at = now + RESTED * (now - self._began)
             if render is self.session.shown:
                 self._tell_measures(found)
                 self.session.measured.emit()

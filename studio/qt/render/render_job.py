@@ -39,7 +39,7 @@ def render_frames(
     if world is None:
         progress("loading meshes", 0.0)
         world = build_world(project.scene, root, step)
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] | None = None
     for frame in refine(
         world,
         project.scene,
@@ -49,10 +49,10 @@ def render_frames(
         run=replace(run, seed=project.seed, goal=goal_of(project, run.threads)),
         progress=progress,
     ):
-        take(world, replace(frame, warnings=(*doubts, *frame.warnings)))
+        take(world, replace(frame, warnings=(*(doubts or ()), *frame.warnings)))
         # the line is there before the kernels of all other light
         warm_up(for_all, lambda stage, done: progress(stage, 0.0), run.cancelled)
-        doubts = doubts or tuple(view_warnings(project, frame))
+        doubts = tuple(view_warnings(project, frame)) if doubts is None else doubts
 
 
 def can_go_on(render: Render | None) -> bool:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QImage, QPixmap, QResizeEvent
+from PySide6.QtGui import QHideEvent, QImage, QPixmap, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QFileDialog,
@@ -24,7 +26,7 @@ from render.base.errors import InputError
 from studio.commands.deviation import details, sentence
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Session
+from studio.qt.core.session import Session, ShownDeviation
 from studio.qt.core.widgets import ElidedLabel, text_button
 from studio.qt.results.shown_points import NOTHING, are_there, shown_points
 from studio.runtime.error_messages import trouble
@@ -65,6 +67,10 @@ class DeviationTab(QWidget):
         self.least, self.most = _limit(-100.0), _limit(100.0)
         self.compare_button = text_button("Compare", "", "primary")
         self.export = text_button("Export as CSV…", "Every point, with map and figures beside it")
+        self.in_view = QCheckBox("In the 3D view")
+        self.in_view.setToolTip("While this is looked at the points there have the colours of their deviation")
+        self.in_view.setChecked(True)
+        self.in_view.toggled.connect(self._place)
         self.told = QLabel(wordWrap=True)
         self.told.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.map = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
@@ -146,12 +152,29 @@ class DeviationTab(QWidget):
         files = write_deviation(self.compared, path, [] if self.cad is None else [self.cad])
         self.session.message.emit("info", f"Wrote {', '.join(str(file) for file in files)}")
 
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._place()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self.session.show_deviation(None)
+
+    def _place(self) -> None:
+        """Into the 3D view, where it is to be seen."""
+        found, shown = self.compared, None
+        if found is not None and self.isVisible() and self.in_view.isChecked():
+            row, step = (found.columns[name].astype(np.int32) for name in ("row", "step"))
+            shown = ShownDeviation(found.found.points, found.found.value, row, step)
+        self.session.show_deviation(shown)
+
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 
     def _show(self, found: Compared | None) -> None:
         self.compared = found
+        self._place()
         self.export.setEnabled(found is not None)
         self.map.setVisible(found is not None)
         if found is None:
@@ -210,6 +233,7 @@ class DeviationTab(QWidget):
         buttons = QHBoxLayout()
         buttons.addWidget(self.compare_button)
         buttons.addWidget(self.export)
+        buttons.addWidget(self.in_view)
         buttons.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(MARGIN, MARGIN, MARGIN, MARGIN)

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTab
 from analysis.report.colour import method_name
 from analysis.report.units import digits
 from studio.qt.core import theme
+from studio.scan.result_series import UNCERTAINTY
 
 COVERED = "Within 2 sigma"
 HONEST = 88.0
@@ -20,6 +21,8 @@ EXPLAINED = {
     "Completeness": "Share of the scan lines on which the line can be seen that have a right measurement.",
     "False scan lines": "Scan lines with a point although no line is to be seen there.",
     "Bias": "Mean error: what averaging does not remove.",
+    UNCERTAINTY: "Twice the standard deviation of the bias, as neighbouring scan lines err alike: a smaller one may be "
+    "chance.",
     "Sigma": "Spread of the errors about their mean, as a standard deviation.",
     "RMSE": "Bias and sigma together: the root of the mean squared error.",
     "Robust sigma": "The spread as it would be without outliers.",

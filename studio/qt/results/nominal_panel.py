@@ -20,7 +20,7 @@ class NominalPanel(QWidget):
         self.tabs = QTabWidget()
         self.tabs.setDocumentMode(True)
         self.tabs.addTab(scrolled(self.deviation), "Deviation")
-        self.tabs.addTab(self.section, "Section")
+        self.tabs.addTab(scrolled(self.section), "Section")
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.tabs)

@@ -73,6 +73,19 @@ class Span(pg.LinearRegionItem):  # type: ignore[misc]
             line.setHoverPen(pg.mkPen(colour, width=3))
 
 
+class UprightAxis(pg.AxisItem):  # type: ignore[misc]
+    """A left axis whose title is shown where it is high enough for it: of low plots one above the other, titles would
+    lie over each other."""
+
+    def __init__(self) -> None:
+        super().__init__("left")
+
+    def resizeEvent(self, event: Any = None) -> None:
+        super().resizeEvent(event)
+        # the title itself knows nothing of its being turned
+        self.label.setVisible(self.label.boundingRect().width() <= self.size().height())
+
+
 class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
     """Plots whose samples belong to scan lines. `hovered` tells the one under the mouse, None when it leaves."""
 
@@ -138,7 +151,7 @@ class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
 def new_plot(bottom: str = "", left: str = "", left_unit: str = "", box: pg.ViewBox | None = None) -> pg.PlotItem:
     """An empty plot; the unit is part of the label, so that no prefix is put before it."""
-    plot = pg.PlotItem(viewBox=box)
+    plot = pg.PlotItem(viewBox=box, axisItems={"left": UprightAxis()})
     plot.setLabel("left", f"{left} / {left_unit}" if left_unit else left)
     if bottom:
         plot.setLabel("bottom", bottom)

@@ -22,6 +22,7 @@ from studio.preview.readouts import readouts
 from studio.qt.core import theme
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
+from studio.qt.core.widgets import ElidedLabel
 from studio.qt.results.placing_fields import PlacingField, PlacingFields
 from studio.qt.results.remedy_list import RemedyList, sentence
 
@@ -41,7 +42,7 @@ class ReadoutPanel(QWidget):
         self.problem = QLabel("Not of the scene as it is set: the scene tree marks what cannot be.", wordWrap=True)
         self.problem.setObjectName("warning")
         self._hint.setObjectName("muted")
-        self._labels: dict[str, tuple[QLabel, QLabel | PlacingField, QLabel]] = {}
+        self._labels: dict[str, tuple[QLabel, QLabel | PlacingField, ElidedLabel]] = {}
         inner = QFrame()
         column = QVBoxLayout(inner)
         column.setContentsMargins(10, 8, 10, 8)
@@ -132,7 +133,7 @@ class ReadoutPanel(QWidget):
                 (value, f"color: {tints[row.level]}; font-weight: 600"),
                 (note, f"color: {colours.muted}"),
             ):
-                label.setToolTip(f"<p>{row.help}</p>")
+                label.setToolTip(f"<p>{row.help}</p><p>{row.note}</p>" if row.note else f"<p>{row.help}</p>")
                 if not isinstance(label, QLabel):
                     label.mark(row.level)
                     continue
@@ -155,13 +156,13 @@ class ReadoutPanel(QWidget):
                 self.fixes.apply(one)
                 return
 
-    def _add(self, key: str) -> tuple[QLabel, QLabel | PlacingField, QLabel]:
+    def _add(self, key: str) -> tuple[QLabel, QLabel | PlacingField, ElidedLabel]:
         """A line of labels at the end."""
-        name, value, note = QLabel(), self.placing.fields.get(key) or QLabel(), QLabel()
+        name, value, note = QLabel(), self.placing.fields.get(key) or QLabel(), ElidedLabel()
         if isinstance(value, QLabel):
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             value.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        # a narrow panel may cut the ranges off, never the values
+        # a narrow panel may shorten the ranges, never the values; the tip has them whole
         note.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         line = self._grid.rowCount()
         for column, label in enumerate((name, value, note)):

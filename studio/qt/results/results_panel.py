@@ -81,7 +81,10 @@ class ResultsPanel(QWidget):
         self.laser = QComboBox()
         self.error = QComboBox()
         self.error.addItems([view.title for view in ERROR_VIEWS])
-        self.error.setToolTip("Which error the plots, the histogram and the table show")
+        self.error.setToolTip(
+            "Which error plots, histogram and table show: measured minus true; of depth and surface positive is too "
+            "far from the camera"
+        )
         self.switches = QHBoxLayout()
         self.switches.setSpacing(2)
         self.reading = QLabel()
@@ -107,7 +110,7 @@ class ResultsPanel(QWidget):
         self.error.currentIndexChanged.connect(lambda _: self.view_changed.emit(self.view))
         for plot in (self.rows, self.profile):
             plot.hovered.connect(self._hover)
-            plot.chosen.connect(self._pin)
+            plot.chosen.connect(self.pin)
         self.rows.ranged.connect(lambda low, high: self._choose(Region("scan lines", low, high)))
         self.profile.ranged.connect(lambda low, high: self._choose(Region("fan", 1e-3 * low, 1e-3 * high)))
         self.region.changed.connect(self._show_region)
@@ -273,7 +276,8 @@ class ResultsPanel(QWidget):
     def _hover(self, scan_line: int | None) -> None:
         self.session.hover(self.pinned if scan_line is None else scan_line)
 
-    def _pin(self, scan_line: int) -> None:
+    def pin(self, scan_line: int) -> None:
+        """Keep a scan line marked; the same one again lets it go."""
         self.pinned = None if scan_line == self.pinned else scan_line
         self.session.hover(scan_line)
 

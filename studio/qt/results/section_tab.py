@@ -1,4 +1,7 @@
-"""A plane through what is shown: where it cuts the true part, and the points near it, in a plot and as DXF or CSV."""
+"""A plane through what is shown: where it cuts the true part, and the points near it, in a plot and as DXF or CSV.
+
+While the tab is looked at the plane stands in the 3D view, where it is moved and turned by the mouse.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QTimer
+from PySide6.QtGui import QHideEvent
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QFileDialog,
@@ -27,7 +32,7 @@ from render.world.world import build_world
 from studio.qt.core import theme
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Session
+from studio.qt.core.session import Session, ShownSection
 from studio.qt.core.widgets import text_button
 from studio.qt.results import plots
 from studio.qt.results.shown_points import NOTHING, are_there, shown_points
@@ -38,7 +43,8 @@ LANE = "section"
 NORMALS = {"across x": (1.0, 0.0, 0.0), "across y": (0.0, 1.0, 0.0), "level (across z)": (0.0, 0.0, 1.0)}
 REST_MS = 120
 FILES = "DXF drawing (*.dxf);;CSV table (*.csv)"
-World = tuple[Cloud, Float, Int]
+World = tuple[Cloud, Float, Float, Int]
+"""Points, (2, 3) least and largest coordinates of all but a few of them, vertices and triangles of the part."""
 
 
 class SectionTab(QWidget):
@@ -53,13 +59,17 @@ class SectionTab(QWidget):
         for name, normal in NORMALS.items():
             self.normal.addItem(name, normal)
         self.normal.addItem("by its normal", None)
-        self.own = [_box(-1.0, 1.0, value, "") for value in (1.0, 0.0, 0.0)]
+        self.own = [_box(-1.0, 1.0, value, "", 5) for value in (1.0, 0.0, 0.0)]
         self.through = [_box(-1e5, 1e5, 0.0, " mm") for _ in range(3)]
         self.thickness = _box(0.001, 1000.0, 1.0, " mm")
         self.middle = text_button("To the middle", "The plane through the middle of the points")
         self.export = text_button("Export…", "DXF (mm, layers TRUE and MEASURED) or CSV")
+        self.in_view = QCheckBox("In the 3D view")
+        self.in_view.setToolTip("Drag the arrow to move the plane, the rings to turn it; Ctrl for whole steps")
+        self.in_view.setChecked(True)
         self.told = QLabel(wordWrap=True)
         self.view = pg.GraphicsLayoutWidget()
+        self.view.setMinimumHeight(120)
         self.plot = plots.new_plot("Across / mm", "Up", "mm")
         self.view.addItem(self.plot)
         self.plot.setAspectLocked(True)
@@ -70,10 +80,12 @@ class SectionTab(QWidget):
         self._rest.timeout.connect(self.cut)
         self._lay_out()
         for box in (*self.own, *self.through, self.thickness):
-            box.valueChanged.connect(self._rest.start)
+            box.valueChanged.connect(self._moved)
         self.normal.currentIndexChanged.connect(self._another_normal)
         self.middle.clicked.connect(self.to_middle)
         self.export.clicked.connect(self._ask)
+        self.in_view.toggled.connect(self._place)
+        session.section_changed.connect(self._follow)
         theme.notice.changed.connect(self._repaint)
         for signal in (session.renders_changed, session.measured):
             signal.connect(self.refresh)
@@ -96,6 +108,7 @@ class SectionTab(QWidget):
         there = are_there(self.session)
         self.told.setText("" if there else NOTHING)
         self.export.setEnabled(False)
+        self._place()
         if there and self.isVisible():
             self._rest.start()
 
@@ -103,13 +116,34 @@ class SectionTab(QWidget):
         super().showEvent(event)  # type: ignore[arg-type]
         if self.section is None:
             self._rest.start()
+        self._place()
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        super().hideEvent(event)
+        self.session.show_section(None)
+
+    def take(self, plane: Plane) -> None:
+        """Another plane, as exactly as the fields have it."""
+        normal = tuple(np.round(plane.axes[2], 5).tolist())
+        known = [self.normal.itemData(i) for i in range(self.normal.count() - 1)]
+        fields = [*zip(self.through, (1e3 * value for value in plane.point), strict=True)]
+        fields += zip(self.own, normal, strict=True)
+        for field, value in fields:
+            field.blockSignals(True)
+            field.setValue(value)
+            field.blockSignals(False)
+        self.normal.blockSignals(True)
+        self.normal.setCurrentIndex(known.index(normal) if normal in known else len(known))
+        self.normal.blockSignals(False)
+        self.form.setRowVisible(self.normals, self.normal.currentData() is None)
+        self._moved()
 
     def to_middle(self) -> None:
         """Of the points, by their medians."""
         if self._read is None:
             return
-        for box, name in zip(self.through, "xyz", strict=True):
-            box.setValue(1e3 * float(np.median(self._read[0][name])))
+        x, y, z = (float(np.median(self._read[0][name])) for name in "xyz")
+        self.take(Plane((x, y, z), self.plane.normal))
 
     def cut(self) -> None:
         """In the background; the last plane counts."""
@@ -124,10 +158,12 @@ class SectionTab(QWidget):
         def work(progress: object, cancelled: object) -> tuple[Section, World]:
             if before is None:
                 world = build_world(scene, root)
-                have = read(), world.vertices, world.triangles
+                cloud = read()
+                box = np.percentile(np.column_stack([cloud[name] for name in "xyz"]), (1.0, 99.0), axis=0)
+                have = cloud, box, world.vertices, world.triangles
             else:
                 have = before
-            return from_pieces([have[0]], plane, thickness, have[1], have[2]), have
+            return from_pieces([have[0]], plane, thickness, *have[2:]), have
 
         def then(found: tuple[Section, World]) -> None:
             first = self._read is None
@@ -145,6 +181,31 @@ class SectionTab(QWidget):
         write_section(self.section, path)
         self.session.message.emit("info", f"Wrote {path}")
 
+    def _moved(self) -> None:
+        """What is cut follows soon, while a drag goes on too."""
+        self._place()
+        if not self._rest.isActive():
+            self._rest.start()
+
+    def _follow(self) -> None:
+        """The 3D view has moved the plane."""
+        shown = self.session.section
+        if shown is not None and shown.plane != self.plane:
+            self.take(shown.plane)
+
+    def _place(self) -> None:
+        """Into the 3D view, with the line that was cut last."""
+        if self._read is None or not (self.isVisible() and self.in_view.isChecked()):
+            self.session.show_section(None)
+            return
+        plane, made = self.plane, self.section
+        try:
+            sheet = plane.sheet(*self._read[1])
+        except InputError:
+            return
+        true = [] if made is None else [made.plane.world(line) for line in made.true]
+        self.session.show_section(ShownSection(plane, sheet, true))
+
     def _show(self) -> None:
         made = self.section
         assert made is not None
@@ -155,10 +216,11 @@ class SectionTab(QWidget):
         self.plot.enableAutoRange()
         self.told.setText(f"{len(made.true)} lines of the true part, {len(made.measured)} points within the slab")
         self.export.setEnabled(bool(made.true) or len(made.measured) > 0)
+        self._place()
 
     def _another_normal(self) -> None:
         self.form.setRowVisible(self.normals, self.normal.currentData() is None)
-        self._rest.start()
+        self._moved()
 
     def _repaint(self) -> None:
         self.view.setBackground(theme.colours().base)
@@ -187,6 +249,7 @@ class SectionTab(QWidget):
         buttons = QHBoxLayout()
         buttons.addWidget(self.middle)
         buttons.addWidget(self.export)
+        buttons.addWidget(self.in_view)
         buttons.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(8, 8, 8, 8)
@@ -196,10 +259,10 @@ class SectionTab(QWidget):
         column.addWidget(self.told)
 
 
-def _box(low: float, high: float, value: float, suffix: str) -> QDoubleSpinBox:
+def _box(low: float, high: float, value: float, suffix: str, decimals: int = 3) -> QDoubleSpinBox:
     box = QDoubleSpinBox()
     box.setRange(low, high)
-    box.setDecimals(3)
+    box.setDecimals(decimals)
     box.setSuffix(suffix)
     box.setValue(value)
     box.setMinimumWidth(48)

@@ -36,7 +36,17 @@ from studio.qt.shell.preferring import Preferring
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.status import StatusBar
 from studio.qt.shell.tour import Step, Tour
-from studio.qt.shell.workspaces import WORKSPACES, arrange, remembered, restore, sealed, share_out, unsealed, workspace
+from studio.qt.shell.workspaces import (
+    WORKSPACES,
+    arrange,
+    hide_stray_tabs,
+    remembered,
+    restore,
+    sealed,
+    share_out,
+    unsealed,
+    workspace,
+)
 from studio.qt.study.cell_opener import CellOpener
 from studio.qt.viewport.error_cloud import ErrorCloud
 from studio.runtime.error_messages import trouble
@@ -48,8 +58,6 @@ TALL = ("render", "develop")
 """Panels that scroll."""
 TRIM_MS = 1000
 """From opening another project until the memory of the former one is given back."""
-SMALL = 0.25
-"""Image scale of the first look."""
 SWITCH = {each.key: "render_workspace" if each.key == "render" else each.key for each in WORKSPACES}
 """Workspace -> command."""
 
@@ -125,22 +133,10 @@ class MainWindow(QMainWindow):
             self._called.add(key)
         self.show_panel(key)
 
-    def render_small(self) -> None:
-        """A quick render of what is open, for a first look."""
-        if self.session.renders or self.runner.busy:
-            return
-        panel, session = self.panels["render"], self.session
-
-        def enough() -> None:
-            shown = session.shown
-            if shown is None or shown.image_scale != SMALL or shown.final:
-                session.measured.disconnect(enough)
-            elif shown.frame.ambient is not None:
-                session.measured.disconnect(enough)
-                panel.keep()  # type: ignore[attr-defined]
-
-        session.measured.connect(enough)
-        panel.start(SMALL)  # type: ignore[attr-defined]
+    def render_first(self) -> None:
+        """Of what is open, as large as the scanner's image: its first figures are true ones."""
+        if not self.session.renders and not self.runner.busy:
+            self.panels["render"].start(1.0)  # type: ignore[attr-defined]
 
     def choose_theme(self, choice: theme.Choice) -> None:
         theme.apply(choice)
@@ -237,6 +233,7 @@ class MainWindow(QMainWindow):
         results, motion = self.panels["results"], self.panels["motion"]
         results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
         results.scan_bar.scope_changed.connect(made.show_all_steps)  # type: ignore[attr-defined]
+        made.pressed.connect(results.pin)  # type: ignore[attr-defined]
         motion.began.connect(made.begin_scan)  # type: ignore[attr-defined]
         motion.grew.connect(made.grow)  # type: ignore[attr-defined]
         return made
@@ -282,6 +279,7 @@ class MainWindow(QMainWindow):
             "arrange": self.rearrange,
             "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
             "render": session.render_asked.emit,
+            "expose": self.panels["develop"].expose,  # type: ignore[attr-defined]
             "pause": self.status.toggle_pause,
             "cancel": self.status.cancel_work,
             "scan": self._scan,
@@ -366,6 +364,7 @@ class MainWindow(QMainWindow):
             self.resize(self.size().boundedTo(size))  # the last workspace's columns may have made it grow
         if not self._restore_panels():
             share_out(self, self.docks, workspace(self.workspace))
+        hide_stray_tabs(self)
 
     def _send_back(self) -> None:
         while self._called:

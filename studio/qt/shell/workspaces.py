@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from PySide6.QtCore import QByteArray, Qt
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QToolBar, QWidget
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QTabBar, QToolBar, QWidget
 
 Named = TypeVar("Named", bound=QWidget)
 
@@ -16,7 +16,7 @@ Area = Qt.DockWidgetArea
 LEFT, RIGHT, BOTTOM = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
 WIDE = ("motion", "log")
 """Panels of no workspace that share a place below when they are called for."""
-VERSION = 3
+VERSION = 4
 """Of the arrangement; a remembered one of another version is dropped."""
 
 
@@ -41,6 +41,8 @@ class Workspace:
     columns: tuple[Column, ...]
     sides_reach_down: bool
     """The areas at the sides, not the bottom one, hold the lower corners."""
+    before: tuple[tuple[str, str], ...] = ()
+    """Panels that are called for, each with the panel that it comes in front of, as there is no room beside."""
 
 
 SETTING_UP = (
@@ -60,7 +62,7 @@ QUESTION = "Many runs with one question: what a value changes, and where methods
 WORKSPACES = (
     Workspace("setup", "Set up", "Place and design: camera, lasers, objects", True, SETTING_UP, True),
     Workspace("render", "Render", "The image and its light", False, RENDERING, True),
-    Workspace("measure", "Measure", "Line, points and their error", True, MEASURING, False),
+    Workspace("measure", "Measure", "Line, points and their error", True, MEASURING, False, (("nominal", "camera"),)),
     Workspace("study", "Study", QUESTION, False, STUDYING, True),
     Workspace("calibrate", "Calibrate", "Camera and lasers from photographs of a board", False, CALIBRATING, True),
     Workspace("dataset", "Dataset", "Labelled images of drawn scenes, by the thousand", False, LABELLING, True),
@@ -107,6 +109,9 @@ def first_state(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Work
                 model.splitDockWidget(before, empty[name], beside)
             before = empty[name]
             empty[name].show()
+    for name, behind in wanted.before:
+        model.tabifyDockWidget(empty[behind], empty[name])
+        empty[name].hide()
     return model.saveState(VERSION)
 
 
@@ -129,6 +134,15 @@ def share_out(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Worksp
             window.resizeDocks([docks[name] for name, _ in column.docks], sizes, along)
     if window.size() != size:  # shares that do not fit beside what is least let the window grow
         window.resize(size)
+
+
+def hide_stray_tabs(window: QMainWindow) -> None:
+    """Of panels that stand one before the other no longer, Qt may leave the bar of their tabs over others."""
+    docks = window.findChildren(QDockWidget)
+    shown = {dock.windowTitle() for dock in docks if not dock.isHidden() and window.tabifiedDockWidgets(dock)}
+    for bar in window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly):
+        if not {bar.tabText(i) for i in range(bar.count())} <= shown:
+            bar.hide()
 
 
 def remembered(window: QMainWindow) -> str:

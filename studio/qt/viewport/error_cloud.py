@@ -1,25 +1,28 @@
-"""The measured points in the 3D view, coloured by their signed error; pointing at one marks its scan line."""
+"""The measured points in the 3D view, coloured by their signed error, their height or their deviation from the nominal.
+
+Pointing at one marks its scan line.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, QPointF, QRect, QRectF, Qt
-from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPaintEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtGui import QColor
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from analysis.cloud import Cloud, at_step, cloud
 from render.base.arrays import Float
-from studio.preview.diverging_colours import diverging
 from studio.qt.core import theme
 from studio.qt.core.session import Session
+from studio.qt.viewport.colour_bar import ColourBar
 from studio.qt.viewport.view3d import View3D
+from studio.scan.colour_scale import PER_METRE, ColourScale
 from studio.scan.point_sample import PointSample
 from studio.scan.redevelop import is_stale
 from studio.scan.remarks import best
-from studio.scan.result_series import ERROR_VIEWS, ErrorView, symmetric_limit
+from studio.scan.result_series import ERROR_VIEWS, ErrorView
 
 POINT_PX, RIM_PX, MARK_PX, NEAR_PX = 3.5, 5.5, 9.0, 9.0
 OFFSET, RIM_OFFSET = -80.0, -60.0
@@ -30,6 +33,9 @@ RIM = (0.16, 0.18, 0.21)
 
 class ErrorCloud(QObject):
     """Follows the shown render, or a running scan. Shown while it fits the scene, and always on `pinned`."""
+
+    pressed = Signal(int)
+    """The scan line of the point that is clicked."""
 
     def __init__(self, session: Session, view: View3D) -> None:
         super().__init__(view)
@@ -42,7 +48,9 @@ class ErrorCloud(QObject):
         self.errors: Float = np.zeros(0)
         self.rows: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
         self.steps: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
-        self.limit = 1.0
+        self.scales = {"error": ColourScale(), "height": ColourScale(about_zero=False), "deviation": ColourScale()}
+        """Of each thing that colours may mean."""
+        self.by_height = False
         self.image_scale = 1.0
         """At which the points were measured, to the scanner's image."""
         self._clouds: list[Cloud] = []
@@ -54,10 +62,15 @@ class ErrorCloud(QObject):
         for actor in (self._rim, self._actor, self._mark_actor):
             view.renderer.AddActor(actor)
         self.bar = ColourBar(view)
+        self.bar.scaled.connect(self._rescale)
+        self.bar.unit_chosen.connect(self._draw)
+        self.bar.height_chosen.connect(self.colour_by_height)
         view.hovered.connect(self._hover)
+        view.takes_click = self._click
         session.hover_changed.connect(self._mark)
         session.project_changed.connect(self._show_or_hide)
         session.step_changed.connect(self._follow_step)
+        session.deviation_changed.connect(self._draw)
         session.document_replaced.connect(self.clear)
         for changed in (session.renders_changed, session.measured):
             changed.connect(self.refresh)
@@ -72,9 +85,29 @@ class ErrorCloud(QObject):
         self.pinned = pinned
         self._show_or_hide()
 
+    @property
+    def meaning(self) -> str:
+        """Of the colours: "error", "height", or "deviation" while a panel shows one."""
+        return "deviation" if self.session.deviation is not None else "height" if self.by_height else "error"
+
+    @property
+    def limit(self) -> float:
+        """Largest value of its own colour, in the unit of the bar."""
+        return self.bar.limits[1]
+
     def choose(self, view: ErrorView) -> None:
-        """Another kind of error."""
+        """Another kind of error, with limits of its own."""
         self.error_view = view
+        self.scales["error"] = self.scales["error"].automatic(self.scales["error"].share)
+        self._draw()
+
+    def colour_by_height(self, by_height: bool) -> None:
+        """The height in the world, in place of the error."""
+        self.by_height = by_height
+        self._draw()
+
+    def _rescale(self, scale: ColourScale) -> None:
+        self.scales[self.meaning] = scale
         self._draw()
 
     def show_all_steps(self, all_steps: bool) -> None:
@@ -123,28 +156,40 @@ class ErrorCloud(QObject):
         self._draw()
 
     def _draw(self) -> None:
-        clouds = self._clouds
-        if clouds:
+        clouds, deviation = self._clouds, self.session.deviation
+        if deviation is not None:
+            first, self.rows, self.steps = deviation.points, deviation.row, deviation.step
+        elif clouds:
             first = np.concatenate([np.stack([one["x"], one["y"], one["z"]], axis=1) for one in clouds])
-            # on the part, wherever it stands now
-            self.points = at_step(first, self.session.project.scene, self.session.step)
-            self.steps = np.concatenate([one["step"] for one in clouds])
-            self.rows = np.concatenate([one["row"] for one in clouds])
-            self.errors = np.concatenate([self._errors_of(i, one) for i, one in enumerate(clouds)])
+            self.rows, self.steps = (np.concatenate([one[name] for one in clouds]) for name in ("row", "step"))
         else:
-            self.points, self.errors = np.zeros((0, 3)), np.zeros(0)
-            self.rows = self.steps = np.zeros(0, dtype=np.int32)
-        self.limit = symmetric_limit(self.errors)
-        _give(self._data, self.points, diverging(self.errors, self.limit))
-        self.bar.show_range(self.error_view, self.limit, self.image_scale)
+            first, self.rows, self.steps = np.zeros((0, 3)), np.zeros(0, np.int32), np.zeros(0, np.int32)
+        # on the part, wherever it stands now
+        self.points = at_step(first, self.session.project.scene, self.session.step) if len(first) else first
+        title, unit, self.errors = self._values(first)
+        low, high = self.bar.show_scale(title, unit, self.scales[self.meaning], self.errors, self.image_scale)
+        _give(self._data, self.points, self.scales[self.meaning].colours(self.errors, low, high))
         self._mark()
         self._show_or_hide()
+
+    def _values(self, first: Float) -> tuple[str, str, Float]:
+        """What colours mean, its unit, and it of each point, in this unit."""
+        length, deviation = self.bar.unit_of(self.meaning), self.session.deviation
+        if deviation is not None:
+            return "Deviation", length, deviation.value * PER_METRE[length]
+        if self.by_height:
+            return "Height", length, first[:, 2] * PER_METRE[length]
+        view = self.error_view
+        errors = np.concatenate([np.zeros(0), *(self._errors_of(i, one) for i, one in enumerate(self._clouds))])
+        if view.kind == "position":
+            return view.title, view.unit, errors
+        return view.title, length, errors * (PER_METRE[length] / view.scale)
 
     def _errors_of(self, i: int, one: Cloud) -> Float:
         view = self.error_view
         if view.kind == "position":
             return np.asarray(self._pixel_errors[i] if not self._of_scan else np.full(len(one["x"]), np.nan))
-        return np.asarray(one["error_depth" if view.kind == "depth" else "error_distance"] * view.scale)
+        return np.asarray(one["error_depth" if view.kind == "depth" else "error_surface"] * view.scale)
 
     def _mark(self) -> None:
         render, hovered = self.session.shown, self.session.hovered
@@ -176,66 +221,27 @@ class ErrorCloud(QObject):
 
     def _hover(self, x: float, y: float) -> None:
         """The scan line of the point under the mouse, if there is one."""
+        row = self._row_at(x, y)
+        if row is not None:
+            self.session.hover(row)
+
+    def _click(self, x: float, y: float) -> bool:
+        """A click on a point keeps its scan line, and does not mean the part below it."""
+        row = self._row_at(x, y)
+        if row is not None:
+            self.pressed.emit(row)
+        return row is not None
+
+    def _row_at(self, x: float, y: float) -> int | None:
         if not self.visible:
-            return
+            return None
         apart = self.view.eye.project(self.points, self.view.pixels) - np.array([x, y])
         squared = np.einsum("ij,ij->i", apart, apart)
         if np.isfinite(squared).any():
             nearest = int(np.nanargmin(squared))
             if squared[nearest] < NEAR_PX**2:
-                self.session.hover(int(self.rows[nearest]))
-
-
-class ColourBar(QWidget):
-    """Lies in the lower right corner of the view; the mouse goes through it."""
-
-    def __init__(self, view: QWidget) -> None:
-        super().__init__(view)
-        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        self.title, self.unit, self.limit, self.note = "", "", 1.0, ""
-        view.installEventFilter(self)
-        self._place()
-
-    def show_range(self, view: ErrorView, limit: float, image_scale: float = 1.0) -> None:
-        self.title, self.unit, self.limit = view.title, view.unit, limit
-        self.note = f"at {image_scale:.3g} x size" if image_scale != 1.0 else ""
-        self.update()
-
-    def eventFilter(self, watched: QObject, event: object) -> bool:
-        if event.type() == event.Type.Resize:  # type: ignore[attr-defined]
-            self._place()
-        return False
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        c = theme.colours()
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        back = QColor(c.window)
-        back.setAlpha(215)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(back)
-        painter.drawRoundedRect(QRectF(self.rect()), 6, 6)
-        bar = QRect(14, 34, 14, self.height() - 70)
-        gradient = QLinearGradient(QPointF(bar.topLeft()), QPointF(bar.bottomLeft()))
-        for i, (red, green, blue) in enumerate(diverging(np.linspace(1.0, -1.0, 21), 1.0).tolist()):
-            gradient.setColorAt(i / 20, QColor(red, green, blue))
-        painter.fillRect(bar, gradient)
-        painter.setPen(QColor(c.text))
-        painter.drawText(QRect(12, 6, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.title)
-        painter.setPen(QColor(c.warning))
-        painter.drawText(QRect(12, self.height() - 24, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.note)
-        painter.setPen(QColor(c.text))
-        zero = ((0.5, "0"),) if bar.height() > 60 else ()
-        for share, text in ((0.0, f"+{self.limit:g}"), *zero, (1.0, f"\u2212{self.limit:g}")):
-            y = bar.top() + round(share * bar.height())
-            painter.drawLine(bar.right() + 2, y, bar.right() + 6, y)
-            box = QRect(bar.right() + 10, y - 10, self.width() - bar.right() - 12, 20)
-            painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, f"{text} {self.unit}")
-
-    def _place(self) -> None:
-        if (view := self.parentWidget()) is not None:
-            self.resize(128, min(208, view.height() - 24))
-            self.move(view.width() - self.width() - 12, view.height() - self.height() - 12)
+                return int(self.rows[nearest])
+        return None
 
 
 def _point_actor(size: float) -> tuple[pv.PolyData, vtkActor]:

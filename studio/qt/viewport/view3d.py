@@ -55,10 +55,12 @@ class View3D(QtInteractor):  # type: ignore[misc]
         super().__init__(parent, multi_samples=0, auto_update=False)
         self.setAcceptDrops(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setMinimumSize(160, 120)
+        self.setMinimumSize(160, 80)
         self.eye = Eye.standing(np.zeros(3), 1.0, -60.0, 30.0)
         self.tool: Tool | None = None
         self.before_paint: Callable[[], None] = lambda: None
+        self.takes_click: Callable[[float, float], bool] = lambda x, y: False
+        """Whether something drawn over the scene is clicked, which the scene then does not hear of."""
         self.paints = 0
         """How often the view has been drawn."""
         self.front = vtkRenderer()
@@ -149,7 +151,10 @@ class View3D(QtInteractor):  # type: ignore[misc]
         if grip == "tool" and self.tool is not None:
             self.tool.release()
         elif grip == "click":
-            self.clicked.emit(event.position().x(), event.position().y())
+            x, y = event.position().x(), event.position().y()
+            # without a tool the next click is another's: that of what the laser is to light
+            if self.tool is None or not self.takes_click(x, y):
+                self.clicked.emit(x, y)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -190,6 +195,7 @@ class View3D(QtInteractor):  # type: ignore[misc]
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.before_paint = lambda: None
+        self.takes_click = lambda x, y: False
         self.tool = None
         super().closeEvent(event)
 

@@ -24,6 +24,8 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.viewport.board_ghost import BoardGhost
 from studio.qt.viewport.gizmo import Gizmo
+from studio.qt.viewport.handle_tool import Tools
+from studio.qt.viewport.section_plane import SectionPlane
 from studio.qt.viewport.view3d import View3D
 from studio.qt.viewport.viewport_bar import ViewportBar
 from studio.qt.viewport.viewport_scene import CAMERA, LASERS, ViewportScene, object_path
@@ -43,8 +45,10 @@ class Viewport(QWidget):
         self.scene = ViewportScene(self.view.renderer)
         self.ghost = BoardGhost(session, self.view)
         self.gizmo = Gizmo(session, self.live, self.view)
-        self.view.tool = self.gizmo
-        self.view.before_paint = self.gizmo.draw
+        self.section = SectionPlane(session, self.view)
+        self._tools = Tools(self.section, self.gizmo)
+        self.view.tool = self._tools
+        self.view.before_paint = self._tools.draw
         self.bar = ViewportBar(self)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -82,7 +86,8 @@ class Viewport(QWidget):
         """Bring an item, or everything, into the middle of the view."""
         self._leave()
         eye = self.view.eye
-        low, high = self.scene.bounds(self.live.look, path)
+        # the first view is of what is measured; who asks for everything gets the lamps as well
+        low, high = self.scene.bounds(self.live.look, path, lamps=not self._frame_soon and not path)
         self.view.look_from(eye.framed(low, high, self.view.pixels))
 
     def look_along(self, name: str) -> None:
@@ -110,7 +115,7 @@ class Viewport(QWidget):
         on = on and not self.session.dragging
         self.bar.aim.setChecked(on)
         self.bar.tell("click what the laser is to light" if on else "")
-        self.view.tool = None if on else self.gizmo  # its handles may lie over what is to be lit
+        self.view.tool = None if on else self._tools  # its handles may lie over what is to be lit
         self.view.setCursor(Qt.CursorShape.CrossCursor if on else Qt.CursorShape.ArrowCursor)
 
     def aim_at(self, x: float, y: float) -> None:
@@ -171,7 +176,8 @@ class Viewport(QWidget):
         view.hovered.connect(self._hover_later)
         view.left.connect(self._hover.stop)
         view.navigated.connect(self._leave)
-        self.gizmo.told.connect(self.bar.tell)
+        for tool in self._tools.tools:
+            tool.told.connect(self.bar.tell)
         handlers: dict[str, Callable[[], None]] = {
             "1": lambda: self.look_along("front"),
             "2": lambda: self.look_along("left"),
@@ -198,9 +204,9 @@ class Viewport(QWidget):
         self.scene.draw(look, self.session.selection, settled=settled)
         self.bar.tell_spacing(self.scene.spacing)
         if self._frame_soon:
-            self._frame_soon = self.live.is_loading
             self.view.look_from(replace(self.view.eye, rotation=turntable(*STANDARD["iso"])))
             self.frame()
+            self._frame_soon = self.live.is_loading
         if self.scene.through:
             self._follow_through()
         self.view.redraw()

@@ -27,6 +27,8 @@ CAMERA: FieldPath = ("scene", "rig", "camera")
 LASERS: FieldPath = ("scene", "rig", "lasers")
 OBJECTS: FieldPath = ("scene", "objects")
 LIGHTS: FieldPath = ("scene", "lights")
+MOST_LABELS = 6
+"""Numbers along a side of the ground: more lie over each other where the view is small."""
 SMALL_PX, LINE_PX, CURVE_PX = 1.0, 1.6, 3.0
 
 
@@ -123,8 +125,8 @@ class ViewportScene:
             self._draw_grid(*self.bounds(look))
         self.highlight(look, selection)
 
-    def bounds(self, look: Look, path: FieldPath = ()) -> tuple[Float, Float]:
-        """Lowest and highest coordinates, m: of one item, or of everything that has a size."""
+    def bounds(self, look: Look, path: FieldPath = (), *, lamps: bool = False) -> tuple[Float, Float]:
+        """Lowest and highest coordinates, m: of one item, or of everything that has a size; lamps: of these too."""
         scene, step, corners = look.scene, look.step, []
         everything = len(path) < 2 or path == ("scene", "rig")
         for item in look.placed:
@@ -138,7 +140,7 @@ class ViewportScene:
             if everything or path == (*LASERS, i):
                 corners.append(_around(scene.T_world_laser(i, step), margin))
         for i, light in enumerate(scene.lights):
-            if path == (*LIGHTS, i):
+            if path == (*LIGHTS, i) or (lamps and not path):
                 corners.append(_around(light.T_world_light.matrix, 2.0 * margin))
         if not corners:
             return self.bounds(look) if path else rig_drawing.bounds_of(np.zeros((0, 3)))
@@ -313,7 +315,9 @@ class ViewportScene:
         low, high = lines.reshape(-1, 3).min(axis=0), lines.reshape(-1, 3).max(axis=0)
         self._labels = []
         for axis in range(2):
-            for k in range(round(low[axis] / step), round(high[axis] / step) + 1):
+            first, last = round(low[axis] / step), round(high[axis] / step)
+            every = -(-(last - first + 1) // MOST_LABELS)
+            for k in (k for k in range(first, last + 1) if k % every == 0):
                 # along the two sides of the ground that the usual view has in front
                 place = (k * step, low[1], 0.0) if axis == 0 else (high[0], k * step, 0.0)
                 self._labels.append(_label(f"{1e3 * k * step:g}", place))

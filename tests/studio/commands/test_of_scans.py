@@ -18,6 +18,7 @@ from click.testing import CliRunner, Result
 import main
 from analysis.cloud import read_ply
 from render.world.world import build_world
+from studio.scan.deviation import Question, compare_cloud, read_cloud
 from studio.scan.scan_folder import open_folder
 from tests.studio.scan_of_steps import small_scan
 
@@ -51,7 +52,7 @@ def column(path: Path, name: str) -> np.ndarray:
 
 def test_against_the_part_as_scanned_deviations_are_the_scan_s_own_distances(scan: Path) -> None:
     record = told("deviation", scan, "--lower=-700", "--upper", 700)
-    own = read_ply(scan / "points.ply")["error_distance"]
+    own = -read_ply(scan / "points.ply")["error_surface"]
     assert np.allclose(column(scan / "deviation.csv", "deviation_m"), own, rtol=0.0, atol=1e-9)
     assert record["rms"] == pytest.approx(float(np.sqrt(np.mean(own**2))), rel=1e-9)
     assert sum(record["verdicts"].values()) == len(own) and record["verdict"] == "fail"
@@ -160,26 +161,32 @@ def test_a_film_has_every_step_and_lasts_as_long_as_was_asked(scan: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    "arguments",
+    ("arguments", "told_of"),
     [
-        ("deviation", "--part", "nobody"),
-        ("deviation", "--align", "3-2-1"),
-        ("deviation", "--lower", "5", "--upper", "-5"),
-        ("deviation", "--cad", "missing.stl"),
-        ("deviation", "--out", "table.txt"),
-        ("section", "--through", "0,0,0", "--normal", "0,0,0"),
-        ("section", "--through", "0,0,90000", "--normal", "0,0,1"),
-        ("section", "--through", "0,0", "--normal", "0,0,1"),
-        ("section", "--through", "0,0,nan", "--normal", "0,0,1"),
-        ("section", "--through", "0,0,0", "--normal", "1,0,0", "--out", "x.dwg"),
-        ("film", "--out", "x.avi"),
-        ("film", "--rate", "0"),
-        ("points", "--out", "points.dat"),
+        (("deviation", "--part", "nobody"), "nobody"),
+        (("deviation", "--align", "3-2-1"), "six spots"),
+        (("deviation", "--lower", "5", "--upper", "-5"), "tolerance is empty"),
+        (("deviation", "--part", "step block", "--cad", "missing.stl"), "missing.stl"),
+        (("deviation", "--cad", "missing.stl"), "which part"),
+        (("deviation", "--out", "table.txt"), "table.txt"),
+        (("section", "--through", "0,0,0", "--normal", "0,0,0"), "no direction"),
+        (("section", "--through", "0,0,90000", "--normal", "0,0,1"), "neither the part nor a point"),
+        (("section", "--through", "0,0", "--normal", "0,0,1"), "0,0"),
+        (("section", "--through", "0,0,nan", "--normal", "0,0,1"), "nan"),
+        (("section", "--through", "0,0,0", "--normal", "1,0,0", "--out", "x.dwg"), "x.dwg"),
+        (("film", "--out", "x.avi"), "x.avi"),
+        (("film", "--rate", "0"), "rate"),
+        (("points", "--out", "points.dat"), ".dat"),
     ],
 )
-def test_bad_input_is_one_message(made: Path, arguments: tuple[str, ...]) -> None:
+def test_bad_input_is_one_message(made: Path, arguments: tuple[str, ...], told_of: str) -> None:
+    """Of what was bad, and of nothing else."""
+    before = sorted(made.iterdir())
     done = call(arguments[0], made, *arguments[1:], "--json")
-    assert done.exit_code == 2 and json.loads(done.stdout)["ok"] is False
+    said = json.loads(done.stdout)
+    assert done.exit_code == 2 and said["ok"] is False
+    assert told_of in json.dumps(said["error"], ensure_ascii=False), said["error"]
+    assert sorted(made.iterdir()) == before
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".csv", ".pcd", ".las", ".e57"])
@@ -202,3 +209,21 @@ def test_files_of_others_are_not_replaced(scan: Path) -> None:
         done = call(*command, "--json")
         assert done.exit_code == 2 and "did not write" in json.loads(done.stdout)["error"]["message"], name
         assert (scan / name).read_text() == "mine"
+
+
+def test_false_points_draw_the_rms_but_not_the_robust_figures(made: Path) -> None:
+    found = open_folder(made)
+    cloud = read_cloud(made / "points.ply")
+    whole = compare_cloud(found.project.scene, found.root, cloud, Question(lower=-1e-3, upper=1e-3)).record
+    spoilt = {name: column.copy() for name, column in cloud.items()}
+    spoilt["z"][::100] += 0.3
+    record = compare_cloud(found.project.scene, found.root, spoilt, Question(lower=-1e-3, upper=1e-3)).record
+    share = len(spoilt["z"][::100]) / len(spoilt["z"])
+    # 1 % of them 300 mm away
+    assert record["rms"] == pytest.approx(0.3 * np.sqrt(share), rel=0.02)
+    assert record["share_false"] == pytest.approx(whole["share_false"] + share, abs=0.003)
+    for name in ("robust_sigma", "rms_without_false"):
+        assert record[name] == pytest.approx(whole[name], rel=0.05)
+    assert record["share_beyond"] == pytest.approx(whole["share_beyond"] + share, abs=0.003)
+    nobody = compare_cloud(found.project.scene, found.root, spoilt, Question()).record
+    assert nobody["share_beyond"] is None

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import binom
 
-from studio.scan.region import error_statistics
+from analysis.measures import error_statistics
 
 TRIALS, COUNT = 400, 120
 

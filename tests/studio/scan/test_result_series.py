@@ -11,10 +11,12 @@ from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.result_series import (
     ERROR_VIEWS,
+    UNCERTAINTY,
     error_values,
     histogram,
     measured_series,
     symmetric_limit,
+    table,
     true_series,
 )
 from studio.scan.stages import Clock, Measurement, develop_step, measure_step, render_step, scaled
@@ -95,3 +97,15 @@ def test_no_error_is_white_and_signs_have_their_colours() -> None:
     assert np.ptp(absent) == 0 and absent[0] < 200
     up, down = diverging(np.array([2.0, -2.0]), 5.0).astype(float)
     assert abs(up.mean() - down.mean()) < 25, "as strong on either side of zero"
+
+
+def test_the_table_tells_how_well_the_bias_is_known(measured) -> None:
+    """Twice what the spread over the root of the number says, where neighbours err apart; more where they err alike."""
+    _, found, _ = measured
+    for view in ERROR_VIEWS:
+        rows = {name: values[0] for name, _, values in table([found], view)}
+        error = error_values(found.errors, view)
+        count = np.count_nonzero(np.isfinite(error))
+        apart = 2.0 * np.nanstd(error) / np.sqrt(count)
+        assert apart <= rows[UNCERTAINTY] < 4.0 * apart
+        assert abs(rows["Bias"]) == pytest.approx(abs(np.nanmean(error)))

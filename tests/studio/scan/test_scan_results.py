@@ -53,7 +53,7 @@ def test_each_step_is_read_as_it_was_written(scanned: tuple[Path, Path]) -> None
     assert results.read_step(2, world)[1] is world, "the rig moves: the part stays where it is"
 
 
-@pytest.mark.parametrize(("view", "column"), [(DEPTH, "error_depth"), (SURFACE, "error_distance")])
+@pytest.mark.parametrize(("view", "column"), [(DEPTH, "error_depth"), (SURFACE, "error_surface")])
 def test_the_error_of_a_step_is_that_of_its_points(scanned: tuple[Path, Path], view, column) -> None:
     points = read_ply(scanned[1] / "points.ply")
     bias, rmse = read_results(open_folder(scanned[1])).by_step(0, view.kind)
@@ -66,13 +66,23 @@ def test_the_error_of_a_step_is_that_of_its_points(scanned: tuple[Path, Path], v
 def test_the_measures_of_all_steps_are_those_of_the_scan(scanned: tuple[Path, Path]) -> None:
     found = open_folder(scanned[1])
     row = found.manifest["results"][0]
-    for view, key in ((DEPTH, "depth_m"), (SURFACE, "surface_m"), (POSITION, "line_px")):
+    for view, key in ((DEPTH, "depth_m"), (SURFACE, "surface_error_m"), (POSITION, "line_px")):
         methods, rows = read_results(found).table(0, view)
         told = {name: values[0] for name, _, values in rows}
         assert methods[0] == row["method"] and len(methods) == 3
         assert told["Points"] == row["points"]
         assert told["RMSE"] == pytest.approx(view.scale * row[key]["rmse"])
         assert told["RMSE"] ** 2 == pytest.approx(told["Bias"] ** 2 + told["Sigma"] ** 2)
+
+
+def test_the_surface_error_of_an_older_manifest_turns_its_sign(scanned: tuple[Path, Path]) -> None:
+    found = read_results(open_folder(scanned[1]))
+    now = {name: values for name, _, values in found.table(0, SURFACE)[1] if name in ("Bias", "Sigma")}
+    for row in found.found.manifest["results"]:
+        row["surface_m"] = {**row.pop("surface_error_m")}
+        row["surface_m"]["bias"] *= -1.0
+    then = {name: values for name, _, values in found.table(0, SURFACE)[1] if name in ("Bias", "Sigma")}
+    assert then == now and len(now) == 2 and abs(now["Bias"][0]) > 0.0
 
 
 def test_what_the_report_remarks_on_is_kept_with_the_scan(scanned: tuple[Path, Path]) -> None:
@@ -142,7 +152,7 @@ def test_a_scan_is_meant_by_its_folder_or_its_own_files(scanned: tuple[Path, Pat
 def test_points_without_their_errors_are_refused_in_words(copy: Path) -> None:
     points = read_ply(copy / "points.ply")
     write_ply(copy / "points.ply", {name: points[name] for name in ("x", "y", "z", "row", "laser", "step")})
-    with pytest.raises(InputError, match="error_depth, error_distance"):
+    with pytest.raises(InputError, match="error_depth, error_surface"):
         read_results(open_folder(copy))
 
 

@@ -47,8 +47,8 @@ def test_every_cell_has_the_part_s_own_numbers(tmp_path: Path) -> None:
     for row in rows.values():
         value, error, sigma = (row[f"length_{kind}:First step"] for kind in ("value", "error", "sigma"))
         assert math.isfinite(value) and sigma > 0.0
-        # a block of equal steps: the truth by the same definition is a whole number of them
-        assert abs(error) < 6.0 * sigma and abs(value) > 1e-3
+        # the truth by the same definition is the block's rise, a little longer along a sheet that is not upright
+        assert abs(error) < 6.0 * sigma and value - error == pytest.approx(-0.01, rel=0.05)
     write_tables(tmp_path, study, bases, rows)
     with open(tmp_path / "table.csv", newline="", encoding="utf-8") as file:
         table = list(csv.DictReader(file))

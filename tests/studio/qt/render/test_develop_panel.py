@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -191,3 +193,37 @@ def test_without_a_render_the_exposure_is_as_estimated(qtbot, panel):
     before = session.project
     panel.expose()
     assert session.project is before and told[-1] == "error"
+
+
+def test_while_light_is_to_come_one_method_measures_and_the_last_frame_is_developed_once(qtbot, monkeypatch):
+    from studio.qt.render import develop_panel
+
+    developed = []
+    once = develop_panel.develop_again
+    monkeypatch.setattr(
+        develop_panel,
+        "develop_again",
+        lambda frame, *rest, **more: developed.append(frame) or once(frame, *rest, **more),
+    )
+    session = small_session(rendered=True)
+    render = session.shown
+    render.final = False
+    made = DevelopPanel(session)
+    qtbot.addWidget(made)
+    made.refresh()
+    qtbot.waitUntil(lambda: not made.busy)
+    assert set(render.measurements) == {"likelihood"}
+    first = render.measurements["likelihood"]
+    # another frame so soon waits for the render, which has the processor
+    render.frame = replace(render.frame, seconds=1.0)
+    session.renders_changed.emit()
+    assert made._later.isActive() and len(developed) == 1
+    qtbot.waitUntil(lambda: not made.busy)
+    assert len(developed) == 2 and render.measurements["likelihood"] is not first
+    second, render.final = render.measurements["likelihood"], True
+    session.renders_changed.emit()
+    assert not made._later.isActive(), "what ended does not wait"
+    qtbot.waitUntil(lambda: not made.busy)
+    assert set(render.measurements) == {"likelihood", "gaussian", "centre_of_mass"}
+    assert len(developed) == 2 and render.measurements["likelihood"] is second
+    made.close()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QMessageBox
 from pytestqt.qtbot import QtBot
 
@@ -17,6 +18,8 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.results.nominal_panel import NominalPanel
+from studio.qt.viewport.error_cloud import ErrorCloud
+from studio.qt.viewport.view3d import View3D
 from studio.scan.deviation import Question, compared
 from studio.scan.scan_folder import open_folder
 from tests.studio.scan_of_steps import small_scan
@@ -100,3 +103,52 @@ def test_a_section_follows_its_plane_and_is_written(panel: NominalPanel, tmp_pat
     for box in tab.own:
         box.setValue(0.0)
     qtbot.waitUntil(lambda: "direction" in tab.told.text())
+
+
+def test_the_deviation_colours_the_points_while_it_is_looked_at(
+    panel: NominalPanel, session: Session, qtbot: QtBot
+) -> None:
+    view = View3D()
+    qtbot.addWidget(view)
+    view.resize(500, 400)
+    cloud = ErrorCloud(session, view)
+    tab = panel.deviation
+    tab.compare()
+    qtbot.waitUntil(lambda: tab.compared is not None)
+    found = tab.compared
+    assert found is not None and cloud.meaning == "deviation" and cloud.bar.title == "Deviation"
+    np.testing.assert_allclose(cloud.errors, 1e6 * found.found.value)
+    tab.in_view.setChecked(False)
+    assert cloud.meaning == "error" and len(cloud.points) == len(session.shown.scan.points["x"])
+    tab.in_view.setChecked(True)
+    assert cloud.meaning == "deviation"
+    panel.show_tab(panel.section)
+    assert cloud.meaning == "error"
+    view.close()
+
+
+def test_an_end_of_the_colour_bar_is_dragged_to_another_value(session: Session, qtbot: QtBot) -> None:
+    view = View3D()
+    qtbot.addWidget(view)
+    view.resize(500, 400)
+    view.show()
+    cloud = ErrorCloud(session, view)
+    bar, (low, high) = cloud.bar, cloud.bar.limits
+    assert low == -high == -cloud.limit and bar.unit == "µm"
+    x, top, tall = bar.bar.center().x(), bar.bar.top(), bar.bar.height()
+    qtbot.mousePress(bar, Qt.MouseButton.LeftButton, pos=QPoint(x, top))
+    qtbot.mouseMove(bar, QPoint(x, top + round(0.25 * tall)))
+    qtbot.mouseRelease(bar, Qt.MouseButton.LeftButton, pos=QPoint(x, top + round(0.25 * tall)))
+    # a quarter of the bar down is half of the upper limit
+    assert bar.limits == pytest.approx((0.5 * low, 0.5 * high), rel=0.02)
+    by_hand = bar.limits
+    actions = {action.text(): action for action in bar.menu().actions()}
+    actions["mm"].trigger()
+    assert bar.unit == "mm" and bar.limits == pytest.approx((1e-3 * by_hand[0], 1e-3 * by_hand[1]))
+    assert np.nanmax(np.abs(cloud.errors)) < 100.0
+    actions["90 % of the points"].trigger()
+    assert np.mean(np.abs(cloud.errors[np.isfinite(cloud.errors)]) <= bar.limits[1]) >= 0.9
+    actions["By the height"].trigger()
+    assert cloud.meaning == "height" and bar.unit == "mm"
+    np.testing.assert_allclose(cloud.errors, 1e3 * cloud._clouds[0]["z"])
+    view.close()

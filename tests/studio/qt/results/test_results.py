@@ -217,3 +217,21 @@ class TestMotion:
         ys = moving.cloud.points[:, 1]
         assert math.isclose(np.ptp(ys), np.ptp(ys[: sizes[0]]) + 0.004, abs_tol=0.002)
         assert (tmp_path / "scan" / "points.ply").is_file()
+
+
+def test_a_click_on_a_point_in_3d_keeps_its_row_and_selects_nothing(
+    window: MainWindow, results: ResultsPanel, qtbot: QtBot
+) -> None:
+    cloud: ErrorCloud = window.cloud
+    cloud.frame()
+    window.session.select(())
+    i = len(cloud.points) // 2
+    x, y = cloud.view.eye.project(cloud.points[i : i + 1], cloud.view.pixels)[0]
+    qtbot.mouseClick(cloud.view, Qt.MouseButton.LeftButton, pos=QPoint(round(x), round(y)))
+    assert results.pinned is not None and window.session.hovered == results.pinned
+    assert window.session.selection == ()
+    # of two points that lie one over the other either may be meant
+    apart = cloud.view.eye.project(cloud.points[cloud.rows == results.pinned], cloud.view.pixels) - (x, y)
+    assert np.linalg.norm(apart, axis=1).min() < 3.0
+    results.pin(results.pinned)
+    assert results.pinned is None

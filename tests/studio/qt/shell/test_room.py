@@ -7,7 +7,7 @@ import re
 import pytest
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QTextDocument
-from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QLabel, QTabBar, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from studio.project.document import FieldPath
@@ -134,6 +134,33 @@ def test_no_workspace_makes_the_window_larger_than_a_small_screen_at_1_5(window:
             grown.append(f"{key}: {window.width()} x {window.height()}, least {window.minimumSizeHint().width()}")
     window.resize(before)
     assert not grown
+
+
+def test_a_panel_that_is_called_for_comes_before_another_and_leaves_nothing_behind(
+    window: MainWindow, qtbot: QtBot
+) -> None:
+    before, size = window.size(), QSize(911, 512)
+    window.resize(size)
+    window.switch_to("measure")
+    window.show_panel("nominal")
+    for _ in range(3):
+        QApplication.processEvents()
+    assert window.size() == size, "there is room for it where the camera view is"
+    assert window.docks["camera"] in window.tabifiedDockWidgets(window.docks["nominal"])
+
+    def tabs() -> list[QTabBar]:
+        bars = window.findChildren(QTabBar, options=Qt.FindChildOption.FindDirectChildrenOnly)
+        # those that it has no use for Qt keeps beyond the edge
+        return [bar for bar in bars if bar.isVisible() and bar.geometry().intersects(window.rect())]
+
+    assert tabs()
+    window.switch_to("setup")
+    qtbot.waitUntil(lambda: not tabs())
+    window.switch_to("measure")
+    qtbot.waitUntil(lambda: bool(tabs()))
+    window.docks["nominal"].hide()
+    window.rearrange()
+    window.resize(before)
 
 
 def test_the_cheat_sheet_fits_on_a_small_screen(window: MainWindow) -> None:

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QMouseEvent
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -22,6 +21,7 @@ from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.results.readout_panel import ReadoutPanel
 from studio.qt.viewport.viewport import Viewport
+from tests.studio.qt.viewport.viewport_hands import drag, mouse, pixel
 
 SAMPLE = Path(__file__).parents[4] / "assets/projects/plane/project.json"
 RIG, CAMERA, LASER, PLATE, LAMP = (
@@ -73,34 +73,6 @@ def select(viewport: Viewport, path: FieldPath) -> Frame:
     frame = viewport.gizmo.frame()
     assert frame is not None
     return frame
-
-
-def pixel(viewport: Viewport, point: np.ndarray) -> QPointF:
-    x, y = viewport.view.eye.project(point, viewport.view.pixels)[0]
-    return QPointF(x, y)
-
-
-def mouse(viewport: Viewport, kind: str, at: QPointF, modifier: Qt.KeyboardModifier) -> None:
-    """A mouse event at a fraction of a pixel, through the event queue."""
-    types = {
-        "press": QMouseEvent.Type.MouseButtonPress,
-        "move": QMouseEvent.Type.MouseMove,
-        "release": QMouseEvent.Type.MouseButtonRelease,
-    }
-    left, none = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
-    button = none if kind == "move" else left
-    held = none if kind == "release" else left
-    event = QMouseEvent(types[kind], at, viewport.view.mapToGlobal(at), button, held, modifier)
-    QApplication.sendEvent(viewport.view, event)
-
-
-def drag(viewport: Viewport, start: QPointF, end: QPointF, modifier: Qt.KeyboardModifier | None = None) -> None:
-    modifier = modifier or Qt.KeyboardModifier.NoModifier
-    mouse(viewport, "press", start, modifier)
-    for share in (0.25, 0.5, 0.75, 1.0):
-        mouse(viewport, "move", start + (end - start) * share, modifier)
-        QApplication.processEvents()
-    mouse(viewport, "release", end, modifier)
 
 
 @pytest.mark.parametrize("path", [LASER, PLATE, CAMERA, RIG, LAMP])

@@ -320,3 +320,13 @@ def test_the_board_s_ghost_stands_before_the_camera(viewport: Viewport) -> None:
     np.testing.assert_allclose(data.points, square[0] @ pose[:3, :3].T + pose[:3, 3], atol=1e-6)
     session.show_ghost(np.zeros((0, 4, 3)))
     assert not actor.GetVisibility()
+
+
+def test_everything_is_in_view_lamps_as_well(viewport: Viewport) -> None:
+    viewport.frame()
+    width, height = viewport.view.pixels
+    scene = viewport.live.look.scene
+    assert scene.lights
+    for light in scene.lights:
+        x, y = viewport.view.eye.project(light.T_world_light.matrix[None, :3, 3], viewport.view.pixels)[0]
+        assert 0.0 <= x <= width and 0.0 <= y <= height

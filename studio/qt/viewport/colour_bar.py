@@ -1,0 +1,170 @@
+"""The bar that says which colour is which value; its ends are handles, its menu has percentiles, unit and meaning."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QObject, QPointF, QRect, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QContextMenuEvent, QLinearGradient, QMouseEvent, QPainter, QPaintEvent, QPolygonF
+from PySide6.QtWidgets import QMenu, QWidget
+
+from render.base.arrays import Float
+from studio.qt.core import theme
+from studio.scan.colour_scale import PER_METRE, SHARES, ColourScale, tick
+
+TIP = (
+    "Drag an end to another value; a double click brings back the percentile. Right click: percentiles, "
+    "mm or \u00b5m, colours by error or by height"
+)
+REACH_PX = 9
+"""From an end of the bar at which the mouse has hold of it."""
+LEFT, TOP, WIDTH, BELOW = 14, 34, 14, 36
+NARROW = 480
+"""px of a view of which a bar of the usual size would hide too much."""
+
+
+class ColourBar(QWidget):
+    """Lies in the lower right corner of the view."""
+
+    scaled = Signal(object)
+    """Another `ColourScale` is asked for."""
+    unit_chosen = Signal()
+    height_chosen = Signal(bool)
+
+    def __init__(self, view: QWidget) -> None:
+        super().__init__(view)
+        self.title, self.unit, self.note = "", "", ""
+        self.scale = ColourScale()
+        self.limits = (-1.0, 1.0)
+        self.units = {"error": "\u00b5m", "height": "mm", "deviation": "\u00b5m"}
+        """In which lengths of each meaning are told."""
+        self.meaning = "error"
+        self._held: bool | None = None
+        """Which end is dragged: the upper one; None: none."""
+        self._from = (-1.0, 1.0)
+        self.setToolTip(TIP)
+        self.setMouseTracking(True)
+        view.installEventFilter(self)
+        self._place()
+
+    def unit_of(self, meaning: str) -> str:
+        self.meaning = meaning
+        return self.units[meaning]
+
+    def show_scale(
+        self, title: str, unit: str, scale: ColourScale, values: Float, image_scale: float = 1.0
+    ) -> tuple[float, float]:
+        """Give the limits of (n,) values, and show them."""
+        self.title, self.unit, self.scale = title, unit, scale
+        self.limits = scale.limits(values)
+        self.note = f"at {image_scale:.3g} x size" if image_scale != 1.0 else ""
+        self.update()
+        return self.limits
+
+    def menu(self) -> QMenu:
+        """What a right click offers."""
+        made = QMenu(self)
+        for share in SHARES:
+            action = made.addAction(f"{share:g} % of the points")
+            action.setCheckable(True)
+            action.setChecked(self.scale.by_hand is None and self.scale.share == share)
+            action.triggered.connect(lambda _=False, share=share: self.scaled.emit(self.scale.automatic(share)))
+        if self.unit in PER_METRE:
+            made.addSeparator()
+            for unit in PER_METRE:
+                action = made.addAction(unit)
+                action.setCheckable(True)
+                action.setChecked(unit == self.unit)
+                action.triggered.connect(lambda _=False, unit=unit: self._choose_unit(unit))
+        if self.meaning != "deviation":
+            made.addSeparator()
+            for title, by_height in (("By the error", False), ("By the height", True)):
+                action = made.addAction(title)
+                action.setCheckable(True)
+                action.setChecked((self.meaning == "height") == by_height)
+                action.triggered.connect(lambda _=False, on=by_height: self.height_chosen.emit(on))
+        return made
+
+    def _choose_unit(self, unit: str) -> None:
+        factor = PER_METRE[unit] / PER_METRE[self.units[self.meaning]]
+        self.units[self.meaning] = unit
+        if self.scale.by_hand is not None:
+            low, high = self.scale.by_hand
+            self.scaled.emit(self.scale.at(low * factor, high * factor))
+        self.unit_chosen.emit()
+
+    @property
+    def bar(self) -> QRect:
+        """Where the colours are, px."""
+        return QRect(LEFT, TOP, WIDTH, self.height() - TOP - BELOW)
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        self.menu().exec(event.globalPos())
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        y = event.position().y()
+        if event.button() == Qt.MouseButton.LeftButton:
+            ends = {True: abs(y - self.bar.top()), False: abs(y - self.bar.bottom())}
+            upper = min(ends, key=lambda end: ends[end])
+            self._held, self._from = (upper if ends[upper] <= REACH_PX else None), self.limits
+        event.accept()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        y, bar = event.position().y(), self.bar
+        if self._held is not None:
+            low, high = self._from
+            # by the bar as it was when the drag began: what is under the mouse becomes the end
+            value = high - (high - low) * (y - bar.top()) / bar.height()
+            self.scaled.emit(self.scale.dragged(self._from, self._held, float(value)))
+        near = min(abs(y - bar.top()), abs(y - bar.bottom())) <= REACH_PX
+        self.setCursor(Qt.CursorShape.SizeVerCursor if near or self._held is not None else Qt.CursorShape.ArrowCursor)
+        event.accept()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        self._held = None
+        event.accept()
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
+        self.scaled.emit(self.scale.automatic(self.scale.share))
+        event.accept()
+
+    def eventFilter(self, watched: QObject, event: object) -> bool:
+        if event.type() == event.Type.Resize:  # type: ignore[attr-defined]
+            self._place()
+        return False
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        c = theme.colours()
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        back = QColor(c.window)
+        back.setAlpha(215)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(back)
+        painter.drawRoundedRect(QRectF(self.rect()), 6, 6)
+        bar, (low, high) = self.bar, self.limits
+        gradient = QLinearGradient(QPointF(bar.topLeft()), QPointF(bar.bottomLeft()))
+        shades = self.scale.colours(np.linspace(high, low, 21), low, high).tolist()
+        for i, (red, green, blue) in enumerate(shades):
+            gradient.setColorAt(i / 20, QColor(red, green, blue))
+        painter.fillRect(bar, gradient)
+        painter.setPen(QColor(c.text))
+        painter.drawText(QRect(12, 6, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.title)
+        painter.setPen(QColor(c.warning))
+        painter.drawText(QRect(12, self.height() - 24, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.note)
+        painter.setPen(QColor(c.text))
+        middle = ((0.5, 0.5 * (low + high)),) if bar.height() > 60 else ()
+        for share, value in ((0.0, high), *middle, (1.0, low)):
+            y = bar.top() + round(share * bar.height())
+            painter.drawLine(bar.right() + 2, y, bar.right() + 6, y)
+            box = QRect(bar.right() + 10, y - 10, self.width() - bar.right() - 12, 20)
+            painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, f"{tick(value)} {self.unit}")
+        painter.setBrush(QColor(c.text))
+        painter.setPen(Qt.PenStyle.NoPen)
+        for y in (bar.top(), bar.bottom() + 1):
+            painter.drawPolygon(QPolygonF([QPointF(bar.left() - 1, y), QPointF(3.0, y - 5.0), QPointF(3.0, y + 5.0)]))
+
+    def _place(self) -> None:
+        if (view := self.parentWidget()) is not None:
+            tall = 208 if view.width() > NARROW else 150
+            self.resize(128 if view.width() > NARROW else 112, min(tall, view.height() - 24))
+            self.move(view.width() - self.width() - 6, view.height() - self.height() - 6)
