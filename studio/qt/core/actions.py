@@ -85,7 +85,7 @@ COMMANDS: tuple[Command | str, ...] = (
     Command("measure", "View", "&Measure", "F8", "", "", True),
     Command("study", "View", "S&tudy", "F12", "", "", True),
     Command("calibrate", "View", "&Calibrate", "F3", "", "", True),
-    Command("dataset", "View", "Datas&et", "F4", "", "", True),
+    Command("dataset", "View", "Datas&et", "F10", "", "", True),
     "View/-",
     Command("panels", "View", "&Panels"),
     Command("log", "View", "M&essages", "Ctrl+L", "", "The log of this session"),

@@ -44,7 +44,7 @@ KEYS = {
     "measure": Qt.Key.Key_F8,
     "study": Qt.Key.Key_F12,
     "calibrate": Qt.Key.Key_F3,
-    "dataset": Qt.Key.Key_F4,
+    "dataset": Qt.Key.Key_F10,
 }
 
 
