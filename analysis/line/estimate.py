@@ -165,6 +165,7 @@ def _alike(lines: Lines, noise: NoiseModel, line: Line) -> bool:
 def _balanced(model: Callable[[float], NoiseModel], start: float, fitted: Callable[[NoiseModel], Line]) -> float:
     """The gain at which the reduced chi-square of the fits is 1."""
     log_gain, slope, before = math.log(start), -1.0, (0.0, 0.0)
+    most = math.log(max(FARTHEST_SCALED))
     for number in range(ROUNDS):
         ratio = residual_ratio(fitted(model(math.exp(log_gain))))
         if ratio is None:
@@ -174,6 +175,8 @@ def _balanced(model: Callable[[float], NoiseModel], start: float, fitted: Callab
             slope = float(np.clip((math.log(ratio) - before[1]) / (log_gain - before[0]), -1.0, -0.2))
         before = (log_gain, math.log(ratio))
         log_gain -= float(np.clip(before[1] / slope, -5.0, 5.0))
+        # of a line that is clipped nearly everywhere, or processed, the fits may leave the same at any gain
+        log_gain = float(np.clip(log_gain, math.log(start) - most, math.log(start) + most))
         if abs(before[1]) < 0.01:
             break
     return math.exp(log_gain)

@@ -10,8 +10,9 @@ with e the errors in sigmas, P the cubic and T_k ones on the k-th diagonals, giv
 covariances c_k. These are weighted as normal likelihood weighs white errors (C. R. Rao, J. Multivariate Analysis 1,
 445, 1971). c_0 is what sigma's square would have to be multiplied with, 1 + 2 (c_1 + c_2 ...) / c_0 how many scan
 lines err alike. What c_0 is above 1 is parted, by non-negative least squares over the scan lines, into a share of
-sigma's square and a variance of its own. Shape finer than a run counts as noise: of a sensor whose pixels are
-independent a rough surface is told, and nothing is asked here.
+sigma's square and a variance of its own. Where it is below 1 on scan lines of one kind, as of those that no fit
+follows, whose sigma holds what that may cost at most, their sigma is as much smaller. Shape finer than a run counts as
+noise: of a sensor whose pixels are independent a rough surface is told, and nothing is asked here.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from analysis.line.result import Flag, Line
@@ -46,8 +48,13 @@ it are apart: where between them it is, nothing tells."""
 SINGLE, MOST = (Flag.OK, Flag.UNRESOLVED, Flag.SPECKLED), 0.6
 """Flags of a line that is no other's neighbour, and the share of them from which they alone are asked: where a line
 that is two or none is taken to be, jumps."""
+KINDS = (SINGLE, (Flag.SATURATED,), (Flag.BLENDED,), (Flag.MISFIT,))
+"""Flags whose sigmas are told in one way each."""
 SURE, KNOWN = 3.0, 0.2
-"""Standard errors from which a variance is believed to be above the one told, and how well that is known at best."""
+"""Standard errors from which a variance is believed to be another than the one told, and how well that is known at
+best."""
+LEAST = 0.01
+"""Of the variance told, in one of two rounds."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +84,7 @@ def with_shared_noise(line: Line) -> Line:
     narrow = valid.any() and float(np.median(line.width[valid, 0])) < FINEST
     coarse = (line.flag == Flag.OK) & ((line.width < FINEST) | narrow)
     line = replace(line, flag=np.where(coarse, Flag.UNRESOLVED, line.flag).astype(line.flag.dtype))
+    line = _no_less_sure(line)
     asked = single if single.sum() >= MOST * valid.sum() else valid
     noise = shared_noise(np.where(asked, line.u[:, 0], np.nan), line.sigma_u[:, 0], line.width[:, 0])
     if noise is None:
@@ -85,11 +93,64 @@ def with_shared_noise(line: Line) -> Line:
     return replace(noise.added_to(line), candidates=candidates)
 
 
+def _no_less_sure(line: Line) -> Line:
+    """The line (n, k) with smaller sigmas on those `KINDS` of scan lines whose first peaks surely scatter by less."""
+    sigma, flag = line.sigma_u.copy(), line.flag[:, 0]
+    for _ in range(2):  # runs are weighted by sigma
+        found = _covariance(np.where(line.valid[:, 0], line.u[:, 0], np.nan), sigma[:, 0], line.width[:, 0])
+        if found is None:
+            break
+        runs, covariance, length = found.runs, found.covariance, found.length
+        rows, squares = (np.concatenate([getattr(run, name) for run in runs]) for name in ("rows", "squares"))
+        # degrees of freedom, and what errs alike, are missing from all squares alike
+        squares = squares * (covariance[0] / squares.mean())
+        for kind in KINDS:
+            here = squares[np.isin(flag[rows], kind)]
+            error = math.sqrt(2.0 * length / max(len(here), 1))
+            if len(here) >= FEWEST_RUNS * RUNS[0] / 2 and here.mean() * (1.0 + SURE * error) + KNOWN < 1.0:
+                sigma[np.isin(line.flag, kind)] *= math.sqrt(max(float(here.mean()), LEAST))
+    if not (sigma < line.sigma_u).any():
+        return line
+    # what neighbours share has to stay a part of it
+    less = np.where(sigma < line.sigma_u, sigma / line.sigma_u, 1.0)
+    return replace(line, sigma_u=sigma, shared_u=None if line.shared_u is None else line.shared_u * less)
+
+
 def shared_noise(u: Float, sigma: Float, width: Float) -> SharedNoise | None:
     """Positions, sigmas and widths (n,) px -> what they scatter beyond their sigmas, and how far alike.
 
     None: as they tell and independently, as far as can be sure, or too few positions.
     """
+    found = _covariance(u, sigma, width)
+    if found is None:
+        return None
+    variance = max(float(found.covariance[0]), 1e-300)
+    more = variance - 1.0 > SURE * found.error + KNOWN
+    if not (more or found.covariance[1] > SURE * found.error * max(variance, 1.0)):
+        return None
+    share, added = _parted(found.runs, variance - 1.0) if more else (0.0, 0.0)
+    return SharedNoise(share, added, found.length)
+
+
+@dataclass(frozen=True)
+class _Covariance:
+    runs: list[_Run]
+    covariance: Float
+    """(lags,) of errors in sigmas."""
+    error: float
+    """Standard error of the first, were errors white."""
+
+    @property
+    def length(self) -> float:
+        """Scan lines that err alike."""
+        below = np.flatnonzero(self.covariance[1:] <= 0.0)
+        last = int(below[0]) if len(below) else len(self.covariance) - 1
+        shared = float(self.covariance[1 : 1 + last].sum())
+        return max(1.0 + 2.0 * shared / max(float(self.covariance[0]), 1e-300), 1.0)
+
+
+def _covariance(u: Float, sigma: Float, width: Float) -> _Covariance | None:
+    """Positions, sigmas and widths (n,) px -> covariances of their errors along the line; None: too few of them."""
     runs: list[_Run] = []
     before = math.inf
     for length in RUNS:
@@ -104,16 +165,8 @@ def shared_noise(u: Float, sigma: Float, width: Float) -> SharedNoise | None:
     moments = np.sum([run.moments for run in runs], axis=0)
     design = np.sum([run.design for run in runs], axis=0)
     covariance = np.linalg.lstsq(design, moments, rcond=1e-9)[0]
-    variance = max(float(covariance[0]), 1e-300)
     # of white errors: twice the squared mean over the degrees of freedom
-    error = float(np.sqrt(2.0 / design[0, 0]))
-    more = variance - 1.0 > SURE * error + KNOWN
-    if not (more or covariance[1] > SURE * error * max(variance, 1.0)):
-        return None
-    below = np.flatnonzero(covariance[1:] <= 0.0)
-    shared = float(covariance[1 : 1 + (int(below[0]) if len(below) else len(covariance) - 1)].sum())
-    share, added = _parted(runs, variance - 1.0) if more else (0.0, 0.0)
-    return SharedNoise(share, added, max(1.0 + 2.0 * shared / variance, 1.0))
+    return _Covariance(runs, covariance, float(np.sqrt(2.0 / design[0, 0])))
 
 
 def _parted(runs: list[_Run], excess: float) -> tuple[float, float]:
@@ -139,6 +192,8 @@ class _Run:
     """(n,) of what the cubic leaves, in sigmas."""
     inverse: Float
     """(n,) 1 / sigma^2, px^-2."""
+    rows: NDArray[np.intp]
+    """(n,) scan lines."""
 
     @property
     def variance(self) -> float:
@@ -148,11 +203,12 @@ class _Run:
 def _runs(u: Float, sigma: Float, width: Float, length: int) -> list[_Run]:
     """Those without jumps."""
     starts = range(0, len(u) - length + 1, length)
-    found = [_run(*(values[start : start + length] for values in (u, sigma, width))) for start in starts]
+    cut = [(start, slice(start, start + length)) for start in starts]
+    found = [_run(u[here], sigma[here], width[here], start) for start, here in cut]
     return [run for run in found if run is not None]
 
 
-def _run(u: Float, sigma: Float, width: Float) -> _Run | None:
+def _run(u: Float, sigma: Float, width: Float, start: int) -> _Run | None:
     """None: too few positions, or a jump among them."""
     there = np.isfinite(u) & np.isfinite(sigma) & (sigma > 0.0)
     if there.sum() < FILLED * len(u):
@@ -165,7 +221,9 @@ def _run(u: Float, sigma: Float, width: Float) -> _Run | None:
     at = np.flatnonzero(there).tobytes()
     scaled = _residual_maker(at, len(u)) @ u[there] / sigma[there]
     lags, design = _lags(at, len(u))
-    return _Run(lags @ np.outer(scaled, scaled).ravel(), design, scaled**2, sigma[there] ** -2)
+    return _Run(
+        lags @ np.outer(scaled, scaled).ravel(), design, scaled**2, sigma[there] ** -2, start + np.flatnonzero(there)
+    )
 
 
 @lru_cache(maxsize=8)

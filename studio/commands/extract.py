@@ -135,6 +135,8 @@ def _prepared(images: tuple[Path, ...], options: ImageOptions, given: dict[str, 
         given["select"] = "continuous"
     if given.get("peaks") is None and given["select"] == "continuous" and options.hdr is None:
         wishes = replace(wishes, count_lines=True)
+    if given.get("smooth_along") is None and given["select"] == "continuous":
+        given["smooth_along"] = not (options.spacetime or options.ridges or options.hdr)
     settings, volume = settings_of(None, channel=wishes.colour, axis=wishes.axis, **given), None
     if settings.geometry:
         if options.project is None:

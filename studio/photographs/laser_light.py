@@ -22,6 +22,7 @@ from analysis.line.series.subtract import subtract_off
 from analysis.line.settings import ExtractionSettings
 from studio.photographs.evidence import COLOURS, Chain, Colour, brightest
 
+Floats = NDArray[np.float64]
 Channel = Literal["mono", "luminance", "red", "green", "blue", "difference"]
 
 LOSSY_FULL = 250.0
@@ -36,6 +37,8 @@ BRIDGE = 12
 """Scan lines of the shrunk image that the band goes on where its chain has none: as far as a chain may skip."""
 LEVEL = 128
 """px of level ground on either side of the bands, at least: what a background and its noise are told by."""
+OWN = 0.25
+"""Of the band, on either side of the chain, where a position is the line's."""
 TIE = 0.1
 """Relative difference of scatter below which the first of two channels is taken."""
 MOST_FOUND = 0.9
@@ -132,14 +135,17 @@ def scatter_of(
     pieces = _pieces(image, off, chain, axis)
     if pieces is None:
         return np.inf, 0
-    light = laser_light(*pieces, channel, colour, full_scale(pieces[0], lossy))
+    some, some_off, expected, reach = pieces
+    light = laser_light(some, some_off, channel, colour, full_scale(some, lossy))
     steps = np.abs(np.diff(light.image.astype(np.float32), axis=1))
     dark = 1.05 * float(np.median(steps)) + 0.3  # half a DN of rounding in each of two neighbours
     gain = max(float(np.nanmax(light.image)), 1.0) / 1e4
     noise = NoiseModel(gain=gain, read_noise=dark / gain, saturation=light.saturation)
     noise = noise.model_copy(update={"alike": True})  # of a photograph's colours
     line = extract(light.image, settings=ExtractionSettings(), noise=noise, threads=1, shared=False)
-    u = np.where(line.valid, line.u, np.nan)[:, 0].reshape(-1, RUN)
+    # in another channel the line may be dark, and what is beside it smooth
+    on = line.valid[:, 0] & (np.abs(line.u[:, 0] - expected) <= reach)
+    u = np.where(on, line.u[:, 0], np.nan).reshape(-1, RUN)
     bends = u[:, : -2 * LAG] - 2.0 * u[:, LAG:-LAG] + u[:, 2 * LAG :]
     bends = np.abs(bends[np.isfinite(bends)])
     if len(bends) < RUN // 2:
@@ -149,8 +155,10 @@ def scatter_of(
 
 def _pieces(
     image: NDArray[Any], off: NDArray[Any] | None, chain: Chain, axis: Axis
-) -> tuple[NDArray[Any], NDArray[Any] | None] | None:
-    """Runs of scan lines about the chain, one below the other: (RUN n, w) or (RUN n, w, 3)."""
+) -> tuple[NDArray[Any], NDArray[Any] | None, Floats, Floats] | None:
+    """Runs of scan lines about the chain, one below the other: (RUN n, w) or (RUN n, w, 3), those of the laser-off
+    image, and (RUN n,) where on them the chain is and how far the line may be from it.
+    """
     if axis == "columns":
         image = image.swapaxes(0, 1)
         off = None if off is None else off.swapaxes(0, 1)
@@ -163,9 +171,13 @@ def _pieces(
     width = min(image.shape[1], max(int(np.median(high[there] - low[there])), 32))
     middles = [int(np.clip((low[s] + high[s + RUN - 1]) // 2 - width // 2, 0, image.shape[1] - width)) for s in starts]
     cut = [(slice(s, s + RUN), slice(m, m + width)) for s, m in zip(starts, middles, strict=True)]
+    ends = [(low[rows] - across.start, high[rows] - 1 - across.start) for rows, across in cut]
+    first, last = (np.concatenate(side) for side in zip(*ends, strict=True))
     return (
         np.concatenate([image[one] for one in cut]),
         None if off is None else np.concatenate([off[one] for one in cut]),
+        0.5 * (first + last),
+        OWN * (last - first),
     )
 
 
@@ -182,11 +194,17 @@ def band(chain: Chain, count: int, width: int) -> tuple[NDArray[np.intp], NDArra
     distance = distance_transform_edt(~np.isfinite(chain.u))
     rows = np.arange(count)
     at = (rows + 0.5) / factor - 0.5
-    middle = np.interp(at, there, chain.u[there])
     half = ROOM * np.interp(at, there, chain.scale[there]) + SPARE
     near = distance[np.clip(rows // factor, 0, n - 1)] <= BRIDGE
-    low = np.where(near, np.clip(np.floor(middle - half), 0, width), 0).astype(np.intp)
-    high = np.where(near, np.clip(np.ceil(middle + half) + 1, 0, width), 0).astype(np.intp)
+    # in a gap the line may still be where it was before it, or already where it is after it
+    after = np.clip(np.searchsorted(there, at), 0, len(there) - 1)
+    before = np.clip(after - 1, 0, None)
+    gap = (there[after] - there[before] > 1) & (there[before] < at) & (at < there[after])
+    middle = np.interp(at, there, chain.u[there])
+    sides = chain.u[there[before]], chain.u[there[after]]
+    least, most = (np.where(gap, choice(*sides), middle) for choice in (np.minimum, np.maximum))
+    low = np.where(near, np.clip(np.floor(least - half), 0, width), 0).astype(np.intp)
+    high = np.where(near, np.clip(np.ceil(most + half) + 1, 0, width), 0).astype(np.intp)
     return low, np.maximum(low, high)
 
 

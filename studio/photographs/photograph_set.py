@@ -214,7 +214,10 @@ def _measuring(seen: Sequence[Seen], evidence: Evidence, wished: Channel | None)
             scatters[name].append(scatter)
             counts[name] += found
     typical = {name: float(np.median(scatters[name])) for name in names}
-    enough = [name for name in names if counts[name] >= MOST_FOUND * max(counts.values()) > 0]
+    own = counts.get(evidence.colour, 0)  # what is only left over of the light in another colour must see all of it
+    least_found = {name: own if name in COLOURS and name != evidence.colour else 1 for name in names}
+    most = max(counts.values())
+    enough = [name for name in names if counts[name] >= max(MOST_FOUND * most, least_found[name])]
     least = min((typical[name] for name in enough), default=np.inf)
     if not np.isfinite(least):
         return names[0], "by default"

@@ -32,8 +32,9 @@ from render.camera.camera import Camera
 from studio.photographs.candidates import peaks_to_choose_from
 from studio.photographs.choice import carried_on, selected
 from studio.photographs.completion import FILLED
+from studio.photographs.half_height import with_half_heights
 from studio.photographs.laser_light import Light, about, bands, full_scale, laser_light, without
-from studio.photographs.line_arrays import changed
+from studio.photographs.line_arrays import changed, column
 from studio.photographs.line_ends import HALF, TONED, ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
@@ -45,6 +46,9 @@ PLATEAU = 32
 """Pixels of one number that a sensor's limit makes, and chance does not."""
 SATURATED_SHARE = 0.5
 """Of the scan lines; an exposure with more of them is no base to estimate noise from."""
+
+WIDER, PIXEL = 2.0, 12.0**-0.5
+"""Times the line's usual width that one scan line's may be; px, the sigma of light spread over a pixel."""
 
 FITS = ("auto", "likelihood", "gaussian")
 """Methods that a profile may defeat."""
@@ -66,12 +70,17 @@ class Measured:
     @property
     def light(self) -> NDArray[Any] | None:
         """(h, w) that was measured, NaN beside it; None: nothing was."""
-        if self.part is None or self.part.shape == self.image.shape[:2]:
-            return self.part
-        (x, y), (height, width) = self.corner, self.part.shape
-        around = np.full(self.image.shape[:2], np.nan, np.float32)
-        around[y : y + height, x : x + width] = self.part
-        return around
+        return None if self.part is None else whole_light(self.part, self.corner, self.image.shape)
+
+
+def whole_light(part: NDArray[Any], corner: tuple[int, int], shape: tuple[int, ...]) -> NDArray[Any]:
+    """A part (h', w') of an image (h, w, ...), the (x, y) of its first pixel -> (h, w), NaN beside it."""
+    if part.shape == shape[:2]:
+        return part
+    (x, y), (height, width) = corner, part.shape
+    around = np.full(shape[:2], np.nan, np.float32)
+    around[y : y + height, x : x + width] = part
+    return around
 
 
 def extract_photograph(
@@ -108,12 +117,16 @@ def extract_photograph(
         if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
             plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
             centres = extract(light.image, settings=plainly, noise=noise, threads=threads, shared=False)
-            line = carried_on(line, placed(centres, whole.shape, corner), settings, volume, half)
+            centres = placed(centres, whole.shape, corner)
+            if settings.peaks == 1 and look.settings.pattern is None:
+                around = whole_light(light.image, corner, whole.shape)
+                centres = with_half_heights(centres, column(line, 0), around, noise.gain)
+            line = carried_on(line, centres, settings, volume, half)
         elif not alone:
             line = selected(line, settings, volume)
         if settings.select == "continuous":
             line = ended(line, half)
-        line = with_shared_noise(line) if shared else line
+        line = _no_wider(with_shared_noise(line), line) if shared else line
         line = smooth_along(line) if look.settings.smooth_along else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
@@ -167,7 +180,7 @@ def no_line(shape: tuple[int, ...], settings: ExtractionSettings, note: str) -> 
 
 def unsure_dropped(line: Line) -> Line:
     """The line without the positions that are less certain than the line is wide."""
-    unsure = line.valid & (line.sigma_u > line.width)
+    unsure = line.valid & (line.sigma_u > _widest(line))
     if not unsure.any():
         return line
 
@@ -175,6 +188,19 @@ def unsure_dropped(line: Line) -> Line:
         return np.where(unsure, np.nan, values)
 
     return changed(line, kept, np.where(unsure, np.uint8(Flag.UNSURE), line.flag).astype(np.uint8))
+
+
+def _widest(line: Line) -> Float:
+    """(n, k) px, the sigma of a position of which nothing is known but that it is in the line: as wide as pixels show
+    it, and no wider than a line of its usual width can be.
+    """
+    usual = float(np.median(line.width[line.valid])) if line.valid.any() else math.inf
+    return np.asarray(np.hypot(np.minimum(line.width, WIDER * usual), PIXEL))
+
+
+def _no_wider(line: Line, before: Line) -> Line:
+    """The line whose sigma was made larger, by no more than to what `_widest` says: before that it was within it."""
+    return replace(line, sigma_u=np.minimum(line.sigma_u, np.maximum(before.sigma_u, _widest(line))))
 
 
 def placed(line: Line, shape: tuple[int, ...], corner: tuple[int, int]) -> Line:

@@ -12,8 +12,9 @@ from scipy.special import ndtr
 
 from analysis.line.estimate import estimate_noise
 from analysis.line.extract import extract
+from analysis.line.result import Flag, Line
 from analysis.line.settings import ExtractionSettings
-from analysis.line.shared_noise import shared_noise
+from analysis.line.shared_noise import shared_noise, with_shared_noise
 from render.sensor.processing import compressed, demosaiced
 
 ROWS, COLUMNS = 1024, 160
@@ -150,3 +151,26 @@ def test_a_rough_surface_is_told_by_a_sensor_of_independent_pixels() -> None:
 def test_too_few_scan_lines_say_nothing() -> None:
     rng = np.random.default_rng(10)
     assert shared_noise(rng.normal(size=96), np.full(96, 0.05), np.full(96, SIGMA)) is None
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_a_misfit_may_cost_at_most_becomes_what_it_costs_and_other_scan_lines_are_left(seed: int) -> None:
+    """Every third scan line is no Gaussian, and is told 0.6 px by its fit: it scatters 0.15 px, the others as told."""
+    rng = np.random.default_rng(seed)
+    misfit = np.arange(ROWS) % 3 == 0
+    flag = np.where(misfit, np.uint8(Flag.MISFIT), np.uint8(Flag.OK))[:, None]
+    true, told = np.where(misfit, 0.15, 0.05)[:, None], np.where(misfit, 0.6, 0.05)[:, None]
+    u = centres()[:, None] + true * rng.normal(size=(ROWS, 1))
+    one = np.ones((ROWS, 1))
+    found = with_shared_noise(Line("rows", "likelihood", u, told, SIGMA * one, one, one, one, flag))
+    # a variance of 341 is known to 8 %: what is above 1 - 0.2 - 3 * 8 % = 0.65 of the one told is not surely less
+    assert 0.15 * (1.0 - 3.0 * 0.04) < np.median(found.sigma_u[misfit]) < 0.15 / 0.65**0.5 * (1.0 + 3.0 * 0.04)
+    assert np.median(found.sigma_u[~misfit]) == pytest.approx(0.05, rel=0.05)
+
+
+def test_sigmas_that_are_as_the_scatter_says_are_left_to_the_bit() -> None:
+    rng = np.random.default_rng(8)
+    flag, one = np.full((ROWS, 1), np.uint8(Flag.MISFIT)), np.ones((ROWS, 1))
+    u = centres()[:, None] + 0.1 * rng.normal(size=(ROWS, 1))
+    line = Line("rows", "likelihood", u, 0.1 * one, SIGMA * one, one, one, one, flag)
+    assert np.array_equal(with_shared_noise(line).sigma_u, line.sigma_u)
