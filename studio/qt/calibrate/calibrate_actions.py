@@ -14,6 +14,7 @@ from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.calibrate.keeping import remove, use, use_file
 from studio.qt.core.actions import Actions
 from studio.qt.core.session import Session, one_of
+from studio.qt.image.photograph_window import PhotographWindow
 
 
 def is_photograph(path: Path) -> bool:
@@ -55,6 +56,8 @@ class CalibrateActions(QObject):
         for key, begin in (("calibrate_photographs", panel.ask_folder), ("calibrate_project", self.work.simulate)):
             actions.connect(key, self.began.emit)
             actions.connect(key, begin)
+        self.photographs: PhotographWindow | None = None
+        actions.connect("photographs", self.open_photographs)
         actions.connect("drop_view", self.toggle_view)
         actions.connect("save_calibration", panel.ask_and_save)
         actions.connect("use_calibration", lambda: use(self.work))
@@ -70,6 +73,15 @@ class CalibrateActions(QObject):
             self.actions[key].setEnabled(self.work.solved is not None)
         self.actions["remove_calibration"].setEnabled(self.work.session.project.calibration != Calibration())
         self.actions["drop_view"].setEnabled(self.work.material is not None)
+
+    def open_photographs(self) -> PhotographWindow:
+        """The window of photographs of a line, which takes what is dropped on it."""
+        if self.photographs is None:
+            parent = self.parent()
+            self.photographs = PhotographWindow(self.work.session, parent if isinstance(parent, QWidget) else None)
+        self.photographs.show()
+        self.photographs.raise_()
+        return self.photographs
 
     def toggle_view(self) -> None:
         """The view that is looked at counts no longer, or again."""

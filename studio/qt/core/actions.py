@@ -126,6 +126,8 @@ COMMANDS: tuple[Command | str, ...] = (
     ),
     Command("section", "Measure", "&Section…", "Alt+S", "", "Truth and points in a plane, as DXF or CSV"),
     "Measure/-",
+    Command("photographs", "Measure", "Line in p&hotographs…", "", "", "Of a real scanner, beside the rendered image"),
+    "Measure/-",
     Command("frame_points", "Measure", "Points in &view", "Alt+P", "", "The measured points in the middle of the view"),
     Command(
         "calibrate_photographs",

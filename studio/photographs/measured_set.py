@@ -1,0 +1,54 @@
+"""A set of photographs measured by what is wished of it, for whoever shows more than tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from analysis.line.extract import settings_of
+from render.base.errors import InputError
+from studio.photographs.photograph_set import Look, Wishes, look_at
+from studio.photographs.photographs import Measured, extract_photograph
+
+
+@dataclass(frozen=True)
+class MeasuredSet:
+    """What was chosen for all, the line of each, and why one has none."""
+
+    look: Look
+    lines: dict[Path, Measured] = field(default_factory=dict)
+    problems: dict[Path, str] = field(default_factory=dict)
+
+    def told_of(self, path: Path) -> str:
+        """One line of text on a photograph."""
+        if path not in self.lines:
+            return self.problems.get(path, "not measured")
+        line = self.lines[path].line
+        found = line.valid[:, 0]
+        if not found.any():
+            return f"no line found on {len(found)} {line.axis}; {line.note}"
+        sigma = float(np.nanmedian(line.sigma_u[found, 0]))
+        width = float(np.median(line.width[found, 0]))
+        return f"{found.sum()} of {len(found)} {line.axis}, sigma {sigma:.3f} px, width {width:.2f} px"
+
+
+def measured_set(
+    paths: Sequence[Path], wishes: Wishes, go_on: Callable[[float], bool] = lambda share: True
+) -> MeasuredSet | None:
+    """Image files of one set -> their lines; as `main.py extract` without options finds them, but for the wishes.
+
+    go_on: told which share is done; False ends it (None). InputError: laser-off images that do not go with the images.
+    """
+    settings = settings_of(None, select="continuous", smooth_along=True)
+    found = MeasuredSet(look_at(paths, settings, replace(wishes, count_lines=True)))
+    for number, path in enumerate(paths):
+        if not go_on(number / len(paths)):
+            return None
+        try:
+            found.lines[path] = extract_photograph(path, found.look)
+        except InputError as error:
+            found.problems[path] = str(error)
+    return found

@@ -1,0 +1,122 @@
+"""Photographs of a line in their window: opened, limited, measured by what is chosen, beside what is rendered."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
+
+from render.sensor.develop import develop
+from studio.qt.image.photograph_window import LANE, PICTURE, RENDERED, PhotographWindow
+from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
+from tests.studio.qt.small_session import small_session
+
+SCENE = Scene(colour=0, room=40.0)
+
+
+@pytest.fixture
+def made(qtbot, tmp_path):
+    """The window with two photographs of one line, over a session with a render."""
+    for seed in (1, 2):
+        write(tmp_path / f"{seed}.png", photograph(SCENE, seed=seed))
+    window = PhotographWindow(small_session(rendered=True))
+    qtbot.addWidget(window)
+    window.show()
+    qtbot.waitExposed(window)
+    window.add([tmp_path / "1.png", tmp_path / "2.png", tmp_path / "notes.txt"])
+    yield window
+    window.runner.close()
+    window.close()
+
+
+def measured(qtbot, window):
+    window.found = None
+    window.measure()
+    qtbot.waitUntil(lambda: window.runner.job(LANE) is None)
+
+
+def points(window):
+    return np.concatenate([item.getData() for item in (window.sure, window.doubtful)], axis=1)
+
+
+def test_the_line_of_each_is_drawn_where_it_is_and_told_with_what_was_chosen(qtbot, made):
+    assert [path.name for path in made.paths] == ["1.png", "2.png"] and made.names.count() == 2
+    measured(qtbot, made)
+    for row in (0, 1):
+        made.names.setCurrentRow(row)
+        u, v = points(made)
+        assert len(u) > 0.98 * HEIGHT
+        assert np.median(np.abs(u - SCENE.centre[v.astype(int)])) < 0.25
+    assert f"of {HEIGHT} rows" in made.told.text() and "laser's colour: red" in made.chosen.text()
+    qtbot.waitUntil(lambda: made.runner.job(PICTURE) is None)
+    assert made.view.item.size == photograph(SCENE, seed=1).shape[1::-1]
+
+
+def test_the_rendered_image_of_the_project_stands_beside_it(qtbot, made):
+    assert made.no_render.isVisible()
+    shown = made.session.shown
+    scene = shown.project.scene
+    shown.images.append(develop(shown.frame, scene, shown.project.sensor, seed=1))
+    made.session.developed.emit()
+    assert not made.no_render.isVisible()
+    qtbot.waitUntil(lambda: made.runner.job(RENDERED) is None)
+    assert made.rendered.item.size == (scene.camera.width, scene.camera.height)
+
+
+def test_a_rectangle_limits_what_is_looked_at(qtbot, made):
+    qtbot.waitUntil(lambda: made.runner.job(PICTURE) is None)
+    made.limited.setChecked(True)
+    width, _ = made.view.item.size
+    made.region.setPos((-0.5, 49.5))
+    made.region.setSize((width, 100.0))
+    measured(qtbot, made)
+    _, v = points(made)
+    assert v.min() >= 50 and v.max() < 150 and len(v) > 95
+    made.limited.setChecked(False)
+    measured(qtbot, made)
+    assert len(points(made)[0]) > 0.98 * HEIGHT
+
+
+def test_colour_axis_and_laser_off_images_are_as_chosen(qtbot, made, tmp_path):
+    made.colour.setCurrentText("blue")
+    made.axis.setCurrentText("columns")
+    dark = tmp_path / "dark.png"
+    write(dark, photograph(SCENE, seed=3, laser=False))
+    made.set_offs([dark])
+    wishes = made.wishes()
+    assert (wishes.colour, wishes.axis, wishes.off) == ("blue", "columns", (dark,))
+    made.colour.setCurrentText("auto")
+    made.axis.setCurrentText("auto")
+    measured(qtbot, made)
+    assert "laser off" in made.chosen.text() and made.off_told.text() == "dark.png"
+    assert len(points(made)[0]) > 0.98 * HEIGHT
+
+
+def test_what_cannot_be_measured_is_said_and_the_others_go_on(qtbot, made, tmp_path):
+    (tmp_path / "broken.png").write_bytes(b"no image")
+    made.add([tmp_path / "broken.png"])
+    measured(qtbot, made)
+    assert str(tmp_path / "broken.png") in made.told.text() and len(points(made)[0]) == 0
+    made.names.setCurrentRow(0)
+    assert len(points(made)[0]) > 0.98 * HEIGHT
+    other = tmp_path / "other.png"
+    write(other, photograph(SCENE, seed=4, laser=False)[:50])
+    made.set_offs([other])
+    measured(qtbot, made)
+    assert "size" in made.problem.text() or "size" in made.told.text()
+
+
+def test_photographs_are_dropped_on_it_and_cleared(qtbot, made, tmp_path):
+    write(tmp_path / "3.png", photograph(SCENE, seed=5))
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(tmp_path / "3.png")), QUrl.fromLocalFile(str(Path("absent.txt").resolve()))])
+    drop = QDropEvent(
+        QPointF(5, 5), Qt.DropAction.CopyAction, data, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    )
+    made.dropEvent(drop)
+    assert [path.name for path in made.paths] == ["1.png", "2.png", "3.png"]
+    made.clear()
+    assert not made.paths and made.names.count() == 0 and not made.measure_button.isEnabled()
