@@ -40,6 +40,8 @@ RIVAL = 0.9
 """Quantile of the scan lines' strongest rivals: a lamp on a few scan lines does not hide a line on all of them."""
 COMPARABLE = 0.5
 """A narrow line answers a filter twice its width with a third of its strength, a plateau with nearly all."""
+CLEAR = 1.0 / 3.0
+"""Share of a piece of the chain that is clear of its rivals, which glowing, broken surfaces have beside the line."""
 JUMP = 5.0
 """px of the shrunk image from one scan line to the next, that a chain's piece ends at."""
 NEAR = 3.0
@@ -379,10 +381,10 @@ def _clearness(
 
 
 def _clear_pieces(found: NDArray[np.float64], clear: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which scan lines (n,) are on a piece of the chain that stands clear of the rivals on most of its length."""
+    """Which scan lines (n,) are on a piece of the chain that stands clear of the rivals on enough of its length."""
     there = np.flatnonzero(np.isfinite(found))
     kept = np.zeros(len(found), np.bool_)
     far = (np.diff(there) > 1) | (np.abs(np.diff(found[there])) > JUMP)
     for piece in np.split(there, np.flatnonzero(far) + 1):
-        kept[piece] = bool(len(piece)) and float(np.median(clear[piece])) > 0.0
+        kept[piece] = bool(len(piece)) and float(np.mean(clear[piece] > 0.0)) > CLEAR
     return kept

@@ -41,8 +41,9 @@ OWN = 0.25
 """Of the band, on either side of the chain, where a position is the line's."""
 TIE = 0.1
 """Relative difference of scatter below which the first of two channels is taken."""
-MOST_FOUND = 0.9
-"""A channel that finds fewer than this share of the most is none to measure with."""
+MOST_FOUND, ALL_FOUND = 0.9, 0.95
+"""A channel that finds fewer than this share of the most is none to measure with; one of another colour than the
+laser's, than this share of what that finds."""
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from studio.photographs.evidence import (
     shrink,
 )
 from studio.photographs.image_files import Photograph, load_photograph, read_photograph
-from studio.photographs.laser_light import MOST_FOUND, TIE, Channel, channels_to_try, scatter_of
+from studio.photographs.laser_light import ALL_FOUND, MOST_FOUND, TIE, Channel, channels_to_try, scatter_of
 from studio.photographs.off_images import pair_offs
 from studio.photographs.region import Region
 
@@ -214,7 +214,8 @@ def _measuring(seen: Sequence[Seen], evidence: Evidence, wished: Channel | None)
             scatters[name].append(scatter)
             counts[name] += found
     typical = {name: float(np.median(scatters[name])) for name in names}
-    own = counts.get(evidence.colour, 0)  # what is only left over of the light in another colour must see all of it
+    # another colour has only what is left over of the light, and must see as good as all of it
+    own = ALL_FOUND * counts.get(evidence.colour, 0)
     least_found = {name: own if name in COLOURS and name != evidence.colour else 1 for name in names}
     most = max(counts.values())
     enough = [name for name in names if counts[name] >= max(MOST_FOUND * most, least_found[name])]
