@@ -221,8 +221,6 @@ def reconstruct_source(
         wishes = wishes_of(extraction, chosen.extraction)
         if extraction.get("select") is None and chosen.extraction.select == "strongest":
             extraction["select"] = "continuous"
-        if extraction.get("smooth_along") is None and not chosen.extraction.spacetime:
-            extraction["smooth_along"] = True
         chosen = with_extraction(chosen, extraction)
         folder = out if out is not None else source.parent
         check_output(folder)
