@@ -11,6 +11,7 @@ from analysis.line.extract import extract
 from analysis.line.selection.continuity import select_chain
 from analysis.line.settings import ExtractionSettings
 from studio.photographs.candidates import peaks_to_choose_from
+from studio.photographs.evidence import _clear_pieces
 
 ROWS, WIDTH = 160, 120
 SETTINGS, NOISE = ExtractionSettings(select="continuous"), NoiseModel(read_noise=3.0)
@@ -49,3 +50,12 @@ def test_second_peaks_are_measured_only_where_the_strongest_are_not_the_line() -
     assert line.u.shape[1] > 1
     assert line.valid[::5, 1].all() and not line.valid[1::5, 1].any()
     assert peaks_to_choose_from(scene(False, False), SETTINGS, NOISE, 1).u.shape == (ROWS, 1)
+
+
+def test_a_piece_of_the_chain_counts_that_is_clear_on_a_third_of_its_length() -> None:
+    """A line on a broken, glowing surface beside rivals; and a piece that is hardly clear anywhere."""
+    found, clear = np.full(60, 10.0), np.zeros(60)
+    found[30:] = 50.0  # another piece
+    clear[:12], clear[30:35] = 0.4, 0.4
+    kept = _clear_pieces(found, clear)
+    assert kept[:30].all() and not kept[30:].any()
