@@ -114,13 +114,25 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
         error, noise = _errors(film, paths, height, seen, held, run.threads)
         noisy = 2.0 * noise**2 > error**2 or block == 1
         needed = 2 * count * len(grid) if noisy else 3 * 2 * FIRST_SAMPLES * len(grid)
-        if error <= COARSE_ERROR or film.total + needed > most:
+        if error <= COARSE_ERROR or film.total + max(needed, _least(error / COARSE_ERROR, needed, noisy)) > most:
             break
         count, block = (2 * count, block) if noisy else (count, block // 2)
     radiance, known = _image(film, paths, height, seen, run.between(0.5, 1.0))
     dropped, clamped = film.invalid_counts.astype(int).tolist()
     deviation = _deviation(film, seen)
     return CoarseImage(radiance, error, deviation, block, film.total, dropped, clamped, film.cut / film.total, known)
+
+
+def _least(beyond: float, next_step: int, noisy: bool) -> float:
+    """Samples that it takes at least until an error so many times too large is small enough, where the next step takes
+    some: noise falls with the root of the samples, interpolation with the square of the spacing at best.
+
+    What is out of reach is not tried: pixels whose error matters to a line are sampled by themselves.
+    """
+    if noisy:
+        return next_step * (2.0 ** math.ceil(2.0 * math.log2(beyond)) - 1.0)
+    # each grid has four times the points of the one before, three in four of them new
+    return next_step * (4.0 ** math.ceil(math.log(beyond, 4.0)) - 1.0) / 3.0
 
 
 def _held_out(pixels: int, run: Run) -> Int:

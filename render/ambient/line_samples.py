@@ -44,6 +44,8 @@ REACH = 2
 """Pixels on each side over which variances are averaged."""
 PILOT, GROWTH, PASSES = 2, 4.0, 12
 """Samples of each half on every pixel at first; most by which a pass multiplies those of a scan line; most passes."""
+FAR = 8.0
+"""Times the samples of a line that may just not miss the goal: lines that need more are out of its reach."""
 SURE, SURE_LINES = 0.05, 0.99
 """Of the variance that a scan line may have, and share of the lines: where a single sample of each half tells less of
 so many, no more are drawn. Of one line they tell little, as light through a gap is met by one sample in many."""
@@ -173,14 +175,18 @@ def _wanted(film: PixelSamples, band: Band, moves: LineMoves) -> Int:
     count = np.maximum(moves.pixels, 1)
     each_now = np.bincount(band.line[measured], done[measured].mean(axis=1), lines) / count
     each = _needed(each_now, moved, np.inf)
-    # those that may miss the goal get as much as the others at most
-    asked = alone.sum(axis=0) + 2.0 * count * each
-    some = (now.sum(axis=0) > 0.0) | (moves.pixels > 0)
-    capped = np.minimum(1.0, known_below(asked[some]) / np.maximum(asked, 1.0))
+    # those that may miss the goal get as much as the others at most; where that is nothing beside what they need, and
+    # most of all samples would not get them there, as much as the others have
+    asked, spent = alone.sum(axis=0) + 2.0 * count * each, now.sum(axis=0) + 2.0 * count * each_now
+    some = spent > 0.0
+    most = known_below(asked[some])
+    far = asked > FAR * most
+    share = np.where(far, spent[some & ~far].mean() if some.any() else 0.0, most)
+    capped = np.minimum(1.0, share / np.maximum(asked, 1.0))
     alone, each = _step(now, alone, moments, capped), _step(each_now, each, moved, capped)
     wanted, of_heavy = done.copy(), band.line[heavy]
-    share = alone[:, of_heavy] * deviation / np.maximum(total, 1e-300)[:, of_heavy]
-    wanted[heavy] = np.maximum(done[heavy], np.ceil(share).T.astype(np.int32))
+    each_pixel = alone[:, of_heavy] * deviation / np.maximum(total, 1e-300)[:, of_heavy]
+    wanted[heavy] = np.maximum(done[heavy], np.ceil(each_pixel).T.astype(np.int32))
     # as many of both halves, on all that a line is measured on
     np.maximum.at(each, band.line[measured], wanted[measured].max(axis=1))
     wanted[measured] = np.ceil(each)[band.line[measured], None]
@@ -195,7 +201,8 @@ def _needed(now: Float, moments: Float, most: Float | float) -> Float:
 def _step(now: Float, needed: Float, moments: Float, capped: Float) -> Float:
     """(..., lines) samples after the next pass, 0: no more are asked; a few at least, unless the line is capped."""
     some = np.clip(needed, 1.25 * now, GROWTH * now)
-    return np.where(moments > 1.0, np.where(capped < 1.0, np.clip(capped * needed, now, some), some), 0.0)
+    left = np.where(capped * needed > now, np.minimum(capped * needed, some), 0.0)
+    return np.where(moments > 1.0, np.where(capped < 1.0, left, some), 0.0)
 
 
 def _pooled(values: Float, band: Band, some: Long) -> Float:

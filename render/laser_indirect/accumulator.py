@@ -40,13 +40,15 @@ Chosen, not tuned."""
 WAVE_WEIGHT_EXPONENT = 1.5
 """A wave weighs as its size to this power. 1 is the least variance of waves that sample alike; later ones are better
 guided, so more. Chosen, not tuned."""
+LEAST_STEP = 0.125
+"""Of the passes so far, at least, are in the next wave."""
 PIXELS_A_CHUNK = 1 << 17
 Arrays = dict[str, NDArray[Any]]
 IMAGES = ("specular", "camera_paths", "guide_moments", "total", "camera_radiance")
 NO_DEMAND = PathDemand(np.zeros(0), np.zeros(0))
 NUMBERS = (
-    *("kinds", "size", "growth_limit", "camera_share", "squares", "waves", "passes", "weight", "paths"),
-    *("variance_sum", "error", "invalid", "clamped", "clamped_radiance"),
+    *("kinds", "size", "growth_limit", "enough", "camera_share", "squares", "waves", "passes", "weight", "shares"),
+    *("paths", "variance_sum", "error", "invalid", "clamped", "clamped_radiance"),
 )
 """Fields of an accumulator that a checkpoint keeps, beside its fan and its guide."""
 
@@ -55,8 +57,9 @@ NUMBERS = (
 class Accumulator:
     """Weighted sums over waves of passes, and the guiding of the next wave; changes as waves are added.
 
-    The second wave is as large as the first, and each after it as all before together, up to a limit. The passes of a
-    wave are independent and alike, so that their spread is an unbiased estimate of its variance.
+    The second wave is as large as the first, and each after it as all before together, up to a limit and to what the
+    measured line should take. The passes of a wave are independent and alike, so that their spread is an unbiased
+    estimate of its variance.
     """
 
     kinds: int
@@ -86,6 +89,10 @@ class Accumulator:
     """Passes added so far, counted in those of the first wave."""
     weight: float = 0.0
     """Sum of the weights of all passes."""
+    shares: float = 0.0
+    """Sum over the passes of weight^2 / size: the variance of `total`, in that of a pass of the first wave."""
+    enough: int = 0
+    """Size of the next wave's passes with which the measured line should be known; 0: that is not known, or it is."""
     paths: int = 0
     """Light paths so far."""
     variance_sum: float = 0.0
@@ -125,7 +132,8 @@ class Accumulator:
     @property
     def growth(self) -> int:
         """Size of the next wave's passes, in that of the first wave's."""
-        return min(1 << max(self.waves - 1, 0), self.growth_limit)
+        most = min(1 << max(self.waves - 1, 0), self.growth_limit)
+        return min(most, self.enough) if self.enough else most
 
     @property
     def next_paths(self) -> int:
@@ -158,6 +166,7 @@ class Accumulator:
         self.waves += 1
         self.passes += passes * growth
         self.weight += passes * weight
+        self.shares += passes * weight**2 / growth
         self.variance_sum += weight**2 * variance_sum
         if light > 0.0:
             # the last wave knows the share best, but nothing of specular pixels that it did not look at
@@ -166,8 +175,16 @@ class Accumulator:
             math.sqrt(self.variance_sum / max(self.squares - self.variance_sum, 1e-300)) if self.squares > 0.0 else 0.0
         )
         self.guide = update_guide(self.guide, wave_moments, self.guide_moments, threads)
+        self.enough = self._enough(self.passes / passes)
         self.guide_camera(self.camera_radiance, self.passes / growth)
         self.consistent = True
+
+    def _enough(self, done: float) -> int:
+        """As `enough`, once the waves' sizes add up to `done`: the variance falls as one over their sum."""
+        beyond = self.line_error
+        if self.line is None or self.line.out_of_reach or not 1.0 < beyond < math.inf:
+            return 0
+        return math.ceil(done * max(beyond**2 - 1.0, LEAST_STEP))
 
     def learn(self, variance: tuple[Float, Float32], size: float) -> None:
         """What passes of some size, whose camera paths are still known, tell of the paths that lines need; variance:
@@ -183,9 +200,7 @@ class Accumulator:
         elif self.line is None or self.aimed not in ("", aimed):
             self.line = LineErrors.of(importance, laser)
             self.demand = PathDemand.none(self.line.projection)
-            sizes = (min(1 << max(wave - 1, 0), self.growth_limit) for wave in range(self.waves))
-            weights = ((size**WAVE_WEIGHT_EXPONENT) ** 2 / size for size in sizes)
-            self.line.all_waves = PASSES_A_WAVE * sum(weights)
+            self.line.all_waves = self.shares
         self.aimed = aimed
 
     def guide_camera(self, radiance: Float32, drawn: float) -> None:

@@ -169,6 +169,21 @@ def test_samples_go_where_weight_and_variance_are():
     assert mean[heavy].mean() > 2.0 * mean[~heavy].mean()
 
 
+def test_lines_that_no_samples_would_get_there_have_no_more_than_the_others():
+    """Fewer than the lines that may miss the goal, a hundred times as sensitive as the others."""
+    scene, world = box_on_a_wall()
+    placed, shape = PlacedScene(world, scene), (scene.camera.height, scene.camera.width)
+    even = CoarseImage(np.ones((*shape, 3), np.float32), 1.0, np.ones((99, 99), np.float32), 8, 1, 0, 0, 0.0)
+    far = np.arange(shape[0]) % 40 == 20
+    weight = np.where(far[:, None], np.float32(100.0), np.float32(1.0)) * band_weights(*shape, 20.0)
+    band = band_of(Importance((), weight), even)
+    film = PixelSamples(band.pixels)
+    deviations = sample_band(film, paths_of(placed), band, 10**9, Run())
+    each = np.bincount(band.line, film.done.sum(axis=1), shape[0])
+    assert np.mean(deviations <= 1.0) >= 0.95 and np.all(deviations[far] > 1.0)
+    assert each[far].mean() <= 1.2 * each[~far].mean()
+
+
 def test_the_error_told_of_the_coarse_image_is_the_true_one():
     scene, world = box_on_a_wall()
     placed = PlacedScene(world, scene)

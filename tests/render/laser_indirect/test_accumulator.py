@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from render.camera.camera import Camera
+from render.importance import Importance
 from render.laser_indirect.accumulator import WAVE_WEIGHT_EXPONENT, Accumulator
 from render.laser_indirect.connection_buffer import empty_connections, splat_unoccluded
 from render.laser_indirect.guiding import BINS, NO_PIXELS, no_guide
@@ -91,6 +92,24 @@ def test_waves_grow_up_to_a_limit():
         sizes.append(so_far.growth)
         so_far.add(passes(np.ones(8), np.ones(8)), np.zeros((2, 0, BINS)))
     assert sizes == [1, 1, 2, 4, 4, 4]
+
+
+def test_a_last_wave_is_no_larger_than_the_measured_line_should_take():
+    rng, weight, sizes, beyond = np.random.default_rng(3), np.zeros((2, 4), np.float32), [], [math.inf]
+    # all waves together need a size of about 100 for an error of 1
+    weight[:, 1], weight[:, 2] = -13.0, 13.0
+    so_far = nothing()
+    so_far.aim_at(Importance((weight,), np.abs(weight)), 0)
+    while beyond[-1] > 1.0:
+        sizes.append(so_far.growth)
+        images = 20.0 + rng.standard_normal((8, 8)) / math.sqrt(sizes[-1])
+        so_far.add(passes(*images), np.zeros((8, 0, BINS)))
+        assert np.array_equal(Accumulator.of_arrays(so_far.arrays()).growth, so_far.growth)
+        beyond.append(so_far.line_error)
+    for wave, size in enumerate(sizes[1:], 1):
+        enough = math.ceil(sum(sizes[:wave]) * max(beyond[wave] ** 2 - 1.0, 0.125))
+        assert size == min(2 ** (wave - 1), enough)
+    assert sizes[-1] < 2 ** (len(sizes) - 2) and sum(sizes) < 128 + 64
 
 
 def test_the_clamp_takes_what_it_says_and_nothing_is_clamped_unasked():
