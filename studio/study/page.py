@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from analysis.report.colour import method_name
 from analysis.report.page import page_of
 from analysis.report.style import png_uri
+from render.base.csv_file import write_csv
 from render.base.files import atomic_write
 from studio.project.project import Project
 from studio.study.answers import Answer, Broken, answers
@@ -131,13 +131,9 @@ def write_bounds(folder: Path, answer: Answer, number: int) -> None:
     """`bounds_N.csv`, in m, of a chart that has some."""
     if not answer.bounds:
         return
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*(one.field for one in answer.sweep.vary), "photons_m", "speckle_m"])
-    for one in answer.bounds:
-        writer.writerow([*one.point, one.photons, "" if one.speckle is None else one.speckle])
-    with atomic_write(folder / f"bounds_{number}.csv") as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+    header = [*(one.field for one in answer.sweep.vary), "photons_m", "speckle_m"]
+    rows = ([*one.point, one.photons, one.speckle] for one in answer.bounds)
+    write_csv(folder / f"bounds_{number}.csv", header, rows)
 
 
 def _header(answer: Answer, labels: dict[str, str]) -> list[str]:
