@@ -16,11 +16,14 @@ from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
 from studio.study.kept import KEPT
 from studio.study.kept_charts import SERIES, pictures_figure, profile_figure
+from studio.study.label_places import Name, name_marks
 from studio.study.measures import Measure, measure_of
 from studio.study.ray_units import MILLION, Throughput
 from studio.study.study import Parameter, Value
 
 MARKERS = "osD^vP*X<>"
+KNEE = 12.0
+"""Diameter of its ring, in points."""
 MOST_IN_LEGEND = 5
 """Methods; more are named at their marks."""
 
@@ -42,6 +45,8 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
                     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
                 axis.set_major_formatter(_tick)
                 axis.set_minor_formatter(NullFormatter())
+        if answer.sweep.chart == "speed":
+            _name_spots(axes, answer)
         return made
 
 
@@ -159,7 +164,6 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     measure = measure_of(answer.sweep.measure)
     methods = list(dict.fromkeys(spot.method for spot in answer.spots))
     named = len(methods) > MOST_IN_LEGEND
-    varied = len({spot.point for spot in answer.spots}) > 1
     for number, method in enumerate(methods):
         spots = [spot for spot in answer.spots if spot.method == method and spot.measure.mean > 0.0]
         mean, low, high = _bands(spots, measure)
@@ -167,18 +171,13 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         style: dict[str, Any] = {"fmt": MARKERS[number % len(MARKERS)], "color": method_colour(method), "ms": 5}
         error = np.abs([mean - low, high - mean])
         axes.errorbar([spot.seconds for spot in spots], mean, yerr=error, capsize=2, label=method_name(method), **style)
-        for spot, height in zip(spots, mean, strict=True):
-            words = [method_name(method)] * named + list(map(shown, spot.point)) * varied
-            _note(axes, ", ".join(words), (spot.seconds, height), MUTED, 6.0, (5, 4))
     front = answer.front
     if front is not None:
-        on = sorted((answer.spots[i] for i in np.flatnonzero(front.member)), key=lambda spot: spot.seconds)
+        on = _on_front(answer)
         axes.plot([s.seconds for s in on], [s.measure.mean * measure.scale for s in on], color=INK, lw=0.8, zorder=0)
         if front.knee is not None:
             spot = answer.spots[front.knee]
-            place = spot.seconds, spot.measure.mean * measure.scale
-            axes.plot(*place, "o", ms=12, mfc="none", mec=INK)
-            _note(axes, f"knee, {front.knee_probability[front.knee]:.0%} sure", place, INK, 7.0, (9, -11))
+            axes.plot(spot.seconds, spot.measure.mean * measure.scale, "o", ms=KNEE, mfc="none", mec=INK)
     for bound in answer.bounds:
         _bound(axes, bound, len(answer.bounds) > 1, measure)
     what = {"frame": "frame", "line": "line's extraction", "calibration": "calibration"}[answer.sweep.time]
@@ -188,6 +187,34 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     _roomy(axes)
     if not named and len(methods) > 1:
         axes.legend()
+
+
+def _name_spots(axes: Any, answer: Answer) -> None:
+    """The knee's name first, then of every mark what the legend does not tell: its method, its values, or both."""
+    scale = measure_of(answer.sweep.measure).scale
+    spots = [spot for spot in answer.spots if spot.measure.mean > 0.0 and spot.seconds > 0.0]
+    named = len({spot.method for spot in answer.spots}) > MOST_IN_LEGEND
+    varied = len({spot.point for spot in answer.spots}) > 1
+    places = {id(spot): (spot.seconds, spot.measure.mean * scale) for spot in spots}
+    names, front = list[Name](), answer.front
+    if front is not None and front.knee is not None:
+        sure = f"knee, {front.knee_probability[front.knee]:.0%} sure"
+        names.append(Name(sure, places[id(answer.spots[front.knee])], INK, 7.0, KNEE / 2.0))
+    for spot in spots if named or varied else ():
+        words = [method_name(spot.method)] * named + list(map(shown, spot.point)) * varied
+        names.append(Name(", ".join(words), places[id(spot)], MUTED, 6.0))
+    least = axes.get_ylim()[0]  # a lower end at 0 is not on a logarithmic axis
+    bars = [
+        [(one.seconds, max(one.measure.low * scale, least)), (one.seconds, one.measure.high * scale)] for one in spots
+    ]
+    name_marks(axes, names, [*bars, [places[id(one)] for one in _on_front(answer) if id(one) in places]])
+
+
+def _on_front(answer: Answer) -> list[Spot]:
+    """From the cheapest on."""
+    if answer.front is None:
+        return []
+    return sorted((answer.spots[i] for i in np.flatnonzero(answer.front.member)), key=lambda spot: spot.seconds)
 
 
 def _bound(axes: Any, bound: Bound, several: bool, measure: Measure) -> None:

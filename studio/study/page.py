@@ -27,6 +27,9 @@ from studio.study.references import page_rows as page_rows_beside
 from studio.study.store import Row
 from studio.study.study import Study, Sweep
 
+SURE = 0.5
+"""A knee that fewer resamples have is told as not known."""
+
 
 def write_page(
     folder: Path, study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]
@@ -88,9 +91,13 @@ def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
             f"{field_label(one, labels)} {shown(value)}"
             for one, value in zip(answer.sweep.vary, spot.point, strict=True)
         )
+        chance = front.knee_probability[front.knee]
+        by = f"{where} by {method_name(spot.method)}"
         said.append(
-            f"More time pays most up to {where} by {method_name(spot.method)}: the knee of the front, in "
-            f"{front.knee_probability[front.knee]:.0%} of the resamples."
+            f"More time pays most up to {by}: the knee of the front, in {chance:.0%} of the resamples."
+            if chance >= SURE
+            else f"Where more time stops paying is not known: {by} is the knee of the front in {chance:.0%} of the "
+            "resamples only; more repeats, or values further apart, would tell."
         )
     for reference, ours in answer.beside:
         ((label, theirs, mean, interval, count),) = page_rows_beside([Beside(answer.sweep.name, reference, ours)])
