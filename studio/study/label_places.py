@@ -62,7 +62,7 @@ def name_marks(axes: Any, names: Sequence[Name], lines: Sequence[Sequence[tuple[
         _, radius, box = min(tried, key=lambda found: found[0])
         taken.append((box, COVERED))
         x, y = (0.5 * (box[k] + box[k + 2]) - mark[k] for k in (0, 1))
-        line = {"arrowstyle": "-", "color": MUTED, "lw": 0.4, "shrinkA": 0.0, "shrinkB": MARK}
+        arrow = {"arrowstyle": "-", "color": MUTED, "lw": 0.4, "shrinkA": 0.0, "shrinkB": MARK}
         written = axes.annotate(
             one.text,
             one.place,
@@ -72,7 +72,7 @@ def name_marks(axes: Any, names: Sequence[Name], lines: Sequence[Sequence[tuple[
             va="center",
             fontsize=one.size,
             color=one.colour,
-            arrowprops=line if radius > RADII[1] else None,
+            arrowprops=arrow if radius > RADII[1] else None,
         )
         written.set_in_layout(False)
 
