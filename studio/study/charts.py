@@ -129,11 +129,7 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         axes.errorbar(x, mean, yerr=np.abs([mean - low, high - mean]), lw=1.2, capsize=2, label=label, **style)
     if sweep.limit is not None and sweep.limit.measure == sweep.measure:
         axes.axhline(sweep.limit.value * measure.scale, color=INK, lw=0.8, ls=(0, (6, 2)))
-    for found in answer.broken:
-        ended = found.breakdown
-        if ended.ending == "found":
-            axes.axvspan(ended.low, ended.high, color=method_colour(found.method), alpha=0.3, lw=0)
-            axes.axvline(ended.value, color=method_colour(found.method), lw=1, ls=":")
+    _breakdowns(axes, answer)
     for reference, _ in answer.beside:
         value = reference.point[0]
         if reference.measure == sweep.measure and (numbers or value in names):
@@ -149,11 +145,22 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     axes.legend()
 
 
+def _breakdowns(axes: Any, answer: Answer) -> None:
+    """Each method's interval as a bar of its own above the chart, as many break at the same place."""
+    above = axes.get_xaxis_transform()
+    for row, found in enumerate(one for one in answer.broken if one.breakdown.ending == "found"):
+        ended, colour, height = found.breakdown, method_colour(found.method), 1.025 + 0.03 * row
+        bar: dict[str, Any] = {"transform": above, "clip_on": False, "color": colour}
+        axes.plot([ended.low, ended.high], [height] * 2, lw=2.0, alpha=0.6, solid_capstyle="butt", **bar)
+        axes.plot([ended.value], [height], "|", ms=7.0, mew=1.5, **bar)
+        axes.axvline(ended.value, color=colour, lw=0.8, ls=":", zorder=0)
+
+
 def _vertical(axes: Any, answer: Answer) -> None:
-    """Logarithmic where errors span more than one power of ten."""
-    means = np.array([spot.measure.mean for spot in answer.spots])
+    """Logarithmic where errors with their intervals span more than one power of ten."""
+    ends = np.array([(one.measure.mean, one.measure.low, one.measure.high) for one in answer.spots]).ravel()
     theirs = [one.value for one, _ in answer.beside if one.measure == answer.sweep.measure]
-    positive = np.append(means[np.isfinite(means) & (means > 0.0)], theirs)
+    positive = np.append(ends[np.isfinite(ends) & (ends > 0.0)], theirs)
     errors = answer.sweep.measure.endswith(("rmse", "sigma", "p95", "angle", "error"))
     if errors and len(positive) and positive.min() > 0.0 and np.ptp(np.log10(positive)) > 1.0:
         axes.set_yscale("log")
