@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from analysis.distance import nearest_triangle, signed_distance, triangle_normals
+from analysis.gauges.gauge import Verdict
 from render.base.arrays import Float, Int
 from render.base.errors import InputError
 from render.base.pose import invert, rotation_matrix, transform_points
@@ -142,6 +143,13 @@ def verdicts(value: Float, sigma: Float, lower: float, upper: float) -> Verdicts
     found[value + uncertainty < lower] = BELOW
     found[value - uncertainty > upper] = ABOVE
     return found
+
+
+def verdict_of(judged: Verdicts) -> Verdict:
+    """Of the whole part: it fails by one proved point, and passes only if all are proved."""
+    if np.isin(judged, (BELOW, ABOVE)).any():
+        return "fail"
+    return "undecided" if (judged == UNDECIDED).any() else "pass"
 
 
 def callouts(points: Float, value: Float, count: int, apart: float) -> list[tuple[int, float]]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.deviation import ABOVE, BELOW, UNDECIDED, WITHIN, verdicts
+from analysis.deviation import ABOVE, BELOW, UNDECIDED, WITHIN, verdict_of, verdicts
 from analysis.report.deviation_figure import DeviationMap, draw
 from analysis.report.gauge_table import MARKS
 from analysis.report.model import ReportInput
@@ -90,8 +90,7 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         ("Proved above", percent(shares[ABOVE], 2)),
         ("Proved below", percent(shares[BELOW], 2)),
     ]
-    beyond = shares[ABOVE] + shares[BELOW]
-    verdict = "fail" if beyond > 0.0 else "undecided" if shares[UNDECIDED] > 0.0 else "pass"
+    verdict = verdict_of(judged)
     return {"verdict": verdict, "mark": MARKS[verdict], "rows": table}
 
 

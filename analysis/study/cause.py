@@ -35,6 +35,8 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
     worst = max(symptoms, key=lambda name: symptoms[name])
     if symptoms[worst] <= LOST:
         worst = "less precise"
+    if worst == "starved" and symptoms["saturated"] > LOST:
+        worst = "saturated"  # too little light saturates no row: here it is the surroundings that drown the line
     if worst == "occluded":
         return worst
     if math.cos(good.get("incidence", 0.0)) > STEEPER * math.cos(bad.get("incidence", 0.0)):

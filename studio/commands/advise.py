@@ -73,6 +73,8 @@ def _print(found: Advice, question: Question, project: Project) -> None:
     if rows:
         print_table(f"What each part of {project.name} is good for", rows, header=header)
         print("Bias in % of the depth error's RMS, sigma in % of itself; processor seconds of a frame, medians.")
+        if any(one.taken and one.part.name == "goal" for one in found.tried):
+            print("What stands below the goal is tried with it, and held against it.")
     asked = f"{100.0 * question.within:g} %"
     for number, proof in enumerate(found.proofs, 1):
         print(f"Proof {number}: {_sentence(proof, question.within)}")

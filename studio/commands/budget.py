@@ -10,7 +10,10 @@ from studio.commands.study import run_into
 from studio.project.project import Project
 from studio.runtime.workers import Engine
 from studio.study.cells import WHOLE
+from studio.study.effects import WHOLE_IMAGE
 from studio.study.study import Study
+
+SAMPLES = "render.ambient_samples"
 
 
 def budget_project(
@@ -35,7 +38,7 @@ def budget_project(
             "laser": check_laser(project, laser),
             "repeats": repeats,
             "methods": [project.extraction.method],
-            "set": {"render.goal": None},  # one render for all that only the sensor makes
+            "set": {**WHOLE_IMAGE, SAMPLES: max(project.render.ambient_samples, WHOLE_IMAGE[SAMPLES])},
             "sweeps": [{"name": "Error budget", "sampling": "effects"}],
         }
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -26,8 +24,8 @@ from analysis.line.series.subtract import subtract_off
 from analysis.line.settings import ExtractionSettings
 from analysis.line.shared_noise import with_shared_noise
 from render.base.arrays import Float
+from render.base.csv_file import write_csv
 from render.base.errors import InputError
-from render.base.files import atomic_write
 from render.camera.camera import Camera
 from studio.photographs.candidates import peaks_to_choose_from
 from studio.photographs.choice import carried_on, selected
@@ -334,19 +332,16 @@ def check_light(image: NDArray[Any]) -> None:
 
 def write_line(path: Path, line: Line) -> None:
     """One row of the table for each scan line and peak: where it is, or the reason why there is none. Units: px, e-."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(line_columns(line.axis))
     along, across = (line.u, line.v) if line.axis == "rows" else (line.v, line.u)
     length = np.ones_like(line.u) if line.correlation_length is None else line.correlation_length
     numbers = (along, across, line.sigma_u, line.width, line.amplitude, line.background, line.chi2, length)
     told = np.stack([np.where(line.valid, values, np.nan) for values in numbers], axis=-1).tolist()
     names = {flag.value: flag.name for flag in Flag}
+    rows = []
     for i, (row, flags) in enumerate(zip(told, line.flag.tolist(), strict=True)):
         for k, (cells, flag) in enumerate(zip(row, flags, strict=True)):
-            writer.writerow([i, k, *(f"{cell:.9g}" if math.isfinite(cell) else "" for cell in cells), names[flag]])
-    with atomic_write(path) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+            rows.append([i, k, *(f"{cell:.9g}" if math.isfinite(cell) else "" for cell in cells), names[flag]])
+    write_csv(path, line_columns(line.axis), rows)
 
 
 def summary(path: Path, line: Line, table: Path) -> dict[str, Any]:

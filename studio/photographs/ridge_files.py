@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,7 @@ from analysis.line.result import Flag
 from analysis.line.ridges.ridges import find_ridges
 from analysis.line.series.subtract import subtract_off
 from analysis.line.settings import ExtractionSettings
-from render.base.files import atomic_write
+from render.base.csv_file import write_csv
 from studio.photographs.image_files import load_photograph
 from studio.photographs.photographs import check_light, naming, table_path
 from studio.scan.own_files import RIDGE_COLUMNS
@@ -39,18 +37,15 @@ def ridges_of_file(
             image, saturation = subtract_off(image, off)
             noise = estimate_noise(image, settings, saturation)
         found = find_ridges(image, settings=settings, noise=noise, threads=threads)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(RIDGE_COLUMNS)
     numbers = np.column_stack(
         (found.u, found.v, found.sigma_u, found.normal, found.width, found.amplitude, found.background)
     )
+    rows = []
     for k, values in enumerate(numbers):
         cells = [f"{value:.9g}" if np.isfinite(value) else "" for value in (*values, found.significance[k])]
-        writer.writerow([int(found.chain[k]), *cells, Flag(int(found.flag[k])).name])
+        rows.append([int(found.chain[k]), *cells, Flag(int(found.flag[k])).name])
     target = table_path(path, out, taken, "ridges")
-    with atomic_write(target) as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+    write_csv(target, RIDGE_COLUMNS, rows)
     known = found.sigma_u[np.isfinite(found.sigma_u)]
     lines = int(found.chain.max()) + 1 if len(found.u) else 0
     return {

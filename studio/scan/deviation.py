@@ -28,6 +28,7 @@ from analysis.deviation import (
     deviations,
     three_two_one,
     turn_and_shift,
+    verdict_of,
     verdicts,
 )
 from analysis.distance import nearest_triangle
@@ -130,7 +131,7 @@ class Compared:
             "lower": self.question.lower,
             "upper": self.question.upper,
             "verdicts": counts,
-            "verdict": _verdict(counts),
+            "verdict": None if self.verdicts is None else verdict_of(self.verdicts),
         }
 
 
@@ -267,13 +268,6 @@ def read_cloud(path: Path) -> Cloud:
     if count == 0:
         raise InputError("there are no points", where=str(path))
     return merge(pieces)
-
-
-def _verdict(counts: dict[str, int] | None) -> str | None:
-    """Of the whole part: it fails by one proved point, and passes only if all are proved."""
-    if counts is None:
-        return None
-    return "fail" if counts["below"] + counts["above"] else "undecided" if counts["undecided"] else "pass"
 
 
 def _share_beyond(value: Float, question: Question) -> float | None:

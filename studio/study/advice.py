@@ -1,15 +1,17 @@
 """No more than a scene needs: what each part of the render changes in the measured depth, and a cheaper project.
 
-Each part is made cheaper by itself, over a few seeds. Of the parts that leave depth as it is the cheapest are taken
+A project that asks for errors of its image is first given a goal in depth, which is most of what can be saved; then
+each part is made cheaper by itself, over a few seeds. Of the parts that leave depth as it is the cheapest are taken
 together, and that project is held against the original on seeds that had no say in the choice: seed by seed, so that
 what both have in common, the sensor's noise, cancels. It is proved where the 95 % intervals of the change in bias and
-in sigma lie within what was asked; a part is given up where they do not, and the rest is proved on fresh seeds.
+in sigma lie within what was asked; where they do not, the half of the parts that changed most is given up, and the
+rest is proved on fresh seeds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,7 @@ from studio.project.project import MAX_SEED, Project
 from studio.runtime.workers import Engine
 from studio.study.effects import without_subsurface
 from studio.study.runner import run_study
-from studio.study.store import Store
+from studio.study.store import Row, Store
 from studio.study.study import Study
 from studio.study.tables import grouped, seconds_of, values_of
 
@@ -74,6 +76,11 @@ class Change:
         found = (self.bias, self.sigma, self.completeness)
         return any(one.high - one.low > 2.0 * share for one in found)
 
+    @property
+    def pays(self) -> bool:
+        """Enough seconds are saved to be worth a change."""
+        return self.seconds < PAYS * self.seconds_before
+
     def size(self) -> float:
         """The largest of the mean changes."""
         return max(abs(one.mean) for one in (self.bias, self.sigma, self.completeness))
@@ -81,11 +88,15 @@ class Change:
 
 @dataclass(frozen=True)
 class Tried:
-    """One part by itself."""
+    """One part by itself, or beside the goal where that is taken."""
 
     part: Part
     found: Change
     taken: bool = False
+
+    def fits(self, allowed: float) -> bool:
+        """It leaves depth as it is, and seconds are saved."""
+        return self.found.size() <= allowed and self.found.pays
 
 
 @dataclass(frozen=True)
@@ -101,7 +112,7 @@ class Proof:
     @property
     def holds(self) -> bool:
         """It is, and seconds are saved."""
-        return self.alike and self.found.seconds < PAYS * self.found.seconds_before
+        return self.alike and self.found.pays
 
 
 @dataclass(frozen=True)
@@ -131,17 +142,25 @@ class Question:
     engine: Engine = field(default_factory=Engine)
 
 
+def goal_of(project: Project) -> Part | None:
+    """What a project without a goal in depth is given first."""
+    if project.render.goal is not None:
+        return None
+    return Part("goal", f"{MEASURED:g} of the line's sigma", {"render.goal": {"depth": MEASURED}})
+
+
 def parts_of(project: Project) -> list[Part]:
-    """Every way in which the project's render can be made cheaper."""
+    """Every way but the goal in which the project's render can be made cheaper."""
     render = project.render
     found = []
     if render.transport != "direct":
+        if render.transport != "auto":
+            found.append(Part("laser light", "what a pilot finds", {"render.transport": "auto"}))
         found.append(Part("laser light", "one surface only", {"render.transport": "direct"}))
         if render.transport != "interreflection":
             found.append(Part("laser light", "no caustics", {"render.transport": "interreflection"}))
     targets = [("laser_error", "laser error", render.laser_error, 0.1)]
     if render.goal is None:
-        found.append(Part("goal", f"{MEASURED:g} of the line's sigma", {"render.goal": {"depth": MEASURED}}))
         targets.append(("indirect_error", "reflection error", render.indirect_error, 1.0))
         targets.append(("ambient_error", "ambient error", render.ambient_error, 0.3))
     else:
@@ -180,35 +199,41 @@ def advise(
     cancelled: Callable[[], bool] = lambda: False,
 ) -> Advice:
     """folder: for what is measured on the way. InputError: there is nothing to measure. Raises Cancelled."""
-    parts = parts_of(project)
-    variants = {f"{part.name}: {part.change}": part for part in parts}
-    projects = {name: _cheaper(project, (part,)) for name, part in variants.items()}
-    found = _changes(project, projects, question, SCREENED, folder / "parts", _staged(progress, "each part"), cancelled)
-    allowed = ROOM * question.within
-    fit = {
-        name: change
-        for name, change in found.items()
-        if change.size() <= allowed and change.seconds < PAYS * change.seconds_before
-    }
-    best: dict[str, str] = {}
-    for name in sorted(fit, key=lambda one: fit[one].seconds):
-        best.setdefault(variants[name].name, name)
-    chosen = sorted(best.values(), key=lambda one: fit[one].size())
-    tried = tuple(Tried(part, found[name], name in chosen) for name, part in variants.items())
+
+    def measured(name: str, stage: str, projects: Mapping[str, Project], seeds: int) -> dict[str, list[Row]]:
+        heard = _staged(progress, stage)
+        return _measured(projects, question, seeds, folder / name, heard, cancelled)
+
+    goal, allowed = goal_of(project), ROOM * question.within
+    leaner = {} if goal is None else {"goal": _cheaper(project, (goal,))}
+    rows = measured("goal", "the original", {ORIGINAL: project, **leaner}, SCREENED)
+    base, before, tried = project, _known(rows[ORIGINAL], project), list[Tried]()
+    if goal is not None:
+        one = Tried(goal, _change(before, rows["goal"]))
+        if one.fits(allowed):
+            base, before, one = leaner["goal"], rows["goal"], replace(one, taken=True)
+        tried.append(one)
+    given = [one.part for one in tried if one.taken]
+    variants = {f"{part.name}: {part.change}": part for part in parts_of(base)}
+    projects = {name: _cheaper(base, (part,)) for name, part in variants.items()}
+    rows = measured("parts", "each part", projects, SCREENED) if projects else {}
+    found = [Tried(part, _change(before, rows[name])) for name, part in variants.items()]
+    best: dict[str, Tried] = {}
+    for one in sorted((one for one in found if one.fits(allowed)), key=lambda one: one.found.seconds):
+        best.setdefault(one.part.name, one)
+    tried += [replace(one, taken=best.get(one.part.name) is one) for one in found]
+    chosen = given + [one.part for one in sorted(best.values(), key=lambda one: one.found.size())]
     proofs: list[Proof] = []
     seed = project.seed + SCREENED
     while chosen and len(proofs) < MOST_PROOFS and not any(proof.holds for proof in proofs):
-        taken = tuple(variants[name] for name in chosen)
         fresh = project.model_copy(update={"seed": seed % (MAX_SEED + 1)}).in_folder(project.folder)
         name = f"proof {len(proofs) + 1}"
-        together = {"cheaper": _cheaper(fresh, taken)}
-        change = _changes(fresh, together, question, question.seeds, folder / name, _staged(progress, name), cancelled)[
-            "cheaper"
-        ]
+        rows = measured(name, name, {ORIGINAL: fresh, "cheaper": _cheaper(fresh, chosen)}, question.seeds)
+        change = _change(_known(rows[ORIGINAL], project), rows["cheaper"])
         seeds = tuple((seed + i) % (MAX_SEED + 1) for i in range(question.seeds))
-        proofs.append(Proof(taken, change, seeds, change.within(question.within)))
-        seed, chosen = seed + question.seeds, chosen[:-1]  # the one that changed most by itself goes first
-    return Advice(tried, tuple(proofs))
+        proofs.append(Proof(tuple(chosen), change, seeds, change.within(question.within)))
+        seed, chosen = seed + question.seeds, chosen[: len(chosen) // 2]  # without those that changed most
+    return Advice(tuple(tried), tuple(proofs))
 
 
 def _staged(progress: Callable[[str, float], None], stage: str) -> Progress:
@@ -219,25 +244,24 @@ def _cheaper(project: Project, parts: Sequence[Part]) -> Project:
     return project.replaced({place: value for part in parts for place, value in part.values.items()})
 
 
-def _changes(
-    original: Project,
-    others: Mapping[str, Project],
+def _measured(
+    projects: Mapping[str, Project],
     question: Question,
     seeds: int,
     folder: Path,
     progress: Progress,
     cancelled: Callable[[], bool],
-) -> dict[str, Change]:
-    """Of each project against the original, over as many seeds from the original's on."""
-    bases = {ORIGINAL: original, **others}
+) -> dict[str, list[Row]]:
+    """Rows of each project over as many seeds, from its own on."""
+    bases, first = dict(projects), next(iter(projects.values()))
     study = Study.model_validate(
         {
             "name": "advice",
-            "base": ORIGINAL,
+            "base": next(iter(bases)),
             "image_scale": question.image_scale,
             "laser": question.laser,
             "repeats": seeds,
-            "methods": (original.extraction.method,),
+            "methods": (first.extraction.method,),
             # a project's name decides nothing: what differs is its base
             "sweeps": [
                 {"name": name, "base": name, "vary": ({"field": "name", "values": ("as it is",)},)} for name in bases
@@ -248,16 +272,19 @@ def _changes(
     with Store(folder, study.digest(bases)) as store:
         run_study(study, bases, store, engine=question.engine, progress=progress, cancelled=cancelled)
         rows = store.rows()
-    groups = [next(iter(grouped(study, bases, rows, number).values())) for number in range(len(bases))]
-    before, *after = groups
-    reasons = {row["reason"] for row in before if row.get("reason")}
-    if not np.isfinite(values_of(before, "depth_sigma")).all():
+    return {name: next(iter(grouped(study, bases, rows, k).values())) for k, name in enumerate(bases)}
+
+
+def _known(rows: list[Row], project: Project) -> list[Row]:
+    """As they are. InputError: a seed measured nothing."""
+    if not np.isfinite(values_of(rows, "depth_sigma")).all():
+        reasons = {str(row["reason"]) for row in rows if row.get("reason")}
         found = "; ".join(sorted(reasons)) or "no depth on some seeds"
-        raise InputError("the project measures nothing that could be compared", where=original.name, found=found)
-    return {name: _change(before, rows) for name, rows in zip(others, after, strict=True)}
+        raise InputError("the project measures nothing that could be compared", where=project.name, found=found)
+    return rows
 
 
-def _change(before: list[dict[str, object]], after: list[dict[str, object]]) -> Change:
+def _change(before: list[Row], after: list[Row]) -> Change:
     def share(measure: str, of: str) -> Interval:
         scale = float(np.mean(values_of(before, of)))
         return mean_interval(_all_or_nothing((values_of(after, measure) - values_of(before, measure)) / scale))

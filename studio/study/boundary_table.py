@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from analysis.report.colour import method_name
-from render.base.files import atomic_write
+from render.base.csv_file import write_csv
 from studio.study.answers import Answer
 from studio.study.boundary_chart import column_value, row_value
 from studio.study.cells import lattice_of
@@ -37,13 +34,8 @@ def write_edges(folder: Path, answer: Answer, number: int) -> None:
     if not answer.edges:
         return
     fields = [one.field for one in answer.sweep.vary]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([fields[0], "method", fields[1], "low", "high", "ending"])
-    for row in edge_rows(answer.sweep, answer.edges):
-        writer.writerow(["" if isinstance(one, float) and math.isnan(one) else one for one in row])
-    with atomic_write(folder / f"boundary_{number}.csv") as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+    header = [fields[0], "method", fields[1], "low", "high", "ending"]
+    write_csv(folder / f"boundary_{number}.csv", header, edge_rows(answer.sweep, answer.edges))
 
 
 def edge_sentences(answer: Answer, limit: str) -> list[str]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +9,7 @@ from pathlib import Path
 from analysis.report.colour import method_name
 from analysis.study.budget import Budget
 from analysis.study.intervals import Interval
+from render.base.csv_file import write_csv
 from render.base.files import atomic_write
 from studio.project.strict_json import pretty
 from studio.study.answers import ErrorBudget
@@ -30,15 +29,11 @@ def write_budgets(folder: Path, budgets: Sequence[ErrorBudget], number: int) -> 
     if not budgets:
         return []
     rows = [row for one in budgets for row in _rows(one)]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows([["" if value is None else value for value in row] for row in rows])
     data = {"budget": [dict(zip(COLUMNS, row, strict=True)) for row in rows], "says": sentences_of(budgets)}
     paths = [folder / f"budget_{number}.csv", folder / f"budget_{number}.json"]
-    for path, content in zip(paths, (text.getvalue(), pretty(data) + "\n"), strict=True):
-        with atomic_write(path) as temporary:
-            temporary.write_text(content, encoding="utf-8")
+    write_csv(paths[0], COLUMNS, rows)
+    with atomic_write(paths[1]) as temporary:
+        temporary.write_text(pretty(data) + "\n", encoding="utf-8")
     return paths
 
 

@@ -126,7 +126,7 @@ def cells_at(study: Study, number: int, bases: Mapping[str, Project], wanted: Se
     """The cells of one sweep at some points. InputError: a field or value that the project does not allow."""
     sweep = study.sweeps[number]
     base = bases[sweep.base or study.base]
-    for name in {sweep.measure, *([] if sweep.limit is None else [sweep.limit.measure])}:
+    for name in sweep.asked:
         check_part(name, base, f"sweeps[{number}]")
     where = f"sweep {sweep.name!r}"
     for point in wanted:

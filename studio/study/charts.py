@@ -16,11 +16,14 @@ from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
 from studio.study.kept import KEPT
 from studio.study.kept_charts import SERIES, pictures_figure, profile_figure
+from studio.study.label_places import Name, name_marks
 from studio.study.measures import Measure, measure_of
 from studio.study.ray_units import MILLION, Throughput
 from studio.study.study import Parameter, Value
 
 MARKERS = "osD^vP*X<>"
+KNEE = 12.0
+"""Diameter of its ring, in points."""
 MOST_IN_LEGEND = 5
 """Methods; more are named at their marks."""
 
@@ -42,6 +45,8 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
                     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
                 axis.set_major_formatter(_tick)
                 axis.set_minor_formatter(NullFormatter())
+        if answer.sweep.chart == "speed":
+            _name_spots(axes, answer)
         return made
 
 
@@ -124,11 +129,7 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         axes.errorbar(x, mean, yerr=np.abs([mean - low, high - mean]), lw=1.2, capsize=2, label=label, **style)
     if sweep.limit is not None and sweep.limit.measure == sweep.measure:
         axes.axhline(sweep.limit.value * measure.scale, color=INK, lw=0.8, ls=(0, (6, 2)))
-    for found in answer.broken:
-        ended = found.breakdown
-        if ended.ending == "found":
-            axes.axvspan(ended.low, ended.high, color=method_colour(found.method), alpha=0.3, lw=0)
-            axes.axvline(ended.value, color=method_colour(found.method), lw=1, ls=":")
+    _breakdowns(axes, answer)
     for reference, _ in answer.beside:
         value = reference.point[0]
         if reference.measure == sweep.measure and (numbers or value in names):
@@ -144,11 +145,22 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     axes.legend()
 
 
+def _breakdowns(axes: Any, answer: Answer) -> None:
+    """Each method's interval as a bar of its own above the chart, as many break at the same place."""
+    above = axes.get_xaxis_transform()
+    for row, found in enumerate(one for one in answer.broken if one.breakdown.ending == "found"):
+        ended, colour, height = found.breakdown, method_colour(found.method), 1.025 + 0.03 * row
+        bar: dict[str, Any] = {"transform": above, "clip_on": False, "color": colour}
+        axes.plot([ended.low, ended.high], [height] * 2, lw=2.0, alpha=0.6, solid_capstyle="butt", **bar)
+        axes.plot([ended.value], [height], "|", ms=7.0, mew=1.5, **bar)
+        axes.axvline(ended.value, color=colour, lw=0.8, ls=":", zorder=0)
+
+
 def _vertical(axes: Any, answer: Answer) -> None:
-    """Logarithmic where errors span more than one power of ten."""
-    means = np.array([spot.measure.mean for spot in answer.spots])
+    """Logarithmic where errors with their intervals span more than one power of ten."""
+    ends = np.array([(one.measure.mean, one.measure.low, one.measure.high) for one in answer.spots]).ravel()
     theirs = [one.value for one, _ in answer.beside if one.measure == answer.sweep.measure]
-    positive = np.append(means[np.isfinite(means) & (means > 0.0)], theirs)
+    positive = np.append(ends[np.isfinite(ends) & (ends > 0.0)], theirs)
     errors = answer.sweep.measure.endswith(("rmse", "sigma", "p95", "angle", "error"))
     if errors and len(positive) and positive.min() > 0.0 and np.ptp(np.log10(positive)) > 1.0:
         axes.set_yscale("log")
@@ -159,7 +171,6 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     measure = measure_of(answer.sweep.measure)
     methods = list(dict.fromkeys(spot.method for spot in answer.spots))
     named = len(methods) > MOST_IN_LEGEND
-    varied = len({spot.point for spot in answer.spots}) > 1
     for number, method in enumerate(methods):
         spots = [spot for spot in answer.spots if spot.method == method and spot.measure.mean > 0.0]
         mean, low, high = _bands(spots, measure)
@@ -167,18 +178,13 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         style: dict[str, Any] = {"fmt": MARKERS[number % len(MARKERS)], "color": method_colour(method), "ms": 5}
         error = np.abs([mean - low, high - mean])
         axes.errorbar([spot.seconds for spot in spots], mean, yerr=error, capsize=2, label=method_name(method), **style)
-        for spot, height in zip(spots, mean, strict=True):
-            words = [method_name(method)] * named + list(map(shown, spot.point)) * varied
-            _note(axes, ", ".join(words), (spot.seconds, height), MUTED, 6.0, (5, 4))
     front = answer.front
     if front is not None:
-        on = sorted((answer.spots[i] for i in np.flatnonzero(front.member)), key=lambda spot: spot.seconds)
+        on = _on_front(answer)
         axes.plot([s.seconds for s in on], [s.measure.mean * measure.scale for s in on], color=INK, lw=0.8, zorder=0)
         if front.knee is not None:
             spot = answer.spots[front.knee]
-            place = spot.seconds, spot.measure.mean * measure.scale
-            axes.plot(*place, "o", ms=12, mfc="none", mec=INK)
-            _note(axes, f"knee, {front.knee_probability[front.knee]:.0%} sure", place, INK, 7.0, (9, -11))
+            axes.plot(spot.seconds, spot.measure.mean * measure.scale, "o", ms=KNEE, mfc="none", mec=INK)
     for bound in answer.bounds:
         _bound(axes, bound, len(answer.bounds) > 1, measure)
     what = {"frame": "frame", "line": "line's extraction", "calibration": "calibration"}[answer.sweep.time]
@@ -188,6 +194,34 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     _roomy(axes)
     if not named and len(methods) > 1:
         axes.legend()
+
+
+def _name_spots(axes: Any, answer: Answer) -> None:
+    """The knee's name first, then of every mark what the legend does not tell: its method, its values, or both."""
+    scale = measure_of(answer.sweep.measure).scale
+    spots = [spot for spot in answer.spots if spot.measure.mean > 0.0 and spot.seconds > 0.0]
+    named = len({spot.method for spot in answer.spots}) > MOST_IN_LEGEND
+    varied = len({spot.point for spot in answer.spots}) > 1
+    places = {id(spot): (spot.seconds, spot.measure.mean * scale) for spot in spots}
+    names, front = list[Name](), answer.front
+    if front is not None and front.knee is not None:
+        sure = f"knee, {front.knee_probability[front.knee]:.0%} sure"
+        names.append(Name(sure, places[id(answer.spots[front.knee])], INK, 7.0, KNEE / 2.0))
+    for spot in spots if named or varied else ():
+        words = [method_name(spot.method)] * named + list(map(shown, spot.point)) * varied
+        names.append(Name(", ".join(words), places[id(spot)], MUTED, 6.0))
+    least = axes.get_ylim()[0]  # a lower end at 0 is not on a logarithmic axis
+    bars = [
+        [(one.seconds, max(one.measure.low * scale, least)), (one.seconds, one.measure.high * scale)] for one in spots
+    ]
+    name_marks(axes, names, [*bars, [places[id(one)] for one in _on_front(answer) if id(one) in places]])
+
+
+def _on_front(answer: Answer) -> list[Spot]:
+    """From the cheapest on."""
+    if answer.front is None:
+        return []
+    return sorted((answer.spots[i] for i in np.flatnonzero(answer.front.member)), key=lambda spot: spot.seconds)
 
 
 def _bound(axes: Any, bound: Bound, several: bool, measure: Measure) -> None:

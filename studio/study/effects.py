@@ -152,6 +152,10 @@ EFFECTS: dict[str, Callable[[Project], Project]] = {
 """What switches each of them off."""
 OF_SIMULATION = ("facets", "render noise")
 """What no real scanner has."""
+WHOLE_IMAGE: dict[str, Any] = {"render.goal": None, "render.ambient_samples": 16}
+"""Fields of a project for its budget: states that differ in the sensor share a render, which knows the light so well
+that the render's own noise is no large term. A project with a goal may have few samples, as they are spent by the line.
+"""
 TOTAL, NONE, WITHOUT, ONLY = "total", "none", "without ", "only "
 STATES = (TOTAL, NONE, *(WITHOUT + name for name in EFFECTS), *(ONLY + name for name in EFFECTS))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from analysis.report.colour import method_name
 from analysis.report.page import page_of
 from analysis.report.style import png_uri
+from render.base.csv_file import write_csv
 from render.base.files import atomic_write
 from studio.project.project import Project
 from studio.study.answers import Answer, Broken, answers
@@ -26,6 +26,9 @@ from studio.study.references import Beside, beside, write_references
 from studio.study.references import page_rows as page_rows_beside
 from studio.study.store import Row
 from studio.study.study import Study, Sweep
+
+SURE = 0.5
+"""A knee that fewer resamples have is told as not known."""
 
 
 def write_page(
@@ -88,9 +91,13 @@ def sentences(answer: Answer, labels: dict[str, str]) -> list[str]:
             f"{field_label(one, labels)} {shown(value)}"
             for one, value in zip(answer.sweep.vary, spot.point, strict=True)
         )
+        chance = front.knee_probability[front.knee]
+        by = f"{where} by {method_name(spot.method)}"
         said.append(
-            f"More time pays most up to {where} by {method_name(spot.method)}: the knee of the front, in "
-            f"{front.knee_probability[front.knee]:.0%} of the resamples."
+            f"More time pays most up to {by}: the knee of the front, in {chance:.0%} of the resamples."
+            if chance >= SURE
+            else f"Where more time stops paying is not known: {by} is the knee of the front in {chance:.0%} of the "
+            "resamples only; more repeats, or values further apart, would tell."
         )
     for reference, ours in answer.beside:
         ((label, theirs, mean, interval, count),) = page_rows_beside([Beside(answer.sweep.name, reference, ours)])
@@ -131,13 +138,9 @@ def write_bounds(folder: Path, answer: Answer, number: int) -> None:
     """`bounds_N.csv`, in m, of a chart that has some."""
     if not answer.bounds:
         return
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*(one.field for one in answer.sweep.vary), "photons_m", "speckle_m"])
-    for one in answer.bounds:
-        writer.writerow([*one.point, one.photons, "" if one.speckle is None else one.speckle])
-    with atomic_write(folder / f"bounds_{number}.csv") as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+    header = [*(one.field for one in answer.sweep.vary), "photons_m", "speckle_m"]
+    rows = ([*one.point, one.photons, one.speckle] for one in answer.bounds)
+    write_csv(folder / f"bounds_{number}.csv", header, rows)
 
 
 def _header(answer: Answer, labels: dict[str, str]) -> list[str]:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.study.intervals import Interval
-from render.base.files import atomic_write
+from render.base.csv_file import write_csv
 from studio.study.answers import Answer
 from studio.study.measures import measure_of
 from studio.study.study import Reference
@@ -49,12 +47,11 @@ def write_references(folder: Path, found: Sequence[Beside]) -> None:
     """`references.csv` in SI units, where there are any."""
     if not found:
         return
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["sweep", "label", "measure", "theirs", "ours", "low", "high", "repeats"])
+    rows = []
     for one in found:
         theirs, ours = one.reference, one.ours
         said = [one.sweep, theirs.label, theirs.measure, theirs.value, ours.mean, ours.low, ours.high, ours.count]
-        writer.writerow(said)
-    with atomic_write(folder / "references.csv") as temporary:
-        temporary.write_text(text.getvalue(), encoding="utf-8")
+        rows.append(said)
+    write_csv(
+        folder / "references.csv", ["sweep", "label", "measure", "theirs", "ours", "low", "high", "repeats"], rows
+    )

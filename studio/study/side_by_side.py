@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.report.units import digits
-from render.base.files import atomic_write
+from render.base.csv_file import write_csv
 from studio.scan.kept_renders import FIGURES, Kept
 from studio.study.changes import changes
 
@@ -55,10 +54,7 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
 
 def write_table(path: Path, renders: Sequence[Kept], rows: Sequence[Row]) -> None:
     """As CSV. InputError: the file cannot be written."""
-    with atomic_write(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["", *(one.name for one in renders)])
-        writer.writerows([row.label, *row.cells] for row in rows)
+    write_csv(path, ["", *(one.name for one in renders)], ([row.label, *row.cells] for row in rows))
 
 
 def _cell(value: float, first: float) -> str:

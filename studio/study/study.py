@@ -21,7 +21,7 @@ from studio.project.ready_made import load_model, names_in
 from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.study.boards import of_project
 from studio.study.effects import STATES
-from studio.study.measures import MEASURES, PART_MEASURES, part_names
+from studio.study.measures import MEASURES, measure_of, part_names
 
 FOLDER = Path(__file__).resolve().parents[2] / "assets" / "studies"
 MOST_VALUES, MOST_CELLS, MOST_VARIED, MOST_SWEEPS = 10_000, 1_000_000, 8, 100
@@ -167,9 +167,20 @@ class Sweep(Model):
             raise ValueError("a boundary is of one limit in a map of two parameters; allowed: two in vary, and a limit")
         if any(len(one.point) != len(self.vary) for one in self.references):
             raise ValueError("a reference is of no point; allowed: a value for each field that is varied")
+        for one in self.references if self.sampling == "grid" else ():
+            for parameter, value in zip(self.vary, one.point, strict=True):
+                if value not in parameter.grid():
+                    values = ", ".join(map(str, parameter.grid()[:20]))
+                    raise ValueError(f"a reference is at {parameter.field} {value}; allowed: one of {values}")
         if self.chart == "map" and len(self.vary) != 2:
             raise ValueError(f"a map has two parameters; found {len(self.vary)}; allowed: two in vary")
         return self
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Every measure that it draws, limits or holds against figures of others."""
+        limit = () if self.limit is None else (self.limit.measure,)
+        return tuple(dict.fromkeys((self.measure, *limit, *(one.measure for one in self.references))))
 
 
 class Study(Model):
@@ -255,13 +266,12 @@ def with_fields(project: Project, values: dict[str, Value], where: str) -> Proje
 
 def check_measure(name: str) -> None:
     """ValueError: no such measure; of the part, `check_part` asks the project."""
-    kind, colon, gauge = name.partition(":")
-    if colon and gauge and kind in PART_MEASURES:
-        return
-    if name not in MEASURES:
+    try:
+        measure_of(name)
+    except KeyError:
         near = difflib.get_close_matches(name, MEASURES, n=1)
         cure = f"; did you mean {near[0]}?" if near else ""
-        raise ValueError(f"there is no measure {name[:60]!r}; allowed: {', '.join(MEASURES)}{cure}")
+        raise ValueError(f"there is no measure {name[:60]!r}; allowed: {', '.join(MEASURES)}{cure}") from None
 
 
 def check_part(name: str, project: Project, where: str) -> None:

@@ -15,6 +15,7 @@ from analysis.deviation import (
     deviations,
     three_two_one,
     turn_and_shift,
+    verdict_of,
     verdicts,
 )
 from render.base.errors import InputError
@@ -137,3 +138,6 @@ def test_a_tolerance_is_proved_by_twice_the_sigma() -> None:
     assert found.tolist() == [WITHIN, UNDECIDED, UNDECIDED, UNDECIDED, ABOVE, BELOW, UNDECIDED]
     unknown = verdicts(value, np.full(7, np.nan), -1.0, 1.0)
     assert set(unknown.tolist()) == {UNDECIDED}, "what has no sigma proves nothing"
+    assert verdict_of(found[:1]) == "pass"
+    assert verdict_of(found[:4]) == "undecided"
+    assert verdict_of(found[[0, 1, 4]]) == verdict_of(found[[0, 5]]) == "fail"

@@ -80,17 +80,15 @@ class PreferencesDialog(QDialog):
         self.setObjectName("preferences")
         self.setWindowTitle("Preferences")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.length = _choice(LENGTHS, values.length_unit)
-        self.threads = _number(0, max(thread_count(1024), 1), values.threads or 0, "")
+        self.length = _choice(LENGTHS)
+        self.threads = _number(0, max(thread_count(1024), 1), "")
         self.threads.setSpecialValueText("all processors")
         self.threads.setToolTip("Of renders and measurements in the window, at most; no number depends on it")
-        self.scale = _choice({key: name for key, (_, name) in SCALES.items()}, values.image_scale)
+        self.scale = _choice({key: name for key, (_, name) in SCALES.items()})
         self.autosave = QCheckBox("Keep unsaved work in case of a crash")
-        self.autosave.setChecked(values.autosave)
-        self.every = _number(5, 3600, round(values.autosave_every), " s")
-        self.every.setEnabled(values.autosave)
+        self.every = _number(5, 3600, " s")
         self.autosave.toggled.connect(self.every.setEnabled)
-        self.undo = _number(10, 10_000, values.undo_depth, " edits")
+        self.undo = _number(10, 10_000, " edits")
         form = QFormLayout()
         form.setLabelAlignment(Qt.AlignmentFlag.AlignRight)
         form.addRow("Lengths in", self.length)
@@ -111,6 +109,7 @@ class PreferencesDialog(QDialog):
         column.setSpacing(14)
         column.addLayout(form)
         column.addWidget(buttons)
+        self.show_values(values)
 
     def show_values(self, values: Preferences) -> None:
         """In the rows; nothing is taken on before OK."""
@@ -118,6 +117,7 @@ class PreferencesDialog(QDialog):
         self.threads.setValue(values.threads or 0)
         self.scale.setCurrentIndex(self.scale.findData(values.image_scale))
         self.autosave.setChecked(values.autosave)
+        self.every.setEnabled(values.autosave)  # a box that stays unchecked tells of no change
         self.every.setValue(round(values.autosave_every))
         self.undo.setValue(values.undo_depth)
 
@@ -133,17 +133,15 @@ class PreferencesDialog(QDialog):
         }
 
 
-def _choice(names: dict[str, str], now: str) -> QComboBox:
+def _choice(names: dict[str, str]) -> QComboBox:
     box = QComboBox()
     for key, name in names.items():
         box.addItem(name, key)
-    box.setCurrentIndex(box.findData(now))
     return box
 
 
-def _number(low: int, high: int, now: int, suffix: str) -> QSpinBox:
+def _number(low: int, high: int, suffix: str) -> QSpinBox:
     box = QSpinBox()
     box.setRange(low, high)
-    box.setValue(now)
     box.setSuffix(suffix)
     return box

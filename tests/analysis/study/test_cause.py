@@ -17,6 +17,8 @@ GOOD = {
     [
         ({"no_peak_rows": 0.3}, "starved"),
         ({"saturated_rows": 0.9, "no_peak_rows": 0.1}, "saturated"),
+        # a plane exposed so long that it is as bright as the line on it, as measured
+        ({"saturated_rows": 0.19, "no_peak_rows": 0.67, "wrong_rows": 0.09, "signal": 10000.0}, "saturated"),
         ({"wrong_rows": 0.2, "false_rows": 0.2, "saturated_rows": 0.3}, "wrong peak"),
         ({"visible_rows": 0.4}, "occluded"),
         ({"unmeasured_rows": 0.5}, "not measurable"),

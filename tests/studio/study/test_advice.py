@@ -51,6 +51,7 @@ def as_if(monkeypatch: pytest.MonkeyPatch) -> Callable[[Sigma], list[int]]:
                 row |= {"depth_sigma": spread, "depth_rmse": spread, "depth_bias": 1e-5 * (1.0 + common)}
                 render = cell.project.render
                 seconds = 1.0 + 2.0 * (render.laser_error < 0.005) + 4.0 * (render.transport != "direct")
+                seconds += 8.0 * (render.goal is None)
                 store.add([(cell.key, {**row, "reason": ""}, {"seconds_render": seconds, "seconds_develop": 0.0,
                                                               "seconds_extract": 0.0})])  # fmt: skip
 
@@ -73,6 +74,33 @@ def test_what_costs_and_changes_nothing_is_left_out_and_proved_on_fresh_seeds(
     assert found.proved.found.seconds == 1.0 and found.proved.found.seconds_before == 7.0
     first = set(range(PLANE.seed, PLANE.seed + SCREENED))
     assert first.isdisjoint(found.proved.seeds) and set(seen) == first | set(found.proved.seeds)
+
+
+@pytest.mark.parametrize("harmless", [True, False])
+def test_a_goal_comes_first_and_where_it_is_taken_the_rest_is_tried_with_it(
+    as_if: Callable[[Sigma], list[int]], tmp_path: Path, harmless: bool
+) -> None:
+    asked: list[Project] = []
+
+    def sigma(project: Project) -> float:
+        asked.append(project)
+        return 1.0 if harmless or project.render.goal is None else 1.1
+
+    as_if(sigma)
+    whole = PLANE.replaced({"render.goal": None, "render.transport": "subsurface"})
+    found = advise(whole, Question(), tmp_path)
+    goal, *others = found.tried
+    assert goal.part.name == "goal" and goal.taken == harmless
+    assert {one.part.change for one in others} >= {"what a pilot finds", "no caustics", "one surface only"}
+    assert found.proved is not None
+    assert (found.project(whole).render.goal is not None) == harmless
+    assert found.proved.found.seconds_before == 15.0
+    if harmless:
+        assert goal.found.seconds == 7.0 and all(one.found.seconds_before == 7.0 for one in others)
+        # what costs most is measured for the choice and for the proof, and beside no part
+        assert sum(one.render.goal is None for one in asked) == SCREENED + Question().seeds
+    else:
+        assert all(one.found.seconds_before == 15.0 for one in others)
 
 
 def test_parts_that_only_do_harm_together_are_found_by_the_proof_and_one_is_given_up(

@@ -12,9 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.study.boundary import Crossing
 from render.base.errors import InputError
 from studio.study.answers import answers
+from studio.study.boundary_chart import outline
 from studio.study.cells import Cell, Shard, next_cells, points
+from studio.study.edges import Edge
 from studio.study.estimate import estimate
 from studio.study.page import write_page
 from studio.study.study import Study
@@ -107,3 +110,19 @@ def test_a_boundary_without_limit_or_second_range_is_refused(tmp_path: Path) -> 
         with pytest.raises(InputError, match=words) as raised:
             Study.load(file)
         assert "sweeps[0]" in str(raised.value)
+
+
+def test_the_boundary_is_drawn_where_columns_that_hold_meet_those_that_fail_and_not_along_the_frame() -> None:
+    sweep, nothing = STUDY.sweeps[0], (math.nan, math.nan, math.nan)
+    crossings = (
+        Crossing(0, "fails", *nothing),
+        Crossing(1, "found", 16.0, 15.0, 17.0),
+        Crossing(2, "holds", *nothing),
+        Crossing(3, "holds", *nothing),
+        Crossing(4, "fails", *nothing),
+    )
+    across, along = outline(sweep, Edge("likelihood", crossings, 20))
+    exposures = [1e-4 * 10.0 ** (k / 4.0) for k in (0, 1, 2, 3, 3, 4)]
+    assert across == pytest.approx(exposures)
+    # logarithmic, from 1 to 100 in 33 values: the 17th is 10
+    assert along == pytest.approx([1.0, 10.0, 100.0, math.nan, 100.0, 1.0], nan_ok=True)

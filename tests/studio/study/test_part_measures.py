@@ -28,9 +28,10 @@ STEP = {
 SWEEP = {"name": "a", "vary": [{"field": "sensor.exposure_time", "values": [0.001, 0.002]}]}
 
 
-def study_of(measure: str) -> tuple[Study, dict[str, Project]]:
+def study_of(measure: str, *references: dict[str, Any]) -> tuple[Study, dict[str, Project]]:
+    sweep = {**SWEEP, "measure": measure, "references": references}
     study = Study.model_validate(
-        {"base": "step_block", "sweeps": [{**SWEEP, "measure": measure}], "repeats": 3, "image_scale": 0.2,
+        {"base": "step_block", "sweeps": [sweep], "repeats": 3, "image_scale": 0.2,
          "methods": ["likelihood"], "set": {"render.goal": None}}
     )  # fmt: skip
     base = Project.load("step_block")
@@ -61,6 +62,9 @@ def test_names_say_what_is_there_and_others_are_refused() -> None:
     study, bases = study_of("length_error:Second step")
     with pytest.raises(InputError, match="length_error:First step"):
         next_cells(study, bases, {})
+    theirs = {"label": "data sheet", "measure": "length_sigma:Second step", "value": 1e-5, "point": [0.001]}
+    with pytest.raises(InputError, match="length_sigma:First step"):
+        next_cells(*study_of("depth_rmse", theirs), {})
     assert part_names(bases["step_block"].measures) == [
         f"length_{kind}:First step" for kind in ("value", "error", "sigma")
     ]

@@ -40,6 +40,8 @@ def test_every_ready_made_study_fits_its_project(name: str) -> None:
         ({"vary": [{"field": "x", "values": [1.0, 1.0]}]}, "each once"),
         ({"vary": []}, "1 to 8"),
         ({"measure": "depth_rmsd"}, "did you mean depth_rmse"),
+        ({"measure": "length_error:"}, "there is no measure"),
+        ({"references": [{"label": "x", "measure": "depth_rmse", "value": 1.0, "point": [0.003]}]}, "0.001, 0.002"),
         ({"sampling": "bisection"}, "low and high for every parameter"),
         ({"chart": "map"}, "two in vary"),
         ({"set": {"sensor.exposure_time": 1.0}}, "each once in vary and set"),
