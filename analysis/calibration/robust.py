@@ -125,7 +125,10 @@ def _outliers(seen: Observations, estimate: Estimate) -> tuple[Bool, Bool, Bool,
             away = float(np.median(laser[line])) / 0.6745
             if away > BAD:
                 laser_bad |= line
-                told.append(f"{name}: the line of laser {one} is {away:.0f} times as far off as is typical; left out")
+                told.append(
+                    f"{name}: the line of laser {one} is {away:.0f} times as far off as is typical, as a reflection "
+                    "is, or the line of a mirrored photograph; left out"
+                )
             elif np.count_nonzero(laser_bad & line):
                 told.append(f"{name}: {np.count_nonzero(laser_bad & line)} stray points of laser {one} left out")
     return corner_bad, laser_bad, view_bad, tuple(told)
