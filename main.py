@@ -316,7 +316,11 @@ def calibrate(what: str, folder: Path | None, **options: Any) -> None:
 @cli.command()
 @click.argument("board", default="checkerboard:13x9:25mm")
 @printing
-@click.option("--out", type=click.Path(path_type=Path), help="PDF file  [default: named by the board].")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    help="PDF file, or GLB: a mesh to render  [default: PDF named by the board].",
+)
 @common
 def board(board: str, **options: Any) -> None:
     """A board as a PDF to scale: checkerboard:13x9:25mm (inner corners), charuco:14x10:25mm:18mm (squares) or

@@ -74,6 +74,8 @@ class Points:
     """(m, 3, k) m, camera frame: how each of k independent errors of the calibration, all of variance 1, moves the
     point; None: the calibration is taken as exact."""
     flag: NDArray[np.uint8]
+    motion: Float | None = None
+    """(m, 3, k) m, camera frame: the same of the motion by which points of several steps are put together."""
 
     @property
     def valid(self) -> Mask:
@@ -97,10 +99,9 @@ class Points:
 
     @property
     def sigma_systematic(self) -> Float:
-        """(m,) m, root of the summed variances that the calibration gives the point; 0 where it is taken as exact."""
-        if self.calibration is None:
-            return np.zeros(len(self.flag))
-        return np.asarray(np.sqrt((self.calibration**2).sum(axis=(1, 2))))
+        """(m,) m, root of the summed variances that calibration and motion give the point; 0 where they are exact."""
+        parts = (part for part in (self.calibration, self.motion) if part is not None)
+        return np.sqrt(sum(((part**2).sum(axis=(1, 2)) for part in parts), start=np.zeros(len(self.flag))))
 
     @property
     def sigma_depth(self) -> Float:

@@ -135,11 +135,14 @@ def leverage(seen: Observations, solution: Solution, first: Index, second: Index
     return np.asarray(common + np.sum((by_pose[first] @ pose) * by_pose[second], axis=(1, 2)))
 
 
-def bending(seen: Observations, solution: Solution, prior: Prior | None = None) -> float:
-    """Rise of chi-square one standard deviation from the estimate, along what is known least, the greater of two sides.
+def bending(
+    seen: Observations, solution: Solution, prior: Prior | None = None, *, far: float = 1.0, directions: int = 1
+) -> float:
+    """Rise of chi-square `far` standard deviations from the estimate over far squared, the greatest of both sides of
+    the directions that are known least.
 
     It is 1 where residuals are linear over their parameters' errors, as the covariance supposes; far above it, the
-    valley of the cost bends away from the covariance's own longest axis.
+    valley of the cost bends away from the covariance's own axes.
     """
     used = np.nonzero(solution.free)[0]
     if len(used) == 0:
@@ -149,12 +152,14 @@ def bending(seen: Observations, solution: Solution, prior: Prior | None = None) 
     inner = matrix[np.ix_(used, used)]
     scale = 1.0 / np.sqrt(np.diag(inner))
     values, vectors = np.linalg.eigh(inner * np.outer(scale, scale))
-    step = np.zeros(len(solution.free))
-    step[used] = scale * vectors[:, 0] / np.sqrt(max(values[0], SINGULAR))
-    with np.errstate(all="ignore"):
-        moved = [solution.estimate.moved(side * step, -follow @ (side * step)) for side in (1.0, -1.0)]
-        costs = [_normal(seen, there, solution.free, prior, guess)[0].cost for there in moved]
-    return max(costs) - normal.cost
+    costs = []
+    for value, vector in zip(values[:directions], vectors.T[:directions], strict=True):
+        step = np.zeros(len(solution.free))
+        step[used] = far * scale * vector / np.sqrt(max(value, SINGULAR))
+        with np.errstate(all="ignore"):
+            moved = [solution.estimate.moved(side * step, -follow @ (side * step)) for side in (1.0, -1.0)]
+            costs += [_normal(seen, there, solution.free, prior, guess)[0].cost for there in moved]
+    return (max(costs) - normal.cost) / far**2
 
 
 def _by_view(seen: Observations, at_corners: Linear, at_lasers: Linear, name: str) -> list[tuple[Float, Float]]:

@@ -24,6 +24,8 @@ from render.base.errors import InputError
 FEWEST_FOR_CHOICE = 9
 """Views that the choice of a lens model needs, in three folds."""
 DEFAULT_TERMS = 5
+SCALE = 0.005
+"""Of its way: what a stage may be off by itself."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,7 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         for one in volumes
         if not len(one.depth)
     ]
+    faults += _wrong_scale(estimate, covariance)
     advice = None
     if usable:
         advice = advise(
@@ -183,7 +186,23 @@ def _carried(guess: Estimate, told: Told, names: Sequence[str], extent: Float) -
     rotation = np.where(other_end[:, None, None], guess.rotation @ np.diag([-1.0, -1.0, 1.0]), guess.rotation)
     translation = np.where(other_end[:, None], last, guess.translation)
     guess = replace(guess, rotation=rotation, translation=translation)
-    return guess.with_motion(started(told.kind, group, given, rotation, translation)), other_end
+    motion = started(told.kind, group, given, rotation, translation)
+    return guess.with_motion(replace(motion, holds=told.holds)), other_end
+
+
+def _wrong_scale(estimate: Estimate, covariance: Float) -> list[str]:
+    """What a stage's way, against what it was told, says of the board: nothing else knows how large its squares are."""
+    motion, own = estimate.motion, estimate.motion_slice
+    if motion is None or motion.kind != "stage":
+        return []
+    way = float(np.linalg.norm(motion.parameters))
+    unit = motion.parameters / way
+    if abs(way - 1.0) < max(SCALE, 5.0 * float(np.sqrt(unit @ covariance[own, own] @ unit))):
+        return []
+    return [
+        f"the board went {way:.4g} times as far as the stage was told: its squares are {1.0 / way:.4g} times as large "
+        "as was said, or the stage's scale is off; measure the board"
+    ]
 
 
 def _prior(known: Known, guess: Estimate) -> Prior:

@@ -20,6 +20,8 @@ FEWEST = 8
 """Corners that a view needs."""
 THICKEST_LINE = 15
 """px of a laser's line that is taken away where it hides the board."""
+SMALLEST = (3, 3)
+"""Corners of a board of which another number is told."""
 GLARE = 0.02
 """Share of full-scale pixels about a corner above which it is dropped."""
 
@@ -98,16 +100,21 @@ def _eight_bit(values: Float) -> NDArray[np.uint8]:
 
 def _checkerboard(shown: NDArray[np.uint8], board: Board) -> tuple[Float, NDArray[np.intp]]:
     size = (board.columns, board.rows)
-    flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
-    found, corners = cv2.findChessboardCornersSB(shown, size, flags=flags)
-    if not found:  # a laser's line across it, which is bright and narrow, may hide the board
-        thinned = cv2.morphologyEx(shown, cv2.MORPH_OPEN, np.ones((1, THICKEST_LINE), dtype=np.uint8))
-        found, corners = cv2.findChessboardCornersSB(thinned, size, flags=flags)
-    if not found:
-        found, corners = cv2.findChessboardCornersSB(shown, size, flags=flags | cv2.CALIB_CB_EXHAUSTIVE)
-    if not found:
+    # a laser's line, which is bright and narrow, may hide the board
+    thinned = cv2.morphologyEx(shown, cv2.MORPH_OPEN, np.ones((1, THICKEST_LINE), dtype=np.uint8))
+    accurate, evened = cv2.CALIB_CB_ACCURACY, cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
+    # evened out, the blocks of a compressed image stand out as its squares do
+    ways = ((shown, evened), (shown, accurate), (thinned, evened), (thinned, accurate))
+    for image, flags in (*ways, (shown, evened | cv2.CALIB_CB_EXHAUSTIVE)):
+        found, corners = cv2.findChessboardCornersSB(image, size, flags=flags)
+        if found:
+            break
+    else:
+        larger, _, squares = cv2.findChessboardCornersSBWithMeta(shown, SMALLEST, accurate | cv2.CALIB_CB_LARGER)
+        counted = sorted(squares.shape, reverse=board.columns > board.rows) if larger else sorted(size)
         raise InputError(
             "no checkerboard of that size is in the image",
+            found=None if sorted(counted) == sorted(size) else "one of {} x {}".format(*counted),
             allowed=f"{board.columns} x {board.rows} inner corners, all of them seen",
             cure="count the corners where four squares meet, and show the whole board with a white margin",
         )

@@ -21,8 +21,11 @@ from scipy.spatial.transform import Rotation
 
 from render.base.arrays import Bool, Float
 from render.base.errors import InputError
+from render.base.pose import invert
 
 Kind = Literal["stage", "turntable", "hand_eye"]
+Held = Literal["camera", "board"]
+"""What a robot's hand holds."""
 NAMES: dict[Kind, tuple[str, ...]] = {
     "stage": ("stage_x", "stage_y", "stage_z"),
     "turntable": ("axis_slope_1", "axis_slope_2", "axis_at_1", "axis_at_2"),
@@ -61,6 +64,8 @@ class Motion:
     """As `NAMES` has them."""
     along: Float
     """(3,) the signed coordinate axis next to a turntable's; of no meaning to others."""
+    holds: Held = "camera"
+    """Of no meaning but to a hand."""
 
     @property
     def across(self) -> NDArray[np.intp]:
@@ -77,6 +82,10 @@ class Motion:
         group = np.unique(self.group[keep], return_inverse=True)[1]
         return replace(self, group=group, given=self.given[keep])
 
+    def with_parameters(self, parameters: Float) -> Motion:
+        """The same told, carried out otherwise."""
+        return replace(self, parameters=parameters)
+
     def standing(self, views: int) -> Motion:
         """The same parameters with other views, each a placement of its own."""
         given = np.broadcast_to(np.eye(4), (views, 4, 4)) if self.kind == "hand_eye" else np.zeros(views)
@@ -89,7 +98,7 @@ class Motion:
             return _stage(self.given - self.given[start], self.parameters)
         if self.kind == "turntable":
             return self._turntable(self.given - self.given[start])
-        return _hand_eye(_inverse(self.given) @ self.given[start], self.parameters)
+        return _hand_eye(invert(self.given) @ self.given[start], self.parameters)
 
     def axis(self) -> tuple[Float, Float]:
         """(3,) unit direction of a turntable's axis, turning positively about it, and (3,) m a point on it."""
@@ -101,6 +110,15 @@ class Motion:
         """(2, 3) of the direction by its slopes."""
         normal, across = self.axis()[0], self.across
         return np.asarray((np.eye(3)[across] - normal[across][:, None] * normal) * abs(normal @ self.along))
+
+    def axis_and_point_derivative(self) -> Float:
+        """(6, 4) of a turntable's direction and of the point of its axis next to the camera, by its parameters."""
+        normal, point = self.axis()
+        by_normal, by_point = np.zeros((3, 4)), np.zeros((3, 4))
+        by_normal[:, :2] = self.axis_derivative().T
+        by_point[self.across, [2, 3]] = 1.0
+        nearest = by_point - np.outer(normal, point @ by_normal + normal @ by_point) - (normal @ point) * by_normal
+        return np.concatenate([by_normal, nearest])
 
     def _turntable(self, angle: Float) -> Moves:
         normal, point = self.axis()
@@ -130,6 +148,7 @@ class Told:
 
     kind: Kind
     by_name: Mapping[str, tuple[str, Float]]
+    holds: Held = "camera"
 
     def of(self, names: Sequence[str]) -> tuple[NDArray[np.intp], Float]:
         """(views,) placement of each, one of its own where nothing was told, and what was given.
@@ -180,7 +199,7 @@ def started(kind: Kind, group: NDArray[np.intp], given: Float, rotation: Float, 
         left, right = np.eye(3) - turn, translation[second] - np.einsum("nij,nj->ni", turn, translation[first])
         at = np.linalg.lstsq(left[:, :, there.across].reshape(-1, 2), right.ravel(), rcond=None)[0]
         return replace(there, parameters=np.append(there.parameters[:2], at))
-    motion = _inverse(given[second]) @ given[first]
+    motion = invert(given[second]) @ given[first]
     ours, theirs = (Rotation.from_matrix(each).as_rotvec() for each in (turned, motion[:, :3, :3]))
     if len(ours) < 2 or np.linalg.svd(theirs, compute_uv=False)[1] < LEAST_TURN:
         raise _undetermined("the hand turned about one axis only", "turn it by 20 deg or more about another as well")
@@ -203,7 +222,7 @@ def turned_about(motion: Motion, rotation: Float) -> Bool:
     elif motion.kind == "turntable":
         told = np.abs(np.angle(np.exp(1j * (motion.given - motion.given[start]))))
     else:
-        told = _angle((_inverse(motion.given) @ motion.given[start])[:, :3, :3])
+        told = _angle((invert(motion.given) @ motion.given[start])[:, :3, :3])
     first = rotation[start].transpose(0, 2, 1)
     as_is, other = (np.abs(_angle(turned @ first) - told) for turned in (rotation, rotation @ ends))
     return np.asarray(other + CLEARLY < as_is)
@@ -231,14 +250,6 @@ def _pairs(group: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]
 
 def _undetermined(what: str, cure: str) -> InputError:
     return InputError(what, where="the board's motion", cure=cure)
-
-
-def _inverse(pose: Float) -> Float:
-    out = np.zeros_like(pose)
-    out[:, :3, :3] = pose[:, :3, :3].transpose(0, 2, 1)
-    out[:, :3, 3] = -np.einsum("nji,nj->ni", pose[:, :3, :3], pose[:, :3, 3])
-    out[:, 3, 3] = 1.0
-    return out
 
 
 def _stage(told: Float, step: Float) -> Moves:

@@ -30,6 +30,9 @@ BAD = 4.0
 MOST_BENT = 2.0
 """Rise of chi-square one sigma away, 1 where errors are linear: sets whose sigmas hold have 1.0 to 1.6."""
 
+MOST_BENT_AT_TWO = 4.0
+"""The same two sigma away, along the three directions known least, over 4: such sets have 1.0 to 2.4."""
+
 
 @dataclass(frozen=True)
 class Adjusted:
@@ -70,13 +73,13 @@ def adjust_robustly(seen: Observations, start: Estimate, free: Bool, prior: Prio
             found=f"least is known of a mixture of {weakest_mixture(solution.information, free, estimate.names)}",
             cure="ask for fewer distortion terms, or photograph the board at other tilts and distances",
         )
-    rise = bending(scaled, solution, prior)
-    if rise > MOST_BENT:
+    rise, farther = bending(scaled, solution, prior), bending(scaled, solution, prior, far=2.0, directions=3)
+    if rise > MOST_BENT or farther > MOST_BENT_AT_TWO:
         raise InputError(
             "the parameters' errors are larger than any covariance of them holds for",
             where="calibration",
-            found=f"one sigma from the best values chi-square rises by {rise:.3g} in place of 1, along a mixture of "
-            f"{weakest_mixture(solution.information, free, estimate.names)}",
+            found=f"chi-square rises by {rise:.3g} and {4.0 * farther:.3g} one and two sigma away, not 1 and 4, by a "
+            f"mixture of {weakest_mixture(solution.information, free, estimate.names)}",
             cure="ask for fewer distortion terms, or photograph the board at other tilts and distances",
         )
     return Adjusted(solution, scaled, corner_scale, laser_scale, told)
@@ -125,7 +128,10 @@ def _outliers(seen: Observations, estimate: Estimate) -> tuple[Bool, Bool, Bool,
             away = float(np.median(laser[line])) / 0.6745
             if away > BAD:
                 laser_bad |= line
-                told.append(f"{name}: the line of laser {one} is {away:.0f} times as far off as is typical; left out")
+                told.append(
+                    f"{name}: the line of laser {one} is {away:.0f} times as far off as is typical, as a reflection "
+                    "is, or the line of a mirrored photograph; left out"
+                )
             elif np.count_nonzero(laser_bad & line):
                 told.append(f"{name}: {np.count_nonzero(laser_bad & line)} stray points of laser {one} left out")
     return corner_bad, laser_bad, view_bad, tuple(told)

@@ -83,10 +83,11 @@ def rotation_vector(rotation: Array) -> Array:
 
 
 def invert(matrix: Array) -> Array:
-    """(4, 4) rigid inverse."""
-    inverse = np.eye(4)
-    inverse[:3, :3] = matrix[:3, :3].T
-    inverse[:3, 3] = -matrix[:3, :3].T @ matrix[:3, 3]
+    """(..., 4, 4) rigid inverse."""
+    inverse = np.zeros(np.shape(matrix))
+    inverse[..., :3, :3] = np.swapaxes(matrix[..., :3, :3], -1, -2)
+    inverse[..., :3, 3] = -np.einsum("...ji,...j->...i", matrix[..., :3, :3], matrix[..., :3, 3])
+    inverse[..., 3, 3] = 1.0
     return inverse
 
 

@@ -18,9 +18,9 @@ from studio.project.calibration import (
     CALIBRATION_KIND,
     CALIBRATION_VERSION,
     CalibratedCamera,
-    check_covariance,
     read_calibration_file,
 )
+from studio.project.covariance import check_covariance
 from studio.project.strict_json import pretty, read_object
 from studio.project.validation_messages import input_error
 

@@ -8,13 +8,14 @@ import numpy as np
 
 from analysis.calibration.board import Board
 from analysis.calibration.estimate import Estimate
-from analysis.calibration.motion import Motion, Told, turntable
+from analysis.calibration.motion import Motion, Told
 from analysis.calibration.observations import View
 from analysis.calibration.virtual import exact_view, noisy
 from render.base.arrays import Float
 from render.base.pose import rotation_vector
-from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
+from render.scene.motion import PoseList
 from studio.calibration.in_silico import LEAST_SEEN
+from studio.project.found_motion import true_motion
 from studio.project.project import Project
 
 POSITIONS = 8
@@ -33,7 +34,7 @@ def carried_views(
     truth: with poses of the board, in the first of which that is carried. sigmas px of corners and lines.
     None: the project stands still, or the camera sees the board at too few positions.
     """
-    motion = true_motion(project)
+    motion = carried_motion(project)
     if motion is None:
         return None
     size = (project.scene.camera.width, project.scene.camera.height)
@@ -49,47 +50,25 @@ def carried_views(
             if seen.all() or (by_hand and seen.sum() >= FEWEST_POSITIONS):
                 kept = np.nonzero(seen)[0]
                 rng = np.random.default_rng([seed, number])
-                told = {views[i].name: ("", np.asarray(chosen.given[i])) for i in kept}
-                return noisy([views[i] for i in kept], rng), replace(truth, motion=chosen), Told(motion.kind, told)
+                by_name = {views[i].name: ("", np.asarray(chosen.given[i])) for i in kept}
+                told = Told(motion.kind, by_name, motion.holds)
+                return noisy([views[i] for i in kept], rng), replace(truth, motion=chosen), told
     return None
 
 
-def true_motion(project: Project) -> Motion | None:
+def carried_motion(project: Project) -> Motion | None:
     """The project's motion as it carries what is seen, in the camera's frame, at positions over the whole of it."""
-    moved, camera = project.scene.motion, project.scene.rig.T_world_rig.matrix
-    if isinstance(moved, NoMotion):
+    scene = project.scene
+    moved, last = scene.motion, scene.frame_count - 1
+    if isinstance(moved, PoseList):
+        some = np.unique(np.linspace(0, last, POSITIONS).round().astype(int))
+        turned = np.array([rotation_vector(moved.displacement(int(i))[:3, :3]) for i in some])
+        shows = len(some) >= FEWEST_POSITIONS and np.linalg.svd(turned - turned[0], compute_uv=False)[1] >= 0.2
+        return true_motion(scene, some) if shows else None
+    motion = true_motion(scene, np.linspace(-0.5, 0.5, POSITIONS) * last)
+    if motion is None or not np.any(motion.given):
         return None
-    camera = camera @ project.scene.camera.T_rig_camera.matrix
-    rotation, sign = camera[:3, :3], 1.0 if moved.moves == "objects" else -1.0
-    group = np.zeros(POSITIONS, dtype=np.intp)
-    middle = np.linspace(-0.5, 0.5, POSITIONS) * (moved.frame_count - 1)
-    if isinstance(moved, LinearStage):
-        length = float(np.linalg.norm(moved.step))
-        if length == 0.0 or moved.steps < 2:
-            return None
-        given = _within(middle * length, LONGEST)
-        return Motion("stage", group, given, sign * rotation.T @ np.array(moved.step) / length, np.eye(3)[1])
-    if isinstance(moved, Turntable):
-        if moved.angle_step == 0.0 or moved.steps < 2:
-            return None
-        axis = sign * rotation.T @ np.array(moved.axis) / np.linalg.norm(moved.axis)
-        point = rotation.T @ (np.array(moved.centre) - camera[:3, 3])
-        return turntable(group, _within(middle * moved.angle_step, WIDEST), axis, point)
-    return _hand(project, moved, camera)
-
-
-def _hand(project: Project, moved: PoseList, camera: Float) -> Motion | None:
-    some = np.unique(np.linspace(0, len(moved.poses) - 1, POSITIONS).round().astype(int))
-    poses = np.array([moved.displacement(int(i)) for i in some])
-    turned = np.array([rotation_vector(pose[:3, :3]) for pose in poses])
-    if len(some) < FEWEST_POSITIONS or np.linalg.svd(turned - turned[0], compute_uv=False)[1] < 0.2:
-        return None
-    eye = project.scene.camera.T_rig_camera.matrix
-    given = poses @ project.scene.rig.T_world_rig.matrix
-    if moved.moves == "objects":
-        eye, given = camera, np.linalg.inv(poses)
-    parameters = np.append(rotation_vector(eye[:3, :3]), eye[:3, 3])
-    return Motion("hand_eye", np.zeros(len(some), dtype=np.intp), given, parameters, np.eye(3)[1])
+    return replace(motion, given=_within(motion.given, LONGEST if motion.kind == "stage" else WIDEST))
 
 
 def _within(given: Float, most: float) -> Float:

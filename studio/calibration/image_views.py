@@ -27,6 +27,8 @@ SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".exr")
 ROLE = re.compile(r"(?P<name>.*?)[ _-](?P<role>off|on|laser(?P<laser>\d{1,2}))", re.IGNORECASE)
 FEWEST_POINTS = 10
 """Points of a line on the board that a view needs to tell anything of a laser."""
+EVEN = 0.1
+"""Of the brightness: what the board's may differ by between photographs with the laser and without."""
 WIDEST_LINE = 25
 """px of a line that stands on the board's own image."""
 CLEAR_WIDTHS = 4.0
@@ -42,6 +44,8 @@ class Shot:
     """Laser off, or the one image for both."""
     lasers: dict[int, Path] = field(default_factory=dict)
     """Laser on, by its number."""
+    both: bool = False
+    """The one image is said to be of the board alone by no name: it may show the line as well."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,10 @@ def shots(folder: Path) -> list[Shot]:
         if other is not None:
             cure = "give each its own name, or move one away"
             raise InputError(f"{other.name} and {file.name} are one photograph by name", where=str(folder), cure=cure)
-        shot = replace(shot, board=file) if board else replace(shot, lasers={**shot.lasers, laser: file})
+        if board:
+            shot = replace(shot, board=file, both=role is None)
+        else:
+            shot = replace(shot, lasers={**shot.lasers, laser: file})
         found[name] = shot
     return list(found.values())
 
@@ -146,7 +153,9 @@ def _with_lines(
 ) -> tuple[View, list[str]]:
     """The view with its laser lines; corners under a line that is in the board's own image are dropped."""
     told, stripes = [], []
-    own = {0: shot.board} if shot.board is not None and not shot.lasers else shot.lasers
+    own = {0: shot.board} if shot.both and not shot.lasers else shot.lasers
+    if not own:
+        told.append("no photograph with the laser on; only its corners are used")
     near = np.zeros(len(view.pixel), dtype=bool)
     disc = spacing(view.pixel) * board.circle / board.square
     for laser, file in sorted(own.items()):
@@ -155,7 +164,17 @@ def _with_lines(
         if with_line.shape != image.shape:
             raise InputError("laser-on and laser-off image are of different size or kind", where=str(file))
         separate = file != shot.board and shot.board is not None
-        pixel, sigma, width = _line(with_line, image if separate else None, settings)
+        if separate:
+            brighter = _brightness(with_line, view) / max(_brightness(image, view), 1e-9)
+            if abs(brighter - 1.0) > EVEN:
+                told.append(
+                    f"the board is {brighter:.2f} times as bright with laser {laser} on as without, which spoils their "
+                    "difference: switch off automatic exposure"
+                )
+            if not _has_light(with_line, image):
+                told.append(f"the photograph with laser {laser} on shows no light that the other has not; is it on?")
+                continue
+        pixel, sigma, width, misfit = _line(with_line, image if separate else None, settings)
         if not separate and len(pixel):
             across = 0 if settings.axis == "rows" else 1
             row = np.rint(view.pixel[:, 1 - across])
@@ -163,7 +182,11 @@ def _with_lines(
             near |= np.abs(view.pixel[:, across] - pixel[index, across]) < 10.0 + 4.0 * width + disc
         keep = on_board(view, board, pixel, CLEAR_WIDTHS * width + 2.0, settings.axis)
         if np.count_nonzero(keep) < FEWEST_POINTS:
-            told.append(f"the line of laser {laser} is not on the board; only its corners are used")
+            if misfit > FEWEST_POINTS + len(pixel):
+                why = f"has no line's form on {misfit} scan lines, as in a picture that was compressed"
+            else:
+                why = "is not on the board"
+            told.append(f"the line of laser {laser} {why}; only its corners are used")
             continue
         stripes.append(Stripe(laser, pixel[keep], sigma[keep], settings.axis))
     if near.any() and np.count_nonzero(~near) >= 8:
@@ -172,10 +195,22 @@ def _with_lines(
     return replace(view, stripes=tuple(stripes)), told
 
 
+def _brightness(image: NDArray[Any], view: View) -> float:
+    """Median over the board, of which a line is a small part."""
+    x, y = (slice(int(low), int(high) + 1) for low, high in zip(view.pixel.min(0), view.pixel.max(0), strict=True))
+    return float(np.median(image[y, x]))
+
+
+def _has_light(image: NDArray[Any], off: NDArray[Any]) -> bool:
+    """Whether anything in an image is brighter than in the one without a laser by more than it is darker elsewhere."""
+    difference = image.astype(np.float64) - off.astype(np.float64)
+    return bool(difference.max() > max(-0.5 * difference.min(), 0.0))
+
+
 def _line(
     image: NDArray[Any], off: NDArray[Any] | None, settings: ExtractionSettings
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """(m, 2) px, (m,) sigma px, and the line's typical width (sigma), px."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float, int]:
+    """(m, 2) px, (m,) sigma px, the line's typical width (sigma), px, and scan lines on which there is no such line."""
     noise = None
     if off is not None:
         image, saturation = subtract_off(image, off)
@@ -187,7 +222,8 @@ def _line(
     good = (line.flag[index, rank] == Flag.OK) & np.isfinite(line.sigma_u[index, rank])
     width = line.width[index, rank][good]
     typical = float(np.median(width)) if good.any() and np.isfinite(width).any() else 1.5
-    return pixel[good], np.maximum(line.sigma_u[index, rank][good], 1e-3), typical
+    misfit = int(np.count_nonzero((line.flag == Flag.MISFIT).any(axis=1)))
+    return pixel[good], np.maximum(line.sigma_u[index, rank][good], 1e-3), typical, misfit
 
 
 def _without_squares(image: NDArray[Any], axis: str) -> NDArray[np.float32]:

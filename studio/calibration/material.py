@@ -17,6 +17,7 @@ from analysis.calibration.observations import View
 from analysis.calibration.virtual import exact_view, noisy
 from analysis.line.settings import ExtractionSettings
 from render.base.errors import InputError
+from studio.calibration.carried import carried_views
 from studio.calibration.drawings import advised_pose
 from studio.calibration.image_views import Shot, shots, views_of
 from studio.calibration.in_silico import virtual_views
@@ -108,22 +109,36 @@ def photographed(
 
 
 def virtual(
-    project: Project, board: Board, nearest: float | None = None, farthest: float | None = None
+    project: Project,
+    board: Board,
+    nearest: float | None = None,
+    farthest: float | None = None,
+    *,
+    count: int = VIEWS,
+    seed: int = SEED,
+    most_tilt: float = MOST_TILT,
+    sigmas: tuple[float, float] = (SIGMA, SIGMA),
 ) -> tuple[Material, Estimate]:
-    """Virtual boards before the project's camera, as many and as good as `main.py calibrate PROJECT` has them, and the
-    truth. nearest, farthest: of them, m. InputError: the camera sees no such board, or the distances are none.
+    """Virtual boards before the project's camera, one of them carried by its motion where it has one, and the truth.
+
+    nearest, farthest: of them, m; most_tilt rad; sigmas px of corners and lines.
+    InputError: the camera sees no such board, or the distances are none.
     """
     views, truth = virtual_views(
         project,
         board,
-        VIEWS,
-        seed=SEED,
+        count,
+        seed=seed,
         depth=board_distances(project, nearest, farthest),
-        most_tilt=MOST_TILT,
-        sigmas=(SIGMA, SIGMA),
+        most_tilt=most_tilt,
+        sigmas=sigmas,
     )
+    moved, told = carried_views(project, board, truth, seed=seed, sigmas=sigmas), None
+    if moved is not None:
+        more, truth, told = moved
+        views += more
     camera = project.scene.camera
-    return Material(tuple(views), (camera.width, camera.height), len(project.scene.lasers)), truth
+    return Material(tuple(views), (camera.width, camera.height), len(project.scene.lasers), told=told), truth
 
 
 def as_advised(material: Material, truth: Estimate, advice: Advice, board: Board) -> Material:
@@ -152,16 +167,21 @@ def need_a_line(material: Material, where: str) -> None:
     """InputError: there is no laser to calibrate."""
     if material.lasers == 0:
         cure = "name pairs NAME_on and NAME_off, hold the board where the line crosses it, or find the camera alone"
-        raise InputError("no photograph shows a laser's line on the board", where=where, cure=cure)
+        raise with_faults(
+            InputError("no photograph shows a laser's line on the board", where=where, cure=cure), material
+        )
 
 
 def with_faults(error: InputError, material: Material) -> InputError:
-    """The same with the files that were left aside: they may be why there is too little."""
-    if not material.errors:
+    """The same with the files that were left aside and what was told of views: they may be why there is too little."""
+    parts = [error.cure] if error.cure else []
+    if material.errors:
+        parts += ["photographs that were not used:", *material.errors]
+    if material.notes:
+        parts += ["of the others:", *material.notes]
+    if not material.errors and not material.notes:
         return error
-    files = "\n".join(("photographs that were not used:", *material.errors))
-    cure = f"{error.cure}\n{files}" if error.cure else files
-    return InputError(error.what, where=error.where, found=error.found, allowed=error.allowed, cure=cure)
+    return InputError(error.what, where=error.where, found=error.found, allowed=error.allowed, cure="\n".join(parts))
 
 
 def board_distances(project: Project, nearest: float | None, farthest: float | None) -> tuple[float, float]:

@@ -6,14 +6,14 @@ import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from analysis.calibration.calibrate import Calibrated
 from analysis.calibration.estimate import Estimate
-from analysis.calibration.motion import Kind, Told
+from analysis.calibration.motion import Held, Kind, Told
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.files import read_bytes
@@ -26,11 +26,9 @@ COLUMNS: dict[Kind, tuple[str, ...]] = {
     "hand_eye": ("x_mm", "y_mm", "z_mm", "qx", "qy", "qz", "qw"),
 }
 FORMS = "; ".join(", ".join(("view", *columns)) for columns in COLUMNS.values())
-Carried = Literal["camera", "board"]
-"""What a robot's hand holds."""
 
 
-def read_motion(file: Path, hand: Carried) -> Told:
+def read_motion(file: Path, hand: Held) -> Told:
     """A table with the columns of `FORMS`, and "placement" where the board was put elsewhere in between.
 
     hand: what it carries; a robot's quaternions are of any length but zero. InputError: not such a table.
@@ -58,7 +56,14 @@ def read_motion(file: Path, hand: Carried) -> Told:
             raise InputError("a view that was told of already", where=where, found=cells["view"])
         values = [_number(cells[column], f"{where}, {column}") for column in COLUMNS[kinds[0]]]
         by_name[cells["view"]] = (cells.get("placement", ""), _given(kinds[0], values, hand, where))
-    return Told(kinds[0], by_name)
+    return Told(kinds[0], by_name, hand)
+
+
+def told_of(file: Path, hand: Held, names: Sequence[str]) -> Told:
+    """What the table tells of photographs of these names. InputError: no such table, or it names another."""
+    told = read_motion(file, hand)
+    check_names(told, names, str(file))
+    return told
 
 
 def check_names(told: Told, names: Sequence[str], where: str) -> None:
@@ -75,13 +80,15 @@ def check_names(told: Told, names: Sequence[str], where: str) -> None:
 
 def motion_data(result: Calibrated) -> dict[str, Any] | None:
     """What was found with its covariance, m and rad, in the camera's frame; None without a motion."""
-    covariance = result.adjusted.solution.covariance
-    own = result.estimate.motion_slice
-    values = motion_values(result.estimate)
-    if values is None:
+    motion, values = result.estimate.motion, motion_values(result.estimate)
+    if motion is None or values is None:
         return None
-    by_parameters = _jacobian(result.estimate)
-    return {**values, "covariance": (by_parameters @ covariance[own, own] @ by_parameters.T).tolist()}
+    own = result.estimate.motion_slice
+    spread = result.adjusted.solution.covariance[own, own]
+    if motion.kind == "turntable":
+        by_parameters = motion.axis_and_point_derivative()
+        spread = by_parameters @ spread @ by_parameters.T
+    return {**values, "covariance": (0.5 * (spread + spread.T)).tolist()}
 
 
 def motion_values(estimate: Estimate) -> dict[str, Any] | None:
@@ -96,7 +103,7 @@ def motion_values(estimate: Estimate) -> dict[str, Any] | None:
         normal, point = motion.axis()
         return {"kind": "turntable", "axis": normal.tolist(), "point": (point - normal * (normal @ point)).tolist()}
     turn, shift = motion.parameters[:3].tolist(), motion.parameters[3:].tolist()
-    return {"kind": "hand_eye", "rotation": turn, "translation": shift}
+    return {"kind": "hand_eye", "holds": motion.holds, "rotation": turn, "translation": shift}
 
 
 def motion_rows(result: Calibrated) -> list[tuple[str, str, str]]:
@@ -134,22 +141,6 @@ def _triple(values: Any, digits: int) -> str:
     return " ".join(f"{value:.{digits}f}" if digits > 0 else f"{value:.{-digits}g}" for value in values)
 
 
-def _jacobian(estimate: Estimate) -> Float:
-    """Of what `motion_values` tells, by the parameters."""
-    motion = estimate.motion
-    assert motion is not None
-    count = len(motion.parameters)
-    if motion.kind != "turntable":
-        return np.asarray(np.eye(count))
-    normal, point = motion.axis()
-    by_normal, by_point = np.zeros((3, 4)), np.zeros((3, 4))
-    by_normal[:, :2] = motion.axis_derivative().T
-    by_point[motion.across, [2, 3]] = 1.0
-    along = normal @ point
-    nearest = by_point - np.outer(normal, point @ by_normal + normal @ by_point) - along * by_normal
-    return np.asarray(np.concatenate([by_normal, nearest]))
-
-
 def _placed(columns: tuple[str, ...]) -> set[str]:
     return {"view", "placement", *columns}
 
@@ -164,7 +155,7 @@ def _number(text: str, where: str) -> float:
     return value
 
 
-def _given(kind: Kind, values: list[float], hand: Carried, where: str) -> Float:
+def _given(kind: Kind, values: list[float], hand: Held, where: str) -> Float:
     if kind == "stage":
         return np.array(1e-3 * values[0])
     if kind == "turntable":

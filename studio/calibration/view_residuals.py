@@ -62,6 +62,8 @@ def residuals(view: View, result: Calibrated, target: Float, *, dropped: bool = 
     if view.name in kept.names and not dropped:
         part: Part = "used"
         number = kept.names.index(view.name)
+        # a board that is carried may have been counted from its other end
+        seen = replace(seen, target=kept.target[kept.view == number])
         posed = estimate.with_poses(estimate.rotation[number : number + 1], estimate.translation[number : number + 1])
         counted = kept.whitening[kept.view == number][:, 0, 0] > 0.0
     else:

@@ -15,6 +15,7 @@ from studio.runtime.streams import print_json
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibrated, Known
+    from analysis.calibration.motion import Held
     from studio.calibration.material import Material
 
 PARTS = ("camera", "laser", "scanner")
@@ -53,9 +54,8 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     from analysis.calibration.calibrate import Request, calibrate
     from studio.calibration.board_text import board_text, parse_board
     from studio.calibration.calibration_file import file_data, write_calibration
-    from studio.calibration.carried import carried_views
-    from studio.calibration.in_silico import true_depth_error, virtual_views
-    from studio.calibration.material import Material, board_distances, with_faults
+    from studio.calibration.in_silico import true_depth_error
+    from studio.calibration.material import virtual, with_faults
     from studio.calibration.motion_file import motion_values
     from studio.commands.commands import load_project
 
@@ -69,25 +69,16 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
             out = options.out or folder / "calibration.json"
         elif folder is None and what not in PARTS:
             project, _ = load_project(Path(what))
-            depth = board_distances(project, options.nearest, options.farthest)
-            views, truth = virtual_views(
+            material, truth = virtual(
                 project,
                 board,
-                options.views,
+                options.nearest,
+                options.farthest,
+                count=options.views,
                 seed=options.seed,
-                depth=depth,
                 most_tilt=float(np.radians(options.most_tilt)),
                 sigmas=(options.corner_sigma, options.line_sigma),
             )
-            camera = project.scene.camera
-            sigmas = (options.corner_sigma, options.line_sigma)
-            moved = carried_views(project, board, truth, seed=options.seed, sigmas=sigmas)
-            told = None
-            if moved is not None:
-                more, truth, told = moved
-                views += more
-            size = (camera.width, camera.height)
-            material = Material(tuple(views), size, len(project.scene.lasers), told=told)
             out = options.out or Path("scan-output") / "calibration.json"
         else:
             allowed = "camera FOLDER, laser FOLDER, scanner FOLDER, or a project alone"
@@ -139,14 +130,14 @@ def _photographed(what: str, folder: Path, options: CalibrateOptions, progress: 
     from analysis.line.extract import settings_of
     from studio.calibration.image_views import shots
     from studio.calibration.material import need_a_line, photographed
-    from studio.calibration.motion_file import check_names, read_motion
+    from studio.calibration.motion_file import told_of
 
     settings = settings_of(None, axis=options.axis, channel=options.channel)
     with_lasers, taken = what != "camera", shots(folder)
     told = None
     if options.motion is not None:
-        told = read_motion(options.motion, "board" if options.hand == "board" else "camera")
-        check_names(told, [shot.name for shot in taken], str(options.motion))
+        hand: Held = "board" if options.hand == "board" else "camera"
+        told = told_of(options.motion, hand, [shot.name for shot in taken])
     found = photographed(
         taken,
         _board(options),

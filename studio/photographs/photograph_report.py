@@ -24,6 +24,7 @@ from studio.photographs.fitted_shapes import STRAY, Fit, fit_flat, fit_round
 from studio.photographs.overlay import draw_overlay
 from studio.photographs.photograph_set import Look
 from studio.photographs.photographs import Measured
+from studio.project.found_motion import measured_pose
 from studio.project.project import Project
 
 Shape = Literal["plane", "sphere"]
@@ -102,7 +103,7 @@ def _whole(report: PhotographReport) -> tuple[Fit, float] | None:
         valid = one.valid
         start = at_first_step(one.world, scene, step)[valid]
         # a difference moves with the part: the error's direction, carried along by a second point
-        turn = scene.T_world_camera(step)[:3, :3]
+        turn = measured_pose(scene, report.project.calibration.motion, step)[:3, :3]
         tip = one.world + (one.gradient * one.sigma_pixel[:, None]) @ turn.T
         places.append(start)
         errors.append(at_first_step(tip, scene, step)[valid] - start)

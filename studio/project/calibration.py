@@ -13,9 +13,10 @@ from analysis.triangulate import CALIBRATION
 from render.base.errors import InputError
 from render.base.model import Model, quantity
 from render.camera.camera import DISTORTION_LENGTHS, MAX_SIDE, Camera, Coefficient
+from studio.project.covariance import Entry, check_covariance
+from studio.project.found_motion import FoundMotion
 from studio.project.strict_json import brief, read_object
 
-Entry = Annotated[float, Field(ge=-1e24, le=1e24)]
 SIZES = tuple(len(CALIBRATION) + terms for terms in DISTORTION_LENGTHS)
 Row = Annotated[tuple[Entry, ...], Field(min_length=SIZES[0], max_length=SIZES[-1])]
 Covariance = Annotated[tuple[Row, ...], Field(min_length=SIZES[0], max_length=SIZES[-1])]
@@ -24,8 +25,6 @@ Plane = tuple[Component, Component, Component, Component]
 
 CALIBRATION_KIND, CALIBRATION_VERSION = "blazer-calibration", 1
 """What a calibration file says of itself."""
-ROUNDING = 1e-9
-"""Of the largest variances: what asymmetry and negative variances of a printed matrix may amount to."""
 
 
 class CalibratedCamera(Model):
@@ -74,6 +73,10 @@ class Calibration(Model):
         help="One matrix for each laser, of fx, fy, cx, cy (px), its plane a, b, c (unit normal), d (m) in the "
         "camera's frame, and, if it has more than 8 rows, the distortion coefficients; none: exact.",
         max_length=64,
+    )
+
+    motion: FoundMotion | None = quantity(
+        None, label="Motion", help="By which a scan's points are put together; none: the scene's."
     )
 
     @field_validator("planes")
@@ -132,17 +135,6 @@ class Calibration(Model):
         return self.model_copy(update={"camera": found, "covariances": covariances})
 
 
-def check_covariance(matrix: NDArray[np.float64], name: str) -> None:
-    """(n, n). ValueError: not symmetric, or not positive semi-definite."""
-    spread = np.sqrt(np.maximum(np.diag(matrix), 0.0))
-    scale = np.outer(spread, spread) + np.finfo(float).tiny
-    if np.any(np.abs(matrix - matrix.T) > ROUNDING * scale):
-        raise ValueError(f"{name} is not symmetric; allowed: a matrix equal to its transpose")
-    related = matrix / np.where(scale > ROUNDING * np.finfo(float).tiny, scale, 1.0)
-    if np.linalg.eigvalsh(np.where(np.abs(matrix) > 0.0, related, 0.0)).min() < -len(matrix) * ROUNDING:
-        raise ValueError(f"{name} has negative variances; allowed: a positive semi-definite matrix")
-
-
 def read_calibration_file(path: Path, where: str) -> dict[str, Any]:
     """The JSON object of a calibration file. InputError: none, or of a later version."""
     data = read_object(path, "calibration file")
@@ -157,5 +149,5 @@ def read_calibration_file(path: Path, where: str) -> dict[str, Any]:
 
 
 def from_file_data(data: dict[str, Any]) -> dict[str, Any]:
-    """The part of a calibration file that a project takes over: camera, planes and covariances."""
-    return {name: data[name] for name in ("camera", "planes", "covariances") if name in data}
+    """The part of a calibration file that a project takes over: camera, planes, covariances and motion."""
+    return {name: data[name] for name in ("camera", "planes", "covariances", "motion") if name in data}

@@ -23,6 +23,7 @@ from render.scene.settings import RenderSettings
 from render.scene.shape import MeshFile
 from render.sensor.sensor import Sensor
 from studio.project.calibration import Calibration, from_file_data, read_calibration_file
+from studio.project.found_motion import motion_fault
 from studio.project.migrations import migrate
 from studio.project.strict_json import parse_object, pretty, read_object
 from studio.project.templates import DESCRIPTIONS, template_folder
@@ -62,6 +63,8 @@ class Project(Model):
         if given not in (0, lasers):
             what = "covariances" if found.covariances else "planes"
             raise ValueError(f"calibration has {given} {what}; allowed: none, or {lasers}, one for each laser")
+        if fault := motion_fault(found.motion, self.scene):
+            raise ValueError(fault)
         camera = self.scene.camera
         if found.camera is not None and (found.camera.width, found.camera.height) != (camera.width, camera.height):
             # photographs cut or scaled have another principal point, and a covariance of other pixels

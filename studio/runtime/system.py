@@ -75,6 +75,9 @@ DESKTOP_LIBRARIES = (
         },
     ),
 )
+MRCAL = Need("mrcal", "python3-mrcal", "the comparison of calibrations")
+MRCAL_FILES = "/usr/lib/python3/dist-packages/mrcal/__init__.py"
+"""Where Debian has it: for the system's own Python, a process of which the comparison starts."""
 VIRTUAL_DISPLAY = Need("Xvfb", "xvfb", "the tests of the desktop")
 DRIVER = Need("an OpenGL driver", "libgl1-mesa-dri", "3D pictures (VTK)")
 FONT = Need("a TrueType font", "fonts-dejavu-core", "the PDF report (WeasyPrint)")
@@ -152,9 +155,13 @@ def main() -> int:
         still_missing, desktop = missing_needs(), _wanted_for_the_desktop()
         venv_is_here = importlib.util.find_spec("ensurepip") is not None
         missing = still_missing + [need for need in missing if need.package.endswith("-venv") and not venv_is_here]
-    if missing or desktop:
-        print(message(missing + desktop), file=sys.stderr)
-    # without the desktop's libraries the commands still work
+    peers = _wanted_peers()
+    if peers and os.geteuid() == 0 and shutil.which("apt-get"):
+        _apt_install([need.package for need in peers])  # apart: not every release has them
+        peers = _wanted_peers()
+    if missing or desktop or peers:
+        print(message(missing + desktop + peers), file=sys.stderr)
+    # without the desktop's libraries the commands still work, without peers all but the comparison with them
     return 2 if missing or (desktop and TESTS in sys.argv) else 0
 
 
@@ -165,6 +172,12 @@ def _wanted_for_the_desktop() -> list[Need]:
     tests = TESTS in sys.argv
     wanted = missing_desktop_needs() if tests or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") else []
     return [*wanted, VIRTUAL_DISPLAY] if tests and not shutil.which("Xvfb") else wanted
+
+
+def _wanted_peers() -> list[Need]:
+    """What a comparison skips where it is absent."""
+    wanted = VALIDATION in sys.argv and sys.platform.startswith("linux")
+    return [MRCAL] if wanted and not os.path.exists(MRCAL_FILES) else []
 
 
 def _loads(library: str) -> bool:

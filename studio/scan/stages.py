@@ -27,6 +27,7 @@ from render.sensor.develop import Image
 from render.sensor.sensor import Sensor
 from render.world.placed import PlacedScene
 from render.world.world import World, build_world
+from studio.project.found_motion import measured_pose, motion_error
 from studio.project.project import Project
 from studio.runtime.console import FRAMES, StageProgress
 from studio.scan.exposure import expose
@@ -220,19 +221,20 @@ def measure_step(
 
 
 def triangulate_line(project: Project, line: Line, laser: int, step: int) -> Points:
-    """Points of one laser's line at a step."""
-    scene = project.scene
-    return triangulate(
+    """Points of one laser's line at a step; in the world by the motion that was found, where the project has one."""
+    scene, found = project.scene, project.calibration
+    points = triangulate(
         line,
-        project.calibration.camera_of(scene.camera),
-        project.calibration.plane(laser, scene.laser_plane(laser)),
+        found.camera_of(scene.camera),
+        found.plane(laser, scene.laser_plane(laser)),
         T_rig_camera=scene.camera.T_rig_camera.matrix,
-        T_world_camera=scene.T_world_camera(step),
-        calibration_covariance=project.calibration.covariance(laser),
+        T_world_camera=measured_pose(scene, found.motion, step),
+        calibration_covariance=found.covariance(laser),
     )
+    return replace(points, motion=motion_error(scene, found.motion, step, points.camera))
 
 
 def compare_points(project: Project, frame: Frame, world: World, points: Points, line: Line, laser: int) -> Errors:
     """Errors of one laser's points against the truth of a frame; world: placed for its step."""
-    pose = project.scene.T_world_camera(frame.step)
+    pose = measured_pose(project.scene, project.calibration.motion, frame.step)
     return compare(points, line, frame.curves[laser], world.vertices, world.triangles, pose)

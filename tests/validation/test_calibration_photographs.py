@@ -75,10 +75,10 @@ def photograph(there: Estimate, number: int, rng: np.random.Generator) -> np.nda
     return np.asarray(np.clip(np.rint(drawn), 0, 255), dtype=np.uint8)
 
 
-def outcome(seed: int, views_taken: int = VIEWS) -> Outcome:
-    there, rng = truth(seed, views_taken, terms=5), np.random.default_rng(seed)
+def outcome(seed: int) -> Outcome:
+    there, rng = truth(seed, VIEWS, terms=5), np.random.default_rng(seed)
     views, chi2 = [], []
-    for number in range(views_taken):
+    for number in range(VIEWS):
         seen, _ = detect(photograph(there, number, rng), BOARD, f"view {number}")
         exact = exact_view(seen.name, there, number, target(), SIZE)
         shifted = seen.target - [6 * SQUARE, 4 * SQUARE]

@@ -35,6 +35,8 @@ EMPTY = (
 )
 PARTS = (("Camera and lasers", "scanner"), ("Camera alone", "camera"), ("Lasers, camera known…", "laser"))
 LENSES = (("Lens by held-out views", None), *((f"{terms} distortion terms", terms) for terms in (0, 4, 5, 8, 12, 14)))
+CARRIED = (("Board put by hand", None), ("Carried by…", "camera"), ("Carried by a robot's hand…", "board"))
+TABLES = "Tables (*.csv);;All files (*)"
 FILES = "Calibrations (*.json);;All files (*)"
 NARROWEST = 250
 """px."""
@@ -58,14 +60,20 @@ class CalibratePanel(QWidget):
             "<p>Kind, counts and side: checkerboard:13x9:25mm counts the corners where four squares meet; "
             "charuco:14x10:25mm:18mm counts squares and has markers of 18 mm</p>"
         )
-        self.what, self.lens = QComboBox(), QComboBox()
+        self.what, self.lens, self.carried = QComboBox(), QComboBox(), QComboBox()
         for text, part in PARTS:
             self.what.addItem(text, part)
         for text, terms in LENSES:
             self.lens.addItem(text, terms)
         self.what.setToolTip("What is found; lasers alone need the calibration file of a camera")
         self.lens.setToolTip("How many terms the lens has; by held-out views: the fewest that are not worse")
-        for box in (self.what, self.lens):
+        for text, holds in CARRIED:
+            self.carried.addItem(text, holds)
+        self.carried.setToolTip(
+            "<p>A table of what a stage, a turntable or a robot whose hand holds the camera was told at each "
+            "photograph, or a robot whose hand holds the board; virtual boards follow the project's own motion</p>"
+        )
+        for box in (self.what, self.lens, self.carried):
             box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.target = QDoubleSpinBox(minimum=0.0, maximum=1e6, decimals=1, singleStep=5.0, suffix=" µm")
         self.target.setSpecialValueText("not said")
@@ -122,6 +130,12 @@ class CalibratePanel(QWidget):
         if not self.board.hasFocus():
             self.board.setText(work.board_text)
         self.lens.setEnabled(work.what != "laser")  # the known camera has its own
+        table, holds = work.motion_file, None if work.motion_file is None else work.holds
+        for i, (text, which) in enumerate(CARRIED):
+            self.carried.setItemText(i, text if table is None or which != holds else f"{text[:-1]}: {table.name}")
+        with QSignalBlocker(self.carried):
+            self.carried.setCurrentIndex(next(i for i, (_, which) in enumerate(CARRIED) if which == holds))
+        self.carried.setEnabled(not work.virtual)
         file = work.camera_file
         self.what.setItemText(len(PARTS) - 1, f"Lasers, {file.name}" if file is not None else PARTS[-1][0])
         with QSignalBlocker(self.what):
@@ -174,6 +188,17 @@ class CalibratePanel(QWidget):
         else:
             self.work.choose_what(part)
 
+    def _choose_carried(self, index: int) -> None:
+        holds = self.carried.itemData(index)
+        if holds is None:
+            self.work.choose_motion(None)
+            self.refresh()
+            return
+        chosen, _ = QFileDialog.getOpenFileName(self, "Table of the motion", self._place(), TABLES)
+        if chosen:
+            self.work.choose_motion(Path(chosen), holds)
+        self.refresh()
+
     def _choose_range(self) -> None:
         nearest, farthest = (1e-3 * side.value() or None for side in (self.nearest, self.farthest))
         self.work.choose_range(nearest, farthest)
@@ -192,6 +217,7 @@ class CalibratePanel(QWidget):
         self.board.editingFinished.connect(lambda: work.choose_board(self.board.text()))
         self.what.activated.connect(self._choose_what)
         self.lens.activated.connect(lambda index: work.choose_terms(self.lens.itemData(index)))
+        self.carried.activated.connect(self._choose_carried)
         self.target.valueChanged.connect(lambda value: work.choose_target(value or None))
         for side in (self.nearest, self.farthest):
             side.valueChanged.connect(self._choose_range)
@@ -217,6 +243,7 @@ class CalibratePanel(QWidget):
         form.addRow("Board", self.board)
         form.addRow("Find", self.what)
         form.addRow("Lens", self.lens)
+        form.addRow("Motion", self.carried)
         between = QHBoxLayout()
         between.addWidget(self.nearest, 1)
         between.addWidget(QLabel("to"))

@@ -6,7 +6,6 @@ Made once for a session by `one_of`; the panels change it and follow its signals
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,6 +20,7 @@ from studio.runtime.jobs import Job, Progress
 if TYPE_CHECKING:
     from analysis.calibration.board import Board
     from analysis.calibration.estimate import Estimate
+    from analysis.calibration.motion import Held
     from studio.calibration.image_views import Shot
     from studio.calibration.material import Material
     from studio.calibration.solving import Solved
@@ -57,6 +57,9 @@ class CalibrationWork(QObject):
         """m, between which depth is measured; None: as far as the boards are."""
         self.camera_file: Path | None = None
         """Of the camera that is held, for lasers alone."""
+        self.motion_file: Path | None = None
+        """Of what carried the board between photographs; None: nothing did."""
+        self.holds: Held = "camera"
         self.shots: list[Shot] = []
         self.source = ""
         """Where the views are from, as it is shown."""
@@ -186,6 +189,11 @@ class CalibrationWork(QObject):
         self.terms = terms
         self.solve()
 
+    def choose_motion(self, file: Path | None, holds: Held = "camera") -> None:
+        """The table of what carried the board, and what a robot's hand holds."""
+        self.motion_file, self.holds = file, holds
+        self.solve()
+
     def choose_range(self, nearest: float | None, farthest: float | None) -> None:
         """m, between which depth is measured, and virtual boards are held."""
         self.nearest, self.farthest = nearest, farthest
@@ -305,20 +313,12 @@ class CalibrationWork(QObject):
 
     def _task(self, board: Board) -> Callable[[Progress, Cancel], Solved | str]:
         """InputError: what is asked for cannot be done with these views."""
-        from analysis.calibration.calibrate import Request
-        from studio.calibration.material import need_a_line
-        from studio.calibration.solving import held_camera, solve
+        from studio.calibration.solving import solve
+        from studio.qt.calibrate.asked import asked_of
 
-        material, dropped, truth = self.material, frozenset(self.dropped), self.truth
-        assert material is not None
-        if self.what == "camera":
-            material = material.without_lasers()
-        elif not self.virtual:
-            need_a_line(material, self.source)
-        known = held_camera(self.camera_file, material.size) if self.what == "laser" else None
-        terms = self.terms if known is None else None
-        request = Request(material.size, material.lasers, terms, nearest=self.nearest, farthest=self.farthest)
-        request = replace(request, known=known, circle=board.circle)
+        assert self.material is not None
+        dropped, truth = frozenset(self.dropped), self.truth
+        material, request = asked_of(self, self.material, board)
 
         def work(progress: Progress, cancelled: Cancel) -> Solved | str:
             progress("adjustment", 0.0)

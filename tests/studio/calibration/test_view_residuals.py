@@ -9,6 +9,7 @@ import pytest
 
 from analysis.calibration.board import Board
 from analysis.calibration.calibrate import Calibrated, Request, calibrate
+from analysis.calibration.motion import Motion, Told
 from analysis.calibration.next_pose import Advice
 from analysis.calibration.observations import View
 from analysis.calibration.virtual import noisy
@@ -49,6 +50,21 @@ class TestResiduals:
             at = seen.view == number
             assert own.off == pytest.approx(np.linalg.solve(seen.whitening[at], whitened[at][:, :, None])[:, :, 0])
             assert own.part == "used" and own.rotation == pytest.approx(found.estimate.rotation[number])
+
+    def test_of_a_carried_board_counted_from_its_other_end_they_are_as_small(self) -> None:
+        group = np.concatenate([np.zeros(4), 1 + np.arange(4)]).astype(np.intp)
+        given = np.array([0.0, 0.02, -0.03, 0.04, 0.0, 0.0, 0.0, 0.0])
+        there = truth(3, VIEWS, tilt=(15.0, 35.0))
+        there = replace(there, motion=Motion("stage", group, given, np.array([0.3, 0.9, 0.31]), np.eye(3)[1]))
+        exact = views_of(there.moved(np.zeros(len(there.shared)), np.zeros((5, 6))), laser_step=64)
+        exact[2] = replace(exact[2], target=-exact[2].target)
+        told = Told("stage", {f"view {i}": ("", given[i]) for i in range(4)})
+        drawn = noisy(exact, np.random.default_rng(4))
+        result = calibrate(drawn, target(), Request(SIZE, 1, 0, told=told))
+        for view in drawn:
+            own = residuals(view, result, target())
+            # 0.05 px along each coordinate
+            assert own.part == "used" and 0.05 < own.rms < 0.09
 
     def test_of_a_view_that_does_not_its_pose_alone_is_fitted(self, found: Calibrated) -> None:
         own = residuals(EXACT[VIEWS], found, target())

@@ -68,6 +68,25 @@ class TestBareMachine:
         assert "missing: no-such-libegl1.so" in capsys.readouterr().err
 
 
+def test_a_peer_that_cannot_be_installed_is_named_and_ends_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tried: list[list[str]] = []
+    for name in ("missing_needs", "_wanted_for_the_desktop"):
+        monkeypatch.setattr(system, name, lambda: [])
+    monkeypatch.setattr(system.sys, "platform", "linux")
+    monkeypatch.setattr(system, "MRCAL_FILES", "/no/such/file")
+    monkeypatch.setattr(system.shutil, "which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr(system.os, "geteuid", lambda: 0)
+    monkeypatch.setattr(system, "_apt_install", tried.append)
+    monkeypatch.setattr(system.sys, "argv", ["system.py", system.VALIDATION])
+    assert system.main() == 0
+    assert tried == [["python3-mrcal"]] and "missing: mrcal, needed for" in capsys.readouterr().err
+    monkeypatch.setattr(system.sys, "argv", ["system.py"])
+    assert system.main() == 0
+    assert len(tried) == 1 and capsys.readouterr().err == ""
+
+
 def test_apt_refreshes_its_lists_once_when_a_package_is_not_found(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[list[str]] = []
 
@@ -90,7 +109,9 @@ def test_an_old_python_is_told_before_anything_else(
 
 def test_the_check_needs_the_standard_library_only() -> None:
     done = subprocess.run(
-        [sys.executable, "-I", "-S", str(ROOT / "studio" / "system.py"), "--help"], capture_output=True, text=True
+        [sys.executable, "-I", "-S", str(ROOT / "studio" / "runtime" / "system.py"), "--help"],
+        capture_output=True,
+        text=True,
     )
     assert "ModuleNotFoundError" not in done.stderr
     assert done.returncode in (0, 2)
