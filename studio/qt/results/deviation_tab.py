@@ -67,7 +67,7 @@ class DeviationTab(QWidget):
         self.least, self.most = _limit(-100.0), _limit(100.0)
         self.compare_button = text_button("Compare", "", "primary")
         self.export = text_button("Export as CSV…", "Every point, with map and figures beside it")
-        self.in_view = QCheckBox("In the 3D view")
+        self.in_view = QCheckBox("In 3D")
         self.in_view.setToolTip("While this is looked at the points there have the colours of their deviation")
         self.in_view.setChecked(True)
         self.in_view.toggled.connect(self._place)

@@ -64,7 +64,7 @@ class SectionTab(QWidget):
         self.thickness = _box(0.001, 1000.0, 1.0, " mm")
         self.middle = text_button("To the middle", "The plane through the middle of the points")
         self.export = text_button("Export…", "DXF (mm, layers TRUE and MEASURED) or CSV")
-        self.in_view = QCheckBox("In the 3D view")
+        self.in_view = QCheckBox("In 3D")
         self.in_view.setToolTip("Drag the arrow to move the plane, the rings to turn it; Ctrl for whole steps")
         self.in_view.setChecked(True)
         self.told = QLabel(wordWrap=True)
