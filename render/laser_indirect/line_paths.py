@@ -25,7 +25,7 @@ from render.laser_indirect.line_goal import Projection, all_but_unmet
 from render.laser_indirect.line_pools import POOLED, pooled
 from render.laser_indirect.line_sums import block_sums, scale_blocks, weigh_blocks
 
-LEAST_NEED = 0.005
+LEAST_NEED = 0.02
 """Of the camera paths of a scan line that needs most: what every line gets beside it."""
 EVERYWHERE = 0.2
 """Of the paths for peaks goes to wherever one could appear, in proportion to light and weight."""
