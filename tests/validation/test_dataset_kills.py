@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import random
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.studio.dataset.test_images import RECIPE, contents
+from tests.validation.killed import killed
 
 pytestmark = pytest.mark.validation
 
@@ -29,20 +28,13 @@ def test_a_dataset_killed_fifty_times_is_the_same_bytes(tmp_path: Path) -> None:
 
     subprocess.run(command(tmp_path / "whole"), check=True, capture_output=True, timeout=900)
     whole = contents(tmp_path / "whole")
-    killed, folder = 0, 0
-    while killed < KILLS:
+    kills, folder = 0, 0
+    while kills < KILLS:
         out = tmp_path / f"out{folder}"
-        while killed < KILLS:
-            process = subprocess.Popen(
-                command(out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-            )
-            try:
-                process.wait(timeout=chance.uniform(0.5, 15.0))
+        while kills < KILLS:
+            if not killed(command(out), chance.uniform(0.5, 15.0)):
                 break  # it came to its end
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-                killed += 1
+            kills += 1
         done = subprocess.run(command(out), capture_output=True, text=True, timeout=900)
         assert done.returncode == 0, done.stderr
         assert contents(out) == whole

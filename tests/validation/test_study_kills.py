@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import random
-import signal
 import subprocess
 import time
 from pathlib import Path
@@ -14,6 +12,7 @@ import pytest
 
 from studio.study.store import FILE, Store
 from tests.studio.study.test_run import DATA, command, run, study
+from tests.validation.killed import killed
 
 pytestmark = pytest.mark.validation
 
@@ -27,21 +26,14 @@ def test_a_study_killed_fifty_times_gives_the_table_of_one_that_was_not(tmp_path
     file.write_text(json.dumps(DATA))
     chosen = study()
     digest = chosen.digest(chosen.bases(tmp_path))
-    killed, folder = 0, 0
-    while killed < KILLS:
+    kills, folder = 0, 0
+    while kills < KILLS:
         out, counts = tmp_path / f"out{folder}", [0]
         run_it = command("run", file, "--out", out, "--workers", "2", "--json")
-        while killed < KILLS:
-            process = subprocess.Popen(
-                run_it, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-            )
-            try:
-                process.wait(timeout=chance.uniform(0.5, 20.0))
+        while kills < KILLS:
+            if not killed(run_it, chance.uniform(0.5, 20.0)):
                 break  # it came to its end
-            except subprocess.TimeoutExpired:
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-                killed += 1
+            kills += 1
             if (out / FILE).exists():
                 with Store(out, digest) as store:
                     counts.append(store.count())
