@@ -52,6 +52,9 @@ LEAST_PASS, LINE_PASS = 1 << 11, 1 << 9
 line is the goal, whose needs do not grow with the image."""
 LOOK_PATHS, LINE_LOOK = 1 << 10, 1 << 9
 """Light paths in a pass of a first look, which only guides; where the line is the goal. Chosen, not tuned."""
+LOOK_SIZE = 0.05
+"""Beside a pass of the first wave, what one of a look weighs in how many camera paths each line needs. It is guided by
+little, and one bright path of it would claim paths for its line until a hundred times as many had outvoted it."""
 LOOKS, TAUGHT = 3, 1 << 16
 """First looks at most, before whose passes those of the waves are not numbered; and waves at most of the frame that
 teaches, whose random numbers those that it teaches must not have again: they would be sampled by what they gave."""
@@ -246,7 +249,7 @@ class Waves:
         if aim is not None:
             found.aim_at(aim.importance, aim.laser)
             assert found.line is not None
-            found.learn(found.line.spread(self.buffers), look_paths / found.size)
+            found.learn(found.line.spread(self.buffers), LOOK_SIZE)
         refine_guiding(found, self.buffers, wave_moments, camera)
         if aim is not None and found.line is not None:
 
@@ -255,7 +258,7 @@ class Waves:
 
             self.trace(2 * PASSES_A_WAVE, sampling_of(found, found.next_paths), behind)
             found.line = found.line.look(self.buffers, weigh, aim.laser)
-            found.learn(found.line.spread(self.buffers), 1.0)
+            found.learn(found.line.spread(self.buffers), LOOK_SIZE)
             refine_guiding(found, self.buffers, wave_moments, camera)
         return found
 

@@ -15,12 +15,14 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from analysis.error import MATCH_SIGMAS
 from analysis.line.detection.rivals import rival_weights
 from analysis.line.influence import influence
 from analysis.line.methods.narrow_line import COARSE
+from analysis.line.result import Line
 from render.base.arrays import Bool, Float, Float32
 from render.base.threads import map_chunks, rows_of
-from render.frame import Frame
+from render.frame import Frame, LaserCurve
 from render.importance import CELL, Importance
 from render.scene.settings import DepthGoal
 from render.sensor.develop import Image, expected_electrons
@@ -185,7 +187,9 @@ def _weigh(
     # of a selection the candidates' method is the one that measured them
     derivative = influence(image.pixels, line, settings, noise, threads, shared=True)
     valid = line.valid
+    stray = strays(line, frame.curves[laser])
     narrow = np.any(valid & (line.width < COARSE), axis=1)[:, None]
+    width = np.min(np.where(valid & np.isfinite(line.width), line.width, np.inf), axis=1)
     if line.axis == "columns":
         electrons, derivative = electrons.T, derivative.T
     # a whole row counts as one sum there, of which a quarter of its pixels may come near
@@ -202,11 +206,26 @@ def _weigh(
         even = risen * np.float32(evenly)
         place = np.nonzero(decided)
         even[place] = np.maximum(even[place], share[place[0]] / np.sqrt(counted[place]))
-        sigma = allowed[0] * _sigma(valid[some], line.sigma_u[some], moves, light + np.float32(noise.floor))
+        sigma = _sigma(valid[some], line.sigma_u[some], moves, light + np.float32(noise.floor))
+        sigma = allowed[0] * np.maximum(sigma, np.where(stray[some], width[some], 0.0))
         moved = moves * (1.0 / sigma).astype(np.float32)[:, None]
         out.put(some, moved, risen, even)
 
     map_chunks(work, len(electrons), rows_of(electrons.shape[1], ROWS, PIXELS), threads)
+
+
+def strays(line: Line, curve: LaserCurve) -> Bool:
+    """(lines,) where all that was measured is away from the exact line of the same laser: a reflection, a shining edge.
+
+    Such a scan line has to stay false, which no share of its sigma decides. Its depth is off by far more than its own
+    width, of which the goal's share is asked.
+    """
+    lit = curve.irradiance > 0.0
+    index, position = curve.index[lit], curve.position[lit]
+    apart = np.full(line.u.shape, np.inf)
+    np.minimum.at(apart, index, np.abs(line.u[index] - position[:, None]))
+    wrong = apart > np.maximum(MATCH_SIGMAS * line.width, 1.0)
+    return np.asarray(line.valid.any(axis=1) & np.all(wrong | ~line.valid, axis=1))
 
 
 def _electrons(project: Project, frame: Frame, laser: int, threads: int | None) -> Float32:

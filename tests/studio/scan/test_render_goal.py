@@ -98,6 +98,31 @@ def test_ambient_light_is_known_to_a_share_of_the_noise_of_every_pixel_of_the_li
         assert (allowed <= 0.3 * np.sqrt(13.0) * 1.01).all()
 
 
+def test_a_line_that_is_not_the_lasers_is_known_to_a_share_of_its_width(frame: Frame) -> None:
+    """Its sigma says how well a reflection is measured, which is nobody's depth; other rows keep theirs."""
+    project = project_of()
+    line, before = line_in(project, frame), importance(project, DepthGoal(depth=0.1), frame, 2).laser[0]
+    rows = np.flatnonzero(line.valid.any(axis=1))
+    stray = rows[len(rows) // 3 : len(rows) // 2]
+    # where hardly anything is lit a line's sigma is as large as its width
+    stray = stray[line.sigma_u[stray, 0] < 0.2 * line.width[stray, 0]]
+    curve = frame.curves[0]
+    away = np.where(np.isin(curve.index, stray), 10.0 * line.width[curve.index, 0] + 10.0, 0.0)
+    after = importance(
+        project,
+        DepthGoal(depth=0.1),
+        replace(frame, curves=(replace(curve, position=curve.position + away),)),
+        2,
+    ).laser[0]
+    kept = np.setdiff1d(rows, stray)
+    assert np.array_equal(after[kept], before[kept])
+    strongest = np.abs(before[stray]).argmax(axis=1)
+    ratio = after[stray, strongest] / before[stray, strongest]
+    told = line.sigma_u[stray, 0] / line.width[stray, 0]
+    # the sigma of a row may be that of its own pixels in place of what is told
+    assert np.all(ratio < 0.5) and np.median(ratio / told) == pytest.approx(1.0, rel=0.1)
+
+
 def test_the_goal_is_reached_in_nineteen_rows_of_twenty(world: World) -> None:
     """Rendered with other seeds, the reflections put each row elsewhere, on average over the sensor's noise: by less
     than the goal.
