@@ -57,8 +57,8 @@ NUMBERS = (
 class Accumulator:
     """Weighted sums over waves of passes, and the guiding of the next wave; changes as waves are added.
 
-    The second wave is as large as the first, and each after it as all before together, up to a limit and to what the
-    measured line should take. The passes of a wave are independent and alike, so that their spread is an unbiased
+    The second wave is as large as the first, and each after it as all before together, up to a limit and to what image
+    or measured line should take. The passes of a wave are independent and alike, so that their spread is an unbiased
     estimate of its variance.
     """
 
@@ -91,8 +91,10 @@ class Accumulator:
     """Sum of the weights of all passes."""
     shares: float = 0.0
     """Sum over the passes of weight^2 / size: the variance of `total`, in that of a pass of the first wave."""
+    target: float = 0.0
+    """Error of the image at which it is known well enough; 0: never."""
     enough: int = 0
-    """Size of the next wave's passes with which the measured line should be known; 0: that is not known, or it is."""
+    """Size of the next wave's passes with which image or line should be known; 0: that is not known, or one is."""
     paths: int = 0
     """Light paths so far."""
     variance_sum: float = 0.0
@@ -181,8 +183,10 @@ class Accumulator:
 
     def _enough(self, done: float) -> int:
         """As `enough`, once the waves' sizes add up to `done`: the variance falls as one over their sum."""
-        beyond = self.line_error
-        if self.line is None or self.line.out_of_reach or not 1.0 < beyond < math.inf:
+        beyond = self.error / self.target if self.target > 0.0 else math.inf
+        if self.line is not None and not self.line.out_of_reach:
+            beyond = min(beyond, self.line_error)
+        if not 1.0 < beyond < math.inf:
             return 0
         return math.ceil(done * max(beyond**2 - 1.0, LEAST_STEP))
 

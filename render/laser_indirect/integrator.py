@@ -138,6 +138,8 @@ def indirect_images(
     so_far = run.restore(Accumulator.of_arrays)
     if so_far is None:
         so_far = waves.begun(placed, uniform_fan(low, high), kinds, aim)
+    # where the line is the goal, its rivals elsewhere are known by waves that go beyond the image's error
+    so_far.target = target if aim is None else 0.0
     so_far.aim_at(None if aim is None else aim.importance, 0 if aim is None else aim.laser)
     wave_moments = attach_wave_moments(waves.buffers, so_far)
 

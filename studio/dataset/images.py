@@ -74,11 +74,11 @@ def make(task: Task, cancelled: Cancel = lambda: False) -> Made:
     frame = rendered(scene, cancelled)
     count = len(base.scene.lasers)
     first = task.scene * images_of(recipe, count)
-    number = first
+    number, shared = first, _shared(recipe, frame)
     for image, project in enumerate(scene.projects):
         said = labels(scene, image, frame)
         for fired in [None] if recipe.lasers == "together" else range(count):
-            _write(Path(task.out), number, recipe, frame, project, said, fired)
+            _write(Path(task.out), number, photograph(project, frame, fired), shared, said, fired)
             number += 1
     preview.drop_unused(base, base.folder)
     return Made(task.scene, number - first, scene.rejected)
@@ -95,17 +95,28 @@ def photograph(project: Project, frame: RenderedFrame, fired: int | None) -> NDA
     return expose(project, frame, powers, fired or 0, threads=1).pixels
 
 
-def _write(
-    out: Path, number: int, recipe: Recipe, frame: RenderedFrame, project: Project, said: Mapping[str, Any],
-    fired: int | None,
-) -> None:  # fmt: skip
-    name = name_of(number)
-    contents: dict[str, bytes | memoryview] = {f"{IMAGES}/{name}.png": encode_png(photograph(project, frame, fired))}
+def _shared(recipe: Recipe, frame: RenderedFrame) -> dict[str, bytes | memoryview]:
+    """The files that all images of a scene have alike, by kind and suffix, with {} for the image's name."""
+    shared: dict[str, bytes | memoryview] = {}
     if "objects" in recipe.maps:
-        contents[f"{OBJECTS}/{name}.png"] = encode_png(object_ids(frame))
-    layers = maps(recipe, frame, project)
+        shared[f"{OBJECTS}/{{}}.png"] = encode_png(object_ids(frame))
+    layers = maps(recipe, frame)
     if layers:
-        contents[f"{MAPS}/{name}.exr"] = encode_exr(layers)
+        shared[f"{MAPS}/{{}}.exr"] = encode_exr(layers)
+    return shared
+
+
+def _write(
+    out: Path,
+    number: int,
+    pixels: NDArray[Any],
+    shared: Mapping[str, bytes | memoryview],
+    said: Mapping[str, Any],
+    fired: int | None,
+) -> None:
+    name = name_of(number)
+    contents: dict[str, bytes | memoryview] = {f"{IMAGES}/{name}.png": encode_png(pixels)}
+    contents |= {path.format(name): content for path, content in shared.items()}
     for path, content in contents.items():
         with atomic_write(out / path) as temporary:
             temporary.write_bytes(content)

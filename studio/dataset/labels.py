@@ -117,7 +117,7 @@ def sigma_floor(project: Project, look: Look, laser: int, curve: LaserCurve) -> 
     return estimates.centre_bound_px(amplitude, width, background, estimates.read_variance(sensor))
 
 
-def maps(recipe: Recipe, frame: Frame, project: Project) -> Mapping[str, NDArray[Any]]:
+def maps(recipe: Recipe, frame: Frame) -> Mapping[str, NDArray[Any]]:
     """Layers of every pixel by name, those that the recipe keeps, but for the objects' ids: (h, w) float32."""
     found: dict[str, NDArray[Any]] = {}
     if frame.truth is not None and "depth" in recipe.maps:
@@ -125,7 +125,7 @@ def maps(recipe: Recipe, frame: Frame, project: Project) -> Mapping[str, NDArray
     if frame.truth is not None and "normals" in recipe.maps:
         found |= {f"normal.{name}": frame.truth.normal[..., k] for k, name in enumerate("XYZ")}
     if "laser" in recipe.maps:
-        for i in range(len(project.scene.lasers)):
+        for i in range(len(frame.laser_direct)):
             found[f"direct{i}.Y"] = frame.laser_direct[i]
             if frame.laser_indirect:
                 found[f"reflected{i}.Y"] = frame.laser_indirect[i]

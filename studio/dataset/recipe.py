@@ -10,6 +10,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from render.base.errors import InputError
 from render.base.model import Model, quantity
 from studio.project.project import Project
 from studio.project.ready_made import load_model, names_in
@@ -143,11 +144,22 @@ def ready_made() -> list[str]:
 
 
 def base_of(recipe: Recipe, root: Path) -> Project:
-    """The recipe's base project with its fixed fields. InputError: it cannot be read, or a field does not fit.
+    """The recipe's base project with its fixed fields, in the folder that its files are in: its own, or the recipe's.
 
     Light is rendered to the errors of the image, as every image of a scene shares it and every pixel is a label.
+    InputError: it cannot be read, a field does not fit, or drawn meshes are in another folder than its own files.
     """
     from render.base.files import inside
+    from studio.project.project_files import named_files
 
-    at = template_folder(recipe.base) if recipe.base in DESCRIPTIONS else inside(root, recipe.base, "base")
-    return Project.load(at).replaced({"render.goal": None, **recipe.set})
+    ready = recipe.base in DESCRIPTIONS
+    base = Project.load(template_folder(recipe.base) if ready else inside(root, recipe.base, "base"))
+    if ready and not named_files(base.scene, "scene"):
+        base = base.in_folder(root)
+    if any(one.kind == "mesh" for one in recipe.draw) and base.folder.resolve() != root.resolve():
+        cure = "save the base project beside the recipe, with its files, and name that one"
+        raise InputError(
+            "the base project has files of its own, in another folder than the drawn meshes",
+            where="base", found=recipe.base, allowed="a project beside the recipe", cure=cure,
+        )  # fmt: skip
+    return base.replaced({"render.goal": None, **recipe.set})

@@ -52,9 +52,13 @@ def place(seed: int, *counters: object) -> float:
 
 
 def parts_of(draw: Draw, root: Path) -> list[str]:
-    """The meshes of a draw's folder, by name. InputError: the folder is outside the recipe's, or holds none."""
+    """The meshes of a draw's folder, by name. InputError: there is no such folder, or it is outside the recipe's, or
+    holds none."""
     assert draw.folder is not None
     folder = inside(root, draw.folder, f"draw of {draw.field}: folder")
+    if not folder.is_dir():
+        cure = "make it beside the recipe, or correct its name"
+        raise InputError("there is no such folder of meshes", where=str(folder), cure=cure)
     found = sorted(file.name for file in folder.glob("*") if file.suffix.lower() in MESHES and file.is_file())
     if not found:
         allowed = f"a folder with {', '.join(MESHES)}"

@@ -66,14 +66,17 @@ def test_parts_come_from_a_folder_of_meshes(tmp_path: Path) -> None:
     (tmp_path / "parts").mkdir()
     for k in range(3):
         trimesh.creation.box((0.2, 0.2, 0.01 + 0.01 * k)).export(tmp_path / "parts" / f"{k}.stl")
-    base = base_of(Recipe(base="plane"), tmp_path)
-    base.save(tmp_path / "project.json")
     draw = Draw(field="scene.objects[0].shape", kind="mesh", folder="parts")
-    recipe = Recipe(base="project.json", image_scale=0.05, draw=(draw,))
-    found = {drawn(recipe, k, tmp_path).projects[0].scene.objects[0].shape.path for k in range(12)}  # type: ignore[union-attr]
-    assert found == {"parts/0.stl", "parts/1.stl", "parts/2.stl"}
-    with pytest.raises(InputError, match="holds no meshes"):
+    # of a ready-made base, which has no files of its own, and of one beside the recipe
+    base_of(Recipe(base="plane"), tmp_path).save(tmp_path / "project.json")
+    for name in ("plane", "project.json"):
+        recipe = Recipe(base=name, image_scale=0.05, draw=(draw,))
+        found = {drawn(recipe, k, tmp_path).projects[0].scene.objects[0].shape.path for k in range(12)}  # type: ignore[union-attr]
+        assert found == {"parts/0.stl", "parts/1.stl", "parts/2.stl"}
+    with pytest.raises(InputError, match="no such folder of meshes"):
         drawn(recipe.model_copy(update={"draw": (draw.model_copy(update={"folder": "none"}),)}), 0, tmp_path)
+    with pytest.raises(InputError, match="files of its own"):
+        base_of(recipe.model_copy(update={"base": "weld_seam"}), tmp_path)
 
 
 def test_the_winding_number_is_one_inside_a_closed_part_and_nothing_outside() -> None:
