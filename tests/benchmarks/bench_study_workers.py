@@ -21,9 +21,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from studio.study.cells import next_cells
-from studio.study.measuring import tasks
 from studio.study.store import Row, Store, described
 from studio.study.tables import CALIBRATING, SECONDS
+from studio.study.tasks import tasks
 
 ROOT = Path(__file__).resolve().parents[2]
 BAR = 0.85
