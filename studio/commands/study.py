@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import textwrap
+import threading
 from pathlib import Path
 
 from render.base.errors import Cancelled, InputError
@@ -17,12 +18,10 @@ from studio.scan.folder_lock import hold
 from studio.scan.interrupt import stop_on_interrupt
 from studio.study.cells import Shard, check_size, next_cells
 from studio.study.labels import field_labels
-from studio.study.measuring import tasks
-from studio.study.page import sentences, write_page
 from studio.study.runner import run_study
 from studio.study.store import Store, described
 from studio.study.study import SEARCHES, Study, ready_made
-from studio.study.tables import write_tables
+from studio.study.tasks import tasks
 
 
 def list_studies(*, quiet: bool, as_json: bool) -> None:
@@ -62,6 +61,7 @@ def run_into(
             more = f", and what {searches} search(es) will ask for" if searches else ""
             there = f"; {known} are there already" if known else ""
             print(f"{len(first)} cells of {renders} renders{more}{there}", file=sys.stderr)
+        threading.Thread(target=_import_page, name="import of charts").start()  # while the workers start and work
         with stage_progress(quiet) as progress, stop_on_interrupt(never) as cancelled:
             try:
                 run_study(
@@ -100,7 +100,14 @@ def merge_folders(folders: tuple[Path, ...], *, out: Path, quiet: bool, as_json:
         _write(out, study, bases, store, as_json=as_json)
 
 
+def _import_page() -> None:
+    import studio.study.page  # noqa: F401
+
+
 def _write(folder: Path, study: Study, bases: dict[str, Project], store: Store, *, as_json: bool) -> None:
+    from studio.study.page import sentences, write_page
+    from studio.study.tables import write_tables
+
     rows = store.rows()
     written = write_tables(folder, study, bases, rows)
     page, found = write_page(folder, study, bases, rows)

@@ -5,17 +5,21 @@ What a worker does is a function of a task and of "asked to stop"; both it and i
 
 from __future__ import annotations
 
+import hashlib
 import multiprocessing
+import pickle
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing.synchronize import Event
+from pathlib import Path
 from typing import Any, TypeVar
 
 from render.base.errors import Cancelled, InputError
+from render.base.kernel_cache import kept_in
 from render.base.threads import Cancel, thread_count
 from render.run import never
 
@@ -47,9 +51,12 @@ class Team:
     together: int
     """Tasks to hand out at a time: few, so that long work takes no memory."""
 
-    def results(self, tasks: Sequence[T], cancelled: Cancel, what: str) -> Iterator[tuple[T, Any]]:
+    def results(
+        self, tasks: Sequence[T], cancelled: Cancel, what: str, more: Callable[[], Sequence[T]] = tuple
+    ) -> Iterator[tuple[T, Any]]:
         """Each task with its result, as it ends. what: "the study", whose tasks they are.
 
+        more: asked as soon as a result was taken, for tasks that follow from it, which go before those that wait.
         InputError: workers are lost again and again at one task. Cancelled: so asked.
         """
         waiting, lost = list(reversed(tasks)), dict[T, int]()
@@ -74,12 +81,16 @@ class Team:
                             cure="give it fewer --workers, as each takes memory; what was done is kept",
                         ) from None
                     waiting.append(task)
+                else:
+                    waiting += reversed(more())
 
 
 @contextmanager
 def team(engine: Engine, work: Work[Any, Any], begin: Callable[[], None], cancelled: Cancel) -> Iterator[Team]:
-    """Workers that do `work`. begin: what each process does first, and this one before any (kernels are compiled once).
+    """Workers that do `work`. begin: what each process does first, which compiles or loads the kernels of the work.
 
+    It is done by this process once, where it never was, and by the others after that, so that nothing is compiled
+    twice; they start meanwhile.
     InputError: no scheduler answers.
     """
     if engine.scheduler is not None:
@@ -89,12 +100,13 @@ def team(engine: Engine, work: Work[Any, Any], begin: Callable[[], None], cancel
             yield Team(submit, together)
         return
     count = thread_count(engine.workers)
-    begin()
     if count == 1:
+        begin()
         yield Team(partial(_here, work, cancelled), 1)
         return
     pool = _Pool(count, work, begin)
     try:
+        pool.let_begin()
         yield Team(pool.submit, 2 * count)
     finally:
         pool.close()
@@ -113,11 +125,23 @@ class _Pool:
     def __init__(self, count: int, work: Work[Any, Any], begin: Callable[[], None]) -> None:
         self.count, self.work, self.begin = count, work, begin
         self.context = multiprocessing.get_context("spawn")  # a fork would copy threads' locks
-        self.stop = self.context.Event()
+        self.stop, self.prepared = self.context.Event(), self.context.Event()
         self.executor = self._start()
 
     def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self.count, self.context, initializer=_begin, initargs=(self.begin, self.stop))
+        given = (self.begin, self.prepared, self.stop)
+        executor = ProcessPoolExecutor(self.count, self.context, initializer=_begin, initargs=given)
+        executor.submit(_nothing)  # which starts the processes
+        return executor
+
+    def let_begin(self) -> None:
+        """Compile what was never compiled, while the processes start; then they go on."""
+        done = Path(kept_in(), f"{hashlib.sha256(pickle.dumps(self.begin)).hexdigest()[:16]}.begun")
+        if not done.exists():
+            self.begin()
+            with suppress(OSError):
+                done.touch()
+        self.prepared.set()
 
     def submit(self, task: Any) -> Future[Any]:
         try:
@@ -130,6 +154,7 @@ class _Pool:
     def close(self) -> None:
         """What is under way is given up, so that work that was stopped ends at once."""
         self.stop.set()
+        self.prepared.set()
         self.executor.shutdown(wait=True, cancel_futures=True)
 
 
@@ -141,11 +166,17 @@ def _in_worker(work: Work[Any, Any], task: Any) -> Any:
     return work(task, _stopped)
 
 
-def _begin(begin: Callable[[], None], stop: Event) -> None:
+def _nothing() -> None:
+    """The first task of a process."""
+
+
+def _begin(begin: Callable[[], None], prepared: Event, stop: Event) -> None:
     """In each process: Ctrl-C is the driver's to hear, and kernels are loaded before anything is timed."""
     global _stopped
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _stopped = stop.is_set
-    begin()
+    prepared.wait()
+    if not stop.is_set():
+        begin()

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.line.settings import Method
 from analysis.study.boundary import Lattice, Node, next_nodes
 from analysis.study.breakdown import Search, next_values
 from render.base.errors import InputError
@@ -95,7 +96,7 @@ def lattice_of(sweep: Sweep) -> Lattice:
     return Lattice(columns, rows, sweep.limit.value, sweep.limit.above)
 
 
-def methods_of(study: Study, sweep: Sweep) -> tuple[str, ...]:
+def methods_of(study: Study, sweep: Sweep) -> tuple[Method, ...]:
     return sweep.methods or study.methods
 
 
@@ -162,11 +163,15 @@ def next_cells(study: Study, bases: Mapping[str, Project], rows: Rows, shard: Sh
                 found.setdefault(cell.key, cell)
             continue
         for method in methods_of(study, sweep):
-            wanted = _next_points(sweep, searched(study, number, method, bases, rows))
-            for cell in cells_at(study, number, bases, wanted):
-                if cell.method == method:
-                    found.setdefault(cell.key, cell)
+            for cell in next_of_search(study, number, method, bases, rows):
+                found.setdefault(cell.key, cell)
     return [cell for key, cell in found.items() if key not in rows and shard.holds(cell.part_key(study))]
+
+
+def next_of_search(study: Study, number: int, method: str, bases: Mapping[str, Project], rows: Rows) -> list[Cell]:
+    """What a search asks for next by one method, measured or not; empty: it is over."""
+    wanted = _next_points(study.sweeps[number], searched(study, number, method, bases, rows))
+    return [cell for cell in cells_at(study, number, bases, wanted) if cell.method == method]
 
 
 def searched(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from analysis.report.colour import INK, MUTED, method_colour, method_name
+from analysis.report.colour import INK, MUTED, PAPER, method_colour, method_name
 from analysis.report.style import figure
 from studio.study.answers import Answer, Spot
 from studio.study.boundary_chart import DASHES, draw_edges
@@ -38,6 +38,7 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
     with figure(3.4) as made:
         axes = made.subplots()
         draw(axes, answer, labels)
+        made.supxlabel(_repeats(answer), x=0.99, ha="right", fontsize=6.0, color=MUTED)
         for axis in (axes.xaxis, axes.yaxis):
             if axis.get_scale() == "log":  # matplotlib's own ticks are formulas
                 low, high = axis.get_view_interval()
@@ -48,6 +49,15 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
         if answer.sweep.chart == "speed":
             _name_spots(axes, answer)
         return made
+
+
+def _repeats(answer: Answer) -> str:
+    """How many repeats stand behind a mark, and what its bar is."""
+    counts = [spot.measure.count for spot in answer.spots]
+    low, high = min(counts, default=0), max(counts, default=0)
+    number = f"N = {high}" if low == high else f"N = {low} to {high}"
+    shown_as = {"map": "bands: 95 % intervals" if answer.edges else "means"}
+    return f"{number} repeats, {shown_as.get(answer.sweep.chart, 'bars: 95 % intervals')}"
 
 
 def places(answer: Answer) -> np.ndarray:
@@ -128,7 +138,11 @@ def _sweep(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
         }
         axes.errorbar(x, mean, yerr=np.abs([mean - low, high - mean]), lw=1.2, capsize=2, label=label, **style)
     if sweep.limit is not None and sweep.limit.measure == sweep.measure:
-        axes.axhline(sweep.limit.value * measure.scale, color=INK, lw=0.8, ls=(0, (6, 2)))
+        height = sweep.limit.value * measure.scale
+        axes.axhline(height, color=INK, lw=0.8, ls=(0, (6, 2)))
+        style = {"fontsize": 6.0, "color": INK}
+        words = f"limit {height:.4g} {measure.unit}".rstrip()
+        axes.annotate(words, (0.01, height), (0, 3), axes.get_yaxis_transform(), "offset points", **style)
     _breakdowns(axes, answer)
     for reference, _ in answer.beside:
         value = reference.point[0]
@@ -186,7 +200,7 @@ def _speed(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
             spot = answer.spots[front.knee]
             axes.plot(spot.seconds, spot.measure.mean * measure.scale, "o", ms=KNEE, mfc="none", mec=INK)
     for bound in answer.bounds:
-        _bound(axes, bound, len(answer.bounds) > 1, measure)
+        _bound(axes, bound, len(answer.bounds) > 1, measure, answer)
     what = {"frame": "frame", "line": "line's extraction", "calibration": "calibration"}[answer.sweep.time]
     axes.set(xscale="log", yscale="log", xlabel=f"processor time of a {what} (s)", ylabel=_axis_label(measure))
     if answer.throughput is not None:
@@ -224,15 +238,21 @@ def _on_front(answer: Answer) -> list[Spot]:
     return sorted((answer.spots[i] for i in np.flatnonzero(answer.front.member)), key=lambda spot: spot.seconds)
 
 
-def _bound(axes: Any, bound: Bound, several: bool, measure: Measure) -> None:
-    """A line of what no method can beat, named at its right end, away from the limit of time."""
+def _bound(axes: Any, bound: Bound, several: bool, measure: Measure, answer: Answer) -> None:
+    """A line of what no method can beat, named where the marks are widest apart."""
     height = bound.all * measure.scale
     words = "Cramér-Rao bound" if bound.speckle is None else "Cramér-Rao bound and speckle"
     at = f", {', '.join(map(shown, bound.point))}" if several else ""
     axes.axhline(height, color=MUTED, lw=0.9, ls=(0, (1, 2)))
-    across = axes.get_yaxis_transform()
-    style: dict[str, Any] = {"fontsize": 6.0, "color": MUTED, "ha": "right"}
-    axes.annotate(words + at, (0.99, height), (0, 3), across, "offset points", **style)
+    seconds = np.sort([spot.seconds for spot in answer.spots if spot.seconds > 0.0 and spot.measure.mean > 0.0])
+    style: dict[str, Any] = {"fontsize": 6.0, "color": MUTED}
+    if len(seconds) > 1:
+        widest = int(np.argmax(seconds[1:] / seconds[:-1]))
+        place, within = math.sqrt(seconds[widest] * seconds[widest + 1]), axes.transData
+    else:
+        place, within = 0.99, axes.get_yaxis_transform()
+    ha = "center" if len(seconds) > 1 else "right"
+    axes.annotate(words + at, (place, height), (0, 3), within, "offset points", ha=ha, **style)
 
 
 def _rays(axes: Any, throughput: Throughput, whole_frame: bool) -> None:
@@ -280,10 +300,16 @@ def _map(axes: Any, answer: Answer, labels: dict[str, str]) -> None:
     norm = matplotlib.colors.LogNorm() if spread else None
     mesh = axes.pcolormesh(x, y, z, cmap="cividis", norm=norm, shading="nearest")
     axes.figure.colorbar(mesh, ax=axes, label=_axis_label(measure))
+    said = [method_name(method)]
     if sweep.limit is not None and sweep.limit.measure == sweep.measure and min(z.shape) > 1:
-        axes.contour(x, y, z, levels=[sweep.limit.value * measure.scale], colors="white", linewidths=1.5)
+        height = sweep.limit.value * measure.scale
+        axes.contour(x, y, z, levels=[height], colors="white", linewidths=1.5)
+        said.append(f"white line: limit {height:.4g} {measure.unit}".rstrip())
+    if np.isnan(z).any():
+        axes.patch.set(facecolor=PAPER, hatch="////", edgecolor=MUTED)
+        said.append("hatched: nothing measured")
     _label_map(axes, answer, labels)
-    axes.set_title(method_name(method), fontweight="normal")
+    axes.set_title("; ".join(said), fontweight="normal")
 
 
 def _boundary(axes: Any, answer: Answer, labels: dict[str, str]) -> None:

@@ -11,10 +11,11 @@ import numpy as np
 from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
 from studio.study.cells import cells_at, check_size, lattice_of, methods_of, next_cells, points
-from studio.study.measuring import measure_task, tasks, warm_up
+from studio.study.measuring import measure_task, warm_up
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
 from studio.study.tables import CALIBRATING, SECONDS, measured_cells
+from studio.study.tasks import tasks
 
 ROW_BYTES, CHART_BYTES = 2500, 250_000
 """On disk: of a cell in the store and the tables, and of a sweep's chart alone and in the page."""

@@ -40,12 +40,15 @@ class Name:
 def name_marks(axes: Any, names: Sequence[Name], lines: Sequence[Sequence[tuple[float, float]]]) -> None:
     """Write the names, the first ones where they like best. Limits and ticks of the axes are to be what they stay.
 
+    Texts that are there already are kept clear of.
     lines: what else is drawn, through places in the chart's units: error bars, a front.
     """
-    axes.figure.draw_without_rendering()  # the layout decides where the axes are
+    axes.figure.draw_without_rendering()  # the layout decides where the axes are, which stay there
+    axes.figure.set_layout_engine("none")
     points = 72.0 / axes.figure.dpi
     frame = axes.bbox.get_points().ravel() * points
-    taken: list[tuple[Box, float]] = []
+    written = [text.get_window_extent().get_points().ravel() * points for text in axes.texts]
+    taken: list[tuple[Box, float]] = [((box[0], box[1], box[2], box[3]), COVERED) for box in written]
     for one in names:
         x, y = axes.transData.transform(one.place) * points
         taken.append(((x - one.mark, y - one.mark, x + one.mark, y + one.mark), COVERED))
@@ -63,7 +66,7 @@ def name_marks(axes: Any, names: Sequence[Name], lines: Sequence[Sequence[tuple[
         taken.append((box, COVERED))
         x, y = (0.5 * (box[k] + box[k + 2]) - mark[k] for k in (0, 1))
         arrow = {"arrowstyle": "-", "color": MUTED, "lw": 0.4, "shrinkA": 0.0, "shrinkB": MARK}
-        written = axes.annotate(
+        note = axes.annotate(
             one.text,
             one.place,
             (x, y),
@@ -74,7 +77,7 @@ def name_marks(axes: Any, names: Sequence[Name], lines: Sequence[Sequence[tuple[
             color=one.colour,
             arrowprops=arrow if radius > RADII[1] else None,
         )
-        written.set_in_layout(False)
+        note.set_in_layout(False)
 
 
 def _box(mark: Sequence[float], size: tuple[float, float], radius: float, direction: tuple[int, int]) -> Box:

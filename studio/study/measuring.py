@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from analysis.gauges.read import read
+from analysis.line.settings import Method
 from render.base.errors import InputError
-from render.base.model import Model
 from render.base.threads import Cancel
 from render.sensor.sensor import Sensor
 from studio.notebook.frame import RenderedFrame, render
@@ -36,35 +36,9 @@ from studio.study.ray_units import RAY_SPEED, rays_per_second
 from studio.study.render_cache import forget, rendered
 from studio.study.round_bodies import facet_error
 from studio.study.tables import CALIBRATING
+from studio.study.tasks import Task
 
 Row = tuple[str, dict[str, Any], dict[str, float]]
-
-
-@dataclass(frozen=True)
-class Work:
-    """One cell, as text: its key, its project, boards and assumed sensor in JSON, and what of it is kept.
-
-    Empty where there is none.
-    """
-
-    key: str
-    project: str
-    boards: str
-    assumed: str
-    kept: str
-
-
-@dataclass(frozen=True)
-class Task:
-    """A render and the cells that share it, as text, so that any process or machine can take it."""
-
-    folder: str
-    """Where the base project's meshes and textures are."""
-    image_scale: float
-    laser: int
-    cells: tuple[Work, ...]
-    again: str = ""
-    """What the render is kept by for later tasks; empty: it is not."""
 
 
 def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
@@ -148,35 +122,13 @@ def as_if(image: DevelopedImage, assumed: Sensor) -> DevelopedImage:
     return replace(image, gain=gain, read_noise=sensor.read_noise, project=project)
 
 
-def _text(given: Model | None) -> str:
-    return "" if given is None else given.model_dump_json()
-
-
-def warm_up(project: Project) -> None:
+def warm_up(project: Project, methods: Sequence[Method] = ()) -> None:
     """Compile or load the kernels that measuring takes, so that no cell's seconds hold them."""
     forget()
     rays_per_second()
     small = project.model_copy(update={"render": project.render.model_copy(update={"laser_error": 0.3})})
     frame = render(small, image_scale=0.05, threads=1)
-    for _ in range(2):
-        compare(triangulate(extract(develop(frame, threads=1), threads=1)), frame)
-
-
-def tasks(cells: Sequence[Any], image_scale: float, laser: int) -> list[Task]:
-    """Cells grouped by render, in the order of their first."""
-    groups: dict[str, list[Any]] = {}
-    for cell in cells:
-        groups.setdefault(cell.render_key, []).append(cell)
-    return [
-        Task(
-            str(group[0].project.folder.resolve()),
-            image_scale,
-            laser,
-            tuple(
-                Work(cell.key, cell.project.to_text(), _text(cell.boards), _text(cell.assumed), cell.kept)
-                for cell in group
-            ),
-            group[0].render_key if group[0].again else "",
-        )
-        for group in groups.values()
-    ]
+    image = develop(frame, threads=1)
+    for method in methods or (project.extraction.method,):
+        settings = project.extraction.model_copy(update={"method": method})
+        compare(triangulate(extract(image, settings=settings, threads=1)), frame)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+import base64
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ from studio.study.references import page_rows as page_rows_beside
 from studio.study.store import Row
 from studio.study.study import Study, Sweep
 
+DPI = 160
+"""Of a chart, in its file and in the page."""
 SURE = 0.5
 """A knee that fewer resamples have is told as not known."""
 
@@ -43,16 +45,14 @@ def write_page(
             continue  # nothing is known of it yet
         if answer.sweep.chart in KEPT and not answer.kept:
             continue
-        made = chart(answer, labels)
-        picture = io.BytesIO()
-        made.savefig(picture, format="png", dpi=160)
+        picture = png_uri(chart(answer, labels), DPI)
         with atomic_write(folder / f"chart_{number + 1}.png") as temporary:
-            temporary.write_bytes(picture.getvalue())
+            temporary.write_bytes(base64.b64decode(picture.partition(",")[2]))
         parts.append(
             {
                 "name": answer.sweep.name,
                 "question": answer.sweep.question,
-                "picture": png_uri(made),
+                "picture": picture,
                 "lines": sentences(answer, labels),
                 "header": _header(answer, labels),
                 "table": _page_table(answer),

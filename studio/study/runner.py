@@ -7,13 +7,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from analysis.line.settings import Method
 from render.base.threads import Cancel
 from studio.project.project import Project
 from studio.runtime.workers import EVERY_PROCESSOR, Engine, team
-from studio.study.cells import WHOLE, Shard, next_cells
-from studio.study.measuring import measure_task, tasks, warm_up
+from studio.study.cells import WHOLE, Cell, Shard, methods_of, next_cells
+from studio.study.searching import Searching
 from studio.study.store import Store
-from studio.study.study import Study
+from studio.study.study import SEARCHES, Study
+from studio.study.tasks import Task, tasks
 
 Progress = Callable[[int, int], None]
 """Cells done, and cells known of so far: a bisection finds out as it goes."""
@@ -34,20 +36,46 @@ def run_study(
     InputError: a field, value or base that does not fit, told before anything runs; workers that are lost again and
     again. Cancelled: so asked; what has been measured is kept.
     """
+    missing = next_cells(study, bases, store.rows(), shard)
+    if not missing:
+        return
     first = next(iter(bases.values()))
-    begin = partial(_warm_up, first.to_text(), str(first.folder))
-    with team(engine, measure_task, begin, cancelled) as workers:
-        while True:
-            rows = store.rows()
-            work = tasks(next_cells(study, bases, rows, shard), study.image_scale, study.laser)
-            if not work:
-                return
-            done, known = store.count(), store.count() + sum(len(task.cells) for task in work)
-            for _, found in workers.results(work, cancelled, "the study"):
-                store.add(found)
-                done += len(found)
-                progress(done, known)
+    methods = tuple(dict.fromkeys(method for sweep in study.sweeps for method in methods_of(study, sweep)))
+    begin = partial(_warm_up, first.to_text(), str(first.folder), methods)
+    searching = Searching(study, bases, shard, missing, store.rows())
+    measured: list[str] = []
+    done, known = store.count(), store.count() + len(missing)
+
+    def follow() -> list[Task]:
+        """What the searches ask for now."""
+        nonlocal known
+        cells = searching.next_cells(measured, store.rows)
+        measured.clear()
+        known += len(cells)
+        return tasks(cells, study.image_scale, study.laser)
+
+    work = tasks(_searches_first(study, missing), study.image_scale, study.laser)
+    with team(engine, _measure, begin, cancelled) as workers:
+        for _, found in workers.results(work, cancelled, "the study", follow):
+            store.add(found)
+            measured += [key for key, _, _ in found]
+            done += len(found)
+            progress(done, known)
 
 
-def _warm_up(text: str, folder: str) -> None:
-    warm_up(Project.from_text(text).in_folder(Path(folder)))
+def _searches_first(study: Study, cells: list[Cell]) -> list[Cell]:
+    """One step of a search waits for the other, and other cells fill the time."""
+    return sorted(cells, key=lambda cell: study.sweeps[cell.sweep].sampling not in SEARCHES)
+
+
+def _measure(task: Task, cancelled: Cancel) -> Any:
+    # not at the top: measuring takes libraries that the driver of several workers does without
+    from studio.study.measuring import measure_task
+
+    return measure_task(task, cancelled)
+
+
+def _warm_up(text: str, folder: str, methods: tuple[Method, ...]) -> None:
+    from studio.study.measuring import warm_up
+
+    warm_up(Project.from_text(text).in_folder(Path(folder)), methods)

@@ -3,10 +3,10 @@
     python tests/benchmarks/bench_study_workers.py [study] [folder]      default: quick
 
 The study is run by one process and by two. Its tasks, with the seconds that the serial run took for each, are then
-dealt out to two workers, round by round as the driver hands them out: a search asks for its next cells only when a
-round is over. The rest of the serial run (start, what is next, tables, page) is done by the driver alone, and half of
-what two processes take beside it (each starts, and loads kernels) comes on top. Bar: 0.85 of two times as fast, and
-the same table.
+dealt out to two workers, round by round: as if a search asked for its next cells only when a round is over, which is
+no better than what the driver does. The rest of the serial run (start, what is next, tables, page) is done by the
+driver alone, and half of what two processes take beside it (each starts, and loads kernels) comes on top. Bar: 0.85 of
+two times as fast, and the same table.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from studio.study.cells import next_cells
-from studio.study.measuring import tasks
 from studio.study.store import Row, Store, described
 from studio.study.tables import CALIBRATING, SECONDS
+from studio.study.tasks import tasks
 
 ROOT = Path(__file__).resolve().parents[2]
 BAR = 0.85

@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QTimer, Signal
 
 from render.base.errors import InputError
 from render.base.files import atomic_write
@@ -20,13 +20,11 @@ from studio.dataset.run import Result, Wanted, make_dataset
 from studio.project.project import Project
 from studio.project.strict_json import pretty
 from studio.qt.core.jobs import JobRunner
+from studio.qt.core.long_work import LongWork
 from studio.qt.core.session import Session
-from studio.runtime.jobs import Job, Progress, State
-from studio.runtime.workers import Engine
+from studio.runtime.jobs import Progress
 from studio.study.folder_run import in_window
 
-LANE = "dataset"
-"""A dataset takes hours: renders go on beside it."""
 REST_MS = 400
 """Without a change before the scenes are drawn anew."""
 SHOWN = 24
@@ -34,22 +32,18 @@ SHOWN = 24
 FIRST = "primitives"
 
 
-class DatasetWork(QObject):
+class DatasetWork(LongWork):
     """Never asks a person anything: what cannot be done is told in `problem`."""
+
+    NAME = "dataset"
 
     _ready = Signal(object, object)
     recipe_changed = Signal()
     pictures_changed = Signal()
     """`pictures`, or `problem`, is another one."""
-    state_changed = Signal()
-    """It runs, or no longer; the folder or the number of scenes is another one."""
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
-        self.session = session
-        self.engine = Engine()
-        self.jobs: JobRunner | None = None
-        """The window's, for what its status bar tells of."""
         self.unseen = JobRunner(self)
         """The pictures."""
         self.watched = False
@@ -60,28 +54,16 @@ class DatasetWork(QObject):
         """The recipe's base project; None: it cannot be read."""
         self.scenes = 100
         self.shown = SHOWN
-        self.folder: Path | None = None
         self.pictures: dict[int, Picture] = {}
         """Of `recipe` as it is, by their numbers, as far as they are ready."""
         self.drawing = False
         self.problem = ""
         """Why the scenes cannot be drawn, or the run could not go on."""
-        self.job: Job[Result | str] | None = None
         self._stale = True
         self._rest = QTimer(self, singleShot=True, interval=REST_MS)
         self._rest.timeout.connect(self.draw)
         self._ready.connect(self._take_picture)
         self._read_base()
-
-    def attach(self, jobs: JobRunner) -> None:
-        """Work is done by the window's runner."""
-        self.jobs = jobs
-        jobs.cancelled.connect(self._end)
-        jobs.failed.connect(self._end)
-
-    @property
-    def running(self) -> bool:
-        return self.job is not None
 
     def load(self, path: Path | str) -> None:
         """A recipe's file, or a ready-made one by its name."""
@@ -167,14 +149,7 @@ class DatasetWork(QObject):
                 return in_window(error)
 
         self._tell("")
-        self.job = self.jobs.run(LANE, "dataset", work, self._take_end)
-        self.state_changed.emit()
-
-    def stop(self) -> None:
-        """What is made stays; `start` goes on from there."""
-        if self.job is not None:
-            self.job.cancel()
-            self.state_changed.emit()
+        self._begin(work, self._take_end)
 
     def close(self) -> None:
         self._rest.stop()
@@ -221,18 +196,10 @@ class DatasetWork(QObject):
         self._tell(problem)
 
     def _take_end(self, ended: Result | str) -> None:
-        self._end(self.job)
         if isinstance(ended, str):
             self._tell(ended)
         else:
             self.session.message.emit("info", f"The dataset is done: {ended.images} images in {self.folder}")
-
-    def _end(self, job: object) -> None:
-        if job is self.job and isinstance(job, Job):
-            self.job = None
-            if job.state is State.CANCELLED:
-                self.session.message.emit("info", f"The dataset was stopped; Go on continues it: {self.folder}")
-            self.state_changed.emit()
 
     def _tell(self, problem: str) -> None:
         self.problem = problem

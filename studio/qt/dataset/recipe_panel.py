@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QMenu,
     QScrollArea,
-    QSizePolicy,
     QSpinBox,
     QVBoxLayout,
     QWidget,
@@ -24,9 +23,10 @@ from studio.dataset.field_names import field_name
 from studio.dataset.images import images_of
 from studio.dataset.recipe import MOST_VARIANTS, ready_made
 from studio.editing.forms import PLAIN
-from studio.qt.core.jobs import JobRunner, time_left
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.run_foot import RunFoot
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import ElidedLabel, flush, text_button, thin_bar
+from studio.qt.core.widgets import ElidedLabel, flush, text_button
 from studio.qt.dataset.dataset_work import DatasetWork
 from studio.qt.dataset.draw_row import DrawRow
 from studio.runtime.jobs import Job
@@ -59,15 +59,7 @@ class RecipePanel(QWidget):
         self.seed = QSpinBox(minimum=0, maximum=2**31 - 1)
         self.seed.setToolTip("Decides every scene and every image")
         self.told = QLabel(wordWrap=True)
-        self.folder = ElidedLabel(Qt.TextElideMode.ElideMiddle)
-        self.folder.setObjectName("muted")
-        self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.choose = text_button("Folder…", "Where the images go; a dataset that is there goes on")
-        self.run = text_button("Run…", name="primary")
-        self.stop = text_button("Stop", "What is made stays")
-        self.bar = thin_bar()
-        self.stage = QLabel()
-        self.stage.setObjectName("muted")
+        self.foot = RunFoot("Where the images go; a dataset that is there goes on", "What is made stays")
         self._lay_out()
         self._connect()
         self.refresh()
@@ -146,9 +138,9 @@ class RecipePanel(QWidget):
         self.scenes.valueChanged.connect(work.choose_count)
         self.images.valueChanged.connect(lambda count: work.set_recipe(images=count))
         self.seed.valueChanged.connect(lambda seed: work.set_recipe(seed=seed))
-        self.choose.clicked.connect(lambda: self.ask_folder())
-        self.run.clicked.connect(self.ask_and_run)
-        self.stop.clicked.connect(work.stop)
+        self.foot.choose.clicked.connect(lambda: self.ask_folder())
+        self.foot.run.clicked.connect(self.ask_and_run)
+        self.foot.stop.clicked.connect(work.stop)
         work.recipe_changed.connect(self.refresh)
         for changed in (work.recipe_changed, work.state_changed):
             changed.connect(self._show_state)
@@ -156,28 +148,16 @@ class RecipePanel(QWidget):
 
     def _tell_progress(self, job: Job[object]) -> None:
         if job is self.work.job:
-            self.bar.setValue(round(1000 * job.done))
-            self.stage.setText("stopping" if job.cancel_asked else f"{job.stage}   {time_left(job.seconds_left)}")
+            self.foot.tell_progress(job)
 
     def _show_state(self) -> None:
         work = self.work
-        running, job, there = work.running, work.job, work.made()
+        there = work.made()
         images = work.scenes * images_of(work.recipe, len(work.base.scene.lasers) if work.base is not None else 1)
         self.told.setText(f"{images} images of {work.scenes} scenes" + (f"; {there} are there" if there else ""))
-        self.run.setVisible(not running)
-        self.run.setText("Run…" if work.folder is None else "Go on" if there else "Run")
-        self.stop.setVisible(running)
-        self.stop.setEnabled(job is not None and not job.cancel_asked)
-        for widget in (self.choose, self.files, self.scenes, self.images, self.seed):
-            widget.setEnabled(not running)
-        for row in self.rows:
-            row.setEnabled(not running)
-        for shown in (self.bar, self.stage):
-            shown.setVisible(running)
-        if not running:
-            self.bar.setValue(0)
-            self.stage.clear()
-        self.folder.setText(str(work.folder) if work.folder is not None else "no folder yet")
+        self.foot.show_state(work.folder, work.job, begun=there > 0)
+        for widget in (self.files, self.scenes, self.images, self.seed, *self.rows):
+            widget.setEnabled(not work.running)
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -200,22 +180,12 @@ class RecipePanel(QWidget):
         counts.addRow("Scenes", self.scenes)
         counts.addRow("Images of each", self.images)
         counts.addRow("Seed", self.seed)
-        where = QHBoxLayout()
-        where.addWidget(self.folder, 1)
-        where.addWidget(self.choose)
-        buttons = QHBoxLayout()
-        for button in (self.run, self.stop):
-            buttons.addWidget(button)
-        buttons.addStretch(1)
         foot = QVBoxLayout()
         foot.setContentsMargins(8, 4, 8, 8)
         foot.setSpacing(4)
         foot.addLayout(counts)
         foot.addWidget(self.told)
-        foot.addLayout(where)
-        foot.addWidget(self.bar)
-        foot.addWidget(self.stage)
-        foot.addLayout(buttons)
+        foot.addWidget(self.foot)
         layout = flush(QVBoxLayout(self))
         layout.addLayout(top)
         layout.addWidget(area, 1)

@@ -27,12 +27,13 @@ from PySide6.QtWidgets import (
 
 from render.base.threads import thread_count
 from studio.qt.core.icons import icon_button
-from studio.qt.core.jobs import JobRunner, time_left
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.run_foot import RunFoot
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import ElidedLabel, align_labels, flush, text_button, thin_bar
+from studio.qt.core.widgets import align_labels, flush, text_button
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
-from studio.runtime.jobs import Job, State
+from studio.runtime.jobs import Job
 from studio.study.draft import new_sweep, varies_nothing
 from studio.study.estimate import Estimate
 from studio.study.study import Study, ready_made
@@ -79,15 +80,8 @@ class StudyPanel(QWidget):
         self.problem = QLabel(wordWrap=True)
         self.problem.setObjectName("error")
         self.problem.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.folder = ElidedLabel(Qt.TextElideMode.ElideMiddle)
-        self.folder.setObjectName("muted")
-        self.folder.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.choose = text_button("Folder…", "Where the results go; a study that is there goes on")
-        self.run = text_button("Run…", name="primary")
-        self.stop = text_button("Stop", "What is measured stays")
-        self.bar = thin_bar()
-        self.stage = QLabel()
-        self.stage.setObjectName("muted")
+        folder_tip = "Where the results go; a study that is there goes on"
+        self.foot = RunFoot(folder_tip, "What is measured stays", [self.time])
         self._lay_out()
         self._connect()
         self.refresh()
@@ -202,9 +196,9 @@ class StudyPanel(QWidget):
         self.repeats.valueChanged.connect(lambda count: work.change(lambda draft: draft.update(repeats=count)))
         self.scale.valueChanged.connect(lambda scale: work.change(lambda draft: draft.update(image_scale=scale)))
         self.time.clicked.connect(lambda: work.look_ahead(timed=True))
-        self.choose.clicked.connect(lambda: self.ask_folder())
-        self.run.clicked.connect(self.ask_and_run)
-        self.stop.clicked.connect(work.stop)
+        self.foot.choose.clicked.connect(lambda: self.ask_folder())
+        self.foot.run.clicked.connect(self.ask_and_run)
+        self.foot.stop.clicked.connect(work.stop)
         work.draft_changed.connect(self.refresh)
         work.estimated.connect(self._tell_estimate)
         for changed in (work.state_changed, work.found_changed):
@@ -236,28 +230,15 @@ class StudyPanel(QWidget):
 
     def _tell_progress(self, job: Job[object]) -> None:
         if job is self.work.job:
-            self.bar.setValue(round(1000 * job.done))
-            left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
-            self.stage.setText("stopping" if job.cancel_asked else f"{job.stage}   {left}")
+            self.foot.tell_progress(job)
 
     def _show_state(self) -> None:
         work = self.work
-        running, job = work.running, work.job
         there = len(work.found.rows) if work.found is not None else 0
         left = work.estimate is None or work.estimate.cells + work.estimate.searched > 0
-        self.run.setVisible(not running)
-        self.run.setText("Run…" if work.folder is None else "Go on" if there and left else "Run")
-        self.run.setEnabled(work.estimate is not None and left)
-        self.run.setToolTip(f"{there} cells are there; what is missing is measured" if there else "")
-        self.stop.setVisible(running)
-        self.stop.setEnabled(job is not None and not job.cancel_asked)
-        self.choose.setEnabled(not running)
-        for widget in (self.bar, self.stage):
-            widget.setVisible(running)
-        if not running:
-            self.bar.setValue(0)
-            self.stage.clear()
-        self.folder.setText(str(work.folder) if work.folder is not None else "no folder yet")
+        self.foot.show_state(work.folder, work.job, begun=there > 0 and left)
+        self.foot.run.setEnabled(work.estimate is not None and left)
+        self.foot.run.setToolTip(f"{there} cells are there; what is missing is measured" if there else "")
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -294,22 +275,11 @@ class StudyPanel(QWidget):
         area.setWidget(inside)
         self.inside = inside
         area.setMinimumWidth(NARROWEST)
-        where = QHBoxLayout()
-        where.addWidget(self.folder, 1)
-        where.addWidget(self.choose)
-        buttons = QHBoxLayout()
-        for button in (self.run, self.stop, self.time):
-            buttons.addWidget(button)
-        buttons.addStretch(1)
         foot = QVBoxLayout()
         foot.setContentsMargins(8, 4, 8, 8)
         foot.setSpacing(4)
-        for widget in (self.told, self.problem):
+        for widget in (self.told, self.problem, self.foot):
             foot.addWidget(widget)
-        foot.addLayout(where)
-        foot.addWidget(self.bar)
-        foot.addWidget(self.stage)
-        foot.addLayout(buttons)
         layout = flush(QVBoxLayout(self))
         layout.addWidget(area, 1)
         layout.addLayout(foot)

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QTimer, Signal
 
 from render.base.errors import InputError
 from render.base.threads import Cancel
@@ -21,16 +21,14 @@ from studio.project.document import FieldPath
 from studio.project.project import Project
 from studio.project.templates import DESCRIPTIONS, FOLDER
 from studio.qt.core.jobs import JobRunner
+from studio.qt.core.long_work import LongWork
 from studio.qt.core.session import Session
-from studio.runtime.jobs import Job, Progress, State
-from studio.runtime.workers import Engine
+from studio.runtime.jobs import Progress
 from studio.study.draft import Data, by_names, finished, new_draft, path_text, suggested, varies_nothing
 from studio.study.estimate import Costs, Estimate, costs, estimate
 from studio.study.folder_run import Found, in_window, opened, run_into
 from studio.study.study import Study, base_project
 
-LANE = "study"
-"""A study takes hours: renders go on beside it."""
 REST_MS = 250
 """Without a change before it is worked out what the study takes."""
 
@@ -43,25 +41,21 @@ class Ended:
     problem: str = ""
 
 
-class StudyWork(QObject):
+class StudyWork(LongWork):
     """Never asks a person anything: what cannot be done is told in `problem`."""
+
+    NAME = "study"
 
     _grew = Signal(object, object)
     draft_changed = Signal()
     estimated = Signal()
     """`estimate`, or `problem` in its place, or `failure` is another one."""
     found_changed = Signal()
-    state_changed = Signal()
-    """It runs, or no longer; the folder is another one."""
     asked_for = Signal()
     """A field joined the draft."""
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
-        self.session = session
-        self.engine = Engine()
-        self.jobs: JobRunner | None = None
-        """The window's, for what its status bar tells of."""
         self.unseen = JobRunner(self)
         """Estimates, and reading a folder."""
         self.watched = False
@@ -71,14 +65,12 @@ class StudyWork(QObject):
         self.draft: Data = new_draft(self.base_name)
         self.chosen = 0
         """The sweep that is edited and whose chart is shown."""
-        self.folder: Path | None = None
         self.found: Found | None = None
         self.estimate: Estimate | None = None
         self.problem = ""
         """Why the draft is no study."""
         self.failure = ""
         """Why the last thing that was asked for could not be done."""
-        self.job: Job[Ended] | None = None
         self._timed: dict[str, Costs] = {}
         self._run_bases: dict[str, Project] = {}
         self._rest = QTimer(self, singleShot=True, interval=REST_MS)
@@ -87,16 +79,6 @@ class StudyWork(QObject):
         session.vary_asked.connect(self.vary)
         session.project_changed.connect(self._follow_project)
         session.document_replaced.connect(self._follow_document)
-
-    def attach(self, jobs: JobRunner) -> None:
-        """Work is done by the window's runner."""
-        self.jobs = jobs
-        jobs.cancelled.connect(self._end)
-        jobs.failed.connect(self._end)
-
-    @property
-    def running(self) -> bool:
-        return self.job is not None
 
     @property
     def base_name(self) -> str:
@@ -269,14 +251,7 @@ class StudyWork(QObject):
 
         self._fail("")
         self._run_bases = bases
-        self.job = self.jobs.run(LANE, "study", work, self._take_end)
-        self.state_changed.emit()
-
-    def stop(self) -> None:
-        """What is measured stays; `start` goes on from there."""
-        if self.job is not None:
-            self.job.cancel()
-            self.state_changed.emit()
+        self._begin(work, self._take_end)
 
     def choose_folder(self, folder: Path) -> None:
         """Where results are kept. One that holds a study: its rows count where they are of the same cells."""
@@ -345,16 +320,10 @@ class StudyWork(QObject):
     def _take_end(self, ended: Ended) -> None:
         if ended.found is not None:
             self.session.message.emit("info", f"The study is done: {self.folder}")
-        self._end(self.job)
         self._fail(ended.problem)
 
-    def _end(self, job: object) -> None:
-        if job is self.job and isinstance(job, Job):
-            self.job = None
-            if job.state is State.CANCELLED:
-                self.session.message.emit("info", f"The study was stopped; Go on continues it: {self.folder}")
-            self.state_changed.emit()
-            self.look_ahead()
+    def _after_run(self) -> None:
+        self.look_ahead()
 
     def _said(self, error: InputError) -> str:
         return by_names(in_window(error), self.draft)

@@ -17,9 +17,10 @@ from studio.study.cells import cells_at, points
 from studio.study.draft import board_fields, path_text, spec_of, suggested
 from studio.study.labels import field_labels
 from studio.study.measures import CALIBRATION_MEASURES
-from studio.study.measuring import measure_task, tasks
+from studio.study.measuring import measure_task
 from studio.study.study import Study, with_fields
 from studio.study.tables import CALIBRATING
+from studio.study.tasks import tasks
 
 SMALL: dict[str, Any] = {"render.goal": None, "render.transport": "direct", "render.ambient_samples": 1}
 

@@ -13,9 +13,10 @@ from render.base.errors import InputError
 from studio.project.project import Project
 from studio.study.cells import next_cells
 from studio.study.measures import measure_of, part_names
-from studio.study.measuring import measure_task, tasks
+from studio.study.measuring import measure_task
 from studio.study.study import Study
 from studio.study.tables import write_tables
+from studio.study.tasks import tasks
 
 STEP = {
     "name": "First step",

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from studio.study import measuring, runner
+from studio.study import measuring
 from studio.study.runner import run_study
 from studio.study.store import Store
 from studio.study.study import Study
@@ -32,7 +32,7 @@ def test_the_steps_of_a_search_share_their_renders(tmp_path: Path, monkeypatch: 
         return render(project, **options)
 
     monkeypatch.setattr(measuring, "render", counted)
-    monkeypatch.setattr(runner, "warm_up", lambda project: measuring.forget())
+    monkeypatch.setattr(measuring, "warm_up", lambda project, methods: measuring.forget())
     search = DATA["sweeps"][0]
     found = measured(tmp_path / "with", search)
     assert len(made) == len(set(made)) == DATA["repeats"] and len(found) > 6 * len(made)

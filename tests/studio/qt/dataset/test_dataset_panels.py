@@ -127,7 +127,7 @@ def test_images_are_made_stopped_and_gone_on_with(desk: Desk, qtbot: QtBot, tmp_
     assert desk.work.made() == 4 and not desk.work.problem
     assert desk.panel.told.text() == "4 images of 2 scenes; 4 are there"
     desk.panel.scenes.setValue(3)
-    assert desk.panel.run.text() == "Go on"
+    assert desk.panel.foot.run.text() == "Go on"
     desk.panel.ask_and_run()
     qtbot.waitUntil(lambda: not desk.work.running)
     assert desk.work.made() == 6

@@ -132,14 +132,14 @@ class TestDraft:
     def test_a_study_that_nobody_has_begun_is_no_fault(self, desk: Desk) -> None:
         desk.work.look_ahead()
         assert not desk.panel.problem.text() and "varies a field" in desk.panel.told.text()
-        assert not desk.panel.run.isEnabled()
+        assert not desk.panel.foot.run.isEnabled()
 
     def test_what_is_impossible_is_told_by_the_name_of_the_sweep_and_nothing_runs(
         self, qtbot: QtBot, desk: Desk
     ) -> None:
         desk.small([2.0, -3.0])
         qtbot.waitUntil(lambda: "read_noise" in desk.panel.problem.text())
-        assert not desk.panel.run.isEnabled()
+        assert not desk.panel.foot.run.isEnabled()
         desk.work.change_sweep(sampling="bisection")
         desk.work.look_ahead()
         assert desk.panel.problem.text().startswith("Sweep 1: bisection takes ranges")
@@ -186,7 +186,7 @@ class TestRun:
         assert len(first) == 2 and desk.charts.table.rowCount() == 2
         desk.small([2.0, 20.0, 60.0])
         qtbot.waitUntil(lambda: desk.work.estimate is not None and desk.work.estimate.cells == 1)
-        assert desk.panel.run.text() == "Go on"
+        assert desk.panel.foot.run.text() == "Go on"
         run(qtbot, desk)
         rows = desk.work.found.rows
         assert len(rows) == 3 and {key: rows[key] for key in first} == first  # their seconds as well: not done twice
@@ -208,7 +208,7 @@ class TestRun:
         assert desk.work.found is not None
         first = dict(desk.work.found.rows)
         assert 0 < len(first) < 3
-        qtbot.waitUntil(lambda: desk.panel.run.text() == "Go on")
+        qtbot.waitUntil(lambda: desk.panel.foot.run.text() == "Go on")
         run(qtbot, desk)
         rows = desk.work.found.rows
         assert len(rows) == 3 and {key: rows[key] for key in first} == first
