@@ -117,6 +117,21 @@ def decoded(numbers: NDArray[np.uint16], scale: float, offset: float) -> Float:
     return np.where(numbers > 0, offset + scale * numbers.astype(np.float64), np.nan)
 
 
+def along(made: HeightMap, start: tuple[float, float], end: tuple[float, float]) -> tuple[Float, Float]:
+    """The cells on a straight line between two places, (column, row): (n,) distances from its start and heights, m.
+
+    About a cell's width apart, each as the map has it; NaN where there is no surface, and beyond the map.
+    """
+    length = math.hypot(end[0] - start[0], end[1] - start[1])
+    share = np.linspace(0.0, 1.0, min(math.ceil(length), sum(made.heights.shape) * 2) + 1)
+    column, row = (np.round(a + share * (b - a)) for a, b in zip(start, end, strict=True))
+    rows, columns = made.heights.shape
+    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    heights = np.full(len(share), np.nan)
+    heights[inside] = made.heights[row[inside].astype(np.intp), column[inside].astype(np.intp)]
+    return share * length * made.pitch, heights
+
+
 @dataclass(frozen=True)
 class _Grid:
     """Cells row by row over a triangulation whose origin is its lowest x and y."""
