@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
 
 from analysis.cloud import Cloud
 from render.base.arrays import Float
 from render.base.errors import InputError
+
+if TYPE_CHECKING:
+    from scipy.spatial import Delaunay
 
 MOST_POINTS = 5_000_000
 MOST_CELLS = 50_000_000
@@ -53,6 +56,8 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
     variance is w^T C w, C with the correlation of neighbouring scan lines; neighbours that share points err alike.
     InputError: too few points, all on one line, or too many cells.
     """
+    from scipy.spatial import Delaunay, QhullError
+
     cloud = _usable(points)
     xy = np.column_stack([cloud["x"], cloud["y"]])
     origin = xy.min(axis=0)
