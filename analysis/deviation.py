@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy  # whose parts are loaded as they are named: the window starts without them
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from analysis.distance import nearest_triangle, signed_distance, triangle_normals
 from analysis.gauges.gauge import Verdict
@@ -112,7 +112,7 @@ def three_two_one(
     spots = np.asarray(datums, dtype=np.float64)
     facet = nearest_triangle(spots, vertices, triangles)
     normals = triangle_normals(vertices, triangles, facet)
-    motion, used, tree = np.eye(4), 0, cKDTree(points)
+    motion, used, tree = np.eye(4), 0, scipy.spatial.cKDTree(points)
     for _ in range(ROUNDS):
         means, middles, used = np.zeros(6), np.zeros((6, 3)), 0
         # the spots go to the points, whose tree stays as it is
@@ -160,7 +160,7 @@ def callouts(points: Float, value: Float, count: int, apart: float) -> list[tupl
     """
     if len(points) == 0:
         return []
-    tree = cKDTree(points)
+    tree = scipy.spatial.cKDTree(points)
     chosen: list[tuple[int, float]] = []
     # cells in place of points: a median for each of a million points would take minutes
     cells = np.unique(np.floor(points / (apart / 4.0)).astype(np.int64), axis=0, return_index=True)[1]

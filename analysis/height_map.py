@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay, QhullError
 
 from analysis.cloud import Cloud
 from render.base.arrays import Float
 from render.base.errors import InputError
+
+if TYPE_CHECKING:
+    from scipy.spatial import Delaunay
 
 MOST_POINTS = 5_000_000
 MOST_CELLS = 50_000_000
@@ -53,6 +56,8 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
     variance is w^T C w, C with the correlation of neighbouring scan lines; neighbours that share points err alike.
     InputError: too few points, all on one line, or too many cells.
     """
+    from scipy.spatial import Delaunay, QhullError
+
     cloud = _usable(points)
     xy = np.column_stack([cloud["x"], cloud["y"]])
     origin = xy.min(axis=0)
@@ -115,6 +120,21 @@ def encoded(heights: Float) -> tuple[NDArray[np.uint16], float, float]:
 def decoded(numbers: NDArray[np.uint16], scale: float, offset: float) -> Float:
     """The heights of `encoded` numbers, m, NaN where there is none."""
     return np.where(numbers > 0, offset + scale * numbers.astype(np.float64), np.nan)
+
+
+def along(made: HeightMap, start: tuple[float, float], end: tuple[float, float]) -> tuple[Float, Float]:
+    """The cells on a straight line between two places, (column, row): (n,) distances from its start and heights, m.
+
+    About a cell's width apart, each as the map has it; NaN where there is no surface, and beyond the map.
+    """
+    length = math.hypot(end[0] - start[0], end[1] - start[1])
+    share = np.linspace(0.0, 1.0, min(math.ceil(length), sum(made.heights.shape) * 2) + 1)
+    column, row = (np.round(a + share * (b - a)) for a, b in zip(start, end, strict=True))
+    rows, columns = made.heights.shape
+    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    heights = np.full(len(share), np.nan)
+    heights[inside] = made.heights[row[inside].astype(np.intp), column[inside].astype(np.intp)]
+    return share * length * made.pitch, heights
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import scipy  # whose parts are loaded as they are named: the window starts without them
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from render.base.arrays import Bool, Float
 from render.base.errors import InputError
@@ -195,19 +195,23 @@ def started(kind: Kind, group: NDArray[np.intp], given: Float, rotation: Float, 
         normal = np.median(each, axis=0)
         normal /= max(float(np.linalg.norm(normal)), 1e-12)
         there = turntable(number, given, normal, np.zeros(3))
-        turn = Rotation.from_rotvec((given[second] - given[first])[:, None] * normal).as_matrix()
+        turn = scipy.spatial.transform.Rotation.from_rotvec(
+            (given[second] - given[first])[:, None] * normal
+        ).as_matrix()
         left, right = np.eye(3) - turn, translation[second] - np.einsum("nij,nj->ni", turn, translation[first])
         at = np.linalg.lstsq(left[:, :, there.across].reshape(-1, 2), right.ravel(), rcond=None)[0]
         return replace(there, parameters=np.append(there.parameters[:2], at))
     motion = invert(given[second]) @ given[first]
-    ours, theirs = (Rotation.from_matrix(each).as_rotvec() for each in (turned, motion[:, :3, :3]))
+    ours, theirs = (
+        scipy.spatial.transform.Rotation.from_matrix(each).as_rotvec() for each in (turned, motion[:, :3, :3])
+    )
     if len(ours) < 2 or np.linalg.svd(theirs, compute_uv=False)[1] < LEAST_TURN:
         raise _undetermined("the hand turned about one axis only", "turn it by 20 deg or more about another as well")
-    eye = Rotation.align_vectors(theirs, ours)[0].as_matrix()
+    eye = scipy.spatial.transform.Rotation.align_vectors(theirs, ours)[0].as_matrix()
     moved = translation[second] - np.einsum("nij,nj->ni", turned, translation[first])
     right = moved @ eye.T - motion[:, :3, 3]
     shift = np.linalg.lstsq((motion[:, :3, :3] - np.eye(3)).reshape(-1, 3), right.ravel(), rcond=None)[0]
-    return replace(empty, parameters=np.append(Rotation.from_matrix(eye).as_rotvec(), shift))
+    return replace(empty, parameters=np.append(scipy.spatial.transform.Rotation.from_matrix(eye).as_rotvec(), shift))
 
 
 def turned_about(motion: Motion, rotation: Float) -> Bool:
@@ -229,7 +233,7 @@ def turned_about(motion: Motion, rotation: Float) -> Bool:
 
 
 def _angle(rotation: Float) -> Float:
-    return np.asarray(Rotation.from_matrix(rotation).magnitude())
+    return np.asarray(scipy.spatial.transform.Rotation.from_matrix(rotation).magnitude())
 
 
 def placements(motion: Motion, rotation: Float, translation: Float) -> tuple[Float, Float]:
@@ -238,7 +242,7 @@ def placements(motion: Motion, rotation: Float, translation: Float) -> tuple[Flo
     back = moves.rotation.transpose(0, 2, 1)
     turns, shifts = back @ rotation, np.einsum("nij,nj->ni", back, translation - moves.shift)
     groups = [motion.group == number for number in range(len(motion.first))]
-    turn = np.array([Rotation.from_matrix(turns[own]).mean().as_matrix() for own in groups])
+    turn = np.array([scipy.spatial.transform.Rotation.from_matrix(turns[own]).mean().as_matrix() for own in groups])
     return turn, np.array([np.median(shifts[own], axis=0) for own in groups])
 
 
@@ -259,7 +263,7 @@ def _stage(told: Float, step: Float) -> Moves:
 
 
 def _hand_eye(motion: Float, parameters: Float) -> Moves:
-    eye = Rotation.from_rotvec(parameters[:3]).as_matrix()
+    eye = scipy.spatial.transform.Rotation.from_rotvec(parameters[:3]).as_matrix()
     turn, shift = motion[:, :3, :3], parameters[3:]
     arm = turn @ shift + motion[:, :3, 3] - shift
     derivative = np.zeros((len(motion), 6, 3, 4))

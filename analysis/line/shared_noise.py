@@ -22,8 +22,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+import scipy  # whose parts are loaded as they are named: the window starts without them
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from analysis.line.result import Flag, Line
 from render.base.arrays import Float
@@ -175,7 +175,7 @@ def _parted(runs: list[_Run], excess: float) -> tuple[float, float]:
     inverse = np.concatenate([run.inverse for run in runs])
     mean = float(inverse.mean())
     design = np.stack([np.ones_like(inverse), inverse / mean], axis=1)
-    share, added = nnls(design, (1.0 + excess) / squares.mean() * squares - 1.0)[0]
+    share, added = scipy.optimize.nnls(design, (1.0 + excess) / squares.mean() * squares - 1.0)[0]
     total = share + added
     if total <= 0.0:
         return excess, 0.0

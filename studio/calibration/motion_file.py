@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy  # whose parts are loaded as they are named: the window starts without them
 
 from analysis.calibration.calibrate import Calibrated
 from analysis.calibration.estimate import Estimate
@@ -163,6 +163,6 @@ def _given(kind: Kind, values: list[float], hand: Held, where: str) -> Float:
     if not np.linalg.norm(values[3:]) > 1e-6:
         raise InputError("a quaternion of no length", where=where, allowed="qx, qy, qz, qw of length 1")
     pose = np.eye(4)
-    pose[:3, :3] = Rotation.from_quat(values[3:]).as_matrix()
+    pose[:3, :3] = scipy.spatial.transform.Rotation.from_quat(values[3:]).as_matrix()
     pose[:3, 3] = 1e-3 * np.array(values[:3])
     return pose if hand == "camera" else np.asarray(np.linalg.inv(pose))

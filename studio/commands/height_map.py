@@ -23,4 +23,4 @@ def make_height_map(source: Path, *, pitch: float | None, out: Path | None, quie
     if not quiet:
         meaning = f"{record['offset']:.9g} m + {record['scale']:g} m * number"
         print(f"Height: {meaning}; 0: none; see {made.paths[1].name}")
-        print(sigma_sentence(record))
+        print(sigma_sentence(record["sigma"]))

@@ -39,8 +39,8 @@ ITEMS = (Camera, Scene, Sensor, RenderSettings, ExtractionSettings, LineLaser, S
          Delivery)  # fmt: skip
 """What the scene tree shows as items of their own, and so no form of another item repeats."""
 HIDDEN = ("kind", "source", "schema_version", "sha256", "calibration", "measures")
-FINE_UNITS = {(Camera, "pixel_pitch"): "um", (Waist, "radius"): "um", (Divergence, "full_angle"): "mrad",
-              (Delivery, "lower"): "um", (Delivery, "upper"): "um"}  # fmt: skip
+FINE_UNITS = {(Camera, "pixel_pitch"): "µm", (Waist, "radius"): "µm", (Divergence, "full_angle"): "mrad",
+              (Delivery, "lower"): "µm", (Delivery, "upper"): "µm"}  # fmt: skip
 PLAIN = Unit()
 BLANKS = str.maketrans("_-", "  ")
 LABELS = {"T_rig_camera": "Pose on the rig", "T_rig_laser": "Pose on the rig", "T_world_rig": "Pose in the world",
@@ -48,7 +48,7 @@ LABELS = {"T_rig_camera": "Pose on the rig", "T_rig_laser": "Pose on the rig", "
 NAMES = {"MeshFile": "Mesh file", "FromMesh": "From the mesh file", "PointLight": "Point", "Waist": "Focused",
          "RectangleLight": "Rectangle", "NoMotion": "None, a single frame", "Divergence": "Diverging",
          "Texture": "Image", "GreyTexture": "Image", "PoseList": "List of poses",
-         "Processing": "Photograph", "srgb": "sRGB"}  # fmt: skip
+         "Processing": "Photograph", "likelihood": "Maximum likelihood", "srgb": "sRGB"}  # fmt: skip
 
 
 class _Required:

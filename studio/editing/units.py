@@ -26,7 +26,7 @@ def show_lengths_in(unit: str) -> None:
     """In forms that are made from now on. ValueError: it is none of LENGTHS."""
     if unit not in LENGTHS:
         raise ValueError(f"{unit}; allowed: {', '.join(LENGTHS)}")
-    SHOWN["m"] = unit
+    SHOWN["m"] = "µm" if unit == "um" else unit
 
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")

@@ -93,6 +93,11 @@ def warm_up(steps: Iterable[str], progress: StageProgress, cancelled: Cancel) ->
         _ends[name].result()
 
 
+def all_compiled() -> bool:
+    """Nothing is left to compile: each kernel is loaded within milliseconds where it is called first."""
+    return _compiled().exists()
+
+
 def needed(project: Project) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The steps whose kernels the line of a project needs, and those of what is drawn and measured after it."""
     pinhole = project.scene.camera.lens.model == "pinhole"

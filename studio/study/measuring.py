@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analysis.gauges.read import read
 from analysis.line.settings import Method
@@ -28,7 +28,6 @@ from studio.project.project import Project
 from studio.scan.gauging import profiles
 from studio.scan.stages import Measurement, scaled_sensor
 from studio.study.boards import Boards
-from studio.study.calibrating import calibrated
 from studio.study.kept import ROW as KEPT_ROW
 from studio.study.kept import picture, profile
 from studio.study.measures import MEASURES, measures, of_the_part
@@ -36,7 +35,10 @@ from studio.study.ray_units import RAY_SPEED, rays_per_second
 from studio.study.render_cache import forget, rendered
 from studio.study.round_bodies import facet_error
 from studio.study.tables import CALIBRATING
-from studio.study.tasks import Task
+from studio.study.tasks import Task, Work
+
+if TYPE_CHECKING:
+    from studio.study.calibrating import Found
 
 Row = tuple[str, dict[str, Any], dict[str, float]]
 
@@ -70,7 +72,7 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
                 image = as_if(image, Sensor.model_validate_json(cell.assumed))
             line = extract(image, settings=project.extraction, threads=1)
             extracted = time.process_time()
-            made = None if not cell.boards else calibrated(project, Boards.model_validate_json(cell.boards), task.laser)
+            made = _made_with(cell, project, task.laser)
             with_it = None if made is None else project.model_copy(update={"calibration": made.calibration})
             points = triangulate(line, project=with_it)
             errors, curve = compare(points, frame), frame.curves[task.laser]
@@ -132,3 +134,12 @@ def warm_up(project: Project, methods: Sequence[Method] = ()) -> None:
     for method in methods or (project.extraction.method,):
         settings = project.extraction.model_copy(update={"method": method})
         compare(triangulate(extract(image, settings=settings, threads=1)), frame)
+
+
+def _made_with(cell: Work, project: Project, laser: int) -> Found | None:
+    """What the cell's points are made with; None: the scene's own."""
+    if not cell.boards:
+        return None
+    from studio.study.calibrating import calibrated  # loads statistics, a tenth of the window's start
+
+    return calibrated(project, Boards.model_validate_json(cell.boards), laser)

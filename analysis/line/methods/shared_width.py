@@ -14,8 +14,9 @@ Bayesian Data Analysis, 5.4, with the spread as given).
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from analysis.line.detection.detect import PRIOR_WIDTHS
 from analysis.line.result import NEIGHBOURS
@@ -34,12 +35,18 @@ WIDEST = 0.5
 FINE_STEP = 0.005
 FINE_WIDTHS = np.arange(PRIOR_WIDTHS[0], PRIOR_WIDTHS[-1], FINE_STEP)
 """px; many lines tell their width better than to a step of PRIOR_WIDTHS."""
-BETWEEN = CubicSpline(PRIOR_WIDTHS, np.eye(len(PRIOR_WIDTHS)))(FINE_WIDTHS)
-"""(f, m): from a smooth function at PRIOR_WIDTHS to FINE_WIDTHS."""
 STEP = 3.0
 """Standard deviations from which a line is at another place in its pixel than the one before."""
 LEAST = 1e-30
 """Relative density of a width that the neighbours rule out."""
+
+
+@cache
+def between() -> Float:
+    """(f, m): from a smooth function at PRIOR_WIDTHS to FINE_WIDTHS."""
+    from scipy.interpolate import CubicSpline  # a tenth of the window's start, and needed by narrow lines alone
+
+    return np.asarray(CubicSpline(PRIOR_WIDTHS, np.eye(len(PRIOR_WIDTHS)))(FINE_WIDTHS))
 
 
 def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] | None:
@@ -64,7 +71,7 @@ def width_priors(told: Float, u: Float, sigma_u: Float) -> tuple[Float, Float] |
         count = _of_neighbours(alike)
         independent = 1.0 + _of_neighbours(moved)
         total = at_best + np.minimum(independent / np.maximum(count, 1.0), 1.0)[:, None] * places
-        log = _weighed(total, BETWEEN)
+        log = _weighed(total, between())
         shared, _ = _moments(log, FINE_WIDTHS)
         enough = known & (count >= FEWEST)
         apart = _deviance(mass, shared)

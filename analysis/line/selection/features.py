@@ -7,9 +7,8 @@ so that neither image scale nor exposure matters; left and right, up and down ar
 from __future__ import annotations
 
 import numpy as np
+import scipy  # whose parts are loaded as they are named: the window starts without them
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from analysis.line.result import Flag, Line
 from analysis.line.selection.continuity import cheapest_chain
@@ -200,5 +199,5 @@ def segments(u: Float) -> NDArray[np.int32]:
         starts.append(number[row, rank])
         ends.append(number[row + gap, onward[row, rank]])
     a, b = (np.concatenate(one) if one else np.zeros(0, int) for one in (starts, ends))
-    graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(rows), len(rows)))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    graph = scipy.sparse.coo_matrix((np.ones(len(a)), (a, b)), shape=(len(rows), len(rows)))
+    return np.asarray(scipy.sparse.csgraph.connected_components(graph, directed=False)[1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
@@ -14,7 +15,9 @@ from studio.qt.calibrate.calibration_work import CalibrationWork
 from studio.qt.calibrate.keeping import remove, use, use_file
 from studio.qt.core.actions import Actions
 from studio.qt.core.session import Session, one_of
-from studio.qt.image.photograph_window import PhotographWindow
+
+if TYPE_CHECKING:
+    from studio.qt.image.photograph_window import PhotographWindow
 
 
 def is_photograph(path: Path) -> bool:
@@ -77,6 +80,8 @@ class CalibrateActions(QObject):
     def open_photographs(self) -> PhotographWindow:
         """The window of photographs of a line, which takes what is dropped on it."""
         if self.photographs is None:
+            from studio.qt.image.photograph_window import PhotographWindow  # and with it OpenCV
+
             parent = self.parent()
             self.photographs = PhotographWindow(self.work.session, parent if isinstance(parent, QWidget) else None)
         self.photographs.show()

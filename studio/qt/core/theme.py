@@ -161,7 +161,7 @@ def style_sheet(c: Colours) -> str:
     QPushButton#primary:enabled {{ background: {c.accent}; color: {c.on_accent}; border-color: {c.accent}; }}
     QPushButton#primary:enabled:hover {{ background: {mixed(c.accent, c.text, 0.85)}; }}
     QToolButton#fix {{ color: {c.accent}; border-color: {c.accent}; padding: 0 9px; font-weight: 600; }}
-    QPushButton#choice {{ text-align: left; padding-left: 4px; }}
+    QPushButton#choice {{ text-align: left; padding-left: 4px; min-height: 1.2em; }}
     QMenuBar {{ background: {c.window}; }}
     QMenuBar::item {{ padding: 4px 9px; background: transparent; border-radius: 4px; }}
     QMenuBar::item:selected {{ background: {mixed(c.text, c.window, 0.10)}; }}
@@ -170,6 +170,7 @@ def style_sheet(c: Colours) -> str:
     QMenu::item:selected {{ background: {c.accent}; color: {c.on_accent}; }}
     QMenu::item:disabled {{ color: {mixed(c.text, c.window, 0.45)}; }}
     QMenu::separator {{ height: 1px; background: {c.line}; margin: 4px 8px; }}
+    QAbstractSpinBox {{ min-height: 1.2em; }}
     QStatusBar {{ background: {c.window}; border-top: 1px solid {c.line}; }}
     QStatusBar::item {{ border: none; }}
     QToolTip {{ background: {c.raised}; color: {c.text}; border: 1px solid {c.line}; padding: 4px; }}

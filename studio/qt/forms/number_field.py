@@ -22,7 +22,7 @@ from render.base.errors import InputError
 from studio.editing.forms import FieldSpec
 from studio.qt.forms.fields import TextField
 
-STEPS = {"mm": 0.2, "um": 0.05, "deg": 0.1, "mrad": 0.005, "mW": 0.1, "ms": 0.01, "nm": 0.5, "px": 0.1, "e-": 5.0,
+STEPS = {"mm": 0.2, "µm": 0.05, "deg": 0.1, "mrad": 0.005, "mW": 0.1, "ms": 0.01, "nm": 0.5, "px": 0.1, "e-": 5.0,
          "cm": 0.02, "m": 2e-4, "in": 0.01}  # fmt: skip
 """Change per pixel of a drag at least, in shown units."""
 EMPTY_TEXT = {"focus_distance": "far away", "gain": "automatic", "width": "measured"}

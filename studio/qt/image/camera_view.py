@@ -37,8 +37,8 @@ DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 HOVER_HZ = 30
 LOW = 400
 """px of height, for picture and profile together."""
-WIDE = 1100
-"""px, for the name of every box."""
+WIDE, NARROW, TINY, LEAST_CHOICE = 1100, 600, 480, 124
+"""px, for the name of every box; below which lines' boxes take room of the choice, which keeps so much; of zooming."""
 LIVE = "Live estimate"
 
 
@@ -60,6 +60,7 @@ class CameraView(QWidget):
         self.saturated = QCheckBox("Saturated")
         self.saturated.setIcon(swatch(SATURATED))
         self.saturated.setChecked(True)
+        self.zooms = QToolButton(), QToolButton()
         self.readout = QLabel()
         self.badge = QFrame()
         self.badge_text = ElidedLabel()
@@ -130,11 +131,9 @@ class CameraView(QWidget):
         # many methods must not make the panel, and so the window, wider
         lines.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         bar.addWidget(lines, 1)
-        for text, tip, action in (
-            ("Fit", "The whole image (F)", self.view.fit),
-            ("1:1", "One screen pixel a pixel", self.view.one_to_one),
-        ):
-            button = QToolButton()
+        fit = "Fit", "The whole image (F)", self.view.fit
+        one_to_one = "1:1", "One screen pixel a pixel", self.view.one_to_one
+        for button, (text, tip, action) in zip(self.zooms, (fit, one_to_one), strict=True):
             button.setText(text)
             button.setToolTip(tip)
             button.clicked.connect(action)
@@ -324,7 +323,10 @@ class CameraView(QWidget):
 
     def _name_boxes(self) -> None:
         """As far as there is room, which the names of lines need first."""
-        self.saturated.setText("Saturated" if self.is_live or self.width() >= WIDE else "")
+        self.choice.setMaximumWidth(LEAST_CHOICE if self.width() < NARROW else self.choice.sizeHint().width())
+        for button in self.zooms:
+            button.setVisible(self.width() >= TINY)
+        self.saturated.setText("Saturated" if self.width() >= (NARROW if self.is_live else WIDE) else "")
         self.overlay.show_names_within(self.lines.width())
 
     def _draw_overlay(self) -> None:

@@ -90,9 +90,9 @@ class DevelopPanel(QWidget):
         for count in range(1, 9):
             self.exposures.addItem("one" if count == 1 else f"{count}, fused", count)
         self.exposures.setToolTip("Several are fused in electrons, each shorter than the one before by the ratio")
-        self.continuous = QCheckBox("on the smoothest chain")
+        self.continuous = QCheckBox("continuous")
         self.continuous.setToolTip("Of all peaks of a scan line the one that continues the line, or none")
-        self.possible = QCheckBox("that the laser can have made")
+        self.possible = QCheckBox("geometric check")
         self.possible.setToolTip("On the laser's plane, within its fan and the working volume, no wider than its sheet")
         self.powers: list[LogField] = []
         self.methods_button = text_button("", name="choice")
@@ -140,7 +140,7 @@ class DevelopPanel(QWidget):
         form.addRow("Laser power", self._power_rows)
         form.addRow("Noise", self.noise)
         form.addRow("Exposures", self.exposures)
-        form.addRow("Only peaks", self.continuous)
+        form.addRow("Selection", self.continuous)
         form.addRow("", self.possible)
         form.addRow("Measure by", self.methods_button)
         layout = QVBoxLayout(self)

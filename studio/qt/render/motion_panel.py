@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QUrl, Signal
+from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QComboBox,
@@ -223,16 +223,15 @@ class MotionPanel(QWidget):
 
     def _lay_out(self) -> None:
         still = QWidget()
-        column, row = QVBoxLayout(still), QHBoxLayout()
+        column = QVBoxLayout(still)
         column.setContentsMargins(8, 8, 8, 6)
         column.addWidget(QLabel("Nothing moves: a scan is a single frame.", wordWrap=True))
-        column.addLayout(row)
-        column.addStretch(1)
         for text, kind in (("Add a linear stage", LinearStage), ("Add a turntable", Turntable)):
             button = QPushButton(text)
             button.clicked.connect(lambda _checked=False, kind=kind: self._set_motion(kind))
-            row.addWidget(button)
-        row.addStretch(1)
+            # one below the other: a low screen has them beside the camera's view
+            column.addWidget(button, alignment=Qt.AlignmentFlag.AlignLeft)
+        column.addStretch(1)
         moving = QWidget()
         inside = QVBoxLayout(moving)
         inside.setContentsMargins(8, 4, 8, 6)

@@ -14,7 +14,7 @@ from studio.preview.inspection import view_warnings
 from studio.project.project import Project
 from studio.qt.core.session import Render
 from studio.runtime.jobs import Progress
-from studio.scan.kernel_warm_up import begin, needed, warm_up
+from studio.scan.kernel_warm_up import all_compiled, begin, needed, warm_up
 from studio.scan.render_goal import goal_of
 
 
@@ -31,7 +31,8 @@ def render_frames(
 
     run: with the project's seed, whatever its own.
     """
-    for_line, for_all = needed(project)
+    # what is compiled is loaded where it is called: most projects need a part of it
+    for_line, for_all = ((), ()) if all_compiled() else needed(project)
     # what the live picture waits for goes first
     begin(("look",))
     warm_up(for_line, lambda stage, done: progress(stage, 0.0), run.cancelled)

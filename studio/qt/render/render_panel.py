@@ -28,6 +28,7 @@ from render.plan import Plan
 from render.products import expected_plan
 from render.run import Memory, Run
 from render.world.world import World
+from studio.editing.forms import choice_label
 from studio.project.project import Project
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Render, Session
@@ -40,12 +41,12 @@ from studio.scan.stages import scaled
 SCALES = (0.125, 0.25, 0.5, 1.0)
 LONGEST_HEAD = 20
 TRANSPORT = {
-    "auto": "as much as matters",
-    "direct": "by way of one surface",
-    "interreflection": "and reflected on",
-    "caustic": "and through glass, off mirrors",
-    "specular-chain": "and seen through glass again",
-    "subsurface": "and below surfaces",
+    "auto": "As much as matters",
+    "direct": "By way of one surface",
+    "interreflection": "And reflected on",
+    "caustic": "And through glass, off mirrors",
+    "specular-chain": "And seen through glass again",
+    "subsurface": "And below surfaces",
 }
 
 
@@ -93,9 +94,12 @@ class RenderPanel(QWidget):
         for box in (self.laser_error, self.ambient_error, self.samples, self.goal, self.limit):
             box.setKeyboardTracking(False)
         self.transport = QComboBox()
-        for value, text in TRANSPORT.items():
-            self.transport.addItem(text, value)
-        self.transport.setToolTip("A short pilot finds out what the reflections add, unless you decide.")
+        for i, (value, text) in enumerate(TRANSPORT.items()):
+            self.transport.addItem(choice_label(value), value)
+            self.transport.setItemData(i, text, Qt.ItemDataRole.ToolTipRole)
+        self.transport.setToolTip(
+            "Auto: a short pilot finds out what the reflections add; each other way: as far as that."
+        )
         self.scale = QComboBox()
         self.start_button = text_button("Render", name="primary")
         self.continue_button = text_button(

@@ -25,7 +25,7 @@ class MeasureActions(QObject):
         actions.connect("previous_line", lambda: self.step(-1))
         actions.connect("next_line", lambda: self.step(1))
         actions.connect("worst_line", self.worst)
-        for key in ("deviation", "section"):
+        for key in ("deviation", "section", "heights"):
             actions.connect(key, partial(self.inspect, key))
         session.renders_changed.connect(self.refresh)
         session.measured.connect(self.refresh)
@@ -59,7 +59,7 @@ class MeasureActions(QObject):
             self.session.hover(int(best.points.index[np.nanargmax(np.abs(best.errors.depth))]))
 
     def inspect(self, key: str) -> None:
-        """The panel of deviation and section, with the tab that was asked for."""
+        """The panel of deviation, section and height map, with the tab that was asked for."""
         self.window.call_panel("nominal")
         panel = self.window.panels["nominal"]
         panel.show_tab(getattr(panel, key))

@@ -39,7 +39,7 @@ TRIES, NEAR = 4, 1e-4
 """How often a move is corrected by what is then read, and the share of the value that is near enough."""
 Start = tuple[Project, Float, dict[str, float | None]]
 """Project, lit point and read-outs before anything moved."""
-WIDTH = 96
+WIDTH = 88
 
 
 class PlacingField(NumberField):

@@ -26,6 +26,9 @@ from studio.qt.core.widgets import ElidedLabel
 from studio.qt.results.placing_fields import PlacingField, PlacingFields
 from studio.qt.results.remedy_list import RemedyList, sentence
 
+LEAST_NAME = 72
+"""px of the name of a read-out, where there is too little room for the whole."""
+
 
 class ReadoutPanel(QWidget):
     """One compact row for each read-out; its tool tip explains it, its colour says when it is out of range."""
@@ -42,10 +45,10 @@ class ReadoutPanel(QWidget):
         self.problem = QLabel("Not of the scene as it is set: the scene tree marks what cannot be.", wordWrap=True)
         self.problem.setObjectName("warning")
         self._hint.setObjectName("muted")
-        self._labels: dict[str, tuple[QLabel, QLabel | PlacingField, ElidedLabel]] = {}
+        self._labels: dict[str, tuple[ElidedLabel, QLabel | PlacingField, ElidedLabel]] = {}
         inner = QFrame()
         column = QVBoxLayout(inner)
-        column.setContentsMargins(10, 8, 10, 8)
+        column.setContentsMargins(10, 8, 4, 8)
         self._grid = QGridLayout()
         column.addLayout(self._grid)
         self.fixes = RemedyList(session)
@@ -54,7 +57,7 @@ class ReadoutPanel(QWidget):
         """Seen in the rows that something would fix."""
         column.addWidget(self.fixes)
         column.addStretch(1)
-        self._grid.setHorizontalSpacing(12)
+        self._grid.setHorizontalSpacing(8)
         self._grid.setVerticalSpacing(5)
         self._grid.setColumnStretch(2, 1)
         area = QScrollArea(widgetResizable=True)
@@ -128,12 +131,13 @@ class ReadoutPanel(QWidget):
             if isinstance(value, QLabel):
                 value.setText(row.value)
             note.setText(row.note)
+            told = f"<p>{row.label}: {row.help}</p>" + (f"<p>{row.note}</p>" if row.note else "")
             for label, style in (
                 (name, f"color: {colours.muted}"),
                 (value, f"color: {tints[row.level]}; font-weight: 600"),
                 (note, f"color: {colours.muted}"),
             ):
-                label.setToolTip(f"<p>{row.help}</p><p>{row.note}</p>" if row.note else f"<p>{row.help}</p>")
+                label.setToolTip(told)
                 if not isinstance(label, QLabel):
                     label.mark(row.level)
                     continue
@@ -156,13 +160,14 @@ class ReadoutPanel(QWidget):
                 self.fixes.apply(one)
                 return
 
-    def _add(self, key: str) -> tuple[QLabel, QLabel | PlacingField, ElidedLabel]:
+    def _add(self, key: str) -> tuple[ElidedLabel, QLabel | PlacingField, ElidedLabel]:
         """A line of labels at the end."""
-        name, value, note = QLabel(), self.placing.fields.get(key) or QLabel(), ElidedLabel()
+        name, value, note = ElidedLabel(), self.placing.fields.get(key) or QLabel(), ElidedLabel()
+        name.setMinimumWidth(LEAST_NAME)
         if isinstance(value, QLabel):
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             value.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        # a narrow panel may shorten the ranges, never the values; the tip has them whole
+        # a narrow panel may shorten ranges and names, never the values; the tip has them whole
         note.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         line = self._grid.rowCount()
         for column, label in enumerate((name, value, note)):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
 
+from analysis.report.colour import method_name
 from studio.editing.forms import kind_label
 from studio.editing.scene_edits import LASERS, LIGHTS, OBJECTS
 from studio.editing.units import Unit
@@ -62,7 +63,7 @@ def nodes(project: Project) -> list[Node]:
         Node(("scene", "motion"), (), "Motion", motion),
         Node(("sensor",), (), "Sensor", Unit.of("s").with_unit(project.sensor.exposure_time)),
         Node(("render",), (), "Render"),
-        Node(("extraction",), (), "Extraction", project.extraction.method.replace("_", " ")),
+        Node(("extraction",), (), "Extraction", method_name(project.extraction.method)),
         Node(("delivery",), (), "Report", project.delivery.customer),
     ]
     return [Node(n.path, n.parent, n.name, n.detail, icon_name(project, n.path), n.visible) for n in found]

@@ -22,7 +22,7 @@ PAGES = {
     "render": "Render",
     "develop": "Exposure and measurement",
     "results": "Results",
-    "nominal": "Deviation and section",
+    "nominal": "Deviation, section, height map",
     "study": "Study",
     "charts": "Charts of a study",
     "calibrate": "Calibrate",

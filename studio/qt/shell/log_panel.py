@@ -9,9 +9,8 @@ from PySide6.QtWidgets import (
     QApplication,
     QComboBox,
     QHBoxLayout,
-    QLabel,
     QPlainTextEdit,
-    QPushButton,
+    QToolButton,
     QVBoxLayout,
     QWidget,
 )
@@ -36,15 +35,15 @@ class LogPanel(QWidget):
         self.level = QComboBox()
         self.level.addItems(list(SHOWN))
         self.level.currentTextChanged.connect(lambda _: self._show_all())
-        copy = QPushButton("Copy")
+        copy = QToolButton()
+        copy.setText("Copy")
         copy.setToolTip("Copy the whole log, for a report")
         copy.clicked.connect(lambda: QApplication.clipboard().setText(self.as_text()))
-        clear = QPushButton("Clear")
+        clear = QToolButton()
+        clear.setText("Clear")
         clear.clicked.connect(self.clear)
         bar = QHBoxLayout()
-        bar.addWidget(QLabel("Show"))
-        bar.addWidget(self.level)
-        bar.addStretch(1)
+        bar.addWidget(self.level, 1)
         bar.addWidget(copy)
         bar.addWidget(clear)
         layout = QVBoxLayout(self)

@@ -33,7 +33,7 @@ PANELS = (
     Panel("render", "Render", "studio.qt.render.render_panel", "RenderPanel", True),
     Panel("develop", "Exposure and measurement", "studio.qt.render.develop_panel", "DevelopPanel"),
     Panel("results", "Results", "studio.qt.results.results_panel", "ResultsPanel"),
-    Panel("nominal", "Deviation and section", "studio.qt.results.nominal_panel", "NominalPanel", True),
+    Panel("nominal", "Deviation, section, height map", "studio.qt.results.nominal_panel", "NominalPanel", True),
     Panel("study", "Study", "studio.qt.study.study_panel", "StudyPanel", True),
     Panel("charts", "Charts", "studio.qt.study.charts_panel", "ChartsPanel", True),
     Panel("recipe", "Dataset", "studio.qt.dataset.recipe_panel", "RecipePanel", True),

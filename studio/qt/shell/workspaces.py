@@ -14,9 +14,9 @@ Named = TypeVar("Named", bound=QWidget)
 
 Area = Qt.DockWidgetArea
 LEFT, RIGHT, BOTTOM = Area.LeftDockWidgetArea, Area.RightDockWidgetArea, Area.BottomDockWidgetArea
-WIDE = ("motion", "log")
-"""Panels of no workspace that share a place below when they are called for."""
-VERSION = 4
+CALLED = ("nominal", "motion", "log")
+"""Panels of no workspace, which come in front of one where they are called for: there is no room beside."""
+VERSION = 5
 """Of the arrangement; a remembered one of another version is dropped."""
 
 
@@ -41,8 +41,8 @@ class Workspace:
     columns: tuple[Column, ...]
     sides_reach_down: bool
     """The areas at the sides, not the bottom one, hold the lower corners."""
-    before: tuple[tuple[str, str], ...] = ()
-    """Panels that are called for, each with the panel that it comes in front of, as there is no room beside."""
+    behind: str
+    """The panel that those which are called for come in front of."""
 
 
 SETTING_UP = (
@@ -60,12 +60,16 @@ CALIBRATING = (Column(BOTTOM, 1.0, (("calibrate", 0.25), ("boards", 0.46), ("cal
 LABELLING = (Column(LEFT, 0.4, (("recipe", 1.0),)), Column(RIGHT, 0.6, (("contact", 1.0),)))
 QUESTION = "Many runs with one question: what a value changes, and where methods break"
 WORKSPACES = (
-    Workspace("setup", "Set up", "Place and design: camera, lasers, objects", True, SETTING_UP, True),
-    Workspace("render", "Render", "The image and its light", False, RENDERING, True),
-    Workspace("measure", "Measure", "Line, points and their error", True, MEASURING, False, (("nominal", "camera"),)),
-    Workspace("study", "Study", QUESTION, False, STUDYING, True),
-    Workspace("calibrate", "Calibrate", "Camera and lasers from photographs of a board", False, CALIBRATING, True),
-    Workspace("dataset", "Dataset", "Labelled images of drawn scenes, by the thousand", False, LABELLING, True),
+    Workspace("setup", "Set up", "Place and design: camera, lasers, objects", True, SETTING_UP, True, "readout"),
+    Workspace("render", "Render", "The image and its light", False, RENDERING, True, "develop"),
+    Workspace("measure", "Measure", "Line, points and their error", True, MEASURING, False, "camera"),
+    Workspace("study", "Study", QUESTION, False, STUDYING, True, "charts"),
+    Workspace(
+        "calibrate", "Calibrate", "Camera and lasers from photographs of a board", False, CALIBRATING, True, "boards"
+    ),
+    Workspace(
+        "dataset", "Dataset", "Labelled images of drawn scenes, by the thousand", False, LABELLING, True, "contact"
+    ),
 )
 """In the order of the switch; the 3D view takes what the columns leave."""
 
@@ -96,9 +100,8 @@ def first_state(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Work
     shown = {name for column in wanted.columns for name, _ in column.docks}
     for name, dock in empty.items():
         if name not in shown:
-            model.addDockWidget(BOTTOM if name in WIDE else RIGHT, dock)
+            model.addDockWidget(RIGHT, dock)
             dock.hide()
-    model.tabifyDockWidget(empty[WIDE[0]], empty[WIDE[1]])
     for column in wanted.columns:
         beside = Qt.Orientation.Horizontal if column.area == BOTTOM else Qt.Orientation.Vertical
         before: QDockWidget | None = None
@@ -109,8 +112,8 @@ def first_state(window: QMainWindow, docks: dict[str, QDockWidget], wanted: Work
                 model.splitDockWidget(before, empty[name], beside)
             before = empty[name]
             empty[name].show()
-    for name, behind in wanted.before:
-        model.tabifyDockWidget(empty[behind], empty[name])
+    for name in CALLED:
+        model.tabifyDockWidget(empty[wanted.behind], empty[name])
         empty[name].hide()
     return model.saveState(VERSION)
 

@@ -35,7 +35,7 @@ class ColourBar(QWidget):
         self.title, self.unit, self.note = "", "", ""
         self.scale = ColourScale()
         self.limits = (-1.0, 1.0)
-        self.units = {"error": "\u00b5m", "height": "mm", "deviation": "\u00b5m"}
+        self.units = {"error": "\u00b5m", "height": "mm", "deviation": "\u00b5m", "map": "mm"}
         """In which lengths of each meaning are told."""
         self.meaning = "error"
         self._held: bool | None = None
@@ -75,7 +75,7 @@ class ColourBar(QWidget):
                 action.setCheckable(True)
                 action.setChecked(unit == self.unit)
                 action.triggered.connect(lambda _=False, unit=unit: self._choose_unit(unit))
-        if self.meaning != "deviation":
+        if self.meaning in ("error", "height"):
             made.addSeparator()
             for title, by_height in (("By the error", False), ("By the height", True)):
                 action = made.addAction(title)

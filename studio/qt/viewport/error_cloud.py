@@ -5,6 +5,8 @@ Pointing at one marks its scan line.
 
 from __future__ import annotations
 
+from operator import is_
+
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
@@ -23,6 +25,7 @@ from studio.scan.point_sample import PointSample
 from studio.scan.redevelop import is_stale
 from studio.scan.remarks import best
 from studio.scan.result_series import ERROR_VIEWS, ErrorView
+from studio.scan.scan import Measurement
 
 POINT_PX, RIM_PX, MARK_PX, NEAR_PX = 3.5, 5.5, 9.0, 9.0
 OFFSET, RIM_OFFSET = -80.0, -60.0
@@ -55,6 +58,8 @@ class ErrorCloud(QObject):
         """At which the points were measured, to the scanner's image."""
         self._clouds: list[Cloud] = []
         self._of_scan = False
+        self._measured: list[Measurement] = []
+        """Whose points are drawn, of a single frame."""
         self._sample, self._scan_scale = PointSample(), 1.0
         self._data, self._actor = _point_actor(POINT_PX)
         self._marks, self._mark_actor = _point_actor(MARK_PX)
@@ -117,7 +122,7 @@ class ErrorCloud(QObject):
 
     def clear(self) -> None:
         """Nothing is shown, until something is measured."""
-        self._clouds, self._of_scan = [], False
+        self._clouds, self._measured, self._of_scan = [], [], False
         self._draw()
 
     def begin_scan(self, image_scale: float) -> None:
@@ -142,10 +147,15 @@ class ErrorCloud(QObject):
         """The points of the shown render, by the project's own method; of a scan those of all its steps, or of one."""
         render = self.session.shown
         if render is not None and render.scan is not None and render.scan.measured and self.all_steps:
-            self._clouds = [render.scan.points]
+            self._clouds, self._measured = [render.scan.points], []
             self._pixel_errors = [np.full(len(self._clouds[0]["x"]), np.nan)]
         elif render is not None and render.measurements:
             found, scene = best(render.measurements, self.session.project), render.project.scene
+            drawn = self._measured
+            if not self._of_scan and len(found) == len(drawn) and all(map(is_, found, drawn)):
+                self._show_or_hide()  # more light came, and nothing is measured of it yet
+                return
+            self._measured = list(found)
             self._clouds = [cloud(one.points, one.errors, one.laser, one.step, scene) for one in found]
             self._pixel_errors = [one.errors.position[one.points.valid] for one in found]
         else:
@@ -203,10 +213,12 @@ class ErrorCloud(QObject):
 
     def _show_or_hide(self) -> None:
         shown = len(self.points) > 0 and (self.pinned or self._of_scan or not self._stale())
+        changed = shown != self.visible
         for actor in (self._rim, self._actor, self._mark_actor):
             actor.SetVisibility(shown)
         self.bar.setVisible(shown)
-        self.view.redraw()
+        if changed:
+            self.view.redraw()
 
     def _follow_step(self) -> None:
         motion = self.session.project.scene.motion

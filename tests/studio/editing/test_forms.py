@@ -76,10 +76,10 @@ class TestDescription:
     def test_every_quantity_has_the_unit_that_people_use_for_it(self, project: Project) -> None:
         fields = [field for field in describe(project.scene.camera) if field.kind == "number"]
         shown = {field.name: field.unit.with_unit(field.value) for field in fields}
-        assert shown["pixel_pitch"] == "3.45 um"
+        assert shown["pixel_pitch"] == "3.45 µm"
         assert shown["focal_length"] == "12 mm"
         assert spec(Divergence(), "full_angle").unit.with_unit(1.15e-3) == "1.15 mrad"
-        assert spec(Waist(), "radius").unit.with_unit(1e-4) == "100 um"
+        assert spec(Waist(), "radius").unit.with_unit(1e-4) == "100 µm"
         assert spec(project.scene.lasers[0], "fan_angle").unit.with_unit(math.radians(45)) == "45 deg"
         assert spec(project.scene.lasers[0], "wavelength_nm").unit.with_unit(450.0) == "450 nm"
         assert spec(project.sensor, "exposure_time").unit.with_unit(0.0038) == "3.8 ms"

@@ -123,11 +123,15 @@ def test_no_workspace_makes_the_window_larger_than_a_small_screen_at_1_5(window:
     window.session.add_render(Render(1, small_project(), world, frame))
     grown = []
     window.resize(size)
-    for key in ("setup", "render", "measure", "study", "calibrate", "setup", "measure", "render", "setup"):
+    for key in ("setup", "render", "measure", "study", "calibrate", "dataset", "setup", "measure", "render", "setup"):
         window.switch_to(key)
         for item in ITEMS if key == "setup" else ():
             window.session.select(item)
             QApplication.processEvents()
+        for _ in range(3):
+            QApplication.processEvents()
+        for called in ("motion", "log"):  # what a command shows beside what is there
+            window.call_panel(called)
         for _ in range(3):
             QApplication.processEvents()
         if window.size() != size:

@@ -1,0 +1,256 @@
+"""The height map of the scan that is shown: its picture, the cells under the mouse, and a profile along a line."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QTimer
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import (
+    QDoubleSpinBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from analysis.height_map import HeightMap, along, encoded
+from analysis.report.colour import method_colour
+from render.base.errors import InputError
+from render.output.tone_mapping import pyramid
+from studio.qt.core import theme
+from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.session import Session
+from studio.qt.core.widgets import ElidedLabel, text_button, upper_and_lower
+from studio.qt.image.image_item import PictureView
+from studio.qt.results import plots
+from studio.qt.viewport.colour_bar import ColourBar
+from studio.runtime.error_messages import trouble
+from studio.runtime.jobs import Job
+from studio.scan.colour_scale import PER_METRE, ColourScale
+from studio.scan.height_map import picture, points_of, read_map, sigma_record, sigma_sentence, write_made
+from studio.scan.scan_results import ScanResults
+
+LANE = "height map"
+NOTHING = "A height map is of a scan: run one (F6, Motion), or open the results of one."
+FILES = "16 bit PNG (*.png);;16 bit TIFF (*.tif *.tiff)"
+HINT = "Drag the line or its ends for another profile; the wheel zooms, a double click shows all."
+REST_MS = 400
+BAR_TIP = "Drag an end to another value; a double click brings back the percentile. Right click: percentiles, mm or µm"
+BAR_PX = 136
+"""Beside the picture, for its colour bar."""
+LEAST_PX, TOLD_PX = 300, 240
+FULL_SHARE = 100.0
+
+
+class HeightMapTab(QWidget):
+    """Made when it is looked at, for as long as the same scan is shown."""
+
+    def __init__(self, session: Session, runner: JobRunner) -> None:
+        super().__init__()
+        self.session, self.runner = session, runner
+        self.made: HeightMap | None = None
+        self._line = ""
+        """What is told of the profile."""
+        self._scan: ScanResults | None = None
+        """Of which the map is, or will be."""
+        self.scale = ColourScale(about_zero=False, share=FULL_SHARE)
+        self.pitch = QDoubleSpinBox(decimals=4, minimum=0.0, maximum=1000.0, singleStep=0.05)
+        self.pitch.setSuffix(" mm")
+        self.pitch.setSpecialValueText("as many cells as points")
+        self.pitch.setToolTip("Width of a cell")
+        self.pitch.setKeyboardTracking(False)
+        self.export = text_button(
+            "Export…", "16 bit, with scale, offset and the value of no height in a file beside it"
+        )
+        self.view = PictureView()
+        self.view.setToolTip(HINT)
+        self.view.item.grid = False
+        held = QWidget()
+        row = QHBoxLayout(held)
+        row.setContentsMargins(0, 0, BAR_PX, 0)
+        row.addWidget(self.view)
+        self.bar = ColourBar(held)
+        self.bar.setToolTip(BAR_TIP)
+        self.line = pg.LineSegmentROI([(0.0, 0.0), (1.0, 0.0)])
+        self.view.box.addItem(self.line, ignoreBounds=True)
+        self.graph = pg.GraphicsLayoutWidget()
+        self.plot = plots.new_plot("Along the line / mm", "Height", "mm")
+        self.graph.addItem(self.plot)
+        self.profile = plots.curve(method_colour("likelihood"))
+        self.plot.addItem(self.profile)
+        self.read = ElidedLabel()
+        self.told = QLabel(wordWrap=True)
+        self.told.setObjectName("muted")
+        self.told.setMinimumWidth(TOLD_PX)
+        self.split = upper_and_lower(held, self.graph, (300, 140))
+        self.split.setMinimumHeight(LEAST_PX)
+        # what scrolls is as high as it asks for: the pictures ask for next to nothing, and take what there is
+        self.split.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)
+        self._rest = QTimer(self, singleShot=True, interval=REST_MS)
+        self._rest.timeout.connect(self.make)
+        self._lay_out()
+        self.pitch.valueChanged.connect(lambda _: self._rest.start())
+        self.export.clicked.connect(self._ask)
+        self.bar.scaled.connect(self._rescale)
+        self.bar.unit_chosen.connect(self._draw)
+        self.line.sigRegionChanged.connect(self._show_profile)
+        self._hover = pg.SignalProxy(self.view.scene().sigMouseMoved, rateLimit=30, slot=self._moved)
+        self.view.scene().sigMouseClicked.connect(lambda event: self.view.fit() if event.double() else None)
+        runner.failed.connect(self._tell_failure)
+        theme.notice.changed.connect(self._repaint)
+        for signal in (session.renders_changed, session.measured):
+            signal.connect(self.refresh)
+        self._repaint()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Another scan is shown, or none: its map is made when the tab is looked at."""
+        render = self.session.shown
+        scan = None if render is None or render.scan is None or not render.scan.measured else render.scan
+        if scan is not None and scan is self._scan:
+            return
+        self._scan = scan
+        self._take(None)
+        self.told.setText(NOTHING if scan is None else "")
+        self.pitch.setEnabled(scan is not None)
+        if self.isVisible():
+            self.make()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        if self.made is None:
+            self._rest.start(0)
+
+    def make(self) -> None:
+        """In the background; the last pitch counts."""
+        scan = self._scan
+        if scan is None:
+            return
+        folder, pitch = scan.found.folder, 1e-3 * self.pitch.value() or None
+        self.told.setText("Making the height map…")
+
+        def then(made: HeightMap) -> None:
+            if scan is self._scan:
+                self._take(made)
+
+        self.runner.run(LANE, "height map", lambda progress, cancelled: read_map(points_of(folder), pitch), then)
+
+    def write(self, path: Path) -> None:
+        """InputError: there is no map, or as of `write_made`."""
+        if self.made is None or self._scan is None:
+            raise InputError("there is no height map yet")
+        files = write_made(self.made, path, points_of(self._scan.found.folder)).paths
+        self.session.message.emit("info", f"Wrote {', '.join(str(file) for file in files)}")
+
+    def _take(self, made: HeightMap | None) -> None:
+        before, self.made = self.made, made
+        self.split.setVisible(made is not None)
+        self.read.setVisible(made is not None)
+        self.export.setEnabled(made is not None)
+        if made is None:
+            return
+        self._draw()
+        rows, columns = made.heights.shape
+        if before is None or before.heights.shape != made.heights.shape:
+            self.view.fit()
+            middle, edge = 0.5 * (rows - 1), 0.1 * (columns - 1)
+            for handle, column in zip(self.line.getHandles(), (edge, columns - 1 - edge), strict=True):
+                self.line.movePoint(handle, (column, middle), coords="parent")
+        self._show_profile()
+        size = f"{columns} x {rows} cells of {1e3 * made.pitch:.4g} mm of {made.points} points, "
+        share = f"{np.isfinite(made.heights).mean():.1%} with a height"
+        texts = [size + share]
+        if np.isfinite(made.heights).any():
+            texts.append(sigma_sentence(sigma_record(made, encoded(made.heights)[1])).replace(" um", " µm"))
+        self.told.setText("\n".join(texts))
+
+    def _draw(self) -> None:
+        if self.made is None:
+            return
+        unit = self.bar.unit_of("map")
+        factor = PER_METRE[unit]
+        limits = self.bar.show_scale("Height", unit, self.scale, factor * self.made.heights.ravel())
+        low, high = (1e3 / factor * limit for limit in limits)
+        rows, columns = self.made.heights.shape
+        self.view.item.set_levels(pyramid(picture(self.made, self.scale, (low, high))), (columns, rows))
+
+    def _rescale(self, scale: ColourScale) -> None:
+        self.scale = scale
+        self._draw()
+
+    def _show_profile(self) -> None:
+        if self.made is None:
+            return
+        ends = [self.line.mapToParent(handle.pos()) for handle in self.line.getHandles()]
+        start, end = ((point.x(), point.y()) for point in ends)
+        distance, height = along(self.made, start, end)
+        self.profile.setData(1e3 * distance, 1e3 * height)
+        self.plot.enableAutoRange()
+        known = height[np.isfinite(height)]
+        step = f", its ends differ by {1e3 * (known[-1] - known[0]):+.4f} mm" if len(known) > 1 else ""
+        self._line = f"Line of {1e3 * distance[-1]:.3f} mm{step}"
+        self.read.setText(self._line)
+
+    def _moved(self, event: tuple[QPointF]) -> None:
+        """Tell the cell under the mouse."""
+        made = self.made
+        if made is None:
+            return
+        where = self.view.box.mapSceneToView(event[0])
+        column, row = round(where.x()), round(where.y())
+        rows, columns = made.heights.shape
+        if not (0 <= row < rows and 0 <= column < columns):
+            self.read.setText(self._line)
+            return
+        x, y = made.x + column * made.pitch, made.y - row * made.pitch
+        z = float(made.heights[row, column])
+        told = f"z {1e3 * z:.4f} mm" if math.isfinite(z) else "no surface here"
+        self.read.setText(f"x {1e3 * x:.3f} mm   y {1e3 * y:.3f} mm   {told}")
+
+    def _tell_failure(self, job: Job[object]) -> None:
+        if job.name == LANE and job.problem is not None:
+            self.told.setText(job.problem.text)
+
+    def _repaint(self) -> None:
+        c = theme.colours()
+        for widget in (self.view, self.graph):
+            widget.setBackground(c.base)
+        plots.paint(self.plot)
+        self.line.setPen(pg.mkPen(c.accent, width=2))
+        self.line.hoverPen = pg.mkPen(c.accent, width=3)
+        self._show_profile()
+
+    def _ask(self) -> None:
+        start = f"{self.session.project.name.replace('/', '-')} height map.png"
+        chosen, kind = QFileDialog.getSaveFileName(self.window(), "Export", start, FILES)
+        if not chosen:
+            return
+        path = Path(chosen)
+        if not path.suffix:
+            path = path.with_name(path.name + (".tif" if "TIFF" in kind else ".png"))
+        try:
+            self.write(path)
+        except InputError as error:
+            show_trouble(self.window(), trouble(error, "export the height map"))
+
+    def _lay_out(self) -> None:
+        form = QFormLayout()
+        row = QHBoxLayout()
+        row.addWidget(self.pitch, 1)
+        row.addWidget(self.export)
+        form.addRow("Cells", row)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(8, 8, 8, 8)
+        column.addLayout(form)
+        column.addWidget(self.split, 1)
+        column.addWidget(self.read)
+        column.addWidget(self.told)
+        column.addStretch(0)

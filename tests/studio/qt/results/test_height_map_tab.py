@@ -1,0 +1,117 @@
+"""The height map in the window: the picture, the cell under the mouse and the profile are those of the map itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PySide6.QtCore import QPointF
+from pytestqt.qtbot import QtBot
+
+from analysis.height_map import along, height_map
+from render.scene.motion import LinearStage
+from studio.project.document import Document, replaced
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Render, Session
+from studio.qt.results.height_map_tab import NOTHING, HeightMapTab
+from studio.scan.deviation import read_cloud
+from studio.scan.options import ScanOptions
+from studio.scan.scan import run_scan
+from studio.scan.scan_folder import open_folder
+from tests.studio.qt.small_session import small_project as one_frame
+from tests.studio.qt.small_session import small_render
+from tests.studio.scan_of_steps import SCALE, small_project
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Three steps across the line."""
+    folder = tmp_path_factory.mktemp("across")
+    file = folder / "project" / "steps.json"
+    stage = LinearStage(step=(0.004, 0.0, 0.0), steps=3)
+    project = replaced(small_project(), ("scene", "motion"), stage).save(file)
+    run_scan(project, file.parent, out=folder / "scan", options=ScanOptions(image_scale=SCALE, report=False))
+    return file, folder / "scan"
+
+
+@pytest.fixture
+def session(scanned: tuple[Path, Path], qtbot: QtBot) -> Iterator[Session]:
+    found = open_folder(scanned[1])
+    made = Session(Document(found.project, scanned[0]))
+    steps = scan_steps(made)
+    steps.show(found)
+    qtbot.waitUntil(lambda: made.shown is not None)
+    yield made
+    steps.close()
+
+
+@pytest.fixture
+def tab(session: Session, qtbot: QtBot) -> Iterator[HeightMapTab]:
+    runner = JobRunner()
+    made = HeightMapTab(session, runner)
+    qtbot.addWidget(made)
+    made.resize(420, 700)
+    made.show()
+    qtbot.waitUntil(lambda: made.made is not None)
+    yield made
+    runner.close()
+
+
+def test_it_is_the_map_of_the_scans_points(tab: HeightMapTab, scanned: tuple[Path, Path], qtbot: QtBot) -> None:
+    made = tab.made
+    assert made is not None
+    points = read_cloud(scanned[1] / "points.ply")
+    expected = height_map(points)
+    np.testing.assert_array_equal(made.heights, expected.heights)
+    rows, columns = made.heights.shape
+    assert tab.view.item.size == (columns, rows) and f"{columns} x {rows} cells" in tab.told.text()
+    assert f"{made.sigma_cells / made.sigma_points:.2f} of a point's" in tab.told.text()
+    low, high = tab.bar.limits
+    assert (low, high) == pytest.approx((1e3 * np.nanmin(made.heights), 1e3 * np.nanmax(made.heights)))
+    # another width of the cells
+    tab.pitch.setValue(2e3 * made.pitch)
+    qtbot.waitUntil(lambda: tab.made is not made)
+    assert tab.made is not None and tab.made.pitch == pytest.approx(2.0 * made.pitch)
+
+
+def test_the_mouse_reads_a_cell_and_the_line_its_profile(tab: HeightMapTab) -> None:
+    made = tab.made
+    assert made is not None
+    row, column = (int(one[0]) for one in np.nonzero(np.isfinite(made.heights)))
+    tab._moved((tab.view.box.mapViewToScene(QPointF(column, row)),))
+    assert f"z {1e3 * made.heights[row, column]:.4f} mm" in tab.read.text()
+    assert f"x {1e3 * (made.x + column * made.pitch):.3f} mm" in tab.read.text()
+    row, column = (int(one[0]) for one in np.nonzero(np.isnan(made.heights)))
+    tab._moved((tab.view.box.mapViewToScene(QPointF(column, row)),))
+    assert "no surface" in tab.read.text()
+    rows, columns = made.heights.shape
+    ends = (0.0, 0.0), (columns - 1.0, rows - 1.0)
+    for handle, end in zip(tab.line.getHandles(), ends, strict=True):
+        tab.line.movePoint(handle, end, coords="parent")
+    distance, height = along(made, *ends)
+    x, z = tab.profile.getData()
+    np.testing.assert_allclose(x, 1e3 * distance)
+    np.testing.assert_allclose(z, 1e3 * height)
+    assert height[0] == pytest.approx(made.heights[0, 0], nan_ok=True)
+    assert distance[-1] == pytest.approx(made.pitch * np.hypot(columns - 1, rows - 1))
+
+
+def test_what_it_writes_reads_back_as_what_it_shows(tab: HeightMapTab, tmp_path: Path) -> None:
+    made, file = tab.made, tmp_path / "map.tif"
+    assert made is not None
+    tab.write(file)
+    beside = json.loads(file.with_suffix(".json").read_text())
+    numbers = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
+    heights = np.where(numbers > 0, beside["offset"] + beside["scale"] * numbers.astype(float), np.nan)
+    np.testing.assert_allclose(heights, made.heights, atol=0.5001 * beside["scale"], rtol=0.0)
+
+
+def test_a_single_frame_has_none_and_is_told_so(tab: HeightMapTab) -> None:
+    world, frame = small_render()
+    tab.session.add_render(Render(2, one_frame(), world, frame))
+    assert tab.made is None and tab.told.text() == NOTHING and not tab.export.isEnabled()
