@@ -1,12 +1,13 @@
-"""What a study keeps of a cell beside its numbers, for charts that show the thing itself: a profile, or the image.
+"""What is kept of a cell beside its numbers: a profile or the image, for charts that show the thing itself, or errors.
 
-Of the first repeat alone, in the row; rounded far below what a figure shows.
+A chart's is of the first repeat alone, in the row, rounded far below what a figure shows.
 """
 
 from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from render.sensor.develop import Image
 
 KEPT = ("profile", "pictures")
 """Charts that need something kept."""
+ERRORS = "errors"
+"""Kept for a comparison of two projects, point by point."""
 ROW = "kept"
 """Of a row, what is kept of its cell."""
 WIDEST = 640
@@ -37,6 +40,12 @@ def profile(points: Points, errors: Errors, curve: LaserCurve) -> dict[str, list
         "true_position": np.round(curve.position, 3).tolist(),
         "true_depth": np.round(curve.depth_z, 7).tolist(),
     }
+
+
+def on_the_line(errors: Errors, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """Depth errors (m) of the points on the line by its crossing, and the seconds of each stage of the render."""
+    right = np.isfinite(errors.depth) & ~errors.outlier
+    return {"crossing": errors.truth[right].tolist(), "error": errors.depth[right].tolist(), "stages": dict(seconds)}
 
 
 def picture(image: Image) -> str:
