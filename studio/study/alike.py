@@ -3,7 +3,9 @@
 Bias and sigma are those of the points that both measure on the line, each at the same crossing of the exact line. A
 point off it, on a reflection that outshines the line, say, errs by a thousand times a right one: a single one would
 decide a sigma, and whether it is there hangs on a little noise. So wrong rows are a share of their own, of the rows on
-which the line can be seen, and so are the rows that are measured at all.
+which the line can be seen, and so are the rows that are measured on it. A point whose predicted sigma is more than a
+pixel tells itself that it may be anywhere, and is wrong wherever it lies. Right and wrong are told by the exact line
+and by each run's own sigma, never by how well the two agree, which would leave out the very changes that are asked for.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ class Run:
     error: Float
     """(n,) m, in depth."""
     wrong: float
-    """Rows with a point off the line or where none can be seen, over those where it can; NaN: nothing is measured."""
+    """Rows with a point off the line, over those on which it can be seen; NaN: nothing is measured."""
     completeness: float
     seconds: float
     """Processor time of a frame."""
@@ -48,15 +50,14 @@ class Run:
 
 def run_of(row: Mapping[str, Any]) -> Run:
     """Of a row of `measure_task` that kept "errors", with its seconds."""
-    kept = row.get(ROW, {"crossing": [], "error": [], "stages": {}})
-    wrong = row["wrong_rows"] + row["false_rows"] / max(row["visible_rows"], 1e-9)
+    kept = row.get(ROW, {"crossing": [], "error": [], "wrong": np.nan, "complete": np.nan, "stages": {}})
     seconds, rendering = float(seconds_of([dict(row)], "frame")[0]), row.get("seconds_render", np.nan)
     wall = max(sum(kept["stages"].values()), 1e-9)
     return Run(
         np.array(kept["crossing"], dtype=np.int64),
         np.array(kept["error"], dtype=np.float64),
-        float(wrong),
-        float(row["completeness"]),
+        float(kept["wrong"]),
+        float(kept["complete"]),
         seconds,
         {name: rendering * share / (wall * seconds) for name, share in kept["stages"].items()},
         str(row.get("reason") or ""),

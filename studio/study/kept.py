@@ -23,6 +23,8 @@ ERRORS = "errors"
 """Kept for a comparison of two projects, point by point."""
 ROW = "kept"
 """Of a row, what is kept of its cell."""
+UNKNOWN = 1.0
+"""px of predicted sigma: as far off a point counts as wrong (`analysis.error.Errors.outlier`)."""
 WIDEST = 640
 """px of a picture."""
 
@@ -42,10 +44,23 @@ def profile(points: Points, errors: Errors, curve: LaserCurve) -> dict[str, list
     }
 
 
-def on_the_line(errors: Errors, seconds: Mapping[str, float]) -> dict[str, Any]:
-    """Depth errors (m) of the points on the line by its crossing, and the seconds of each stage of the render."""
-    right = np.isfinite(errors.depth) & ~errors.outlier
-    return {"crossing": errors.truth[right].tolist(), "error": errors.depth[right].tolist(), "stages": dict(seconds)}
+def on_the_line(points: Points, errors: Errors, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """Depth errors (m) of the points on the line by its crossing, and the seconds of each stage of the render.
+
+    wrong: rows with a point off the line, on no line, or that tells itself to be as far off as a wrong one, by its
+    sigma; complete: rows with a point on the line. Both over the rows on which it can be seen.
+    """
+    unknown = points.sigma_pixel > UNKNOWN
+    right = np.isfinite(errors.depth) & ~errors.outlier & ~unknown
+    wrong = np.unique(points.index[errors.outlier | (np.isfinite(errors.depth) & unknown)])
+    visible = max(errors.truth_rows, 1)
+    return {
+        "crossing": errors.truth[right].tolist(),
+        "error": errors.depth[right].tolist(),
+        "wrong": (len(wrong) + errors.false_rows) / visible,
+        "complete": len(np.unique(points.index[right])) / visible,
+        "stages": dict(seconds),
+    }
 
 
 def picture(image: Image) -> str:

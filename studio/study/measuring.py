@@ -104,7 +104,7 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
             found["facet_error"] = facet_error(frame.project.scene, curve)
             found |= _of_the_part(project, frame, line, points, errors)
             if cell.kept == ERRORS:
-                found[KEPT_ROW] = on_the_line(errors, frame.seconds)
+                found[KEPT_ROW] = on_the_line(points, errors, frame.seconds)
             elif cell.kept:
                 found[KEPT_ROW] = profile(points, errors, curve) if cell.kept == "profile" else picture(image)
         except InputError as error:

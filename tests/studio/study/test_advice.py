@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from studio.study import advice
 from studio.study.advice import MOST_PROOFS, SCREENED, Proof, Question, advise
 from studio.study.alike import Change, Run, change
 from studio.study.cheaper_parts import AMBIENT, DIRECT, REFLECTED, TRUTH, parts_of
-from studio.study.measures import MEASURES
+from studio.study.kept import on_the_line
 from studio.study.measuring import Task
 from tests.studio.small_scan import small_project
 
@@ -61,10 +62,10 @@ def as_if(monkeypatch: pytest.MonkeyPatch) -> AsIf:
             seconds += 8.0 * (render.goal is None)
             share = {DIRECT: 0.3, REFLECTED: 0.3, AMBIENT: 0.3, TRUTH: 0.01}
             kept = {"crossing": list(range(off, ROWS)), "error": error[off:].tolist(), "stages": share}
-            row = {**dict.fromkeys(MEASURES, 1.0), "kept": kept, "reason": ""}
-            row |= {"wrong_rows": off / ROWS, "false_rows": 0.0, "completeness": 1.0 - off / ROWS}
+            kept |= {"wrong": off / ROWS, "complete": 1.0 - off / ROWS}
+            row = {"kept": kept, "reason": ""}
             if not np.isfinite(error).all():
-                row = {**dict.fromkeys(MEASURES, float("nan")), "reason": "all is dark"}
+                row = {"reason": "all is dark"}
             return [(cell.key, row, {"seconds_render": seconds, "seconds_develop": 0.0, "seconds_extract": 0.0})]
 
         monkeypatch.setattr(advice, "measure_task", measure_task)
@@ -145,6 +146,20 @@ def test_wrong_rows_decide_no_sigma_and_are_a_change_of_their_own(as_if: AsIf) -
     direct = tried["one surface only"]
     assert direct.found.wrong.mean == pytest.approx(0.08) and abs(direct.found.sigma.mean) < 0.005
     assert not direct.taken and tried["no caustics"].part.values == {"render.transport": "interreflection"}
+
+
+def test_a_point_that_says_to_be_anywhere_is_wrong_wherever_it_lies() -> None:
+    index = np.array([0, 1, 2, 3, 4, 9])
+    sigma = np.array([0.01, 0.02, 19.0, 0.01, np.nan, 0.01])
+    depth = np.array([1e-5, 2e-5, 1e-5, 0.3, 3e-5, np.nan])  # the last is on a row without a line
+    outlier = np.array([False, False, False, True, False, False])
+    points: Any = SimpleNamespace(sigma_pixel=sigma, index=index)
+    errors: Any = SimpleNamespace(
+        depth=depth, outlier=outlier, truth=np.array([0, 1, 2, 3, 4, -1]), truth_rows=8, false_rows=1
+    )
+    found = on_the_line(points, errors, {DIRECT: 2.0})
+    assert found["crossing"] == [0, 1, 4] and found["error"] == [1e-5, 2e-5, 3e-5]
+    assert found["wrong"] == 3 / 8 and found["complete"] == 3 / 8
 
 
 def test_a_change_is_of_the_points_that_both_have() -> None:
