@@ -98,7 +98,7 @@ def _sentence(proof: Proof, share: float) -> str:
     return (
         f"{parts}: on {len(proof.seeds)} fresh seeds bias changes by {_percent(found.bias)}, sigma by "
         f"{_percent(found.sigma)}, completeness by {_percent(found.completeness)} and wrong rows, {_wrong(found)}, by "
-        f"{_percent(found.wrong)} of all (95 % intervals), {within}; {found.seconds:.3g} s in place of "
+        f"{_percent(found.wrong)} of the rows to be seen (95 % intervals), {within}; {found.seconds:.3g} s in place of "
         f"{found.seconds_before:.3g} s a frame{pays}."
     )
 
@@ -107,7 +107,7 @@ def _wrong(found: Change) -> str:
     """Before and after."""
     if not math.isfinite(found.wrong_after):
         return "measures nothing"
-    return f"{100.0 * found.wrong_before:.2g} to {100.0 * found.wrong_after:.2g} %"
+    return f"from {100.0 * found.wrong_before:.2g} to {100.0 * found.wrong_after:.2g} %"
 
 
 def _seconds(found: Change) -> str:
