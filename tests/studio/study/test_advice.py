@@ -125,15 +125,18 @@ def test_parts_that_only_do_harm_together_are_found_by_the_proof_and_some_are_gi
         return 1.0 + 0.05 * (render.transport == "direct" and not finer and project.seed >= PLANE.seed + SCREENED)
 
     seen = as_if(sigma)
-    found = advise(PLANE, QUESTION)
+    whole = PLANE.replaced({"render.goal": None, "render.transport": "subsurface"})
+    found = advise(whole, QUESTION)
     assert [proof.holds for proof in found.proofs] == [False, True]
     first, second = found.proofs
     assert len(first.seeds) == 4 and not first.alike  # half of the seeds refute it
     assert second.seeds[:4] == first.seeds and len(second.seeds) == 8
-    cheaper = found.project(PLANE).render
-    assert cheaper.transport == "direct" and cheaper.laser_error == PLANE.render.laser_error
+    # goal and transport are given up last
+    cheaper = found.project(whole).render
+    assert cheaper.goal is not None and cheaper.transport == "direct"
+    assert cheaper.laser_error == PLANE.render.laser_error
     # both are held against the same originals
-    assert sum(one.render == PLANE.render for one in seen) == SCREENED + QUESTION.seeds
+    assert sum(one.render == whole.render for one in seen) == SCREENED + QUESTION.seeds
 
 
 def test_wrong_rows_decide_no_sigma_and_are_a_change_of_their_own(as_if: AsIf) -> None:
