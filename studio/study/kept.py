@@ -1,12 +1,13 @@
-"""What a study keeps of a cell beside its numbers, for charts that show the thing itself: a profile, or the image.
+"""What is kept of a cell beside its numbers: a profile or the image, for charts that show the thing itself, or errors.
 
-Of the first repeat alone, in the row; rounded far below what a figure shows.
+A chart's is of the first repeat alone, in the row, rounded far below what a figure shows.
 """
 
 from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,12 @@ from render.sensor.develop import Image
 
 KEPT = ("profile", "pictures")
 """Charts that need something kept."""
+ERRORS = "errors"
+"""Kept for a comparison of two projects, point by point."""
 ROW = "kept"
 """Of a row, what is kept of its cell."""
+UNKNOWN = 1.0
+"""px of predicted sigma: as far off a point counts as wrong (`analysis.error.Errors.outlier`)."""
 WIDEST = 640
 """px of a picture."""
 
@@ -36,6 +41,25 @@ def profile(points: Points, errors: Errors, curve: LaserCurve) -> dict[str, list
         "true_line": curve.index.tolist(),
         "true_position": np.round(curve.position, 3).tolist(),
         "true_depth": np.round(curve.depth_z, 7).tolist(),
+    }
+
+
+def on_the_line(points: Points, errors: Errors, seconds: Mapping[str, float]) -> dict[str, Any]:
+    """Depth errors (m) of the points on the line by its crossing, and the seconds of each stage of the render.
+
+    wrong: rows with a point off the line, on no line, or that tells itself to be as far off as a wrong one, by its
+    sigma; complete: rows with a point on the line. Both over the rows on which it can be seen.
+    """
+    unknown = points.sigma_pixel > UNKNOWN
+    right = np.isfinite(errors.depth) & ~errors.outlier & ~unknown
+    wrong = np.unique(points.index[errors.outlier | (np.isfinite(errors.depth) & unknown)])
+    visible = max(errors.truth_rows, 1)
+    return {
+        "crossing": errors.truth[right].tolist(),
+        "error": errors.depth[right].tolist(),
+        "wrong": (len(wrong) + errors.false_rows) / visible,
+        "complete": len(np.unique(points.index[right])) / visible,
+        "stages": dict(seconds),
     }
 
 

@@ -28,8 +28,8 @@ from studio.project.project import Project
 from studio.scan.gauging import profiles
 from studio.scan.stages import Measurement, scaled_sensor
 from studio.study.boards import Boards
+from studio.study.kept import ERRORS, on_the_line, picture, profile
 from studio.study.kept import ROW as KEPT_ROW
-from studio.study.kept import picture, profile
 from studio.study.measures import MEASURES, measures, of_the_part
 from studio.study.ray_units import RAY_SPEED, rays_per_second
 from studio.study.render_cache import forget, rendered
@@ -79,7 +79,9 @@ def measure_task(task: Task, cancelled: Cancel = lambda: False) -> list[Row]:
             found: dict[str, Any] = dict(measures(line, points, errors, curve))
             found["facet_error"] = facet_error(frame.project.scene, curve)
             found |= _of_the_part(project, frame, line, points, errors)
-            if cell.kept:
+            if cell.kept == ERRORS:
+                found[KEPT_ROW] = on_the_line(points, errors, frame.seconds)
+            elif cell.kept:
                 found[KEPT_ROW] = profile(points, errors, curve) if cell.kept == "profile" else picture(image)
         except InputError as error:
             rows.append((cell.key, _nothing(str(error)), {"seconds_render": rendering, RAY_SPEED: rays_per_second()}))
