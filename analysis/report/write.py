@@ -227,7 +227,7 @@ def write_pdf(page: str, path: Path) -> None:
 def _motion(report: ReportInput) -> dict[str, Any] | None:
     """What carried the objects, where a calibration found it."""
     found = None if report.calibration is None else report.calibration.motion
-    return found and {"name": calibration.CARRIED[found.kind], "rows": calibration.motion_rows(found)}
+    return None if found is None else {"name": calibration.CARRIED[found.kind], "rows": calibration.motion_rows(found)}
 
 
 def _calibrations(report: ReportInput, frame: FrameResult) -> list[dict[str, Any]]:
