@@ -16,6 +16,7 @@ from analysis.calibration.estimate import Estimate, free_parameters
 from analysis.calibration.motion import Motion, Told, started, turned_about
 from analysis.calibration.next_pose import Advice, advise
 from analysis.calibration.observations import Observations, View, gather
+from analysis.calibration.odd_views import mirrored, refocused
 from analysis.calibration.robust import Adjusted, adjust_robustly
 from analysis.calibration.start import start
 from render.base.arrays import Bool, Float
@@ -82,7 +83,8 @@ class Calibrated:
 def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibrated:
     """views: each with eight corners or more; target (n, 2) m, all corners of the board.
 
-    InputError: too few views, or the views do not determine what is asked for; it tells what to photograph.
+    Views that are not of the camera as it was (`odd_views`) are left out and named. InputError: too few views, or the
+    views do not determine what is asked for; it tells what to photograph.
     """
     extent = np.stack([target.min(axis=0), target.max(axis=0)])
     seen = centroids = gather(views, extent)
@@ -119,6 +121,11 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
             found="; ".join(faults) if faults else str(error),
             cure="" if faults else "photograph the board at other tilts and distances",
         ) from None
+    odd = mirrored(views, adjusted, extent, request.size[0]) or refocused(adjusted)
+    if odd:
+        found = calibrate([view for view in views if view.name not in odd], target, request)
+        told = (*odd.values(), *found.adjusted.left_out)
+        return replace(found, adjusted=replace(found.adjusted, left_out=told))
     estimate, covariance = adjusted.solution.estimate, adjusted.solution.covariance
     middle = np.append(0.5 * (target.min(axis=0) + target.max(axis=0)), 0.0)
     distance = (estimate.rotation @ middle + estimate.translation)[:, 2]

@@ -259,7 +259,7 @@ def _undetermined(what: str, cure: str) -> InputError:
 def _stage(told: Float, step: Float) -> Moves:
     derivative = np.zeros((len(told), 3, 3, 4))
     derivative[:, np.arange(3), np.arange(3), 3] = told[:, None]
-    return Moves(np.broadcast_to(np.eye(3), (len(told), 3, 3)), told[:, None] * step, derivative)
+    return Moves(np.tile(np.eye(3), (len(told), 1, 1)), told[:, None] * step, derivative)
 
 
 def _hand_eye(motion: Float, parameters: Float) -> Moves:

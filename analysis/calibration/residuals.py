@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from analysis.calibration.estimate import Estimate
@@ -114,9 +115,31 @@ def _board_level(seen: Observations, estimate: Estimate, q: Float) -> tuple[Floa
 
 def _by_motion(moves: Moves, view: Index, by_point: Float, point: Float) -> Float:
     """(n, k, p) of k functions of points (n, 3) of some views (n,), whose derivatives by the point are (n, k, 3)."""
-    before = np.einsum("nji,nj->ni", moves.rotation[view], point - moves.shift[view])
-    lifted = np.concatenate([before, np.ones((len(before), 1))], axis=1)
-    return np.asarray(np.einsum("nki,npij,nj->nkp", by_point, moves.derivative[view], lifted, optimize=True))
+    given = (moves.rotation, moves.shift, moves.derivative, by_point, point)
+    return np.asarray(through_motion(view, *(np.ascontiguousarray(one) for one in given)))
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def through_motion(
+    view: Index, rotation: Float, shift: Float, derivative: Float, by_point: Float, point: Float
+) -> Float:
+    """What each parameter of a motion moves a point by, where it was placed, and what that does to functions of it."""
+    count, rows, size = len(view), by_point.shape[1], derivative.shape[1]
+    out, placed, moved = np.empty((count, rows, size)), np.empty(3), np.empty(3)
+    for i in range(count):
+        v = view[i]
+        for a in range(3):
+            placed[a] = 0.0
+            for b in range(3):
+                placed[a] += rotation[v, b, a] * (point[i, b] - shift[v, b])
+        for p in range(size):
+            for a in range(3):
+                by = derivative[v, p, a]
+                moved[a] = by[0] * placed[0] + by[1] * placed[1] + by[2] * placed[2] + by[3]
+            for row in range(rows):
+                by = by_point[i, row]
+                out[i, row, p] = by[0] * moved[0] + by[1] * moved[1] + by[2] * moved[2]
+    return out
 
 
 def board_points(seen: Observations, warp: Float, target: Float) -> tuple[Float, Float]:

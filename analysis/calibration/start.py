@@ -30,7 +30,7 @@ def start(
     if known is None:
         known = _camera(views, size, terms)
     intrinsics, distortion = known
-    rotation, translation = _poses(views, intrinsics, distortion)
+    rotation, translation = board_poses(views, intrinsics, distortion)
     estimate = Estimate(intrinsics, distortion, np.zeros(2), np.zeros((0, 3)), rotation, translation)
     planes = [_plane(views, estimate, laser) for laser in range(lasers)]
     return Estimate(intrinsics, distortion, np.zeros(2), np.array(planes).reshape(-1, 3), rotation, translation)
@@ -66,7 +66,8 @@ def _camera(views: Sequence[View], size: tuple[int, int], terms: int) -> tuple[F
     return intrinsics, distortion
 
 
-def _poses(views: Sequence[View], intrinsics: Float, distortion: Float) -> tuple[Float, Float]:
+def board_poses(views: Sequence[View], intrinsics: Float, distortion: Float) -> tuple[Float, Float]:
+    """(views, 3, 3) and (views, 3) m, from board to camera, of a camera that is known."""
     rotation, translation = np.empty((len(views), 3, 3)), np.empty((len(views), 3))
     for i, view in enumerate(views):
         flat = np.column_stack([view.target, np.zeros(len(view.target))])

@@ -23,6 +23,29 @@ COLUMNS = ("", "found", "sigma", "true", "off by, in sigmas")
 LENS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "taux", "tauy")
 
 
+MOTION: dict[str, tuple[tuple[str, float], ...]] = {
+    "stage": tuple((f"way {axis}, mm for each mm told", 1.0) for axis in "xyz"),
+    "turntable": (*((f"axis {axis}", 1.0) for axis in "xyz"), *((f"point {axis} mm", 1e3) for axis in "xyz")),
+    "hand_eye": (*((f"turn {axis} mrad", 1e3) for axis in "xyz"), *((f"place {axis} mm", 1e3) for axis in "xyz")),
+}
+"""Of each kind of motion its values' names, and what they are multiplied by."""
+CARRIED = {
+    "stage": "The stage, by the objects' way in the camera's frame",
+    "turntable": "The turntable, by its axis in the camera's frame and the point of it next to the camera",
+    "hand_eye": "The robot's hand, by the camera's pose in it, or in its base where it holds the objects",
+}
+
+
+@dataclass(frozen=True)
+class MotionFound:
+    """What puts the points of a scan's steps together: its kind, and (n,) values, sigmas and the scene's, m and rad."""
+
+    kind: str
+    values: Float
+    sigma: Float
+    true: Float
+
+
 @dataclass(frozen=True)
 class FoundCalibration:
     """Camera, laser planes (4,) and their covariances, as `triangulate` has them, that points were made with."""
@@ -30,6 +53,8 @@ class FoundCalibration:
     camera: Camera
     planes: tuple[Float, ...]
     covariances: tuple[Float | None, ...]
+    motion: MotionFound | None = None
+    """None: the scene's."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +84,19 @@ def parameter_rows(found: FoundCalibration, scene: Scene, laser: int) -> list[li
     if covariance is not None:
         spread[: len(covariance)] = np.sqrt(np.maximum(np.diag(covariance), 0.0))[: len(values)]
     spread[7] *= 1e3
-    rows = []
-    for name, value, sigma, truth in zip(names, values, spread, truths, strict=True):
-        digits = ".3f" if name.endswith("px") else ".6g"
-        off = f"{(value - truth) / sigma:+.1f}" if sigma > 0.0 else "-"
-        rows.append([name, f"{value:{digits}}", f"{sigma:.2g}" if sigma > 0.0 else "-", f"{truth:{digits}}", off])
-    return rows
+    return [_row(*each) for each in zip(names, values, spread.tolist(), truths, strict=True)]
+
+
+def motion_rows(found: MotionFound) -> list[list[str]]:
+    """Cells of `COLUMNS` for what carried the objects, or the scanner."""
+    each = zip(MOTION[found.kind], found.values, found.sigma, found.true, strict=True)
+    return [_row(name, scale * value, scale * sigma, scale * truth) for (name, scale), value, sigma, truth in each]
+
+
+def _row(name: str, value: float, sigma: float, truth: float) -> list[str]:
+    digits = ".3f" if name.endswith("px") else ".6g"
+    off = f"{(value - truth) / sigma:+.1f}" if sigma > 0.0 else "-"
+    return [name, f"{value:{digits}}", f"{sigma:.2g}" if sigma > 0.0 else "-", f"{truth:{digits}}", off]
 
 
 def depth_map(found: FoundCalibration, scene: Scene, laser: int, depths: Float) -> DepthMap | None:

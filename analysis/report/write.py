@@ -125,6 +125,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
         "gauge_reasons": gauge_table.reasons(list(report.measures)),
         "calibrations": calibrations,
         "calibration_columns": calibration.COLUMNS,
+        "motion_found": _motion(report),
         "measure_tables": measure_tables(report),
         "measure_columns": MEASURE_COLUMNS,
         "term_tables": term_tables(report),
@@ -221,6 +222,12 @@ def write_pdf(page: str, path: Path) -> None:
     logging.getLogger("weasyprint").setLevel(logging.ERROR)
     # the page refers to nothing outside itself; if it ever did, nothing would be fetched
     HTML(string=page, url_fetcher=URLFetcher(allowed_protocols=("data",))).write_pdf(path)
+
+
+def _motion(report: ReportInput) -> dict[str, Any] | None:
+    """What carried the objects, where a calibration found it."""
+    found = None if report.calibration is None else report.calibration.motion
+    return None if found is None else {"name": calibration.CARRIED[found.kind], "rows": calibration.motion_rows(found)}
 
 
 def _calibrations(report: ReportInput, frame: FrameResult) -> list[dict[str, Any]]:

@@ -44,6 +44,8 @@ class CalibrateOptions:
     motion: Path | None
     """Table of what carried the board."""
     hand: str
+    project: Path | None
+    """That takes on what photographs tell."""
 
 
 def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: bool, **given: Any) -> int:
@@ -55,6 +57,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     from studio.calibration.board_text import board_text, parse_board
     from studio.calibration.calibration_file import file_data, write_calibration
     from studio.calibration.in_silico import true_depth_error
+    from studio.calibration.into_project import into_project
     from studio.calibration.material import virtual, with_faults
     from studio.calibration.motion_file import motion_values
     from studio.commands.commands import load_project
@@ -104,6 +107,8 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     data = file_data(result, material.size, board_text(board))
     write_calibration(out, data)
     files = [str(out), *_exported(out, data, options.export)]
+    if options.project is not None:
+        files.append(str(into_project(options.project, data)))
     true = None if truth is None else true_depth_error(result, truth)
     if as_json:
         extra = {"errors": list(material.errors), "notes": list(material.notes), "files": files}
@@ -165,6 +170,9 @@ def _check_options(what: str, options: CalibrateOptions) -> None:
     if what not in PARTS and options.motion is not None:
         cure = "leave it out: a project's own motion carries a virtual board"
         raise InputError("a table of the motion is for photographs", where="--motion", found=what, cure=cure)
+    if what not in PARTS and options.project is not None:
+        cure = "leave it out: a project's points are not to be made with errors that were drawn for it"
+        raise InputError("a project takes on what photographs tell", where="--project", found=what, cure=cure)
     if what == "laser" and options.lens != "auto":
         cure = "leave --lens out"
         raise InputError("the known camera has its lens", where="--lens", found=options.lens, cure=cure)

@@ -35,6 +35,12 @@ class _Found(Model):
         """(3,) or (6,) of what the covariance is."""
         raise NotImplementedError
 
+    @property
+    def sigma(self) -> Float:
+        """Of each of the values; 0 where it is exact."""
+        size = len(self.values)
+        return np.asarray(np.sqrt(np.maximum(np.diag(_matrix(self.covariance, size)), 0.0)))
+
     @model_validator(mode="after")
     def _goes_with_its_values(self) -> Self:
         size = len(self.values)
@@ -142,6 +148,14 @@ def true_motion(scene: Scene, steps: Any) -> Motion | None:
     if moved.moves == "objects":
         eye, given, holds = camera, invert(poses), BOARD
     return Motion("hand_eye", group, given, np.append(rotation_vector(eye[:3, :3]), eye[:3, 3]), along, holds)
+
+
+def values_of(motion: Motion) -> Float:
+    """(3,) or (6,) what a motion is, as `FoundMotion.values` has it."""
+    if motion.kind != "turntable":
+        return motion.parameters
+    axis, point = motion.axis()
+    return np.append(axis, point - axis * (axis @ point))
 
 
 def measured_pose(scene: Scene, found: FoundMotion | None, step: int) -> Float:

@@ -289,6 +289,11 @@ def calibrating(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of a calibration, from photographs or in silico."""
     for option in (
         click.option(
+            "--project",
+            type=click.Path(path_type=Path),
+            help="Project to measure photographs with, which takes it on; made where there is none.",
+        ),
+        click.option(
             "--export",
             type=click.Choice(["opencv", "ros", "kalibr", "mrcal"]),
             multiple=True,

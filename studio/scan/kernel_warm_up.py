@@ -190,12 +190,18 @@ def draw(cancelled: Cancel) -> None:
 
 
 def scan(cancelled: Cancel) -> None:
-    """The same, measured by every method, smoothed along, with what is foretold. Raises whatever is broken."""
+    """The same, measured by every method, smoothed along, with what is foretold, and what calibrations need.
+
+    Raises whatever is broken.
+    """
+    from analysis.calibration.residuals import through_motion
     from analysis.line.along.smooth import smoothed
     from studio.scan.depth_noise import foreseen_noise
     from studio.scan.results import measure_frame
 
     smoothed(np.zeros(32), np.ones(32), np.ones(32), np.zeros(32))
+    turned = np.zeros((1, 3, 3))
+    through_motion(np.zeros(1, np.intp), turned, turned[0, :1], np.zeros((1, 1, 3, 4)), turned, turned[0, :1])
     project, frame, world, images, clock = _drawn(cancelled, DepthGoal())
     foreseen_noise(project, template_folder(TEMPLATE))
     found = measure_frame(project, frame, world, images, clock, None, keep=False)

@@ -8,13 +8,14 @@ from contextlib import suppress
 from importlib import metadata
 
 from analysis.line.settings import Method
-from analysis.report.calibration import FoundCalibration
+from analysis.report.calibration import FoundCalibration, MotionFound
 from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
 from analysis.report.record import ScanRecord
 from render.base.model import Model
 from render.frame import Frame
 from render.sensor.develop import Image
 from render.world.world import World
+from studio.project.found_motion import true_motion, values_of
 from studio.project.project import Project
 from studio.scan.gauging import measures_record, readings
 from studio.scan.logo import logo_uri
@@ -120,13 +121,18 @@ def report_input(
 def _found(project: Project) -> FoundCalibration | None:
     """The project's calibration as a report has it; None where points are made as the scene has it, exactly."""
     given, scene = project.calibration, project.scene
-    if given.camera is None and given.laser_count == 0:
+    if given.camera is None and given.laser_count == 0 and given.motion is None:
         return None
     lasers = range(len(scene.lasers))
+    moved, true = given.motion, true_motion(scene, (0,))
+    motion = None
+    if moved is not None and true is not None:
+        motion = MotionFound(moved.kind, moved.values, moved.sigma, values_of(true))
     return FoundCalibration(
         given.camera_of(scene.camera),
         tuple(given.plane(i, scene.laser_plane(i)) for i in lasers),
         tuple(given.covariance(i) for i in lasers),
+        motion,
     )
 
 

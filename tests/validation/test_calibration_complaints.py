@@ -9,11 +9,14 @@ import pytest
 
 from analysis.calibration.calibrate import DEFAULT_TERMS
 from analysis.calibration.degenerate import complaints
-from analysis.calibration.estimate import Estimate
+from analysis.calibration.estimate import Estimate, free_parameters
+from analysis.calibration.observations import gather
+from analysis.calibration.odd_views import mirrored, refocused
+from analysis.calibration.robust import adjust_robustly
 from analysis.calibration.start import start
 from analysis.calibration.virtual import noisy
 from render.base.errors import InputError
-from tests.analysis.calibration.boards import DEGENERATE, SIZE, degenerate, truth, views_of
+from tests.analysis.calibration.boards import DEGENERATE, SIZE, degenerate, target, truth, views_of
 
 pytestmark = pytest.mark.validation
 
@@ -36,3 +39,14 @@ def test_each_degenerate_set_is_named_by_its_estimate(given: dict[str, Any], sen
 def test_of_200_good_sets_none_is_blamed_by_its_estimate() -> None:
     blamed = {seed: found for seed in range(200) if (found := said(truth(seed, 12, terms=5), seed))}
     assert blamed == {}
+
+
+def test_of_200_good_sets_no_view_is_called_mirrored_or_of_another_focus() -> None:
+    extent, called = np.stack([target().min(axis=0), target().max(axis=0)]), {}
+    for seed in range(200):
+        there = truth(seed, 12, terms=5)
+        views = noisy(views_of(there, laser_step=64), np.random.default_rng(2000 + seed))
+        found = adjust_robustly(gather(views, extent), there, free_parameters(there, warp=True))
+        if told := mirrored(views, found, extent, SIZE[0]) | refocused(found):
+            called[seed] = told
+    assert called == {}

@@ -1,4 +1,5 @@
-"""A scanner calibrated by 38 photographs of 2448 x 2048 pixels with noise, drawn by the camera's equations.
+"""A scanner calibrated by 38 photographs of 2448 x 2048 pixels with noise, drawn by the camera's equations; and 30
+times by 12 such photographs, which errs as it tells.
 
 python -m tests.validation.test_calibration_photographs 3    # a table, of as many draws of poses and noise
 """
@@ -11,10 +12,11 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.special import erf
 
 from analysis.calibration.board import Board
-from analysis.calibration.calibrate import Request, calibrate
+from analysis.calibration.calibrate import Calibrated, Request, calibrate
 from analysis.calibration.detect import detect
 from analysis.calibration.estimate import Estimate, unit_plane
 from analysis.calibration.lens import normalise
@@ -27,6 +29,7 @@ pytestmark = pytest.mark.validation
 
 BOARD = Board("checkerboard", 13, 9, SQUARE)
 VIEWS, BLUR, AROUND = 38, 0.8, 60
+TRIALS, FEWER = 30, 12
 DARK, BRIGHT, FULL_WELL = 60.0, 170.0, 10_000.0
 """Digital numbers of 255, and the electrons that 255 is of."""
 
@@ -75,10 +78,11 @@ def photograph(there: Estimate, number: int, rng: np.random.Generator) -> np.nda
     return np.asarray(np.clip(np.rint(drawn), 0, 255), dtype=np.uint8)
 
 
-def outcome(seed: int) -> Outcome:
-    there, rng = truth(seed, VIEWS, terms=5), np.random.default_rng(seed)
+def calibrated(seed: int, count: int = VIEWS) -> tuple[Calibrated, Estimate, np.ndarray]:
+    """From so many photographs, beside the truth, and chi-square of each corner."""
+    there, rng = truth(seed, count, terms=5), np.random.default_rng(seed)
     views, chi2 = [], []
-    for number in range(VIEWS):
+    for number in range(count):
         seen, _ = detect(photograph(there, number, rng), BOARD, f"view {number}")
         exact = exact_view(seen.name, there, number, target(), SIZE)
         shifted = seen.target - [6 * SQUARE, 4 * SQUARE]
@@ -90,6 +94,11 @@ def outcome(seed: int) -> Outcome:
         stripes = noisy([exact], rng)[0].stripes
         views.append(View(seen.name, seen.pixel, seen.covariance, shifted, stripes))
     found = calibrate(views, target(), Request(SIZE, 1, 5, nearest=0.7, farthest=1.0))
+    return found, there, np.concatenate(chi2)
+
+
+def outcome(seed: int) -> Outcome:
+    found, there, chi2 = calibrated(seed)
     estimate, adjusted = found.estimate, found.adjusted
     used = adjusted.seen.whitening[:, 0, 0] > 0.0
     white = adjusted.solution.corner_residual[used]
@@ -99,9 +108,28 @@ def outcome(seed: int) -> Outcome:
         float(np.sqrt(np.mean(pixel**2))),
         1e3 * float(np.linalg.norm(np.cross(*normals))),
         float(np.abs(estimate.intrinsics[2:] - there.intrinsics[2:]).max()),
-        float(np.concatenate(chi2).mean()) / 2.0,
+        float(chi2.mean()) / 2.0,
         true_depth_error(found, there)[0],
     )
+
+
+def squared_errors(seed: int) -> tuple[float, float]:
+    """Chi-square of the intrinsics, of 4 degrees, and of the plane, of 3, by the covariance told; of FEWER views."""
+    found, there, _ = calibrated(seed, FEWER)
+    out = []
+    for part in (slice(0, 4), there.plane_slice(0)):
+        error = found.estimate.shared[part] - there.shared[part]
+        out.append(float(error @ np.linalg.solve(found.adjusted.solution.covariance[part, part], error)))
+    return out[0], out[1]
+
+
+def test_30_sets_of_photographs_err_as_they_tell() -> None:
+    for values, degrees in zip(zip(*map(squared_errors, range(TRIALS)), strict=True), (4, 3), strict=True):
+        low, high = stats.chi2.ppf([0.0005, 0.9995], degrees * TRIALS)
+        assert low < sum(values) < high, values
+        # as many of 30 outside the 95 % region as a binomial has with a probability of 99.9 %
+        outside = sum(value > stats.chi2.ppf(0.95, degrees) for value in values)
+        assert outside <= stats.binom.ppf(0.999, TRIALS, 0.05)
 
 
 def test_38_photographs_reach_the_noise() -> None:

@@ -39,8 +39,8 @@ def motion_of(kind: Kind, views: int, rng: np.random.Generator) -> Motion:
     return Motion(kind, group, hand, np.array([0.4, -1.1, 0.7, 0.05, -0.02, 0.08]), along)
 
 
-def carried(kind: Kind, *, views: int = 12, terms: int = 4, seed: int = 3) -> Estimate:
-    there = truth(seed, views, terms=terms, tilt=(10.0, 35.0), warp=(1e-4, -5e-5))
+def carried(kind: Kind, *, views: int = 12, terms: int = 4, lasers: int = 1, seed: int = 3) -> Estimate:
+    there = truth(seed, views, terms=terms, lasers=lasers, tilt=(10.0, 35.0), warp=(1e-4, -5e-5))
     there = replace(there, motion=motion_of(kind, views, np.random.default_rng(seed)))
     return there.moved(np.zeros(len(there.shared)), np.zeros((views - 2 * PLACED + 2, 6)))
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.report.calibration import FoundCalibration, depth_map, parameter_rows, sentence
+from analysis.report.calibration import FoundCalibration, MotionFound, depth_map, motion_rows, parameter_rows, sentence
 from analysis.report.write import render_page
 from tests.analysis.report.test_report import make_report, make_scene
 
@@ -66,3 +66,14 @@ def test_the_page_has_the_section_where_points_were_made_with_a_calibration() ->
     assert "The calibration</h2>" not in render_page(report)
     page = render_page(replace(report, calibration=found(report.scene, 1e-3)))
     assert "The calibration</h2>" in page and "Depth error by the calibration" in page
+    assert "by the motion that the calibration found" not in page
+
+
+def test_the_page_has_the_motion_that_was_found_beside_the_scene_s() -> None:
+    report, axis = make_report(), np.array([0.0, 0.6, 0.8])
+    point, sigma = np.array([0.1, 0.03, 0.5]), np.array([1e-4] * 3 + [1e-5] * 3)
+    moved = MotionFound("turntable", np.append(axis, point + np.array([2e-5, 0.0, 0.0])), sigma, np.append(axis, point))
+    rows = {row[0]: row[1:] for row in motion_rows(moved)}
+    assert rows["point x mm"] == ["100.02", "0.01", "100", "+2.0"] and rows["axis y"][3] == "+0.0"
+    page = render_page(replace(report, calibration=replace(found(report.scene, 1e-3), motion=moved)))
+    assert "by the motion that the calibration found" in page and "100.02" in page

@@ -17,6 +17,7 @@ from main import cli
 from render.base.errors import InputError
 from studio.calibration.calibration_file import read_calibration
 from studio.calibration.image_views import shots
+from studio.calibration.into_project import into_project
 from studio.project.project import Project
 from studio.scan.stages import triangulate_line
 from tests.analysis.calibration.test_circles import photograph, scene
@@ -39,7 +40,8 @@ def run(*words: str) -> tuple[int, dict[str, object]]:
 
 def test_photographs_of_a_scanner_give_its_camera_and_laser(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "calibration.json"
-    code, told = run("calibrate", "scanner", str(folder), "--board", BOARD, "--lens", "4", "--out", str(out))
+    options = ("--board", BOARD, "--lens", "4", "--out", str(out), "--project", str(tmp_path / "mine"))
+    code, told = run("calibrate", "scanner", str(folder), *options)
     assert code == 0, told
     there = scanner(VIEWS)
     found = [told["camera"][name] for name in ("fx", "fy", "cx", "cy")]
@@ -54,6 +56,10 @@ def test_photographs_of_a_scanner_give_its_camera_and_laser(folder: Path, tmp_pa
     assert told["next_pose"]["depth_rms_after_m"] < told["next_pose"]["depth_rms_before_m"]
     # one scale of the corners' errors, told by the images themselves
     assert told["checks"]["corner_sigma_factor"] < 1.6
+
+    mine = Project.load(tmp_path / "mine" / "project.json")
+    assert (mine.scene.camera.width, mine.scene.camera.height) == (640, 512)
+    assert np.array_equal(mine.calibration.planes, told["planes"]) and mine.scene.camera.fx == found[0]
 
     data = json.loads(Project.load("plane").to_text())
     data["scene"]["rig"]["camera"] |= {"width": 640, "height": 512}
@@ -206,3 +212,15 @@ def test_a_project_names_only_calibration_files(tmp_path: Path) -> None:
     (tmp_path / "project.json").write_text(json.dumps(data | {"calibration": "../other.json"}))
     with pytest.raises(InputError, match="leaves the project folder"):
         Project.load(tmp_path / "project.json")
+
+
+def test_a_project_takes_on_a_calibration_that_goes_with_it(tmp_path: Path) -> None:
+    data = {"camera": None, "planes": [[1.0, 0.0, 0.0, -0.2]] * 2, "covariances": []}
+    with pytest.raises(InputError, match=r"does not go with the project.*2 planes"):
+        into_project(tmp_path, data)
+    assert not list(tmp_path.iterdir())
+    kept = Project.load("scan")
+    kept.save(tmp_path / "project.json")
+    into_project(tmp_path, data | {"planes": [[1.0, 0.0, 0.0, -0.2]]})
+    found = Project.load(tmp_path)
+    assert found.scene == kept.scene and found.calibration.planes == ((1.0, 0.0, 0.0, -0.2),)
