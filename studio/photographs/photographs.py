@@ -106,10 +106,14 @@ def extract_photograph(
         half = TONED if taken.lossy else HALF
         shared = noise.alike or whole.ndim == 3 or taken.lossy
         noise = noise.model_copy(update={"alike": shared})
+        # where a camera has shaped the profile, no line is a Gaussian, and what some scan lines are taken for, one line
+        # or two, would move them against the others
+        judged = not shared
         if alone:
-            line = extract(light.image, settings=settings, noise=noise, threads=threads, shared=False)
+            line = extract(light.image, settings=settings, noise=noise, threads=threads, shared=False, judged=judged)
         else:
-            line = peaks_to_choose_from(light.image, settings, noise, threads, every=volume is not None)
+            every = volume is not None
+            line = peaks_to_choose_from(light.image, settings, noise, threads, every=every, judged=judged)
         line = placed(unsure_dropped(line), whole.shape, corner)
         fits = settings.select == "continuous" and settings.method in FITS
         if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
