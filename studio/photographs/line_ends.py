@@ -4,8 +4,8 @@ A sharp end blurred by anything symmetric has half of its light exactly at the e
 the line if it surely has half of the light of those next to it, a width like theirs, and lies where they go on to. A
 camera that makes pictures for the eye shows half of the light at more than half of the number.
 
-What fades over more scan lines than the line is wide is no sharp end that is blurred, but the end of the laser's fan, and
-the line as far as it is seen. Of clipped scan lines a fit tells a height that may be anything above what clips.
+What fades over more scan lines than the line is wide is no sharp end that is blurred, but the end of the laser's fan,
+and the line as far as it is seen. Of clipped scan lines a fit tells a height that may be anything above what clips.
 
 Beyond that, for as long as it may be, there is what lens and surface scatter: softer than the line and much dimmer. A
 dark surface dims the line and leaves its width, a depth out of focus widens it and leaves its light.
