@@ -102,7 +102,7 @@ def _scattered(found: _Found) -> NDArray[np.bool_]:
         )
         # the line's own end fades among the scan lines beside
         beside = [float(np.quantile(found.amplitude[side], 0.75)) for side in sides if len(side) >= SURE]
-        saturated = found.saturated[np.concatenate([run, *sides])].any()
+        saturated = found.saturated[run].any()
         if beside and not saturated and np.median(light[run]) < DIMMER * min(beside):
             out[run] = True
     return out

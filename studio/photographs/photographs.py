@@ -36,6 +36,7 @@ from studio.photographs.line_arrays import changed, column
 from studio.photographs.line_ends import HALF, TONED, ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
+from studio.photographs.pieces import NO_LINE, lines_only
 from studio.scan.line_extraction import note_of
 from studio.scan.own_files import check_replaceable, line_columns
 
@@ -127,7 +128,9 @@ def extract_photograph(
         elif not alone:
             line = selected(line, settings, volume)
         if settings.select == "continuous":
-            line = ended(line, half)
+            line = lines_only(ended(line, half))
+            if not line.valid.any():
+                return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)
         line = _no_wider(with_shared_noise(line), line) if shared else line
         line = smooth_along(line) if look.settings.smooth_along else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
