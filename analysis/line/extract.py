@@ -40,6 +40,7 @@ def extract(
     volume: WorkingVolume | None = None,
     threads: int | None = None,
     shared: bool = True,
+    judged: bool = True,
     **changes: Any,
 ) -> Line:
     """Image (h, w) or (h, w, 3), uint8, uint16, float32 or float64 -> Line with arrays (n, peaks).
@@ -51,7 +52,7 @@ def extract(
     "strongest", or a working volume, one peak of several candidates is taken: arrays (n, 1), `candidates` holds the
     rest. Smoothed along the line, where the settings ask for it, are the positions that were selected. Scan lines
     without a position carry a flag that says why. shared: False where somebody selects among the peaks first, and then
-    asks what neighbouring pixels share.
+    asks what neighbouring pixels share. judged: False where every line is to be measured as one, whatever its profile.
     Raises InputError: an image of the wrong type, shape or size, without a finite pixel, a channel it does not have,
     settings out of range.
     """
@@ -72,7 +73,7 @@ def extract(
     alone = chosen.select == "strongest" and volume is None
     wanted = chosen if alone else chosen.model_copy(update={"peaks": max(chosen.peaks, CANDIDATES)})
     # fused exposures hold so many electrons that no lens draws a line which is a Gaussian to their noise
-    line = replace(measure(lines, wanted, threads, judge=variance is None), note=note)
+    line = replace(measure(lines, wanted, threads, judge=judged and variance is None), note=note)
     check_finite("line", positions=line.u[line.valid])
     line = line if alone else select(line, chosen.select, volume, chosen.chooser)
     if noise.alike:

@@ -28,26 +28,34 @@ FEW = 0.5
 
 
 def peaks_to_choose_from(
-    image: NDArray[Any], settings: ExtractionSettings, noise: NoiseModel, threads: int | None, every: bool = False
+    image: NDArray[Any],
+    settings: ExtractionSettings,
+    noise: NoiseModel,
+    threads: int | None,
+    every: bool = False,
+    judged: bool = True,
 ) -> Line:
     """Image (h, w) -> Line (n, k) of candidates, strongest first; what its pixels share is not asked yet.
 
-    every: also where the strongest will do, as for a choice that is not by the smoothest chain alone.
+    every: also where the strongest will do, as for a choice that is not by the smoothest chain alone. judged: as
+    `extract` has it.
     """
     several = settings.model_copy(update={"select": "strongest", "peaks": max(settings.peaks, CANDIDATES)})
     every = every or settings.peaks > 1 or settings.select != "continuous" or settings.smoothing > 0.0
     if every or (settings.method in METHODS and METHODS[settings.method].halo > 0):
-        return extract(image, settings=several, noise=noise, threads=threads, shared=False)
+        return extract(image, settings=several, noise=noise, threads=threads, shared=False, judged=judged)
     strongest = settings.model_copy(update={"select": "strongest"})
-    first = extract(image, settings=strongest, noise=noise, threads=threads, shared=False)
+    first = extract(image, settings=strongest, noise=noise, threads=threads, shared=False, judged=judged)
     again = _unsettled(first)
     if again.mean() > FEW:
-        return extract(image, settings=several, noise=noise, threads=threads, shared=False)
+        return extract(image, settings=several, noise=noise, threads=threads, shared=False, judged=judged)
     if not again.any():
         return first
     part = image[again] if settings.axis == "rows" else image[:, again]
     several = several.model_copy(update={"method": first.method})
-    return _with(first, again, extract(part, settings=several, noise=noise, threads=threads, shared=False))
+    return _with(
+        first, again, extract(part, settings=several, noise=noise, threads=threads, shared=False, judged=judged)
+    )
 
 
 def _unsettled(line: Line) -> NDArray[np.bool_]:

@@ -4,6 +4,9 @@ A sharp end blurred by anything symmetric has half of its light exactly at the e
 the line if it surely has half of the light of those next to it, a width like theirs, and lies where they go on to. A
 camera that makes pictures for the eye shows half of the light at more than half of the number.
 
+What fades over more scan lines than the line is wide is no sharp end that is blurred, but the end of the laser's fan,
+and the line as far as it is seen. Of clipped scan lines a fit tells a height that may be anything above what clips.
+
 Beyond that, for as long as it may be, there is what lens and surface scatter: softer than the line and much dimmer. A
 dark surface dims the line and leaves its width, a depth out of focus widens it and leaves its light.
 """
@@ -31,6 +34,9 @@ SURE = 3
 """Scan lines one after the other that are the line's: there it begins; fewer between two jumps are no piece of it."""
 SOFTER, DIMMER, RUNNING = 1.5, 1.0 / 3.0, 7
 """Width and amplitude over those of the line next to it, from which light is scattered; their running medians."""
+FAINT, BLURRED, SLOWLY = 0.2, 1.2, 1.5
+"""Of the light next to it, from which a fading end is looked at; widths of the line on which blur falls from `TONED` to
+there; times these scan lines, and one more, beyond which it fades of itself."""
 JUMP = 3.0
 """Widths from one scan line to the next at which a piece of the line ends."""
 
@@ -69,6 +75,8 @@ class _Found:
             line.amplitude[rows, k],
         )
         self.saturated = line.flag[rows, k] == Flag.SATURATED
+        if self.saturated.any():
+            self.amplitude = np.minimum(self.amplitude, self.amplitude[self.saturated].min())
 
     def usual(self, some: NDArray[np.intp]) -> float:
         """Amplitude of some of them."""
@@ -94,7 +102,7 @@ def _scattered(found: _Found) -> NDArray[np.bool_]:
         )
         # the line's own end fades among the scan lines beside
         beside = [float(np.quantile(found.amplitude[side], 0.75)) for side in sides if len(side) >= SURE]
-        saturated = found.saturated[np.concatenate([run, *sides])].any()
+        saturated = found.saturated[run].any()
         if beside and not saturated and np.median(light[run]) < DIMMER * min(beside):
             out[run] = True
     return out
@@ -136,7 +144,23 @@ def _first(found: _Found, inward: NDArray[np.intp], half: float) -> int:
     # one that is wild, as a saturated fit may be, is no end
     begins = [k for k in range(NEXT) if there[k] and sum(there[k : k + SURE]) >= SURE - 1]
     likely = [k for k in range(NEXT) if on[k]] if begins else []
-    return next((k for k in begins if surely[k]), likely[0] if likely else 0)
+    first = next((k for k in begins if surely[k]), likely[0] if likely else 0)
+    return _fades_from(found, inward, first)
+
+
+def _fades_from(found: _Found, inward: NDArray[np.intp], first: int) -> int:
+    """The same from which scan line on a line fades, that has half of its light on the `first`; that, if it is blur."""
+    inside = inward[first : first + NEXT]
+    usual, width = found.usual(inside), float(np.median(found.width[inside]))
+    start = first
+    while start > 0:
+        at = inward[start - 1]
+        follows = abs(int(found.rows[at]) - int(found.rows[inward[start]])) == 1
+        like = width / WIDER <= found.width[at] <= WIDER * width and _goes_on(found, at, inside)
+        if not (follows and like and found.amplitude[at] >= FAINT * usual):
+            break
+        start -= 1
+    return start if first - start > SLOWLY * BLURRED * width + 1.0 else first
 
 
 def _goes_on(found: _Found, at: np.intp, inside: NDArray[np.intp]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -30,6 +31,7 @@ from studio.photographs.evidence import (
 )
 from studio.photographs.image_files import Photograph, load_photograph, read_photograph
 from studio.photographs.laser_light import ALL_FOUND, MOST_FOUND, TIE, Channel, channels_to_try, scatter_of
+from studio.photographs.mosaic import FILLED_IN
 from studio.photographs.off_images import pair_offs
 from studio.photographs.region import Region
 
@@ -213,7 +215,8 @@ def _measuring(seen: Sequence[Seen], evidence: Evidence, wished: Channel | None)
             scatter, found = scatter_of(one.image, one.off, line, name, evidence.colour, evidence.axis, one.lossy)
             scatters[name].append(scatter)
             counts[name] += found
-    typical = {name: float(np.median(scatters[name])) for name in names}
+    # what a mosaic moves all scan lines by makes none of them scatter
+    typical = {name: math.hypot(float(np.median(scatters[name])), FILLED_IN[name] if lossy else 0.0) for name in names}
     # another colour has only what is left over of the light, and must see as good as all of it
     own = ALL_FOUND * counts.get(evidence.colour, 0)
     least_found = {name: own if name in COLOURS and name != evidence.colour else 1 for name in names}
@@ -224,4 +227,5 @@ def _measuring(seen: Sequence[Seen], evidence: Evidence, wished: Channel | None)
         return names[0], "by default"
     best = next(name for name in enough if typical[name] <= (1.0 + TIE) * least)
     listed = ", ".join(f"{name} {typical[name]:.2f}" for name in names if np.isfinite(typical[name]))
-    return best, f"scatter along the line, px: {listed}"
+    what = "scatter along the line and the mosaic" if lossy else "scatter along the line"
+    return best, f"{what}, px: {listed}"

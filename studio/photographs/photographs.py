@@ -36,6 +36,7 @@ from studio.photographs.line_arrays import changed, column
 from studio.photographs.line_ends import HALF, TONED, ended
 from studio.photographs.mosaic import with_mosaic
 from studio.photographs.photograph_set import Look
+from studio.photographs.pieces import NO_LINE, lines_only
 from studio.scan.line_extraction import note_of
 from studio.scan.own_files import check_replaceable, line_columns
 
@@ -106,10 +107,14 @@ def extract_photograph(
         half = TONED if taken.lossy else HALF
         shared = noise.alike or whole.ndim == 3 or taken.lossy
         noise = noise.model_copy(update={"alike": shared})
+        # where a camera has shaped the profile, no line is a Gaussian, and what some scan lines are taken for, one line
+        # or two, would move them against the others
+        judged = not shared
         if alone:
-            line = extract(light.image, settings=settings, noise=noise, threads=threads, shared=False)
+            line = extract(light.image, settings=settings, noise=noise, threads=threads, shared=False, judged=judged)
         else:
-            line = peaks_to_choose_from(light.image, settings, noise, threads, every=volume is not None)
+            every = volume is not None
+            line = peaks_to_choose_from(light.image, settings, noise, threads, every=every, judged=judged)
         line = placed(unsure_dropped(line), whole.shape, corner)
         fits = settings.select == "continuous" and settings.method in FITS
         if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
@@ -123,7 +128,9 @@ def extract_photograph(
         elif not alone:
             line = selected(line, settings, volume)
         if settings.select == "continuous":
-            line = ended(line, half)
+            line = lines_only(ended(line, half))
+            if not line.valid.any():
+                return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)
         line = _no_wider(with_shared_noise(line), line) if shared else line
         line = smooth_along(line) if look.settings.smooth_along else line
         line = with_mosaic(line, look.channel) if taken.lossy else line
