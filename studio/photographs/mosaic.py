@@ -3,7 +3,7 @@
 Red and blue are seen on every other pixel of a row, and filled in between. Tone curve, sharpening and JPEG after that
 leave a profile that is wrong in the same way on all scan lines that cross the mosaic at one place. Lines of 1.5 to 3 px
 in red, green and blue, through the mosaics, tone curves and JPEGs of a webcam and a phone, were off on average by 0.01
-to 0.03 px in luminance, but by 0.1 in that of a red laser after a JPEG of quality 70; by 0.015 to 0.08 in green, 0.01 to
+to 0.03 px in luminance, but by 0.1 in a red laser's after a JPEG of quality 70; by 0.015 to 0.08 in green, 0.01 to
 0.05 in the mean of the channels and 0.03 to 0.3 in red or blue alone; where they saturate, by more in those that hold
 most of the green pixels as well, 0.03 to 0.05 px at three times the full well, more above.
 """

@@ -128,8 +128,9 @@ def extract_photograph(
         elif not alone:
             line = selected(line, settings, volume)
         if settings.select == "continuous":
-            line = lines_only(ended(line, half))
-            if not line.valid.any():
+            found = ended(line, half)
+            line = lines_only(found)
+            if found.valid.any() and not line.valid.any():
                 return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)
         line = _no_wider(with_shared_noise(line), line) if shared else line
         line = smooth_along(line) if look.settings.smooth_along else line

@@ -187,7 +187,8 @@ def _weigh(
     # of a selection the candidates' method is the one that measured them
     derivative = influence(image.pixels, line, settings, noise, threads, shared=True)
     valid = line.valid
-    stray = strays(line, frame.curves[laser])
+    # the pilots of a scan have no exact line: they ask for no less
+    stray = strays(line, frame.curves[laser]) if frame.curves else np.zeros(len(valid), np.bool_)
     narrow = np.any(valid & (line.width < COARSE), axis=1)[:, None]
     width = np.min(np.where(valid & np.isfinite(line.width), line.width, np.inf), axis=1)
     if line.axis == "columns":

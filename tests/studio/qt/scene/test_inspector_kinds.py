@@ -42,7 +42,7 @@ class TestKinds:
     def test_a_sheet_becomes_focused(self, qtbot: QtBot, session: Session, inspector: Inspector) -> None:
         self.choose(qtbot, inspector, (*LASER, "sheet"), "Focused")
         assert session.project.scene.lasers[0].sheet == Waist()
-        assert field(inspector, *LASER, "sheet", "radius").suffix == "um"
+        assert field(inspector, *LASER, "sheet", "radius").suffix == "µm"
         session.document.undo()
         assert field(inspector, *LASER, "sheet", "full_angle").text() == "1.15"
 
