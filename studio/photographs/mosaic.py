@@ -15,10 +15,11 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.line.result import Flag, Line
+from studio.photographs.evidence import Colour
 from studio.photographs.laser_light import Channel
 
 FILLED_IN: dict[Channel, float] = {
-    "luminance": 0.1,
+    "luminance": 0.03,
     "green": 0.03,
     "mono": 0.04,
     "red": 0.15,
@@ -26,16 +27,24 @@ FILLED_IN: dict[Channel, float] = {
     "difference": 0.15,
 }
 """px, by the channel that measures."""
+COMPRESSED = 0.1
+"""px at least, in the luminance of a laser that is seen on every other pixel alone, after a strong JPEG."""
 CLIPPED = 0.08
 """px at least, where the mosaic is clipped before it is filled in."""
 
 
-def with_mosaic(line: Line, channel: Channel) -> Line:
-    """The line, measured in a channel of an image whose colour is coarse, with larger sigmas.
+def filled_in(channel: Channel, colour: Colour) -> float:
+    """px that a mosaic moves the line of a laser of some colour by, measured in a channel."""
+    usual = FILLED_IN[channel]
+    return max(usual, COMPRESSED) if channel == "luminance" and colour in ("red", "blue") else usual
+
+
+def with_mosaic(line: Line, channel: Channel, colour: Colour) -> Line:
+    """The line of a laser of some colour, measured in a channel of an image whose colour is coarse, with larger sigmas.
 
     All scan lines err alike by that much: so the correlation length becomes as long as the line, in its share.
     """
-    usual = FILLED_IN[channel]
+    usual = filled_in(channel, colour)
     extra = np.where(line.flag == Flag.SATURATED, max(usual, CLIPPED), usual) ** 2
     told = np.ones_like(line.u) if line.length_apart is None else line.length_apart
     variance = line.variance_apart

@@ -31,7 +31,7 @@ from studio.photographs.evidence import (
 )
 from studio.photographs.image_files import Photograph, load_photograph, read_photograph
 from studio.photographs.laser_light import ALL_FOUND, MOST_FOUND, TIE, Channel, channels_to_try, scatter_of
-from studio.photographs.mosaic import FILLED_IN
+from studio.photographs.mosaic import filled_in
 from studio.photographs.off_images import pair_offs
 from studio.photographs.region import Region
 
@@ -216,7 +216,8 @@ def _measuring(seen: Sequence[Seen], evidence: Evidence, wished: Channel | None)
             scatters[name].append(scatter)
             counts[name] += found
     # what a mosaic moves all scan lines by makes none of them scatter
-    typical = {name: math.hypot(float(np.median(scatters[name])), FILLED_IN[name] if lossy else 0.0) for name in names}
+    mosaic = {name: filled_in(name, evidence.colour) if lossy else 0.0 for name in names}
+    typical = {name: math.hypot(float(np.median(scatters[name])), mosaic[name]) for name in names}
     # another colour has only what is left over of the light, and must see as good as all of it
     own = ALL_FOUND * counts.get(evidence.colour, 0)
     least_found = {name: own if name in COLOURS and name != evidence.colour else 1 for name in names}
