@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from analysis.error import MATCH_SIGMAS
 from analysis.line.detection.rivals import rival_weights
+from analysis.line.error_weights import Weights
 from analysis.line.influence import influence
 from analysis.line.methods.narrow_line import COARSE
 from analysis.line.result import Line
-from render.base.arrays import Bool, Float, Float32
+from render.base.arrays import Bool, Float32
 from render.base.threads import map_chunks, rows_of
 from render.frame import Frame, LaserCurve
 from render.importance import CELL, Importance
@@ -144,34 +143,6 @@ def _noise(electrons: Float32, floor: float, share: float, seed: tuple[int, ...]
     return noise
 
 
-@dataclass(frozen=True)
-class Weights:
-    """What becomes of one laser's weights, by scan line: arrays (n, w), those of columns turned."""
-
-    laser: Float32
-    peaks: Float32
-    ambient: Float32
-    """Of all lasers so far, by which peaks appear or a line is told otherwise."""
-    moves: Float32
-    """Of ambient light, by which it moves this laser's line."""
-    illumination: Float32
-    response: Float
-    """(2, 2) electrons by the laser's radiance, by parity of scan line and place."""
-    bands: Float
-    """(2, 2) by ambient radiance."""
-
-    def put(self, lines: slice, moved: Float32, risen: Float32, even: Float32) -> None:
-        """Of some scan lines, the first of them even, how far an electron moves the line over what is allowed, how far
-        it goes to make or hide a peak, and how far any light that is spread evenly."""
-        lit, on = self.illumination[lines], np.nonzero(moved)
-        response, bands = (_tiled(one, lit) for one in (self.response, self.bands))
-        self.laser[lines][on] = moved[on] * response[on]
-        self.moves[lines][on] = moved[on] * bands[on]
-        np.multiply(risen, response, out=self.peaks[lines])
-        even *= bands
-        np.maximum(self.ambient[lines], even, out=self.ambient[lines])
-
-
 def _weigh(
     project: Project, frame: Frame, laser: int, allowed: tuple[float, float], out: Weights, threads: int | None
 ) -> None:
@@ -189,28 +160,23 @@ def _weigh(
     valid = line.valid
     # the pilots of a scan have no exact line: they ask for no less
     stray = strays(line, frame.curves[laser]) if frame.curves else np.zeros(len(valid), np.bool_)
-    narrow = np.any(valid & (line.width < COARSE), axis=1)[:, None]
+    narrow = np.any(valid & (line.width < COARSE), axis=1)
     width = np.min(np.where(valid & np.isfinite(line.width), line.width, np.inf), axis=1)
+    least = np.where(stray, width, 0.0)
     if line.axis == "columns":
         electrons, derivative = electrons.T, derivative.T
     # a whole row counts as one sum there, of which a quarter of its pixels may come near
     evenly = 1.0 / math.sqrt(max(0.25 * electrons.shape[1] / CELL, 1.0))
 
+    told = np.min(np.where(valid & np.isfinite(line.sigma_u), line.sigma_u, np.inf), axis=1)
+    told = np.where(valid.any(axis=1), np.where(np.isfinite(told), told, 0.0), np.inf)
+    numbers = float(noise.floor), *allowed, evenly
+
     def work(start: int, stop: int) -> None:
         some = slice(start, stop)
         light, moves = np.ascontiguousarray(electrons[some]), np.ascontiguousarray(derivative[some])
         risen = rival_weights(light, (line.u[some], line.width[some], valid[some]), noise, settings)
-        counted = np.maximum(light + np.float32(noise.floor), np.float32(1e-2))
-        # one more on either side, as windows begin with the pixel
-        decided = maximum_filter1d((moves != 0.0) & narrow[some], 3, axis=1)
-        share = (1.0 / (allowed[1] * np.sqrt(np.count_nonzero(decided, axis=1).clip(1)))).astype(np.float32)
-        even = risen * np.float32(evenly)
-        place = np.nonzero(decided)
-        even[place] = np.maximum(even[place], share[place[0]] / np.sqrt(counted[place]))
-        sigma = _sigma(valid[some], line.sigma_u[some], moves, light + np.float32(noise.floor))
-        sigma = allowed[0] * np.maximum(sigma, np.where(stray[some], width[some], 0.0))
-        moved = moves * (1.0 / sigma).astype(np.float32)[:, None]
-        out.put(some, moved, risen, even)
+        out.put(some, (light, moves, risen), (told[some], least[some], narrow[some]), numbers)
 
     map_chunks(work, len(electrons), rows_of(electrons.shape[1], ROWS, PIXELS), threads)
 
@@ -257,27 +223,3 @@ def _expected_image(
     return Image(
         numbers, sensor.bits, gain, sensor.black_level, saturation, sensor.read_noise, pattern, sensor.exposure_time
     )
-
-
-def _sigma(valid: Bool, sigma_u: Float, derivative: Float32, variance: Float32) -> Float:
-    """Of peaks (n, k) and pixels (n, w): (n,) standard deviation of each scan line's position, px; infinite where there
-    is none.
-
-    At least what the noise of its own pixels makes of it: a line that is moved by more than it tells asks of no light
-    to be known better than the goal's share of that noise.
-    """
-    told = np.min(np.where(valid & np.isfinite(sigma_u), sigma_u, np.inf), axis=1)
-    counted = np.sqrt(np.einsum("ij,ij,ij->i", derivative, derivative, variance, dtype=np.float64))
-    sigma = np.maximum(np.where(np.isfinite(told), told, 0.0), counted)
-    return np.where(valid.any(axis=1) & (sigma > 0.0), sigma, np.inf)
-
-
-def _tiled(response: Float, illumination: Float32) -> Float32:
-    """(h, w) of a (2, 2) response by parity of row and column, times the illumination."""
-    if np.all(response == response[0, 0]):
-        return illumination * np.float32(response[0, 0])
-    out = np.empty(illumination.shape, np.float32)
-    for i in range(2):
-        for j in range(2):
-            np.multiply(illumination[i::2, j::2], np.float32(response[i, j]), out=out[i::2, j::2])
-    return out
