@@ -103,8 +103,9 @@ def _smoothed(deviate: Float) -> tuple[float, float]:
     if not near < (1.0 - ALIKE) * far:  # NaN: too few tell
         return 1.0, 1.0
     correlation = [1.0 - _mean_square(deviate[lag:] - deviate[:-lag]) / far for lag in range(1, FAR)]
-    sure = np.cumprod(np.array(correlation) > ALIKE)
-    return far / max(near, UNIT), 1.0 + 2.0 * float(np.sum(sure * correlation))
+    # up to the first that is not alike, or of which too few tell
+    alike = np.cumprod(np.array(correlation) > ALIKE) > 0
+    return far / max(near, UNIT), 1.0 + 2.0 * float(np.sum(correlation, where=alike))
 
 
 def _mean_square(values: Float) -> float:

@@ -30,6 +30,15 @@ def test_lines_that_err_alike_are_not_taken_for_lines_that_lean():
     assert not by_lean(deviate, np.full_like(deviate, 16.0)).any()
 
 
+def test_lines_of_which_some_distances_apart_are_hardly_known_lean_no_more_than_others():
+    """Pairs that err alike, eight lines apart: nothing is known of lines two to six apart."""
+    deviate = np.full((8000, 1), np.nan)
+    first = np.random.default_rng(4).normal(size=1000)
+    deviate[::8, 0], deviate[1::8, 0] = first, first
+    with np.errstate(invalid="raise"):
+        assert by_lean(deviate, np.full_like(deviate, 2.0)).mean() < 0.001
+
+
 def test_a_lean_of_one_standard_deviation_shows_among_neighbours_and_a_tiny_one_is_none():
     deviate = np.random.default_rng(3).normal(size=(1000, 1))
     assert by_lean(deviate + 1.5, np.ones_like(deviate)).mean() > 0.98
