@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from analysis.calibration.board import Board
 from analysis.calibration.circles import find_circles, refine_circles
 from analysis.calibration.corners import noise_of, refine
+from analysis.calibration.marker import by_marker
 from analysis.calibration.observations import View
 from analysis.line.result import Axis
 from render.base.arrays import Bool, Float
@@ -22,6 +25,10 @@ THICKEST_LINE = 15
 """px of a laser's line that is taken away where it hides the board."""
 SMALLEST = (3, 3)
 """Corners of a board of which another number is told."""
+LOOKED_THROUGH = 1600
+"""px of the longer side of an image in which a board is looked for first."""
+SAMPLE = 2**18
+"""Pixels that tell the darkest and the brightest of an image."""
 GLARE = 0.02
 """Share of full-scale pixels about a corner above which it is dropped."""
 
@@ -44,7 +51,10 @@ def detect(image: NDArray[Any], board: Board, name: str) -> tuple[View, list[str
         refined, covariance, good = refine_circles(values, pixel, spacing(pixel), noise)
         dropped = "discs that are cut off or not round dropped"
     else:
-        refined, covariance, good = refine(values, pixel, noise, board.clear)
+        # twice, as the surroundings that are looked at are those of where a corner was thought to be
+        refined, _, near = refine(values, pixel, noise, board.clear)
+        refined, covariance, good = refine(values, np.where(near[:, None], refined, pixel), noise, board.clear)
+        good &= near
         dropped = "corners without a clear crossing dropped"
     notes = []
     strayed = int(np.count_nonzero(~good))
@@ -79,10 +89,13 @@ def on_board(view: View, board: Board, pixel: Float, margin: float, axis: Axis =
     inside = np.all((place > least) & (place < greatest), axis=1)
     first, last = place / board.square, stepped / board.square
     back = 2.0 * first - last
+    centres, radius = board.discs
+    if len(centres):
+        between = (np.linspace(-1.0, 1.0, 9)[:, None, None] * (last - first) + first) * board.square
+        on_disc = cKDTree(centres).query(between)[0] < radius
+        inside &= (on_disc == on_disc[0]).all(axis=0)
     if board.kind == "circles":
-        between = np.linspace(-1.0, 1.0, 9)[:, None, None] * (last - first) + first
-        on_disc = np.linalg.norm(between - np.rint(between), axis=2) < board.circle / board.square
-        return np.asarray(inside & (on_disc == on_disc[0]).all(axis=0))
+        return np.asarray(inside)
     clear = np.all((np.floor(first) == np.floor(last)) & (np.floor(first) == np.floor(back)), axis=1)
     return np.asarray(inside & clear)
 
@@ -94,32 +107,63 @@ def without_corners(view: View, near: Bool) -> View:
 
 
 def _eight_bit(values: Float) -> NDArray[np.uint8]:
-    low, high = float(np.quantile(values, 0.001)), float(np.quantile(values, 0.999))
+    some = values.ravel()[:: 1 + values.size // SAMPLE]
+    low, high = float(np.quantile(some, 0.001)), float(np.quantile(some, 0.999))
     return np.asarray(np.clip((values - low) * (255.0 / max(high - low, 1e-12)), 0, 255), dtype=np.uint8)
 
 
 def _checkerboard(shown: NDArray[np.uint8], board: Board) -> tuple[Float, NDArray[np.intp]]:
     size = (board.columns, board.rows)
-    # a laser's line, which is bright and narrow, may hide the board
-    thinned = cv2.morphologyEx(shown, cv2.MORPH_OPEN, np.ones((1, THICKEST_LINE), dtype=np.uint8))
-    accurate, evened = cv2.CALIB_CB_ACCURACY, cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
-    # evened out, the blocks of a compressed image stand out as its squares do
-    ways = ((shown, evened), (shown, accurate), (thinned, evened), (thinned, accurate))
-    for image, flags in (*ways, (shown, evened | cv2.CALIB_CB_EXHAUSTIVE)):
+    for image, factor, flags in _ways(shown):
         found, corners = cv2.findChessboardCornersSB(image, size, flags=flags)
         if found:
-            break
-    else:
-        larger, _, squares = cv2.findChessboardCornersSBWithMeta(shown, SMALLEST, accurate | cv2.CALIB_CB_LARGER)
-        counted = sorted(squares.shape, reverse=board.columns > board.rows) if larger else sorted(size)
-        raise InputError(
-            "no checkerboard of that size is in the image",
-            found=None if sorted(counted) == sorted(size) else "one of {} x {}".format(*counted),
-            allowed=f"{board.columns} x {board.rows} inner corners, all of them seen",
-            cure="count the corners where four squares meet, and show the whole board with a white margin",
-        )
-    pixel = np.asarray(corners, dtype=np.float64).reshape(-1, 2)
-    return pixel, np.arange(len(pixel))
+            pixel = _at_full_size(corners, factor)
+            known = by_marker(shown, pixel.reshape(board.rows, board.columns, 2), board) if board.dotted else None
+            return known or (pixel, np.arange(len(pixel)))
+        if board.dotted:
+            larger, corners, squares = cv2.findChessboardCornersSBWithMeta(image, SMALLEST, flags | cv2.CALIB_CB_LARGER)
+            part = _at_full_size(corners, factor).reshape(*squares.shape, 2) if larger else None
+            if part is not None and (known := by_marker(shown, part, board)):
+                return known
+    larger, _, squares = cv2.findChessboardCornersSBWithMeta(
+        shown, SMALLEST, cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_LARGER
+    )
+    counted = sorted(squares.shape, reverse=board.columns > board.rows) if larger else sorted(size)
+    hidden = "; of a board that is cut off its marker is to be seen" if board.dotted else ", all of them seen"
+    raise InputError(
+        "no checkerboard of that size is in the image",
+        found=None if sorted(counted) == sorted(size) else "one of {} x {}".format(*counted),
+        allowed=f"{board.columns} x {board.rows} inner corners{hidden}",
+        cure="count the corners where four squares meet, and show the whole board with a white margin",
+    )
+
+
+def _ways(shown: NDArray[np.uint8]) -> Iterator[tuple[NDArray[np.uint8], int, int]]:
+    """Images to look for a checkerboard in, by how much they are smaller, and how: what is quick and mostly does first.
+
+    Corners are refined in the image itself, so that a large one is looked through at half or a quarter of its size.
+    """
+    accurate, evened = cv2.CALIB_CB_ACCURACY, cv2.CALIB_CB_NORMALIZE_IMAGE
+    # a laser's line, which is bright and narrow, may hide the board
+    thinned = cv2.morphologyEx(shown, cv2.MORPH_OPEN, np.ones((1, THICKEST_LINE), dtype=np.uint8))
+    factor = 1
+    while max(shown.shape) > factor * LOOKED_THROUGH:
+        factor *= 2
+    if factor > 1:
+        smaller = [
+            cv2.resize(one, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
+            for one in (shown, thinned)
+        ]
+        yield from ((one, factor, flags) for one in smaller for flags in (evened, 0))
+        accurate = 0
+    # evened out, the blocks of a compressed image stand out as its squares do
+    yield from ((one, 1, flags | accurate) for one in (shown, thinned) for flags in (evened, 0))
+    yield shown, 1, evened | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_EXHAUSTIVE
+
+
+def _at_full_size(corners: Any, factor: int) -> Float:
+    """(n, 2) px of the image that was made smaller by a factor."""
+    return (np.asarray(corners, dtype=np.float64).reshape(-1, 2) + 0.5) * factor - 0.5
 
 
 def _charuco(shown: NDArray[np.uint8], board: Board) -> tuple[Float, NDArray[np.intp]]:

@@ -51,14 +51,16 @@ def coverage(board: Board) -> Float:
         here, there = np.nonzero(y)[0], np.nonzero(x)[0]
         part = np.ix_(here, there)
         out[part] = np.maximum(out[part], y[here][:, None] * x[there])
-    radius = board.circle / board.square * fine
-    reach = np.arange(int(np.ceil(radius)) + 2)
-    offset = np.concatenate([-reach[:0:-1], reach])
-    # the middle of a disc is where four texels meet; of an edge the share on either side, to first order
-    beyond = np.hypot(offset[:, None] + 0.5, offset + 0.5) - radius
-    for x, y in (2.0 + board.target / board.square) * fine if board.kind == "circles" else ():
-        part = np.ix_(int(round(y)) + offset, int(round(x)) + offset)
-        out[part] = np.maximum(out[part], np.clip(0.5 - beyond, 0.0, 1.0))
+    centres, radius = board.discs
+    radius = radius / board.square * fine
+    reach = np.arange(-int(np.ceil(radius)) - 1, int(np.ceil(radius)) + 2)
+    in_dark = board.dots.sum(axis=1) % 2 == 0 if board.dotted else np.zeros(len(centres), dtype=bool)
+    for (x, y), light in zip((2.0 + centres / board.square) * fine, in_dark, strict=True):
+        columns, rows = int(x) + reach, int(y) + reach
+        # of an edge the share on either side, to first order
+        covered = np.clip(0.5 - np.hypot(rows[:, None] + 0.5 - y, columns + 0.5 - x) + radius, 0.0, 1.0)
+        part = np.ix_(rows, columns)
+        out[part] = np.minimum(out[part], 1.0 - covered) if light else np.maximum(out[part], covered)
     return np.minimum(out, 1.0)
 
 

@@ -45,6 +45,11 @@ def write_board(path: Path, board: Board, paper: str | None, contrast: float = 1
         # pages count upwards from the bottom, boards downwards from the top
         corner = (left + x, bottom + size[1] - y - side)
         axes.add_patch(Rectangle(corner, side, side, facecolor=ink, edgecolor="none", linewidth=0.0))
+    centres, radius = board.discs if board.dotted else (np.empty((0, 2)), 0.0)
+    for (x, y), cell in zip(centres, board.dots, strict=True):
+        middle = (left + board.square + x, bottom + size[1] - board.square - y)
+        colour = "1.0" if cell.sum() % 2 == 0 else ink
+        axes.add_patch(Circle(middle, radius, facecolor=colour, edgecolor="none", linewidth=0.0))
     _ruler(axes, left, size[0])
     words = f"{board_text(board)}   print at 100 %; the ruler must be right, or the scale is wrong   Blazer Studio"
     axes.text(left, 0.0035, words, fontsize=7, color="0.25", family="DejaVu Sans")

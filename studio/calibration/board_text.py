@@ -1,4 +1,4 @@
-"""A board as a person types it: "checkerboard:13x9:25mm", "charuco:14x10:25mm:18mm:DICT_5X5_250:legacy",
+"""A board as a person types it: "checkerboard:13x9:25mm:marker", "charuco:14x10:25mm:18mm:DICT_5X5_250:legacy",
 "circles:13x9:25mm:12mm"."""
 
 from __future__ import annotations
@@ -9,13 +9,15 @@ from analysis.calibration.board import Board
 from render.base.errors import InputError
 
 FORM = (
-    "checkerboard:COLUMNSxROWS:SIDE with inner corners, as checkerboard:13x9:25mm, or "
+    "checkerboard:COLUMNSxROWS:SIDE[:marker] with inner corners, as checkerboard:13x9:25mm, or "
     "charuco:COLUMNSxROWS:SIDE:MARKER[:DICTIONARY][:legacy] with squares, as charuco:14x10:25mm:18mm, or "
     "circles:COLUMNSxROWS:SPACING:DIAMETER with dark discs, as circles:13x9:25mm:12mm"
 )
 UNITS = {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 WIDEST_DISC = 0.6
 """Of the spacing: about each disc the paper's brightness is to be seen."""
+FEWEST_ABOUT_MARKER = 4
+"""Corners a side of a board with a marker in its middle."""
 MOST = 200
 """Corners a side."""
 
@@ -33,9 +35,10 @@ def parse_board(text: str) -> Board:
     columns, rows = int(counts[1]), int(counts[2])
     square = _length(parts[1], text)
     if kind == "checkerboard":
-        if len(parts) > 2:
+        dotted = parts[2:] == ["marker"]
+        if (len(parts) > 2 and not dotted) or (dotted and min(columns, rows) < FEWEST_ABOUT_MARKER):
             raise _refused(text)
-        board = Board("checkerboard", columns, rows, square)
+        board = Board("checkerboard", columns, rows, square, dotted=dotted)
     elif kind == "circles":
         diameter = _length(parts[2], text)
         if len(parts) > 3 or not 0.1 * square <= diameter <= WIDEST_DISC * square:
@@ -59,7 +62,7 @@ def board_text(board: Board) -> str:
     """The text that `parse_board` reads."""
     side = f"{1e3 * board.square:.9g}mm"
     if board.kind == "checkerboard":
-        return f"checkerboard:{board.columns}x{board.rows}:{side}"
+        return f"checkerboard:{board.columns}x{board.rows}:{side}{':marker' if board.dotted else ''}"
     if board.kind == "circles":
         return f"circles:{board.columns}x{board.rows}:{side}:{1e3 * board.marker:.9g}mm"
     legacy = ":legacy" if board.legacy else ""

@@ -26,6 +26,7 @@ DISCS = Board("circles", 7, 5, 0.04, 0.02)
 SAMPLES, BLUR = 64, 0.8 * 3.45e-6
 """Of a pixel, so that edges of the texture are in their place; and of the lens, m."""
 CHECKERS = Board("checkerboard", 7, 5, 0.04)
+MARKED = Board("checkerboard", 7, 5, 0.04, dotted=True)
 
 
 def test_as_much_is_dark_as_the_board_has() -> None:
@@ -34,6 +35,8 @@ def test_as_much_is_dark_as_the_board_has() -> None:
     # 35 discs, of squares; an edge is right to second order in a texel over the radius of 40
     assert dark == pytest.approx(35 * np.pi * 0.25**2, rel=0.5 / 40.0**2)
     assert coverage(CHECKERS).sum() / fine**2 == pytest.approx(24.0)
+    # a dot of paper in a dark square, two of ink in light ones
+    assert coverage(MARKED).sum() / fine**2 == pytest.approx(24.0 + np.pi * 0.17**2, rel=1e-5)
     marked = parse_board("charuco:7x6:30mm:20mm:DICT_4X4_50")
     share = coverage(marked)
     assert share.min() >= 0.0 and share.max() == 1.0
@@ -64,7 +67,7 @@ def rendered(board: Board, there: Estimate, folder: Path) -> np.ndarray:
     return np.asarray(image)
 
 
-@pytest.mark.parametrize("board", [DISCS, CHECKERS], ids=["discs", "squares"])
+@pytest.mark.parametrize("board", [DISCS, MARKED], ids=["discs", "squares with a marker"])
 def test_a_rendered_board_is_found_where_the_camera_sees_it(board: Board, tmp_path: Path) -> None:
     there = scene(30.0)
     view, _ = detect(rendered(board, there, tmp_path), board, "image")

@@ -13,7 +13,12 @@ from render.base.errors import InputError
 from studio.calibration.board_pdf import PAPERS, dark_squares, write_board
 from studio.calibration.board_text import board_text, parse_board
 
-BOARDS = ["checkerboard:13x9:25mm", "charuco:14x10:25mm:18mm", "charuco:7x6:0.03m:20mm:DICT_4X4_50:legacy"]
+BOARDS = [
+    "checkerboard:13x9:25mm",
+    "checkerboard:13x9:25mm:marker",
+    "charuco:14x10:25mm:18mm",
+    "charuco:7x6:0.03m:20mm:DICT_4X4_50:legacy",
+]
 
 
 @pytest.mark.parametrize("text", BOARDS)
