@@ -64,9 +64,11 @@ def candidate_features(candidates: Line) -> Float:
         *(candidates.flag == flag for flag in (Flag.SATURATED, Flag.BLENDED, Flag.MISFIT)),
     ]  # fmt: skip
     bends, beside = _beside(u, amplitude)
-    parts = np.stack([*own, *_row(u, amplitude, width), *beside], axis=2)[valid].astype(np.float64)
-    table = np.column_stack([parts, _along(u, candidates.amplitude, own, bends)])
-    return np.clip(np.nan_to_num(table), -20.0, 20.0)
+    alone = [values[valid] for values in (*own, *_row(u, amplitude, width), *beside)]
+    # one table and no copies of it: memory that is touched for the first time costs more than the numbers
+    table = np.column_stack([*alone, _along(u, candidates.amplitude, own, bends)]).astype(np.float64, copy=False)
+    np.nan_to_num(table, copy=False)
+    return np.clip(table, -20.0, 20.0, out=table)
 
 
 def _known(values: Float, valid: NDArray[np.bool_]) -> Float:
@@ -108,9 +110,8 @@ def _beside(u: Float, amplitude: Float) -> tuple[Float, list[Float]]:
         steps, levels = [], []
         for rows in (-d, d):
             other, level = _shifted(u, rows), _shifted(amplitude, rows)
-            step = other[:, None, :] - u[:, :, None]
-            nearest = np.where(np.isnan(step), np.inf, np.abs(step)).argmin(axis=2)
-            steps.append(np.take_along_axis(step, nearest[:, :, None], axis=2)[..., 0])
+            nearest, _ = _nearest(u, other)
+            steps.append(np.take_along_axis(other, nearest, axis=1) - u)
             levels.append(np.take_along_axis(level, nearest, axis=1) - amplitude)
         size = [np.where(np.isnan(step), FAR, np.arcsinh(np.abs(step) / d)) for step in steps]
         bend = np.arcsinh(np.abs(steps[0] + steps[1]) / d)
@@ -120,6 +121,20 @@ def _beside(u: Float, amplitude: Float) -> tuple[Float, list[Float]]:
         if d == 2:
             kept = bend
     return kept, found
+
+
+def _nearest(u: Float, others: Float) -> tuple[NDArray[np.intp], Float]:
+    """Positions (n, k) and others (n, k), NaN for none -> (n, k) the rank of the nearest other, and how far it is, px.
+
+    Rank 0, infinitely far, where there is none.
+    """
+    rank, least = np.zeros(u.shape, np.intp), np.full(u.shape, np.inf)
+    for k in range(others.shape[1]):  # few ranks, many rows: several times faster than argmin over (n, k, k)
+        apart = np.abs(others[:, k : k + 1] - u)
+        closer = apart < least
+        rank[closer] = k
+        np.copyto(least, apart, where=closer)
+    return rank, least
 
 
 def _shifted(values: Float, rows: int) -> Float:
@@ -188,12 +203,10 @@ def segments(u: Float) -> NDArray[np.int32]:
     starts, ends = [], []
     linked = np.zeros(u.shape, np.bool_)  # a candidate has its successor
     for gap in range(1, min(LINKS, len(u) - 1) + 1):
-        apart = np.abs(u[gap:, None, :] - u[:-gap, :, None])
-        apart = np.where(np.isnan(apart), np.inf, apart)
-        onward, back = apart.argmin(axis=2), apart.argmin(axis=1)
+        onward, apart = _nearest(u[:-gap], u[gap:])
+        back, _ = _nearest(u[gap:], u[:-gap])
         mutual = np.take_along_axis(back, onward, axis=1) == np.arange(u.shape[1])
-        near = np.take_along_axis(apart, onward[:, :, None], axis=2)[..., 0] <= STEEPEST * gap
-        found = mutual & near & ~linked[:-gap]
+        found = mutual & (apart <= STEEPEST * gap) & ~linked[:-gap]
         linked[:-gap] |= found
         row, rank = np.nonzero(found)
         starts.append(number[row, rank])
