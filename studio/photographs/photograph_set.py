@@ -75,8 +75,8 @@ class Look:
 
     @property
     def banded(self) -> bool:
-        """A colour selects, and a channel that also sees other light measures."""
-        return self.evidence is not None and self.evidence.combination.difference and self.channel != "difference"
+        """The line stands out: it alone is looked at."""
+        return self.evidence is not None and self.evidence.score >= FAINT
 
     def record(self) -> dict[str, Any]:
         """For programs: what was chosen, and why."""

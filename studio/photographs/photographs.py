@@ -27,11 +27,13 @@ from render.base.arrays import Float
 from render.base.csv_file import write_csv
 from render.base.errors import InputError
 from render.camera.camera import Camera
+from studio.photographs.bands import about, bands
 from studio.photographs.candidates import peaks_to_choose_from
 from studio.photographs.choice import carried_on, selected
 from studio.photographs.completion import FILLED
 from studio.photographs.half_height import with_half_heights
-from studio.photographs.laser_light import Light, about, bands, full_scale, laser_light, without
+from studio.photographs.laser_light import full_scale, laser_light
+from studio.photographs.light import Light, without
 from studio.photographs.line_arrays import changed, column
 from studio.photographs.line_ends import HALF, TONED, ended
 from studio.photographs.mosaic import with_mosaic
