@@ -211,7 +211,8 @@ def _falling(image: Floats32, line: Course) -> tuple[Ints, Ints]:
     ends = []
     for side in sides:
         valley = np.minimum.accumulate(np.where(away < inner, np.inf, side), axis=1)
-        rises = (away >= inner) & (side > valley + RISE * (top - valley))
+        rises = away >= inner
+        rises[rises] = (side > (1.0 - RISE) * valley + RISE * top)[rises]
         found = rises.any(axis=1) & clear
         last = np.argmax(rises, axis=1)
         lowest = np.argmin(np.where((away >= inner) & (away <= last[:, None]), side, np.inf), axis=1)

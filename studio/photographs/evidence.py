@@ -153,7 +153,7 @@ class Evidence:
     def warnings(self) -> list[str]:
         """Doubts for a person."""
         found = []
-        if self.score < FAINT:
+        if max(max(scores.values()) for scores in self.scores.values()) < FAINT:
             found.append(
                 "no line stands out in the photographs, in any colour or direction: see the overlay, and give "
                 "--axis and --laser"

@@ -74,9 +74,14 @@ class Look:
     """Of the photographs that were looked at."""
 
     @property
-    def banded(self) -> bool:
-        """The line stands out: it alone is looked at."""
+    def stands_out(self) -> bool:
+        """The line is clearer than all else."""
         return self.evidence is not None and self.evidence.score >= FAINT
+
+    @property
+    def coloured(self) -> bool:
+        """A colour selects, and a channel that also sees other light measures."""
+        return self.evidence is not None and self.evidence.combination.difference and self.channel != "difference"
 
     def record(self) -> dict[str, Any]:
         """For programs: what was chosen, and why."""

@@ -231,7 +231,7 @@ def judged(name: str, folder: Path, *options: str) -> tuple[Score, Score]:
 if __name__ == "__main__":
     target = Path(sys.argv[1])
     target.mkdir(parents=True, exist_ok=True)
-    print(f"{'drawing':20s} {'found':>7s} {'false':>7s} {'2 sigma':>8s} {'err/sig':>8s}  axis     colour      centre of mass")
+    print(f"{'drawing':20s} {'found':>7s} {'false':>7s} {'2 sigma':>8s} {'err/sig':>8s}  told    centre of mass")
     for drawing_name in sys.argv[2:] or DRAWINGS:
         wanted, (got, plain) = DRAWINGS[drawing_name], judged(drawing_name, target)
         numbers = f"{got.found:7.1%} {got.false:7.2%} {got.within:8.1%} {got.normalised:8.2f}"
