@@ -44,6 +44,9 @@ CLEAR = 1.0 / 3.0
 """Share of a piece of the chain that is clear of its rivals, which glowing, broken surfaces have beside the line."""
 JUMP = 5.0
 """px of the shrunk image from one scan line to the next, that a chain's piece ends at."""
+FAR, FALL = 3.0, 0.56
+"""Sigmas of the filter to either side at which a ridge has fallen, and what makes its fall as much as its bend: for a
+Gaussian of the filter's own width, (1/2)^(3/2) of its height over (1 - exp(-9/4)) / 2^(1/2)."""
 NEAR = 3.0
 """Sigmas of the ridge's own filter within which another maximum is a part of it."""
 COLOURFUL = 0.5
@@ -150,7 +153,7 @@ class Evidence:
     def warnings(self) -> list[str]:
         """Doubts for a person."""
         found = []
-        if self.score < FAINT:
+        if max(max(scores.values()) for scores in self.scores.values()) < FAINT:
             found.append(
                 "no line stands out in the photographs, in any colour or direction: see the overlay, and give "
                 "--axis and --laser"
@@ -324,6 +327,8 @@ def ridge_peaks(
         smooth = cv2.GaussianBlur(light, (0, 0), scale, borderType=cv2.BORDER_REPLICATE)
         # Lindeberg (1998), eq. 42: with the power 3/2 a Gaussian ridge answers most at its own width
         bent = -(scale**1.5) * cv2.Sobel(smooth, cv2.CV_32F, 2, 0, ksize=1, borderType=cv2.BORDER_REPLICATE)
+        # an edge is bent as well, but falls to one side only
+        np.minimum(bent, FALL / scale**0.5 * _fall(smooth, round(FAR * scale)), out=bent)
         widest[bent > response] = scale
         np.maximum(response, bent, out=response)
     if closed is not None:
@@ -340,6 +345,14 @@ def ridge_peaks(
     bend = np.maximum(2.0 * strength - left - right, 1e-12)
     u = order + 1.0 + 0.5 * (right - left) / bend
     return np.where(there, u, np.nan), np.where(there, strength, np.nan), widths
+
+
+def _fall(smooth: Floats, far: int) -> Floats:
+    """How far each pixel (n, w) is above both of those so far to its left and right; beyond the image it is level."""
+    width = smooth.shape[1]
+    places = np.arange(width)
+    left, right = smooth[:, np.maximum(places - far, 0)], smooth[:, np.minimum(places + far, width - 1)]
+    return np.asarray(smooth - np.maximum(left, right))
 
 
 def _flanks(order: NDArray[np.intp], strength: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.bool_]:

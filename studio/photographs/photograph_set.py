@@ -74,7 +74,12 @@ class Look:
     """Of the photographs that were looked at."""
 
     @property
-    def banded(self) -> bool:
+    def stands_out(self) -> bool:
+        """The line is clearer than all else."""
+        return self.evidence is not None and self.evidence.score >= FAINT
+
+    @property
+    def coloured(self) -> bool:
         """A colour selects, and a channel that also sees other light measures."""
         return self.evidence is not None and self.evidence.combination.difference and self.channel != "difference"
 

@@ -27,11 +27,15 @@ from render.base.arrays import Float
 from render.base.csv_file import write_csv
 from render.base.errors import InputError
 from render.camera.camera import Camera
+from studio.photographs.bands import about, bands, course
 from studio.photographs.candidates import peaks_to_choose_from
 from studio.photographs.choice import carried_on, selected
 from studio.photographs.completion import FILLED
+from studio.photographs.evidence import Chain
 from studio.photographs.half_height import with_half_heights
-from studio.photographs.laser_light import Light, about, bands, full_scale, laser_light, without
+from studio.photographs.image_files import Photograph
+from studio.photographs.laser_light import full_scale, laser_light
+from studio.photographs.light import Light, without
 from studio.photographs.line_arrays import changed, column
 from studio.photographs.line_ends import HALF, TONED, ended
 from studio.photographs.mosaic import with_mosaic
@@ -48,6 +52,9 @@ SATURATED_SHARE = 0.5
 
 WIDER, PIXEL = 2.0, 12.0**-0.5
 """Times the line's usual width that one scan line's may be; px, the sigma of light spread over a pixel."""
+
+FOLLOWED = 0.95
+"""Share of its ridge on which a line has to lie, of as much as it could be found on."""
 
 FITS = ("auto", "likelihood", "gaussian")
 """Methods that a profile may defeat."""
@@ -91,14 +98,53 @@ def extract_photograph(
     file and what is wrong: unreadable, of the wrong type or size, black, saturated, not a number, without the channel
     asked for.
     """
-    # what is smoothed along is the line that was selected, with its noise, and not with what all scan lines share
-    settings = look.settings.model_copy(update={"smooth_along": False})
     with naming(path):
         taken, off = look.read(path)
         whole = check_image(taken.pixels)
         check_camera(whole, volume)
         check_light(look.region.part(whole))
-        light, corner = measured_light(path, whole, off, look, taken.lossy)
+        measured = _measured(path, taken, off, look, threads, volume, look.coloured)
+        if look.coloured or not look.stands_out or volume is not None or look.settings.select != "continuous":
+            return measured
+        image = look.region.part(whole)
+        chains = look.lines(path, image, None if off is None else look.region.part(off))
+        seen, held = _on_ridges(measured.line, chains, look, image.shape)
+        if held >= FOLLOWED * seen:
+            return measured
+        # something else in the room may be brighter than the line
+        within = _measured(path, taken, off, look, threads, volume, True)
+        return within if held < FOLLOWED * _on_ridges(within.line, chains, look, image.shape)[1] else measured
+
+
+def _on_ridges(line: Line, chains: Sequence[Chain], look: Look, shape: tuple[int, ...]) -> tuple[int, int]:
+    """On how many scan lines chains of ridges in an image (h, w, ...) are, and on how many of them a line (n, k)."""
+    axis, (x, y) = look.settings.axis, look.region.corner
+    along, first = (x, y) if axis == "rows" else (y, x)
+    count, width = shape[:2] if axis == "rows" else shape[1::-1]
+    u = line.u[first : first + count] - along
+    seen = held = 0
+    for one in (course(chain, count, width) for chain in chains):
+        there = one.beyond == 0.0
+        seen += int(there.sum())
+        held += int((there & np.any([one.holds(u[:, k]) for k in range(u.shape[1])], axis=0)).sum())
+    return seen, held
+
+
+def _measured(
+    path: Path,
+    taken: Photograph,
+    off: NDArray[Any] | None,
+    look: Look,
+    threads: int | None,
+    volume: WorkingVolume | None,
+    banded: bool,
+) -> Measured:
+    """As `extract_photograph`; banded: only where the line's ridge runs."""
+    # what is smoothed along is the line that was selected, with its noise, and not with what all scan lines share
+    settings = look.settings.model_copy(update={"smooth_along": False})
+    with naming(path):
+        whole = check_image(taken.pixels)
+        light, corner = measured_light(path, whole, off, look, taken.lossy, banded)
         if light is None:
             return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
         noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy, threads=threads)
@@ -140,7 +186,7 @@ def extract_photograph(
 
 
 def measured_light(
-    path: Path, whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lossy: bool
+    path: Path, whole: NDArray[Any], off: NDArray[Any] | None, look: Look, lossy: bool, banded: bool
 ) -> tuple[Light | None, tuple[int, int]]:
     """What is measured of an image, in its region and about its lines, and (x, y) of its first pixel; None: nothing is
     left.
@@ -149,7 +195,7 @@ def measured_light(
     x, y = corner = look.region.corner
     off = None if off is None else look.region.part(off)
     full, within = full_scale(image, lossy), None
-    if look.banded:
+    if banded:
         found = look.lines(path, image, off)
         near = about(found, look.settings.axis, image.shape)
         chains = [replace(chain, u=chain.u - near.start) for chain in found]

@@ -14,9 +14,9 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 import main
+from studio.photographs.bands import course
 from studio.photographs.evidence import Chain
 from studio.photographs.image_files import has_coarse_colour
-from studio.photographs.laser_light import band
 from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
 
 SCENES: dict[str, tuple[Scene, int | None]] = {
@@ -257,7 +257,7 @@ def test_where_a_line_jumps_the_band_holds_both_of_its_places() -> None:
     """A wall far behind a part: the part's first scan lines, which the shrunk image does not show, are not cut off."""
     u = np.where(np.arange(60) < 25, 20.0, 120.0)
     u[25:30] = np.nan
-    low, high = band(Chain(u, np.full(60, 1.0), 1.0), 60, 200)
+    low, high = course(Chain(u, np.full(60, 1.0), 1.0), 60, 200).band()
     inside = (low[25:30] <= 20) & (high[25:30] > 120)
     assert inside.all()
     assert high[10] < 60 and low[50] > 60
