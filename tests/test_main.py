@@ -155,6 +155,14 @@ class TestExitCodes:
 
 
 class TestBadProjects:
+    def test_a_template_is_a_project_by_its_name_unless_a_file_has_it(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        assert json.loads(call("inspect", "v_groove", "--json").stdout)["ok"]
+        done = call("inspect", "groove")
+        assert done.exit_code == 2 and "did you mean v_groove?" in done.output
+        (tmp_path / "v_groove").write_text("none")
+        assert call("inspect", "v_groove").exit_code == 2
+
     @pytest.mark.parametrize("command", ["run", "render", "inspect"])
     @pytest.mark.parametrize("text", ["", "{", "[]", '{"schema_version": 99}', "\x00\x01", '{"schema_version": 1}'])
     def test_a_damaged_project_is_refused_and_nothing_is_written(

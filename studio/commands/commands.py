@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from render.base.errors import InputError
-from studio.project.project import Project, project_file
+from studio.project.project import Project, project_file, template_or_path
 from studio.project.templates import DESCRIPTIONS, new_project, template_folder
 from studio.runtime.console import print_plan, print_table, stage_progress
 from studio.runtime.streams import print_json
@@ -39,12 +39,12 @@ SCAN_OPTIONS = {
 
 
 def chosen_file(path: Path | None) -> Path:
-    """The project file at a path (itself, or the one in a folder), or the sample's."""
-    return project_file(path if path is not None else template_folder(SAMPLE))
+    """The project file at a path (itself, or the one in a folder), or of a template by its name, or the sample's."""
+    return project_file(template_folder(SAMPLE) if path is None else template_or_path(str(path)))
 
 
 def load_project(path: Path | None) -> tuple[Project, Path]:
-    """The project at a path (a file, or a folder with one project), or the sample; and its folder."""
+    """The project at a path (a file, or a folder with one project), a template, or the sample; and its folder."""
     file = chosen_file(path)
     return Project.load(file), file.parent
 

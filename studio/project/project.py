@@ -124,7 +124,7 @@ class Project(Model):
         InputError: one message for all that is wrong with it.
         """
         try:
-            file = project_file(_template_or_path(path) if isinstance(path, str) else Path(path))
+            file = project_file(template_or_path(path) if isinstance(path, str) else Path(path))
         except TypeError:
             kind = type(path).__name__
             allowed = "a template's name or a path"
@@ -210,7 +210,7 @@ def _there(key: str | int, node: Any, place: str) -> Any:
     return key
 
 
-def _template_or_path(name: str) -> Path:
+def template_or_path(name: str) -> Path:
     """What a word means. InputError: neither a path that is there nor a template, and it does not look like a path."""
     path = Path(name)
     if not name.strip() or path.exists() or path.suffix or len(path.parts) != 1:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from analysis.line.detection.noise import NoiseModel
 from analysis.line.extract import extract
 from analysis.line.result import Line
 from analysis.line.selection.geometry import WorkingVolume
+from analysis.line.selection.learned import READY_MADE, load_chooser
 from analysis.line.series.hdr import fuse
 from analysis.line.settings import ExtractionSettings, Method
 from render.sensor.develop import Image
@@ -55,6 +57,13 @@ def extraction_of(project: Project) -> ExtractionSettings:
         return settings
     file = allowed_file(project.folder, settings.chooser, "extraction.chooser")
     return settings.model_copy(update={"chooser": str(file)})
+
+
+def check_chooser(project: Project) -> None:
+    """Before anything is rendered for a learned selection. InputError: its weights are no chooser's."""
+    settings = extraction_of(project)
+    if settings.select == "learned":
+        load_chooser(READY_MADE if settings.chooser is None else Path(settings.chooser))
 
 
 def extract_line(

@@ -24,6 +24,7 @@ from studio.scan.frame_writer import FrameWriter
 from studio.scan.frames_ahead import rendered_frames
 from studio.scan.gauging import measures_record
 from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
+from studio.scan.line_extraction import check_chooser
 from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.render_goal import goal_of
@@ -87,6 +88,8 @@ def run_scan(
         project = validated(project.model_copy(update={"seed": options.seed}), "with another seed")
     if options.measure and not project.scene.lasers:
         raise InputError("the rig has no laser, so there is no line to measure", where="scene.rig.lasers", found="none")
+    if options.measure:
+        check_chooser(project)
     cautions = Cautions(project, image_scale)
     count = min(options.steps or project.scene.frame_count, project.scene.frame_count)
     clock = Clock(listener.progress, listener.cancelled)

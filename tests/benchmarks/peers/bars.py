@@ -23,6 +23,8 @@ BARS = (
     Bar("s2", "reflection", 0.03, 40.0),
     Bar("s2-shiny", "reflection", 0.10, 100.0),
     Bar("s3", "reflection", 0.10, 30.0),
+    Bar("channel", "reflection", 0.03, 20.0),
+    Bar("rocker", "reflection", 0.03, 20.0),
 )
 QUICK = {"s2": ("ours", "mitsuba ptracer, LLVM", "mitsuba ptracer, aimed", "luxcore light", "cycles guided")}
 QUICK |= {

@@ -19,6 +19,8 @@ TITLES = {
     ("s2-shiny", "reflection"): "tee weld, alpha 0.03: reflections",
     ("s3", "reflection"): "s3: caustic of the glass ball",
     ("s4", "reflection"): "caustic behind a glass plate",
+    ("channel", "reflection"): "channel of copper: reflections",
+    ("rocker", "reflection"): "trough of chromium: reflections",
 }
 # colour-blind safe (Okabe and Ito 2008); ours in black
 COLOURS = ("#000000", "#0072B2", "#56B4E9", "#882255", "#009E73", "#D55E00", "#E69F00", "#CC79A7", "#999999")

@@ -46,6 +46,15 @@ def test_a_project_names_no_chooser_outside_its_folder_but_the_command_line_may(
     assert extraction_of(with_extraction(project, chooser=named)).chooser == named
 
 
+def test_weights_that_are_no_chooser_s_are_refused_before_anything_is_rendered(tmp_path):
+    weights = tmp_path / "mine.onnx"
+    weights.write_bytes(b"none")
+    project = with_extraction(Project.load(ROOT / "project.json"), select="learned", chooser=of_command_line(weights))
+    with pytest.raises(InputError, match="chooser's card"):
+        run_scan(project, ROOT, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def bright(project: Project, times: float) -> Project:
     sensor = project.sensor.model_copy(update={"exposure_time": times * project.sensor.exposure_time})
     return project.model_copy(update={"sensor": sensor})
