@@ -338,7 +338,7 @@ def _print_results(result: dict[str, Any]) -> None:
         if row["sampled_scan_lines"] < row["scan_lines"]:
             sample = f"a sample of {row['sampled_scan_lines']} of {row['scan_lines']} scan lines"
             print(f"robust sigma and P95 are those of {sample}, all else of every point")
-    for text in result.get("notes", ()):
+    for text in dict.fromkeys([*result.get("notes", ()), *result.get("remarks", ())]):
         print(f"warning: {text}")
 
 

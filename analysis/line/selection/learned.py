@@ -35,7 +35,10 @@ READY_MADE = Path(__file__).resolve().parents[3] / "assets" / "chooser" / "steel
 MOST_BYTES = 2**20
 FEWEST = 20
 """Candidates that a frame is judged by; with fewer, it is not known what it looks like."""
-UNLIKE = "the image, as it is measured, is unlike those that the chooser was trained on: no peak is taken"
+UNLIKE = (
+    "the image, as it is measured, is unlike those that the chooser was trained on: no peak is taken (select "
+    "continuous, or train a chooser on a recipe like it)"
+)
 
 
 class Card(Model):
