@@ -70,6 +70,7 @@ def make_images(
             raise InputError("there is no such format", where="--format", found=name, allowed=", ".join(FORMATS))
     folder = out if out is not None else Path("scan-output") / f"dataset-{folder_name(recipe.name)}"
     check_output(folder)
+    engine.check()
     scenes, shard, sources = wanted
     with stage_progress(quiet) as progress, stop_on_interrupt(never) as cancelled:
         try:

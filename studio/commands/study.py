@@ -52,6 +52,7 @@ def run_into(
     check_output(folder)
     check_size(study)
     first = next_cells(study, bases, {}, part)  # every field and value is looked at before anything runs
+    engine.check()
     with hold(folder), Store(folder, study.digest(bases)) as store:
         store.describe(study, bases)
         known = store.count()

@@ -134,6 +134,8 @@ class Evidence:
     """Of each photograph in the chosen combination: the line, and what would be a second one."""
     colour: Colour
     """Of the laser: the combination's, or that of most of its light where another channel shows it more clearly."""
+    clearest: dict[Axis, float]
+    """By axis, of the combination that shows the line best: its score, or that of a second line that hides it."""
 
     @property
     def score(self) -> float:
@@ -153,26 +155,24 @@ class Evidence:
     def warnings(self) -> list[str]:
         """Doubts for a person."""
         found = []
-        if max(max(scores.values()) for scores in self.scores.values()) < FAINT:
+        if max(self.clearest.values()) < FAINT:
             found.append(
                 "no line stands out in the photographs, in any colour or direction: see the overlay, and give "
                 "--axis and --laser"
             )
         else:
-            for axis, scores in self.scores.items():
-                other = max(scores.values())
-                if axis != self.axis and other > WEAK * self.score:
+            for axis, other in self.clearest.items():
+                if axis != self.axis and other > WEAK * self.clearest[self.axis]:
                     found.append(
                         f"the line may run along the {self.axis} instead (evidence {other:.2f} for --axis {axis}, "
-                        f"{self.score:.2f} for {self.axis})"
+                        f"{self.clearest[self.axis]:.2f} for {self.axis})"
                     )
         return found
 
     def told(self) -> list[tuple[str, str]]:
         """(what, choice and reason) for a person."""
-        best = {axis: max(scores.values()) for axis, scores in self.scores.items()}
         axis = self.axis
-        axis_reason = ", ".join(f"{name} {score:.2f}" for name, score in best.items())
+        axis_reason = ", ".join(f"{name} {score:.2f}" for name, score in self.clearest.items())
         by_name = self.scores[self.axis]
         ranked = sorted(by_name.items(), key=lambda item: -item[1])[:4]
         reason = ", ".join(f"{name} {score:.2f}" for name, score in ranked) if len(by_name) > 1 else "given"
@@ -215,13 +215,27 @@ def find_evidence(
     map_chunks(look, len(tried), 1)
     means = iter(found.reshape(-1, len(shrunk)).mean(axis=1).tolist())
     scores: dict[Axis, dict[str, float]] = {way: {one.name: next(means) for one in allowed} for way in AXES}
-    best_axis = axis if axis is not None else max(AXES, key=lambda way: max(scores[way].values()))
-    highest = max(scores[best_axis].values())
-    best = next(c for c in allowed if scores[best_axis][c.name] >= (1.0 - TIE) * highest)
+    best_of = {way: _simplest_of_best(allowed, scores[way]) for way in AXES}
+    clearest = {way: _clearest(shrunk, best_of[way], way, max(scores[way].values())) for way in AXES}
+    best_axis = axis if axis is not None else max(AXES, key=lambda way: clearest[way])
+    best = best_of[best_axis]
     both = [chains_of(one, best, best_axis, 2) for one in shrunk]
     lines = [pair[0] for pair in both]
     seen = best.colour if mono or colour is not None else _colour_of(shrunk, lines, best, best_axis)
-    return Evidence(best_axis, best, scores, tuple((pair[0], pair[1]) for pair in both), seen)
+    return Evidence(best_axis, best, scores, tuple((pair[0], pair[1]) for pair in both), seen, clearest)
+
+
+def _simplest_of_best(allowed: Sequence[Combination], scores: dict[str, float]) -> Combination:
+    highest = max(scores.values())
+    return next(one for one in allowed if scores[one.name] >= (1.0 - TIE) * highest)
+
+
+def _clearest(shrunk: Sequence[Shrunk], combination: Combination, axis: Axis, score: float) -> float:
+    """Of two lines that are alike each hides how clear the other is: what is left without the first one tells."""
+    if score >= SECOND:
+        return score
+    second = float(np.mean([chains_of(one, combination, axis, 2)[1].score for one in shrunk]))
+    return second if second > SECOND else score
 
 
 def _colour_of(shrunk: Sequence[Shrunk], lines: Sequence[Chain], combination: Combination, axis: Axis) -> Colour:

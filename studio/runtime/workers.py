@@ -39,6 +39,13 @@ class Engine:
     workers: int | None = None
     scheduler: str | None = None
 
+    def check(self) -> None:
+        """Before anything is written for its work. InputError: no scheduler answers."""
+        if self.scheduler is not None:
+            from studio.runtime.cluster import check_answers
+
+            check_answers(self.scheduler)
+
 
 EVERY_PROCESSOR = Engine()
 

@@ -15,7 +15,7 @@ from PIL import Image
 
 import main
 from studio.photographs.bands import course
-from studio.photographs.evidence import Chain
+from studio.photographs.evidence import AXES, Chain, find_evidence, shrink
 from studio.photographs.image_files import has_coarse_colour
 from tests.studio.photographs.colour_photographs import HEIGHT, Scene, photograph, write
 
@@ -53,6 +53,17 @@ def positions(path: Path, count: int = HEIGHT, across: str = "u") -> tuple[Any, 
                 first = row["row"] if "row" in row else row["column"]
                 found[:, int(first)] = float(row[across]), float(row["sigma_u"])
     return found[0], found[1]
+
+
+@pytest.mark.parametrize("axis", AXES)
+def test_two_lines_that_are_alike_hide_neither_themselves_nor_which_way_they_run(axis: str) -> None:
+    """Each is as strong as what is elsewhere, and on dark ground noise alone stands as clear on the other axis."""
+    y, x = np.mgrid[0:360, 0:480].astype(np.float64)
+    lines = sum(100.0 * np.exp(-0.5 * (x - at - 0.15 * y) ** 2) for at in (190.0, 310.0))
+    for seed in range(5):
+        image = np.rint(20.0 + lines + np.random.default_rng(seed).normal(size=x.shape)).astype(np.uint8)
+        evidence = find_evidence([shrink(image if axis == "rows" else image.T, None)])
+        assert (evidence.axis, evidence.lines) == (axis, 2) and not evidence.warnings
 
 
 @pytest.mark.parametrize("name", SCENES)
