@@ -100,8 +100,9 @@ def _extract_group(
     threads: int | None,
 ) -> dict[str, Any]:
     """One image, or the exposures of one scene: written, and summed up. InputError names the file."""
+    from studio.photographs.line_tables import summary, table_path, write_line
     from studio.photographs.overlay import write_overlay
-    from studio.photographs.photographs import extract_photograph, extract_series, summary, table_path, write_line
+    from studio.photographs.photographs import extract_photograph, extract_series
     from studio.photographs.ridge_files import ridges_of_file
 
     look = prepared.look

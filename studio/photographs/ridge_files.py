@@ -16,7 +16,8 @@ from analysis.line.series.subtract import subtract_off
 from analysis.line.settings import ExtractionSettings
 from render.base.csv_file import write_csv
 from studio.photographs.image_files import load_photograph
-from studio.photographs.photographs import check_light, naming, table_path
+from studio.photographs.line_tables import table_path
+from studio.photographs.photographs import check_light, naming
 from studio.scan.own_files import RIDGE_COLUMNS
 
 
