@@ -42,8 +42,7 @@ class Weights:
         """
         everywhere = (self.laser, self.moves, self.peaks, self.ambient, self.illumination)
         arrays = [np.ascontiguousarray(one[lines]) for one in everywhere]
-        sigma, least, narrow = of_lines
-        _put(pixels, (sigma, least, narrow), numbers, self.response, self.bands, tuple(arrays))
+        _put(pixels, of_lines, numbers, self.response, self.bands, tuple(arrays))
         for whole, some in zip(everywhere[:-1], arrays[:-1], strict=True):
             if not np.may_share_memory(whole, some):
                 whole[lines] = some
@@ -58,7 +57,7 @@ def _put(
     bands: Float,
     out: tuple[Float32, Float32, Float32, Float32, Float32],
 ) -> None:
-    """As `Weights.put` -> out: laser, moves, peaks, ambient, each (n, w), the last of all is read, the illumination."""
+    """As `Weights.put` -> out: laser, moves, peaks and ambient (n, w); its last is the illumination, which is read."""
     light, move, risen = pixels
     told, least, narrow = of_lines
     floor, allowed, of_pixel, evenly = numbers
@@ -77,7 +76,7 @@ def _put(
                     decided[max(i - 1, 0) : i + 2] = True
         for i in range(w):
             count += decided[i]
-        # A line that is moved by more than it tells asks of no light to be known better than its pixels' noise.
+        # a line that is moved by more than it tells asks of no light to be known better than its pixels' noise
         sigma = max(told[y], np.sqrt(variance))
         scale = np.float32(1.0 / (allowed * max(sigma, least[y]))) if 0.0 < sigma < np.inf else np.float32(0.0)
         share = 1.0 / (of_pixel * np.sqrt(max(count, 1)))

@@ -140,46 +140,45 @@ def _measured(
     """As `extract_photograph`; banded: only where the line's ridge runs."""
     # what is smoothed along is the line that was selected, with its noise, and not with what all scan lines share
     settings = look.settings.model_copy(update={"smooth_along": False})
-    with naming(path):
-        whole = check_image(taken.pixels)
-        light, corner = measured_light(path, whole, off, look, taken.lossy, banded)
-        if light is None:
-            return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
-        noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy, threads=threads)
-        alone = settings.select == "strongest" and volume is None
-        # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
-        half = TONED if taken.lossy else HALF
-        shared = noise.alike or whole.ndim == 3 or taken.lossy
-        noise = noise.model_copy(update={"alike": shared})
-        # where a camera has shaped the profile, no line is a Gaussian, and what some scan lines are taken for, one line
-        # or two, would move them against the others
-        judged = not shared
-        if alone:
-            line = extract(light.image, settings=settings, noise=noise, threads=threads, shared=False, judged=judged)
-        else:
-            every = volume is not None
-            line = peaks_to_choose_from(light.image, settings, noise, threads, every=every, judged=judged)
-        line = placed(unsure_dropped(line), whole.shape, corner)
-        fits = settings.select == "continuous" and settings.method in FITS
-        if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
-            plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
-            centres = extract(light.image, settings=plainly, noise=noise, threads=threads, shared=False)
-            centres = placed(centres, whole.shape, corner)
-            if settings.peaks == 1 and look.settings.pattern is None:
-                around = whole_light(light.image, corner, whole.shape)
-                centres = with_half_heights(centres, column(line, 0), around, noise.gain)
-            line = carried_on(line, centres, settings, volume, half)
-        elif not alone:
-            line = selected(line, settings, volume)
-        if settings.select == "continuous":
-            found = ended(line, half)
-            line = lines_only(found)
-            if found.valid.any() and not line.valid.any():
-                return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)
-        line = _no_wider(with_shared_noise(line), line) if shared else line
-        line = smooth_along(line) if look.settings.smooth_along else line
-        colour = "mono" if look.evidence is None else look.evidence.colour
-        line = with_mosaic(line, look.channel, colour) if taken.lossy else line
+    whole = check_image(taken.pixels)
+    light, corner = measured_light(path, whole, off, look, taken.lossy, banded)
+    if light is None:
+        return Measured(no_line(whole.shape, settings, "no light of the laser's colour on a line"), whole)
+    noise = estimate_noise(light.seen, settings, light.saturation, processed=taken.lossy, threads=threads)
+    alone = settings.select == "strongest" and volume is None
+    # what neighbouring pixels share is asked of the line that was selected, not of the strongest peaks
+    half = TONED if taken.lossy else HALF
+    shared = noise.alike or whole.ndim == 3 or taken.lossy
+    noise = noise.model_copy(update={"alike": shared})
+    # where a camera has shaped the profile, no line is a Gaussian, and what some scan lines are taken for, one line
+    # or two, would move them against the others
+    judged = not shared
+    if alone:
+        line = extract(light.image, settings=settings, noise=noise, threads=threads, shared=False, judged=judged)
+    else:
+        every = volume is not None
+        line = peaks_to_choose_from(light.image, settings, noise, threads, every=every, judged=judged)
+    line = placed(unsure_dropped(line), whole.shape, corner)
+    fits = settings.select == "continuous" and settings.method in FITS
+    if fits and np.isin(line.flag[:, : settings.peaks], FILLED).any():
+        plainly = settings.model_copy(update={"method": "centre_of_mass", "select": "strongest"})
+        centres = extract(light.image, settings=plainly, noise=noise, threads=threads, shared=False)
+        centres = placed(centres, whole.shape, corner)
+        if settings.peaks == 1 and look.settings.pattern is None:
+            around = whole_light(light.image, corner, whole.shape)
+            centres = with_half_heights(centres, column(line, 0), around, noise.gain)
+        line = carried_on(line, centres, settings, volume, half)
+    elif not alone:
+        line = selected(line, settings, volume)
+    if settings.select == "continuous":
+        found = ended(line, half)
+        line = lines_only(found)
+        if found.valid.any() and not line.valid.any():
+            return Measured(no_line(whole.shape, settings, NO_LINE), whole, light.image, corner, noise)
+    line = _no_wider(with_shared_noise(line), line) if shared else line
+    line = smooth_along(line) if look.settings.smooth_along else line
+    colour = "mono" if look.evidence is None else look.evidence.colour
+    line = with_mosaic(line, look.channel, colour) if taken.lossy else line
     return Measured(replace(line, note=note_of(line, settings, [])), whole, light.image, corner, noise)
 
 

@@ -120,15 +120,11 @@ def _wood(rng: np.random.Generator, h: int, w: int) -> Floats:
     return np.asarray(0.55 + 0.2 * veins + 0.05 * _soft(rng, h, w, 1.5))
 
 
-def _window(rng: np.random.Generator, h: int, w: int) -> Floats:
-    return _even(rng, h, w)
-
-
 SURFACES: dict[str, Callable[[np.random.Generator, int, int], Floats]] = {
     "even": _even,
     "board": _board,
     "wood": _wood,
-    "window": _window,
+    "window": _even,
 }
 
 
