@@ -1,9 +1,11 @@
-"""The camera model with its derivatives, for arrays: distortion as OpenCV's, in OpenCV's order of coefficients."""
+"""The camera model with its derivatives: distortion as OpenCV's, in OpenCV's order of coefficients."""
 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from render.base.arrays import Float
@@ -12,19 +14,40 @@ from render.camera.distortion import fold_radii, tilt_matrix, undistort_points
 LENGTHS = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that a lens model may have."""
 NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "taux", "tauy")
+CAMERA = 4 + len(NAMES)
+"""Parameters of a camera with all of them."""
 
 
-def distort(q: Float, k: Float) -> tuple[Float, Float, Float]:
-    """(n, 2) normalised -> (n, 2) distorted, (n, 2, 2) its derivative by q, (n, 2, terms) by the coefficients.
+class Lens(NamedTuple):
+    """A camera as kernels take it."""
 
-    k (terms,) with as many terms as one of `LENGTHS`. Source: OpenCV, projectPoints; derivatives by hand.
+    intrinsics: Float
+    """(4,) fx, fy, cx, cy, px."""
+    k: Float
+    """(14,) all coefficients."""
+    tilts: Float
+    """(3, 3, 3) the homography of the sensor's tilt and its derivatives by taux and tauy."""
+    tilted: bool
+    """Whether there is a tilt to know."""
+
+
+def lens_of(intrinsics: Float, k: Float) -> Lens:
+    """intrinsics (4,) px, and k (terms,) with as many terms as one of `LENGTHS`."""
+    padded = np.zeros(len(NAMES))
+    padded[: len(k)] = k
+    tilted = len(k) == len(NAMES)
+    angles = padded[12], padded[13]
+    tilts = np.stack([tilt_matrix(*angles), *_tilt_derivatives(*angles)]) if tilted else np.zeros((3, 3, 3))
+    return Lens(np.ascontiguousarray(intrinsics, dtype=np.float64), padded, tilts, tilted)
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def project_point(x: float, y: float, lens: Lens, by_q: Float, by_camera: Float) -> tuple[float, float]:
+    """Normalised x, y -> u, v px; by_q (2, 2) and by_camera (2, 18), by fx, fy, cx, cy and k, become its derivatives.
+
+    Source: OpenCV, projectPoints; derivatives by hand.
     """
-    terms = len(k)
-    x, y = q[:, 0], q[:, 1]
-    if terms == 0:
-        return q, np.broadcast_to(np.eye(2), (len(q), 2, 2)), np.empty((len(q), 2, 0))
-    c = np.zeros(14)
-    c[:terms] = k
+    c, by_k = lens.k, by_camera[:, 4:]
     xx, xy, yy = x * x, x * y, y * y
     r2 = xx + yy
     r4 = r2 * r2
@@ -33,40 +56,78 @@ def distort(q: Float, k: Float) -> tuple[Float, Float, Float]:
     radial = (1.0 + c[0] * r2 + c[1] * r4 + c[4] * r6) / bottom
     slope = c[0] + 2.0 * c[1] * r2 + 3.0 * c[4] * r4 - radial * (c[5] + 2.0 * c[6] * r2 + 3.0 * c[7] * r4)
     slope /= bottom
-    out = np.empty((len(q), 2))
-    out[:, 0] = x * radial + 2.0 * c[2] * xy + c[3] * (r2 + 2.0 * xx) + c[8] * r2 + c[9] * r4
-    out[:, 1] = y * radial + c[2] * (r2 + 2.0 * yy) + 2.0 * c[3] * xy + c[10] * r2 + c[11] * r4
+    u = x * radial + 2.0 * c[2] * xy + c[3] * (r2 + 2.0 * xx) + c[8] * r2 + c[9] * r4
+    v = y * radial + c[2] * (r2 + 2.0 * yy) + 2.0 * c[3] * xy + c[10] * r2 + c[11] * r4
     thin_x, thin_y = c[8] + 2.0 * c[9] * r2, c[10] + 2.0 * c[11] * r2
-    by_q = np.empty((len(q), 2, 2))
-    by_q[:, 0, 0] = radial + 2.0 * xx * slope + 2.0 * c[2] * y + 6.0 * c[3] * x + 2.0 * x * thin_x
-    by_q[:, 0, 1] = 2.0 * xy * slope + 2.0 * c[2] * x + 2.0 * c[3] * y + 2.0 * y * thin_x
-    by_q[:, 1, 0] = 2.0 * xy * slope + 2.0 * c[2] * x + 2.0 * c[3] * y + 2.0 * x * thin_y
-    by_q[:, 1, 1] = radial + 2.0 * yy * slope + 6.0 * c[2] * y + 2.0 * c[3] * x + 2.0 * y * thin_y
-    by_k = np.zeros((len(q), 2, max(terms, 12)))
-    for column, power in ((0, r2), (1, r4), (4, r6)):
-        by_k[:, :, column] = q * (power / bottom)[:, None]
-    for column, power in ((5, r2), (6, r4), (7, r6)):
-        by_k[:, :, column] = -q * (radial * power / bottom)[:, None]
-    by_k[:, 0, 2], by_k[:, 1, 2] = 2.0 * xy, r2 + 2.0 * yy
-    by_k[:, 0, 3], by_k[:, 1, 3] = r2 + 2.0 * xx, 2.0 * xy
-    by_k[:, 0, 8], by_k[:, 0, 9], by_k[:, 1, 10], by_k[:, 1, 11] = r2, r4, r2, r4
-    if terms < 14:
-        return out, by_q, by_k[:, :, :terms]
-    return _tilted(out, by_q, by_k, c[12], c[13])
+    by_q[0, 0] = radial + 2.0 * xx * slope + 2.0 * c[2] * y + 6.0 * c[3] * x + 2.0 * x * thin_x
+    by_q[0, 1] = 2.0 * xy * slope + 2.0 * c[2] * x + 2.0 * c[3] * y + 2.0 * y * thin_x
+    by_q[1, 0] = 2.0 * xy * slope + 2.0 * c[2] * x + 2.0 * c[3] * y + 2.0 * x * thin_y
+    by_q[1, 1] = radial + 2.0 * yy * slope + 6.0 * c[2] * y + 2.0 * c[3] * x + 2.0 * y * thin_y
+    by_camera[:] = 0.0
+    for row, along in enumerate((x, y)):
+        for column, power in ((0, r2), (1, r4), (4, r6)):
+            by_k[row, column] = along * power / bottom
+        for column, power in ((5, r2), (6, r4), (7, r6)):
+            by_k[row, column] = -along * radial * power / bottom
+    by_k[0, 2], by_k[1, 2] = 2.0 * xy, r2 + 2.0 * yy
+    by_k[0, 3], by_k[1, 3] = r2 + 2.0 * xx, 2.0 * xy
+    by_k[0, 8], by_k[0, 9], by_k[1, 10], by_k[1, 11] = r2, r4, r2, r4
+    if lens.tilted:
+        u, v = _tilt(u, v, lens.tilts, by_q, by_k)
+    fx, fy = lens.intrinsics[0], lens.intrinsics[1]
+    by_q[0] *= fx
+    by_q[1] *= fy
+    by_k[0] *= fx
+    by_k[1] *= fy
+    by_camera[0, 0], by_camera[1, 1] = u, v
+    by_camera[0, 2] = by_camera[1, 3] = 1.0
+    return fx * u + lens.intrinsics[2], fy * v + lens.intrinsics[3]
 
 
-def _tilted(straight: Float, by_q: Float, by_k: Float, tau_x: float, tau_y: float) -> tuple[Float, Float, Float]:
-    """The image on the tilted sensor, a homography of the straight one, with its derivatives."""
-    tilt = tilt_matrix(tau_x, tau_y)
-    lifted = np.concatenate([straight, np.ones((len(straight), 1))], axis=1)
-    mapped = lifted @ tilt.T
-    out = mapped[:, :2] / mapped[:, 2:]
-    by_straight = (tilt[None, :2, :2] - out[:, :, None] * tilt[2, None, None, :2]) / mapped[:, 2, None, None]
-    by_k = by_straight @ by_k
-    for column, change in enumerate(_tilt_derivatives(tau_x, tau_y)):
-        moved = lifted @ change.T
-        by_k[:, :, 12 + column] = (moved[:, :2] - out * moved[:, 2:]) / mapped[:, 2:]
-    return out, by_straight @ by_q, by_k
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def _tilt(u: float, v: float, tilts: Float, by_q: Float, by_k: Float) -> tuple[float, float]:
+    """The image on the tilted sensor, a homography of the straight one; its derivatives follow."""
+    tilt = tilts[0]
+    mapped = tilt[:, 0] * u + tilt[:, 1] * v + tilt[:, 2]
+    there = mapped[0] / mapped[2], mapped[1] / mapped[2]
+    by_straight = np.empty((2, 2))
+    for row in range(2):
+        by_straight[row] = (tilt[row, :2] - there[row] * tilt[2, :2]) / mapped[2]
+    by_q[:] = by_straight @ by_q
+    for column in range(12):
+        first, second = by_k[0, column], by_k[1, column]
+        for row in range(2):
+            by_k[row, column] = by_straight[row, 0] * first + by_straight[row, 1] * second
+    for angle in range(2):
+        change = tilts[1 + angle]
+        moved = change[:, 0] * u + change[:, 1] * v + change[:, 2]
+        for row in range(2):
+            by_k[row, 12 + angle] = (moved[row] - there[row] * moved[2]) / mapped[2]
+    return there
+
+
+@numba.njit(nogil=True, cache=True, error_model="numpy")
+def project_points(q: Float, lens: Lens) -> tuple[Float, Float, Float]:
+    """(n, 2) normalised -> (n, 2) px, (n, 2, 2) its derivative by q, (n, 2, 18) by the camera."""
+    pixel, by_q, by_camera = np.empty((len(q), 2)), np.empty((len(q), 2, 2)), np.empty((len(q), 2, CAMERA))
+    for i in range(len(q)):
+        pixel[i, 0], pixel[i, 1] = project_point(q[i, 0], q[i, 1], lens, by_q[i], by_camera[i])
+    return pixel, by_q, by_camera
+
+
+def project(q: Float, intrinsics: Float, k: Float) -> tuple[Float, Float, Float]:
+    """(n, 2) normalised -> (n, 2) px, (n, 2, 2) its derivative by q, (n, 2, 4 + terms) by fx, fy, cx, cy and k.
+
+    intrinsics (4,) fx, fy, cx, cy in px.
+    """
+    pixel, by_q, by_camera = project_points(np.ascontiguousarray(q, dtype=np.float64), lens_of(intrinsics, k))
+    return pixel, by_q, by_camera[:, :, : 4 + len(k)]
+
+
+def distort(q: Float, k: Float) -> tuple[Float, Float, Float]:
+    """(n, 2) normalised -> (n, 2) distorted, (n, 2, 2) its derivative by q, (n, 2, terms) by the coefficients k."""
+    distorted, by_q, by_camera = project(q, np.array([1.0, 1.0, 0.0, 0.0]), k)
+    return distorted, by_q, by_camera[:, :, 4:]
 
 
 def _tilt_derivatives(tau_x: float, tau_y: float) -> tuple[Float, Float]:
@@ -81,20 +142,6 @@ def _tilt_derivatives(tau_x: float, tau_y: float) -> tuple[Float, Float]:
 
     p = projection(r, 1.0)
     return projection(by_x, 0.0) @ r + p @ by_x, projection(by_y, 0.0) @ r + p @ by_y
-
-
-def project(q: Float, intrinsics: Float, k: Float) -> tuple[Float, Float, Float]:
-    """(n, 2) normalised -> (n, 2) px, (n, 2, 2) its derivative by q, (n, 2, 4 + terms) by fx, fy, cx, cy and k.
-
-    intrinsics (4,) fx, fy, cx, cy in px.
-    """
-    distorted, by_q, by_k = distort(q, k)
-    focal = intrinsics[:2]
-    by_camera = np.zeros((len(q), 2, 4 + len(k)))
-    by_camera[:, 0, 0], by_camera[:, 1, 1] = distorted[:, 0], distorted[:, 1]
-    by_camera[:, 0, 2] = by_camera[:, 1, 3] = 1.0
-    by_camera[:, :, 4:] = by_k * focal[None, :, None]
-    return distorted * focal + intrinsics[2:], by_q * focal[None, :, None], by_camera
 
 
 def normalise(pixels: Float, intrinsics: Float, k: Float) -> Float:

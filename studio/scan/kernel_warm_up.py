@@ -194,14 +194,19 @@ def scan(cancelled: Cancel) -> None:
 
     Raises whatever is broken.
     """
-    from analysis.calibration.residuals import through_motion
+    from analysis.calibration.estimate import Estimate
+    from analysis.calibration.observations import Stripe, View, gather
+    from analysis.calibration.residuals import corners, laser_points
     from analysis.line.along.smooth import smoothed
     from studio.scan.depth_noise import foreseen_noise
     from studio.scan.results import measure_frame
 
     smoothed(np.zeros(32), np.ones(32), np.ones(32), np.zeros(32))
-    turned = np.zeros((1, 3, 3))
-    through_motion(np.zeros(1, np.intp), turned, turned[0, :1], np.zeros((1, 1, 3, 4)), turned, turned[0, :1])
+    point, alone = np.ones((1, 2)), np.eye(3)[None]
+    seen = gather([View("", point, alone[:, :2, :2], point, (Stripe(0, point, np.ones(1)),))])
+    estimate = Estimate(np.ones(4), np.zeros(0), np.zeros(2), alone[0, :1], alone, alone[0, 2:])
+    corners(seen, estimate)
+    laser_points(seen, estimate)
     project, frame, world, images, clock = _drawn(cancelled, DepthGoal())
     foreseen_noise(project, template_folder(TEMPLATE))
     found = measure_frame(project, frame, world, images, clock, None, keep=False)
