@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -82,15 +82,24 @@ def upper_and_lower(upper: QWidget, lower: QWidget, sizes: tuple[int, int]) -> Q
     return split
 
 
-def scrolled(panel: QWidget) -> QScrollArea:
-    """So that a low screen shows a part of a panel, and the window does not outgrow the screen."""
-    area = QScrollArea()
-    area.setWidgetResizable(True)
-    area.setFrameShape(QScrollArea.Shape.NoFrame)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setMinimumWidth(panel.minimumSizeHint().width() + area.verticalScrollBar().sizeHint().width())
-    area.setWidget(panel)
-    return area
+class Scrolled(QScrollArea):
+    """A low screen shows a part of a panel, and the window does not outgrow it; never narrower than what it holds."""
+
+    def __init__(self, panel: QWidget) -> None:
+        super().__init__(widgetResizable=True)
+        self.setFrameShape(QScrollArea.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.panel = panel
+        self.setWidget(panel)
+        self._widen()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        if watched is self.panel and event.type() == QEvent.Type.LayoutRequest:
+            self._widen()
+        return super().eventFilter(watched, event)
+
+    def _widen(self) -> None:
+        self.setMinimumWidth(self.panel.minimumSizeHint().width() + self.verticalScrollBar().sizeHint().width())
 
 
 def spring() -> QWidget:

@@ -5,15 +5,12 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
-    QFrame,
     QHBoxLayout,
     QLabel,
     QMenu,
-    QScrollArea,
     QSpinBox,
     QVBoxLayout,
     QWidget,
@@ -26,13 +23,11 @@ from studio.editing.forms import PLAIN
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.run_foot import RunFoot
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import ElidedLabel, flush, text_button
+from studio.qt.core.widgets import ElidedLabel, Scrolled, flush, text_button
 from studio.qt.dataset.dataset_work import DatasetWork
 from studio.qt.dataset.draw_row import DrawRow
 from studio.runtime.jobs import Job
 
-NARROWEST = 320
-"""px; every row has room for its range then."""
 FILES = "Recipes (*.json);;All files (*)"
 
 
@@ -167,11 +162,6 @@ class RecipePanel(QWidget):
         self.inside = QVBoxLayout(page)
         self.inside.setContentsMargins(8, 4, 8, 4)
         self.inside.addStretch(1)
-        area = QScrollArea(widgetResizable=True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        area.setWidget(page)
-        area.setMinimumWidth(NARROWEST)
         top = QVBoxLayout()
         top.setContentsMargins(8, 8, 8, 4)
         top.addLayout(head)
@@ -188,5 +178,5 @@ class RecipePanel(QWidget):
         foot.addWidget(self.foot)
         layout = flush(QVBoxLayout(self))
         layout.addLayout(top)
-        layout.addWidget(area, 1)
+        layout.addWidget(Scrolled(page), 1)
         layout.addLayout(foot)

@@ -6,6 +6,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QCheckBox,
     QComboBox,
     QFrame,
@@ -25,7 +26,7 @@ from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
-from studio.qt.core.widgets import ElidedLabel, flush, upper_and_lower
+from studio.qt.core.widgets import flush, upper_and_lower
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.line_overlay import LineOverlay, swatch
 from studio.qt.image.row_profile import RowProfile
@@ -63,7 +64,7 @@ class CameraView(QWidget):
         self.zooms = QToolButton(), QToolButton()
         self.readout = QLabel()
         self.badge = QFrame()
-        self.badge_text = ElidedLabel()
+        self.badge_text = QLabel(wordWrap=True)
         self.lines = QWidget()
         self.render_button = QPushButton("Render")
         self.is_live = True
@@ -110,17 +111,14 @@ class CameraView(QWidget):
 
     def refresh(self) -> None:
         """Draw what is chosen."""
-        if self.is_live:
-            self._draw_live()
-        else:
-            self._draw_render()
+        self._draw_live() if self.is_live else self._draw_render()
 
     def _lay_out(self) -> None:
         self.choice.setToolTip("What to look at")
         self.bright.setToolTip("Square root of the light, to see what is faint")
         self.saturated.setToolTip("Paint the pixels of an image that are saturated")
-        bar = QHBoxLayout()
-        bar.setContentsMargins(6, 4, 6, 4)
+        bar, self.bar = QHBoxLayout(), QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self.bar.setContentsMargins(6, 4, 6, 4)
         for widget in (self.choice, self.bright, self.saturated):
             bar.addWidget(widget)
             bar.addSpacing(8)
@@ -130,14 +128,16 @@ class CameraView(QWidget):
         self.overlay.bar.addStretch(1)
         # many methods must not make the panel, and so the window, wider
         lines.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        bar.addWidget(lines, 1)
+        bar.addStretch(1)
+        self.bar.addLayout(bar)
+        self.bar.addWidget(lines, 1)
         fit = "Fit", "The whole image (F)", self.view.fit
         one_to_one = "1:1", "One screen pixel a pixel", self.view.one_to_one
         for button, (text, tip, action) in zip(self.zooms, (fit, one_to_one), strict=True):
             button.setText(text)
             button.setToolTip(tip)
             button.clicked.connect(action)
-            bar.addWidget(button)
+            self.bar.addWidget(button)
         badge = QHBoxLayout(self.badge)
         badge.setContentsMargins(8, 3, 4, 3)
         badge.addWidget(self.badge_text, 1)
@@ -150,7 +150,7 @@ class CameraView(QWidget):
         column.addWidget(self.view, 1)
         column.addWidget(self.readout)
         layout = flush(QVBoxLayout(self))
-        layout.addLayout(bar)
+        layout.addLayout(self.bar)
         layout.addWidget(upper_and_lower(picture, self.profile, (300, 140)), 1)
         self._colour()
 
@@ -194,7 +194,7 @@ class CameraView(QWidget):
         new = shown is not self._last_shown
         self._last_shown = shown
         if new:
-            self._set_live(shown is None or self.stale)
+            self.is_live = shown is None or self.stale
             self._read_out(None)
         self._fill_choice()
         self._profile_of_view()
@@ -202,16 +202,13 @@ class CameraView(QWidget):
 
     def _project_changed(self) -> None:
         if self.session.shown is not None and self.stale and not self.is_live:
-            self._set_live(True)
+            self.is_live = True
             self._fill_choice()
         self._show_badge()
 
     def _step_changed(self) -> None:
         self.live.show_step(self.session.step)
         self._project_changed()
-
-    def _set_live(self, on: bool) -> None:
-        self.is_live = on
 
     def _fill_choice(self) -> None:
         """The live estimate, and below it the ways to look at the shown render."""
@@ -228,7 +225,7 @@ class CameraView(QWidget):
         self._show_badge()
 
     def _choose(self, index: int) -> None:
-        self._set_live(index == 0)
+        self.is_live = index == 0
         if index > 0:
             self._chosen = index
             self._profile_of_view()
@@ -323,6 +320,8 @@ class CameraView(QWidget):
 
     def _name_boxes(self) -> None:
         """As far as there is room, which the names of lines need first."""
+        one_row, two_rows = QBoxLayout.Direction.LeftToRight, QBoxLayout.Direction.TopToBottom
+        self.bar.setDirection(one_row if self.width() >= TINY else two_rows)
         self.choice.setMaximumWidth(LEAST_CHOICE if self.width() < NARROW else self.choice.sizeHint().width())
         for button in self.zooms:
             button.setVisible(self.width() >= TINY)

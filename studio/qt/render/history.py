@@ -64,7 +64,9 @@ def describe(render: Render) -> str:
     if ambient is not None:
         parts.append(f"ambient {ambient.work:.0f}")
     parts.append(f"{sum(render.frame.seconds.values()):.1f} s")
-    return ", ".join(parts) + ("" if render.final else ", not finished")
+    if not render.final:
+        parts.append("under way" if render.refining else "stopped early, Continue goes on")
+    return ", ".join(parts)
 
 
 def thumbnail(render: Render) -> Picture | None:

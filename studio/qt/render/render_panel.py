@@ -41,13 +41,14 @@ from studio.scan.stages import scaled
 SCALES = (0.125, 0.25, 0.5, 1.0)
 LONGEST_HEAD = 20
 TRANSPORT = {
-    "auto": "As much as matters",
-    "direct": "By way of one surface",
-    "interreflection": "And reflected on",
-    "caustic": "And through glass, off mirrors",
-    "specular-chain": "And seen through glass again",
-    "subsurface": "And below surfaces",
+    "auto": "A pilot measures what each further step adds, and leaves out what is negligible",
+    "direct": "To one surface",
+    "interreflection": "From surface to surface as well",
+    "caustic": "Also through clear glass and off mirrors, on one side of a rough surface",
+    "specular-chain": "Also on both sides of it, as through a plate",
+    "subsurface": "Also below the surface of wax, marble, nylon or skin",
 }
+"""How far a laser's light is followed, in the words of README and project file; each step includes those before."""
 
 
 class RenderPanel(QWidget):
@@ -98,7 +99,7 @@ class RenderPanel(QWidget):
             self.transport.addItem(choice_label(value), value)
             self.transport.setItemData(i, text, Qt.ItemDataRole.ToolTipRole)
         self.transport.setToolTip(
-            "Auto: a short pilot finds out what the reflections add; each other way: as far as that."
+            "How far the light of the lasers is followed. Auto: a pilot decides; else the last step that is computed."
         )
         self.scale = QComboBox()
         self.start_button = text_button("Render", name="primary")
@@ -129,8 +130,8 @@ class RenderPanel(QWidget):
         if render is None or render.final or render.state is None or not self._may_start():
             return
         self._before, self._keep = render, True
-        self._render = render
-        self._run(render.project, self.session.document.root, render.frame.step, render.world, render.state)
+        self._render, state, render.state = render, render.state, None
+        self._run(render.project, self.session.document.root, render.frame.step, render.world, state)
 
     def start(self, image_scale: float | None = None) -> None:
         """Render the project as it is now; one render at a time."""
@@ -205,21 +206,21 @@ class RenderPanel(QWidget):
             ("Image", self.scale),
         ):
             form.addRow(name, widget)
-        buttons = QHBoxLayout()
-        for button in (
-            self.start_button,
-            self.continue_button,
-            self.pause_button,
-            self.keep_button,
-            self.cancel_button,
+        # a second click where a render was started must not meet what ends it
+        begin, hold = QHBoxLayout(), QHBoxLayout()
+        for row, buttons in (
+            (begin, (self.start_button, self.continue_button)),
+            (hold, (self.pause_button, self.keep_button, self.cancel_button)),
         ):
-            buttons.addWidget(button)
+            for button in buttons:
+                row.addWidget(button)
         for label in (self.stage, self.errors):
             label.setObjectName("muted")
         self.stage.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         layout = QVBoxLayout(self)
         layout.addLayout(form)
-        layout.addLayout(buttons)
+        layout.addLayout(begin)
+        layout.addLayout(hold)
         layout.addWidget(self.bar)
         layout.addWidget(self.stage)
         layout.addWidget(self.errors)
@@ -367,8 +368,10 @@ class RenderPanel(QWidget):
     def _show_state(self) -> None:
         job = self._job
         running = job is not None
-        self.start_button.setVisible(not running)
-        self.continue_button.setVisible(not running and can_go_on(self.session.shown))
+        self.start_button.setEnabled(not running)
+        self.continue_button.setEnabled(not running)
+        if not running:  # while it runs what stands there stays
+            self.continue_button.setVisible(can_go_on(self.session.shown))
         for button in (self.pause_button, self.keep_button, self.cancel_button):
             button.setVisible(running)
             button.setEnabled(job is not None and not job.cancel_asked)

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
-from studio.qt.core.widgets import scrolled
+from studio.qt.core.widgets import Scrolled
 from studio.qt.results.deviation_tab import DeviationTab
 from studio.qt.results.height_map_tab import HeightMapTab
 from studio.qt.results.section_tab import SectionTab
@@ -22,7 +22,7 @@ class NominalPanel(QWidget):
         self.tabs = QTabWidget()
         self.tabs.setDocumentMode(True)
         for tab, title in ((self.deviation, "Deviation"), (self.section, "Section"), (self.heights, "Height map")):
-            self.tabs.addTab(scrolled(tab), title)
+            self.tabs.addTab(Scrolled(tab), title)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.tabs)

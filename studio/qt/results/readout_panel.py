@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -28,6 +29,8 @@ from studio.qt.results.remedy_list import RemedyList, sentence
 
 LEAST_NAME = 72
 """px of the name of a read-out, where there is too little room for the whole."""
+LEFT, SPACING, RIGHT = 10, 8, 4
+"""px before a name, between it, its value and its range, and after."""
 
 
 class ReadoutPanel(QWidget):
@@ -45,10 +48,12 @@ class ReadoutPanel(QWidget):
         self.problem = QLabel("Not of the scene as it is set: the scene tree marks what cannot be.", wordWrap=True)
         self.problem.setObjectName("warning")
         self._hint.setObjectName("muted")
+        self._narrow = False
+        """Ranges stand below their values."""
         self._labels: dict[str, tuple[ElidedLabel, QLabel | PlacingField, ElidedLabel]] = {}
         inner = QFrame()
         column = QVBoxLayout(inner)
-        column.setContentsMargins(10, 8, 4, 8)
+        column.setContentsMargins(LEFT, 8, RIGHT, 8)
         self._grid = QGridLayout()
         column.addLayout(self._grid)
         self.fixes = RemedyList(session)
@@ -57,7 +62,7 @@ class ReadoutPanel(QWidget):
         """Seen in the rows that something would fix."""
         column.addWidget(self.fixes)
         column.addStretch(1)
-        self._grid.setHorizontalSpacing(8)
+        self._grid.setHorizontalSpacing(SPACING)
         self._grid.setVerticalSpacing(5)
         self._grid.setColumnStretch(2, 1)
         area = QScrollArea(widgetResizable=True)
@@ -80,6 +85,20 @@ class ReadoutPanel(QWidget):
         self.fixes.changed.connect(self._offer_fixes)
         self._rows: tuple[Row, ...] = ()
         self._refresh()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._fit_notes()
+
+    def _fit_notes(self) -> None:
+        """Ranges below their values where one of them has no room beside."""
+        widths = [[label.sizeHint().width() for label in self._labels[row.key]] for row in self._rows]
+        wanted = sum(map(max, zip(*widths, strict=True)), LEFT + RIGHT + 2 * SPACING) if widths else 0
+        narrow = self.width() - self._area.verticalScrollBar().sizeHint().width() < wanted
+        if narrow != self._narrow:
+            self._narrow = narrow
+            for row, (_, _, note) in enumerate(self._labels.values()):
+                self._place_note(row, note)
 
     def rows(self) -> tuple[Row, ...]:
         """What is shown."""
@@ -123,7 +142,7 @@ class ReadoutPanel(QWidget):
         offered = {one.key for one in self.fixes.found}
         for key, labels in self._labels.items():
             for label in labels:
-                label.setVisible(key in keys and not (key in offered and label is labels[2]))
+                label.setVisible(key in keys)
         tints = {"": colours.text, "warning": colours.warning, "error": colours.error}
         for row in self._rows:
             name, value, note = self._labels.get(row.key) or self._add(row.key)
@@ -131,6 +150,7 @@ class ReadoutPanel(QWidget):
             if isinstance(value, QLabel):
                 value.setText(row.value)
             note.setText(row.note)
+            note.setVisible(bool(row.note) and row.key not in offered)
             told = f"<p>{row.label}: {row.help}</p>" + (f"<p>{row.note}</p>" if row.note else "")
             for label, style in (
                 (name, f"color: {colours.muted}"),
@@ -144,13 +164,15 @@ class ReadoutPanel(QWidget):
                 # a style sheet costs more to set than all the numbers to compute
                 if label.styleSheet() != style:
                     label.setStyleSheet(style)
+        self._fit_notes()
 
     def _offer_fixes(self) -> None:
         """A button in each row that something would fix, in the place of its range."""
         offered = {one.key: one for one in self.fixes.found}
         for key, button in self._fix.items():
             button.setVisible(key in offered)
-            self._labels[key][2].setVisible(key not in offered)
+            note = self._labels[key][2]
+            note.setVisible(bool(note.text()) and key not in offered)
             if key in offered:
                 button.setToolTip(f"<p>{sentence(offered[key])}. Ctrl+Z takes it back.</p>")
 
@@ -169,16 +191,25 @@ class ReadoutPanel(QWidget):
             value.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         # a narrow panel may shorten ranges and names, never the values; the tip has them whole
         note.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        line = self._grid.rowCount()
-        for column, label in enumerate((name, value, note)):
-            self._grid.addWidget(label, line, column)
+        row = len(self._labels)
+        for column, label in enumerate((name, value)):
+            self._grid.addWidget(label, 2 * row, column)
+        self._place_note(row, note)
+        for label in (name, value, note):
             label.show()
         button = QToolButton()
         button.setText("Fix")
         button.setObjectName("fix")
         button.clicked.connect(partial(self._apply, key))
-        self._grid.addWidget(button, line, 2, Qt.AlignmentFlag.AlignLeft)
+        self._grid.addWidget(button, 2 * row, 2, Qt.AlignmentFlag.AlignLeft)
         button.hide()
         self._fix[key] = button
         self._labels[key] = (name, value, note)
         return name, value, note
+
+    def _place_note(self, row: int, note: QWidget) -> None:
+        """Each read-out has two lines of the grid, the lower of which is for a range that has no room beside."""
+        if self._narrow:
+            self._grid.addWidget(note, 2 * row + 1, 1, 1, 2)
+        else:
+            self._grid.addWidget(note, 2 * row, 2)

@@ -20,7 +20,7 @@ from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import scrolled, spring
+from studio.qt.core.widgets import Scrolled, spring
 from studio.qt.render.python_copy import copy_as_python
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
@@ -193,7 +193,7 @@ class MainWindow(QMainWindow):
                 continue
             dock = QDockWidget(panel.title, self)
             dock.setObjectName(panel.key)
-            dock.setWidget(scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
+            dock.setWidget(Scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
             # added here once; from now on Qt moves docks only by restoring a state
             self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
             dock.hide()

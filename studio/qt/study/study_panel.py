@@ -13,12 +13,10 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
-    QFrame,
     QHBoxLayout,
     QLabel,
     QLineEdit,
     QMenu,
-    QScrollArea,
     QSizePolicy,
     QSpinBox,
     QVBoxLayout,
@@ -30,7 +28,7 @@ from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.run_foot import RunFoot
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import align_labels, flush, text_button
+from studio.qt.core.widgets import Scrolled, align_labels, flush, text_button
 from studio.qt.study.study_work import StudyWork
 from studio.qt.study.sweep_editor import SweepEditor
 from studio.runtime.jobs import Job
@@ -38,8 +36,6 @@ from studio.study.draft import new_sweep, varies_nothing
 from studio.study.estimate import Estimate
 from studio.study.study import Study, ready_made
 
-NARROWEST = 300
-"""px; every row has room for its values then."""
 EMPTY = "What it takes is told here as soon as every sweep varies a field."
 FILES = "Studies (*.json);;All files (*)"
 
@@ -105,7 +101,7 @@ class StudyPanel(QWidget):
         for box in (self.base, self.sweeps, self.repeats, self.scale):
             box.blockSignals(True)
         self.base.clear()
-        self.base.addItem(f"Open project: {self.session.project.name}")
+        self.base.addItem(f"Open: {self.session.project.name}")
         if draft["base"] in work.loaded:
             self.base.addItem(f"{draft['base'].replace('_', ' ')}, as in the study")
             self.base.setCurrentIndex(1)
@@ -269,19 +265,14 @@ class StudyPanel(QWidget):
         column.addWidget(self.editor)
         column.addLayout(last)
         column.addStretch(1)
-        area = QScrollArea(widgetResizable=True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        area.setWidget(inside)
         self.inside = inside
-        area.setMinimumWidth(NARROWEST)
         foot = QVBoxLayout()
         foot.setContentsMargins(8, 4, 8, 8)
         foot.setSpacing(4)
         for widget in (self.told, self.problem, self.foot):
             foot.addWidget(widget)
         layout = flush(QVBoxLayout(self))
-        layout.addWidget(area, 1)
+        layout.addWidget(Scrolled(inside), 1)
         layout.addLayout(foot)
 
 

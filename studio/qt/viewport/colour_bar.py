@@ -17,9 +17,11 @@ TIP = (
 )
 REACH_PX = 9
 """From an end of the bar at which the mouse has hold of it."""
-LEFT, TOP, WIDTH, BELOW = 14, 34, 14, 36
-NARROW = 480
-"""px of a view of which a bar of the usual size would hide too much."""
+LEFT, WIDTH = 14, 14
+ABOVE, BELOW = (34, 28), (36, 14)
+"""px about the bar: for title and note; in a low view for the title alone."""
+NARROW, LOW = 480, 150
+"""px of width and height of a view of which a bar of the usual size would hide too much."""
 
 
 class ColourBar(QWidget):
@@ -95,7 +97,14 @@ class ColourBar(QWidget):
     @property
     def bar(self) -> QRect:
         """Where the colours are, px."""
-        return QRect(LEFT, TOP, WIDTH, self.height() - TOP - BELOW)
+        above, below = ABOVE[self.low], BELOW[self.low]
+        return QRect(LEFT, above, WIDTH, self.height() - above - below)
+
+    @property
+    def low(self) -> bool:
+        """There is no room for more than the title and both ends."""
+        view = self.parentWidget()
+        return view is not None and view.height() < LOW
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         self.menu().exec(event.globalPos())
@@ -150,7 +159,9 @@ class ColourBar(QWidget):
         painter.setPen(QColor(c.text))
         painter.drawText(QRect(12, 6, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.title)
         painter.setPen(QColor(c.warning))
-        painter.drawText(QRect(12, self.height() - 24, self.width() - 16, 20), Qt.AlignmentFlag.AlignLeft, self.note)
+        if not self.low:
+            note = QRect(12, self.height() - 24, self.width() - 16, 20)
+            painter.drawText(note, Qt.AlignmentFlag.AlignLeft, self.note)
         painter.setPen(QColor(c.text))
         middle = ((0.5, 0.5 * (low + high)),) if bar.height() > 60 else ()
         for share, value in ((0.0, high), *middle, (1.0, low)):
@@ -166,5 +177,6 @@ class ColourBar(QWidget):
     def _place(self) -> None:
         if (view := self.parentWidget()) is not None:
             tall = 208 if view.width() > NARROW else 150
-            self.resize(128 if view.width() > NARROW else 112, min(tall, view.height() - 24))
+            room = view.height() - (6 if self.low else 24)
+            self.resize(128 if view.width() > NARROW else 112, min(tall, room))
             self.move(view.width() - self.width() - 6, view.height() - self.height() - 6)

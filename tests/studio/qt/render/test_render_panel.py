@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLineEdit
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLineEdit
 
 from render.render import render_world
 from render.run import Run
+from render.scene.settings import RenderSettings
 from studio.qt.core.jobs import JobRunner
 from studio.qt.image.compare_view import DIFFERENCE
-from studio.qt.render.render_panel import RenderPanel
+from studio.qt.render.render_panel import TRANSPORT, RenderPanel
 from studio.runtime.jobs import State
 from studio.scan.compare import compare, resampled
 from studio.scan.redevelop import develop_again, development
@@ -72,7 +76,35 @@ def test_keep_stops_and_leaves_the_frame_so_far(qtbot, panel):
     finish(qtbot, panel)
     (render,) = panel.session.renders
     assert not render.final and render.frame.ambient is not None and panel.session.shown is render
-    assert "not finished" in panel.history.list.item(0).toolTip()
+    assert "stopped early" in panel.history.list.item(0).toolTip()
+
+
+def test_a_second_click_on_render_ends_nothing(qtbot, panel):
+    """What holds and ends a render comes beside the button that starts it, never below the mouse."""
+    panel.session.set(("render", "goal"), None)
+    panel.session.set(("render", "ambient_samples"), 65536)
+    panel.session.set(("render", "ambient_error"), 2e-4)
+    QApplication.processEvents()
+    places = [QPoint(x, panel.start_button.height() // 2) for x in range(2, panel.start_button.width(), 20)]
+    places = [panel.start_button.mapTo(panel, place) for place in places]
+    press(qtbot, panel.start_button)
+    job = panel.runner.job()
+    qtbot.waitUntil(panel.cancel_button.isVisible)
+    QApplication.processEvents()
+    assert {panel.childAt(place) for place in places} == {panel.start_button} and not panel.start_button.isEnabled()
+    for place in places:
+        QTest.mouseClick(panel.childAt(place), Qt.MouseButton.LeftButton)
+    assert panel.runner.job() is job and job.state is State.RUNNING and not job.cancel_asked
+    press(qtbot, panel.cancel_button)
+    finish(qtbot, panel)
+    assert panel.start_button.isEnabled() and not panel.cancel_button.isVisible()
+
+
+def test_every_way_of_light_is_told_in_the_words_of_the_project(panel):
+    kinds = get_args(RenderSettings.model_fields["transport"].annotation)
+    assert tuple(TRANSPORT) == kinds
+    shown = [panel.transport.itemText(i).lower().replace(" ", "-") for i in range(panel.transport.count())]
+    assert tuple(shown) == kinds
 
 
 def test_cancel_forgets_the_render_and_shows_the_one_before(qtbot, panel):
