@@ -15,6 +15,8 @@ by the calibration has, whose boards then tell too little."""
 WIDER = 1.5
 """A line so many times as wide as before is out of focus, or too wide."""
 DIMMER = 2.0
+BRIGHTER = 4.0
+"""Times that the light beneath a line has grown, and grown more than the line itself, where other light drowns it."""
 
 
 def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
@@ -22,8 +24,9 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
 
     Each symptom is the fraction of rows that it takes, more than before; the largest names the cause. A surface seen or
     lit at grazing angles loses its rows to that, whatever their symptom, unless they are hidden. Where no row is lost,
-    depth may be coarse though the line is exact; else the line itself says why it is measured worse: it is wider, which
-    also loses rows or tears the peak, or dimmer. A measure that is not known has not changed.
+    depth may be coarse though the line is exact; else the line itself says why it is measured worse: what lies beneath
+    it is brighter, or it is wider, which also loses rows or tears the peak, or dimmer. A measure that is not known has
+    not changed.
     """
     symptoms = {
         "occluded": _less(good, bad, "visible_rows"),
@@ -41,6 +44,9 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
         return worst
     if math.cos(good.get("incidence", 0.0)) > STEEPER * math.cos(bad.get("incidence", 0.0)):
         return "grazing"
+    background = _times(good, bad, "background")
+    if worst != "saturated" and background > BRIGHTER * max(_times(good, bad, "signal"), 1.0):
+        return "too much other light"
     if worst in ("starved", "saturated"):
         return worst
     coarser = max(_times(good, bad, name) for name in ("depth_per_pixel", "calibration_rmse"))

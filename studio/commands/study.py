@@ -91,6 +91,7 @@ def merge_folders(folders: tuple[Path, ...], *, out: Path, quiet: bool, as_json:
     digest = study.digest(bases)
     for folder in folders:
         described(folder)
+        Store(folder, digest).close()  # refused before anything is written
     with hold(out), Store(out, digest) as store:
         store.describe(study, bases)
         for folder in folders:
