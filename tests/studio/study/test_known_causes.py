@@ -67,7 +67,7 @@ def grazing(look: Look, value: float) -> Look:
 
 def outshone(look: Look, value: float) -> Look:
     """A faint line, which is lost in the noise of other light before that fills the pixels."""
-    return replace(look, peak=0.1 * look.peak, ambient=value)
+    return replace(look, peak=0.05 * look.peak, ambient=value)
 
 
 SEARCHES = {
