@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from render.base.errors import InputError
+from render.base.full_disk import is_full, no_room
 
 IN_MEMORY = 1 << 20
 """Bytes that need no file."""
@@ -31,12 +32,11 @@ class Spool:
             start = self._file.seek(0, 2) if start is None else self._file.seek(start)
             self._file.write(data)
         except OSError as error:
-            raise InputError(
-                "the scan's results cannot be kept",
-                where=str(self._folder or tempfile.gettempdir()),
-                found=error.strerror or error,
-                cure="choose a folder that you may write to and that has free space",
-            ) from error
+            where = str(self._folder or tempfile.gettempdir())
+            if is_full(error):
+                raise no_room(where, error) from error
+            what, cure = "the scan's results cannot be kept", "choose a folder that you may write to"
+            raise InputError(what, where=where, found=error.strerror or error, cure=cure) from error
         return start
 
     def read(self, start: int, size: int) -> bytes:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from analysis.deviation import callouts
 from analysis.report.colour import INK, MUTED
 from analysis.report.error_figures import nice_limit
-from analysis.report.labels import label_places
+from analysis.report.labels import label_places, text_size
 from analysis.report.style import figure
 from render.base.arrays import Float
 
@@ -21,6 +21,8 @@ BANDS = ("#2166ac", "#67a9cf", "#d1e5f0", "#a6d96a", "#a6d96a", "#fddbc7", "#ef8
 MOST_DRAWN = 120_000
 CALLOUTS = 5
 LABEL_PT = 7.0
+FRAME = 0.65
+"""What the frame of a callout adds to its text, over the font's size."""
 
 
 @dataclass(frozen=True)
@@ -111,11 +113,11 @@ def _point_at(axes: Any, what: DeviationMap, place: Float) -> None:
     found = callouts(what.points, what.value, CALLOUTS, apart)
     texts = [f"{i}: {value * 1e6:+.{_places(value)}f} µm" for i, (_, value) in enumerate(found, 1)]
     px = axes.figure.dpi / 72.0  # of a typographic point
-    anchors = axes.transData.transform(place[[i for i, _ in found]].reshape(-1, 2))
-    sizes = px * np.array([(LABEL_PT * (0.58 * len(text) + 1.0), 1.9 * LABEL_PT) for text in texts]).reshape(-1, 2)
-    box = axes.get_window_extent()
-    middles = label_places(anchors, sizes, np.array([box.x0, box.y0]), np.array([box.x1, box.y1]), 3.0 * px)
-    for (i, _), text, offset in zip(found, texts, (middles - anchors) / px, strict=True):
+    anchors = axes.transData.transform(place[[i for i, _ in found]].reshape(-1, 2)) / px
+    sizes = np.array([text_size(text, LABEL_PT) for text in texts]).reshape(-1, 2) + FRAME * LABEL_PT
+    low, high = axes.get_window_extent().get_points() / px
+    middles = label_places(anchors, sizes, low, high, gap=3.0)
+    for (i, _), text, offset in zip(found, texts, middles - anchors, strict=True):
         axes.annotate(
             text, place[i], xytext=tuple(offset.tolist()), textcoords="offset points", ha="center", va="center",
             fontsize=LABEL_PT, color=INK, bbox={"boxstyle": "round,pad=0.25", "fc": "white", "ec": INK, "lw": 0.5},

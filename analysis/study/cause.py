@@ -15,6 +15,10 @@ by the calibration has, whose boards then tell too little."""
 WIDER = 1.5
 """A line so many times as wide as before is out of focus, or too wide."""
 DIMMER = 2.0
+BRIGHTER, KEPT = 4.0, 0.5
+"""Times that the light beneath a line has grown, and grown more than the line itself, where other light drowns it, and
+the least that is then left of both together: a line that spreads beyond its window leaves light beneath it as well, but
+that is its own, and both together grow far fainter."""
 
 
 def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
@@ -22,8 +26,9 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
 
     Each symptom is the fraction of rows that it takes, more than before; the largest names the cause. A surface seen or
     lit at grazing angles loses its rows to that, whatever their symptom, unless they are hidden. Where no row is lost,
-    depth may be coarse though the line is exact; else the line itself says why it is measured worse: it is wider, which
-    also loses rows or tears the peak, or dimmer. A measure that is not known has not changed.
+    depth may be coarse though the line is exact; else the line itself says why it is measured worse: what lies beneath
+    it is brighter, or it is wider, which also loses rows or tears the peak, or dimmer. A measure that is not known has
+    not changed.
     """
     symptoms = {
         "occluded": _less(good, bad, "visible_rows"),
@@ -41,16 +46,25 @@ def cause(good: Mapping[str, float], bad: Mapping[str, float]) -> str:
         return worst
     if math.cos(good.get("incidence", 0.0)) > STEEPER * math.cos(bad.get("incidence", 0.0)):
         return "grazing"
+    wider = _times(good, bad, "line_width") > WIDER
+    brighter = _times(good, bad, "background") > BRIGHTER * max(_times(good, bad, "signal"), 1.0)
+    if worst != "saturated" and brighter and not wider and _both(bad) > KEPT * _both(good):
+        return "too much other light"
     if worst in ("starved", "saturated"):
         return worst
     coarser = max(_times(good, bad, name) for name in ("depth_per_pixel", "calibration_rmse"))
     if worst == "less precise" and coarser > max(COARSER, _times(good, bad, "position_rmse")):
         return "degenerate"
-    if _times(good, bad, "line_width") > WIDER:
+    if wider or brighter:
         return "out of focus or too wide"
     if worst != "wrong peak" and _times(bad, good, "signal") > DIMMER:
         return "starved"
     return worst
+
+
+def _both(run: Mapping[str, float]) -> float:
+    """Line and the light beneath it."""
+    return run["background"] + run.get("signal", 0.0)
 
 
 def _less(a: Mapping[str, float], b: Mapping[str, float], name: str) -> float:

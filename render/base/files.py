@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
 
 from render.base.errors import InputError
+from render.base.full_disk import is_full, no_room
 
 TEMPORARY = re.compile(r"\.(?P<stem>.+)\.[0-9a-f]{8}(?P<suffix>(\.[^.]*)?)")
 ABANDONED = 3600.0
@@ -41,15 +42,20 @@ def atomic_write(path: Path | str) -> Iterator[Path]:
         with open(temporary, "r+b") as written:
             os.fsync(written.fileno())
         os.replace(temporary, target)
-    except OSError as error:
+    except InputError:
+        raise
+    except Exception as error:
+        if is_full(error):
+            raise no_room(path, error, temporary.stat().st_size if temporary.is_file() else 0) from error
         named = {None, str(temporary), str(target), *map(str, target.parents)}
-        if (None if error.filename is None else str(error.filename)) not in named:
-            raise  # about another file, which the writer was reading
+        about = getattr(error, "filename", None)
+        if not isinstance(error, OSError) or (None if about is None else str(about)) not in named:
+            raise  # a fault of the writer, or about another file, which it was reading
         raise InputError(
             "the file cannot be written",
             where=str(path),
             found=error.strerror or error,
-            cure="choose a folder that you may write to and that has free space",
+            cure="choose a folder that you may write to",
         ) from error
     finally:
         with suppress(OSError):

@@ -8,7 +8,6 @@ from typing import Any
 
 from analysis.study.intervals import Interval
 from render.base.errors import InputError
-from studio.commands.budget import check_laser
 from studio.commands.commands import check_output, load_project, never
 from studio.project.project import Project
 from studio.project.project_files import carry
@@ -19,6 +18,7 @@ from studio.scan.interrupt import stop_on_interrupt
 from studio.study.advice import PAYS, Advice, Proof, Question, advise
 from studio.study.alike import Change
 from studio.study.cheaper_parts import GOAL, TRANSPORT
+from studio.study.study import require_laser
 
 
 def advise_project(
@@ -28,7 +28,7 @@ def advise_project(
     project, root = load_project(path)
     if out is not None:
         check_target(out)
-    laser = check_laser(project, given["laser"])
+    laser = require_laser(project, given["laser"], "--laser")
     question = Question(within / 100.0, seeds, given["scale"], laser, Engine(given["workers"]))
     with stage_progress(quiet) as progress, stop_on_interrupt(never) as cancelled:
         found = advise(project, question, progress, cancelled)

@@ -16,7 +16,8 @@ from studio.runtime.streams import print_json
 from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
 from studio.scan.interrupt import stop_on_interrupt
-from studio.study.cells import Shard, check_size, next_cells
+from studio.study.begin import begin
+from studio.study.cells import Shard, next_cells
 from studio.study.labels import field_labels
 from studio.study.runner import run_study
 from studio.study.store import Store, described
@@ -50,13 +51,10 @@ def run_into(
 ) -> None:
     """Measure what is missing of a study in a folder, and write what it says so far."""
     check_output(folder)
-    check_size(study)
-    first = next_cells(study, bases, {}, part)  # every field and value is looked at before anything runs
-    engine.check()
-    with hold(folder), Store(folder, study.digest(bases)) as store:
-        store.describe(study, bases)
+    with begin(folder, study, bases, engine, part) as store:
         known = store.count()
         if not quiet:
+            first = next_cells(study, bases, {}, part)
             renders = len(tasks(first, study.image_scale, study.laser))
             searches = sum(sweep.sampling in SEARCHES for sweep in study.sweeps)
             more = f", and what {searches} search(es) will ask for" if searches else ""
@@ -93,6 +91,7 @@ def merge_folders(folders: tuple[Path, ...], *, out: Path, quiet: bool, as_json:
     digest = study.digest(bases)
     for folder in folders:
         described(folder)
+        Store(folder, digest).close()  # refused before anything is written
     with hold(out), Store(out, digest) as store:
         store.describe(study, bases)
         for folder in folders:

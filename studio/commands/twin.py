@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from render.base.errors import InputError
 from studio.commands.advise import check_target, write_project
-from studio.commands.budget import check_laser
 from studio.commands.commands import chosen_file, load_project
 from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json
+from studio.study.study import require_laser
 
 if TYPE_CHECKING:
     from studio.photographs.twin import Told
@@ -41,7 +41,7 @@ def twin_project(
     if missing:
         raise InputError("there is no such photograph", where=str(missing[0]))
     project, root = load_project(path)
-    check_laser(project, laser)
+    require_laser(project, laser, "--laser")
     with stage_progress(shown["quiet"] or shown["as_json"]) as progress:
         progress("fit", 0.0)
         made = twin_of(project, root, laser, photographs, threads)

@@ -89,6 +89,7 @@ class Commands(click.Group):
 def _report_error(error: BaseException, debug: bool, as_json: bool) -> int:
     """Say what happened, on standard error and, where asked for, as JSON; return the exit code."""
     from render.base.errors import Cancelled, InputError
+    from render.base.full_disk import is_full, no_room
 
     details: dict[str, Any] = {}
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
@@ -108,6 +109,8 @@ def _report_error(error: BaseException, debug: bool, as_json: bool) -> int:
         code, text = BAD_INPUT, missing_python_package(error.name)
     elif isinstance(error, MemoryError):
         code, text = BAD_INPUT, f"not enough memory{f' ({error})' if str(error) else ''}; {NEEDS_LESS}"
+    elif is_full(error):
+        code, text = BAD_INPUT, str(no_room(getattr(error, "filename", None) or "the system's files", error))
     elif isinstance(error, OSError):
         code, text = BAD_INPUT, f"{error.filename or 'the system refused'}: {error.strerror or error}"
     else:

@@ -6,6 +6,7 @@ import traceback
 from dataclasses import dataclass
 
 from render.base.errors import InputError
+from render.base.full_disk import is_full, no_room
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ class Trouble:
 def trouble(error: BaseException, doing: str) -> Trouble:
     """doing: what failed, as it follows "could not" ("open the project")."""
     title = f"Could not {doing}"
+    if is_full(error):
+        error = no_room(getattr(error, "filename", None) or "the system's files", error)
     if isinstance(error, InputError):
         return Trouble(title, _cause(error), _sentence(error.cure) or "Nothing was changed.")
     details = "".join(traceback.format_exception(error))

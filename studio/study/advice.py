@@ -36,8 +36,8 @@ SCREENED = 3
 """Seeds for the choice."""
 ROOM = 0.5
 """A part may change depth by so much of what is asked: several are taken together."""
-HOPELESS = 3.0
-"""Times that, on the first seed: two more would not bring it back."""
+HOPELESS, SURELY = 3.0, 2.0
+"""Times that, by so many standard errors, on the first seed: two more would not bring it back."""
 PAYS = 0.95
 """A part that leaves more of the seconds than this is not worth a change."""
 MOST_PROOFS = 3
@@ -52,8 +52,8 @@ class Tried:
     taken: bool = False
 
     def fits(self, allowed: float) -> bool:
-        """It leaves depth as it is, and seconds are saved."""
-        return self.found.size() <= allowed and _pays(self.found)
+        """It leaves depth as it is, as far as so few seeds tell, and seconds are saved."""
+        return self.found.size(less=1.0) <= allowed and _pays(self.found)
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ def _tried(bench: _Bench, stage: str, base: Project, parts: Mapping[str, Part]) 
 
 
 def _hopeful(one: Tried, question: Question) -> bool:
-    return one.found.size() <= HOPELESS * question.allowed and _pays(one.found)
+    return one.found.size(less=SURELY) <= HOPELESS * question.allowed and _pays(one.found)
 
 
 def _proofs(bench: _Bench, tried: Sequence[Tried]) -> list[Proof]:

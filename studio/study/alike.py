@@ -5,7 +5,8 @@ point off it, on a reflection that outshines the line, say, errs by a thousand t
 decide a sigma, and whether it is there hangs on a little noise. So wrong rows are a share of their own, of the rows on
 which the line can be seen, and so are the rows that are measured on it. A point whose predicted sigma is more than a
 pixel tells itself that it may be anywhere, and is wrong wherever it lies. Right and wrong are told by the exact line
-and by each run's own sigma, never by how well the two agree, which would leave out the very changes that are asked for.
+and by each run's own sigma, never by how well the two agree, which would leave out the very changes that are asked for. Where a point tells itself to be ten times less sure than is
+usual in its run it is wrong as well: two or three of a thousand, hundreds of times less sure, would make most of sigma.
 """
 
 from __future__ import annotations
@@ -16,13 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from analysis.study.intervals import Interval, mean_interval
+from analysis.study.intervals import Interval, mean_interval, student
 from render.base.arrays import Float
 from studio.study.kept import ROW
 from studio.study.tables import seconds_of
 
 FEWEST = 4
 """Points that both have, at least: fewer have no spread worth telling."""
+BLOCKS = 16
+"""Of neighbouring points, at most: how well one seed alone tells a change."""
 
 
 @dataclass(frozen=True)
@@ -98,9 +101,9 @@ class Change:
         """An interval is so wide that no change, not even none, could be shown to lie within it."""
         return any(one.high - one.low > 2.0 * share for one in self.intervals)
 
-    def size(self) -> float:
-        """The largest of the mean changes."""
-        return float(np.max(np.abs([one.mean for one in self.intervals])))  # NaN where one is
+    def size(self, less: float = 0.0) -> float:
+        """The largest of the mean changes, each less so many of its standard errors, where these are known."""
+        return float(np.max([abs(one.mean) - less * _standard_error(one) for one in self.intervals]))  # NaN where one is
 
 
 def change(before: Sequence[Run], after: Sequence[Run]) -> Change:
@@ -111,6 +114,8 @@ def change(before: Sequence[Run], after: Sequence[Run]) -> Change:
     complete = float(np.mean([one.completeness for one in before]))
 
     def share(of: Callable[[Float, Float], float], scale: float) -> Interval:
+        if len(pairs) == 1:
+            return _of_blocks(lambda a, b: of(a, b) / scale, *pairs[0])
         return _all_or_nothing(np.array([of(a, b) for a, b in pairs]) / scale)
 
     def differs(of: Callable[[Run], float], scale: float) -> Interval:
@@ -132,6 +137,21 @@ def _common(a: Run, b: Run) -> tuple[Float, Float]:
     """Errors at the crossings that both have; of too few, none."""
     _, in_a, in_b = np.intersect1d(a.crossing, b.crossing, assume_unique=True, return_indices=True)
     return (a.error[in_a], b.error[in_b]) if len(in_a) >= FEWEST else (a.error[:0], b.error[:0])
+
+
+def _of_blocks(of: Callable[[Float, Float], float], a: Float, b: Float) -> Interval:
+    """Of one seed: the delete-a-block jackknife. Source: Kuensch (1989), Annals of Statistics 17, 1217."""
+    count, found = min(BLOCKS, len(a)), of(a, b)
+    if count < FEWEST:
+        return _all_or_nothing(np.array([found]))
+    block = np.arange(len(a)) * count // len(a)
+    left = np.array([of(a[block != i], b[block != i]) for i in range(count)])
+    half = student(count - 1) * float(np.sqrt((count - 1) * np.var(left)))
+    return Interval(found, found - half, found + half, count)
+
+
+def _standard_error(one: Interval) -> float:
+    return 0.5 * (one.high - one.low) / student(one.count - 1) if one.count > 1 else 0.0
 
 
 def _spread(error: Float) -> float:

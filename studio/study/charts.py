@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from analysis.report.colour import INK, MUTED, PAPER, method_colour, method_name
+from analysis.report.labels import Name, name_marks
 from analysis.report.style import figure
 from studio.study.answers import Answer, Spot
 from studio.study.boundary_chart import DASHES, draw_edges
@@ -16,7 +17,6 @@ from studio.study.bounds import Bound
 from studio.study.budget_chart import budget_figure
 from studio.study.kept import KEPT
 from studio.study.kept_charts import SERIES, pictures_figure, profile_figure
-from studio.study.label_places import Name, name_marks
 from studio.study.measures import Measure, measure_of
 from studio.study.ray_units import MILLION, Throughput
 from studio.study.study import Parameter, Value

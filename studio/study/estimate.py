@@ -10,6 +10,7 @@ import numpy as np
 
 from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
+from studio.study.begin import study_bytes
 from studio.study.cells import cells_at, check_size, lattice_of, methods_of, next_cells, points
 from studio.study.measuring import measure_task, warm_up
 from studio.study.store import Row
@@ -17,8 +18,6 @@ from studio.study.study import SEARCHES, Study
 from studio.study.tables import CALIBRATING, SECONDS, measured_cells
 from studio.study.tasks import tasks
 
-ROW_BYTES, CHART_BYTES = 2500, 250_000
-"""On disk: of a cell in the store and the tables, and of a sweep's chart alone and in the page."""
 A_COLUMN = 5
 """Cells of a boundary's column, about."""
 
@@ -62,7 +61,7 @@ def estimate(
             # what a search asks for comes one value at a time, so each cell may take a render
             taken = math.nan if cost is None else (frames + more) * cost[0] + (len(mine) + more) * cost[1]
             seconds += taken
-    size = ROW_BYTES * (len(rows) + cells + searched) + CHART_BYTES * len(study.sweeps)
+    size = study_bytes(study, len(rows) + cells + searched)
     return Estimate(cells, renders, searched, None if math.isnan(seconds) else seconds, size)
 
 

@@ -13,7 +13,8 @@ from studio.runtime.console import StageProgress
 from studio.runtime.workers import EVERY_PROCESSOR, Engine
 from studio.scan.folder_lock import hold
 from studio.study.answers import Answer, answers
-from studio.study.cells import Cell, cells_at, check_size, next_cells
+from studio.study.begin import begin
+from studio.study.cells import Cell, cells_at
 from studio.study.runner import run_study
 from studio.study.store import Row, Store, described
 from studio.study.study import Study
@@ -62,14 +63,10 @@ def run_into(
 ) -> Found:
     """Measure what is missing, then write tables, charts and page. grew: hears what is found as it grows.
 
-    InputError: as `run_study`, or the folder cannot be written, is at work elsewhere or holds another study. Cancelled:
-    so asked; what has been measured is kept.
+    InputError: as `begin` and `run_study`. Cancelled: so asked; what has been measured is kept.
     """
-    check_size(study)
-    next_cells(study, bases, {})  # every field and value is looked at before anything runs
     progress("preparing", 0.0)
-    with hold(folder), Store(folder, study.digest(bases)) as store:
-        store.describe(study, bases)
+    with begin(folder, study, bases, engine) as store:
         before, next_look = store.count(), 0.0
 
         def tell(done: int, known: int) -> None:

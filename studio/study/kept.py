@@ -25,6 +25,8 @@ ROW = "kept"
 """Of a row, what is kept of its cell."""
 UNKNOWN = 1.0
 """px of predicted sigma: as far off a point counts as wrong (`analysis.error.Errors.outlier`)."""
+UNSURE = 10.0
+"""Times the median of the predicted sigmas: a point so unsure has a hundredth of the weight of a usual one."""
 WIDEST = 640
 """px of a picture."""
 
@@ -47,10 +49,12 @@ def profile(points: Points, errors: Errors, curve: LaserCurve) -> dict[str, list
 def on_the_line(points: Points, errors: Errors, seconds: Mapping[str, float]) -> dict[str, Any]:
     """Depth errors (m) of the points on the line by its crossing, and the seconds of each stage of the render.
 
-    wrong: rows with a point off the line, on no line, or that tells itself to be as far off as a wrong one, by its
-    sigma; complete: rows with a point on the line. Both over the rows on which it can be seen.
+    wrong: rows with a point off the line, on no line, or that tells itself to be useless by its sigma, UNKNOWN or
+    UNSURE; complete: rows with a point on the line. Both over the rows on which it can be seen.
     """
-    unknown = points.sigma_pixel > UNKNOWN
+    sigma = points.sigma_pixel
+    usual = float(np.median(sigma[np.isfinite(sigma)])) if np.isfinite(sigma).any() else np.inf
+    unknown = sigma > min(UNKNOWN, UNSURE * usual)
     right = np.isfinite(errors.depth) & ~errors.outlier & ~unknown
     wrong = np.unique(points.index[errors.outlier | (np.isfinite(errors.depth) & unknown)])
     visible = max(errors.truth_rows, 1)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -16,11 +16,13 @@ from urllib.parse import quote
 from pydantic import ValidationError
 
 from render.base.errors import InputError
+from render.base.full_disk import is_full, no_room
 from studio.project.project import Project
 from studio.study.study import Study
 
 FILE = "study.sqlite"
 VERSION = 1
+ROWS = "row (key TEXT PRIMARY KEY, measured TEXT, seconds TEXT)"
 
 Row = dict[str, Any]
 
@@ -38,17 +40,17 @@ class Store:
             self._connection = sqlite3.connect(self.path, isolation_level=None)
             self._connection.execute("PRAGMA journal_mode = DELETE")
             self._connection.execute("PRAGMA synchronous = FULL")
-            self._connection.execute("CREATE TABLE IF NOT EXISTS about (name TEXT PRIMARY KEY, value TEXT) STRICT")
-            self._connection.execute(
-                "CREATE TABLE IF NOT EXISTS row (key TEXT PRIMARY KEY, measured TEXT, seconds TEXT) STRICT"
-            )
+            with self._transaction():
+                for table in ("about (name TEXT PRIMARY KEY, value TEXT)", ROWS):
+                    self._connection.execute(f"CREATE TABLE IF NOT EXISTS {table} STRICT")
             self._check(digest)
         except sqlite3.DatabaseError as error:
-            cure = "restore it from a copy, or remove the folder and run the study anew"
-            raise self._refused("read", error, cure) from None
-
-    def _refused(self, what: str, error: sqlite3.Error, cure: str) -> InputError:
-        return InputError(f"the study's store cannot be {what}", where=str(self.path), found=str(error), cure=cure)
+            raise InputError(
+                "the study's store cannot be read",
+                where=str(self.path),
+                found=str(error),
+                cure="restore it from a copy, or remove the folder and run the study anew",
+            ) from None
 
     def _check(self, digest: str | None) -> None:
         with self._transaction():
@@ -71,13 +73,20 @@ class Store:
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
-        self._connection.execute("BEGIN IMMEDIATE")
+        """All that is done in it, or nothing. InputError: there is no room for it, or it may not be written."""
         try:
+            self._connection.execute("BEGIN IMMEDIATE")
             yield
-        except BaseException:
-            self._connection.execute("ROLLBACK")
-            raise
-        self._connection.execute("COMMIT")
+            self._connection.execute("COMMIT")
+        except BaseException as error:
+            with suppress(sqlite3.OperationalError):  # SQLite itself takes back what found no room
+                self._connection.execute("ROLLBACK")
+            if not isinstance(error, sqlite3.OperationalError):
+                raise
+            if is_full(error):
+                raise no_room(self.path, error) from None
+            what, cure = "the study's store cannot be written", "choose a folder that you may write to"
+            raise InputError(what, where=str(self.path), found=str(error), cure=cure) from None
 
     def describe(self, study: Study, bases: Mapping[str, Project]) -> None:
         """Keep the study as it is now, with its base projects, so that the folder alone tells what it holds."""
@@ -89,11 +98,8 @@ class Store:
     def add(self, rows: Iterable[tuple[str, Mapping[str, Any], Mapping[str, float]]]) -> None:
         """Keep key, measured numbers and seconds of several cells, all or none. What is there already stays."""
         lines = [(key, json.dumps(measured), json.dumps(seconds)) for key, measured, seconds in rows]
-        try:
-            with self._transaction():
-                self._connection.executemany("INSERT OR IGNORE INTO row VALUES (?, ?, ?)", lines)
-        except sqlite3.OperationalError as error:
-            raise self._refused("written", error, "make room, then run the study again: it goes on from here") from None
+        with self._transaction():
+            self._connection.executemany("INSERT OR IGNORE INTO row VALUES (?, ?, ?)", lines)
 
     def rows(self) -> dict[str, Row]:
         """Measured numbers and, as `seconds_...`, times of every cell by its key."""

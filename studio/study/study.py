@@ -49,7 +49,8 @@ class Parameter(Model):
             raise ValueError("a range has two ends; allowed: both low and high")
         ranged = self.low is not None
         if bool(self.values) == ranged:
-            raise ValueError("it has both values and a range, or neither; allowed: values, or low and high")
+            found = "both values and a range" if ranged else "neither values nor a range"
+            raise ValueError(f"it has {found}; allowed: values, or low and high")
         if ranged and self.spacing == "logarithmic" and not (self.low > 0 and self.high > 0):  # type: ignore[operator]
             raise ValueError("a logarithmic range reaches 0; allowed: low and high above 0")
         if ranged and self.low == self.high:
@@ -225,9 +226,15 @@ class Study(Model):
         return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
     def bases(self, root: Path) -> dict[str, Project]:
-        """Every base project by its name in the file. InputError: one cannot be read, or lies outside `root`."""
+        """Every base project by its name in the file.
+
+        InputError: one cannot be read, lies outside `root` or has no such laser as is measured.
+        """
         names = {self.base, *(sweep.base for sweep in self.sweeps if sweep.base is not None)}
-        return {name: base_project(name, root) for name in sorted(names)}
+        found = {name: base_project(name, root) for name in sorted(names)}
+        for name, project in found.items():
+            require_laser(project, self.laser, f"laser, of {name}")
+        return found
 
 
 @lru_cache(maxsize=1)
@@ -250,7 +257,20 @@ def base_project(name: str, root: Path) -> Project:
     """A template by its name, or a project beside the study file. InputError: neither."""
     if name in DESCRIPTIONS:
         return Project.load(template_folder(name))
-    return Project.load(inside(root, name, "base"))
+    path = inside(root, name, "base")
+    if not path.exists():
+        allowed = f"a project file beside the study, or a template: {', '.join(DESCRIPTIONS)}"
+        raise InputError("there is no such base project", where="base", found=name, allowed=allowed)
+    return Project.load(path)
+
+
+def require_laser(project: Project, laser: int, where: str) -> int:
+    """The laser's index. InputError: the rig has no such laser."""
+    count = len(project.scene.lasers)
+    if laser >= count:
+        allowed = f"0 to {count - 1}" if count > 1 else "0" if count else "none: the rig has no laser"
+        raise InputError("there is no such laser in the project", where=where, found=laser, allowed=allowed)
+    return laser
 
 
 def with_fields(project: Project, values: dict[str, Value], where: str) -> Project:

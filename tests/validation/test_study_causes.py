@@ -26,6 +26,7 @@ FEWER = ("completeness",)
 MEASURES = {
     "starved": FEWER + WORSE,
     "saturated": ("position_rmse",),
+    "too much other light": FEWER,
     "wrong peak": FEWER,
     "occluded": ("visible_rows",),
     "out of focus or too wide": WORSE,

@@ -9,6 +9,7 @@ from analysis.study.cause import cause
 GOOD = {
     "visible_rows": 1.0, "no_peak_rows": 0.01, "saturated_rows": 0.0, "wrong_rows": 0.0, "false_rows": 0.0,
     "unmeasured_rows": 0.01, "line_width": 1.5, "signal": 1000.0, "position_rmse": 0.1, "calibration_rmse": 1e-5,
+    "background": 20.0,
 }  # fmt: skip
 
 
@@ -22,6 +23,12 @@ GOOD = {
         ({"wrong_rows": 0.2, "false_rows": 0.2, "saturated_rows": 0.3}, "wrong peak"),
         ({"visible_rows": 0.4}, "occluded"),
         ({"unmeasured_rows": 0.5}, "not measurable"),
+        ({"unmeasured_rows": 0.5, "background": 400.0}, "too much other light"),
+        # what a fit takes for light beneath a line that is as wide as its window
+        ({"line_width": 4.0, "background": 400.0, "signal": 300.0}, "out of focus or too wide"),
+        ({"unmeasured_rows": 0.9, "background": 200.0, "signal": 20.0}, "out of focus or too wide"),
+        # brighter all together, as by a longer exposure
+        ({"unmeasured_rows": 0.5, "background": 400.0, "signal": 10000.0}, "not measurable"),
         ({"line_width": 4.0}, "out of focus or too wide"),
         ({"signal": 100.0}, "starved"),
         ({"calibration_rmse": 1e-4}, "degenerate"),

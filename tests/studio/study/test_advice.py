@@ -151,9 +151,10 @@ def test_wrong_rows_decide_no_sigma_and_are_a_change_of_their_own(as_if: AsIf) -
     assert not direct.taken and tried["no caustics"].part.values == {"render.transport": "interreflection"}
 
 
-def test_a_point_that_says_to_be_anywhere_is_wrong_wherever_it_lies() -> None:
+@pytest.mark.parametrize("unsure", [19.0, 0.11])  # more than a pixel, and ten times what is usual
+def test_a_point_that_says_to_be_anywhere_is_wrong_wherever_it_lies(unsure: float) -> None:
     index = np.array([0, 1, 2, 3, 4, 9])
-    sigma = np.array([0.01, 0.02, 19.0, 0.01, np.nan, 0.01])
+    sigma = np.array([0.01, 0.02, unsure, 0.01, np.nan, 0.01])
     depth = np.array([1e-5, 2e-5, 1e-5, 0.3, 3e-5, np.nan])  # the last is on a row without a line
     outlier = np.array([False, False, False, True, False, False])
     points: Any = SimpleNamespace(sigma_pixel=sigma, index=index)
@@ -163,6 +164,18 @@ def test_a_point_that_says_to_be_anywhere_is_wrong_wherever_it_lies() -> None:
     found = on_the_line(points, errors, {DIRECT: 2.0})
     assert found["crossing"] == [0, 1, 4] and found["error"] == [1e-5, 2e-5, 3e-5]
     assert found["wrong"] == 3 / 8 and found["complete"] == 3 / 8
+
+
+def test_one_seed_tells_how_well_it_knows_a_change() -> None:
+    """95 % intervals of one seed hold what no project changes: a second render of the same, with noise of its own."""
+    random, held = np.random.default_rng(5), 0
+    for _ in range(400):
+        common = random.normal(0.0, 1e-4, ROWS)
+        runs = [Run(np.arange(ROWS), common + random.normal(0.0, 2e-5, ROWS), 0.0, 1.0, 2.0, {}) for _ in range(2)]
+        found = change(runs[:1], runs[1:])
+        held += found.bias.low <= 0.0 <= found.bias.high and found.sigma.low <= 0.0 <= found.sigma.high
+    # both at once in 0.95**2 of cases, give or take four standard deviations and the jackknife's own 2 %
+    assert 0.82 <= held / 400 <= 0.96
 
 
 def test_a_change_is_of_the_points_that_both_have() -> None:

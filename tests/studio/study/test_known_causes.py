@@ -41,6 +41,8 @@ class Look:
     """Of the rows, behind something."""
     ghosts: float = 0.0
     """Of the rows, with a reflection brighter than the line."""
+    ambient: float = 2.0
+    """e- a pixel."""
     method: Method = "likelihood"
 
 
@@ -63,9 +65,15 @@ def grazing(look: Look, value: float) -> Look:
     return replace(look, angle=value, peak=look.peak / more, width=look.width * more)
 
 
+def outshone(look: Look, value: float) -> Look:
+    """A faint line, which is lost in the noise of other light before that fills the pixels."""
+    return replace(look, peak=0.05 * look.peak, ambient=value)
+
+
 SEARCHES = {
     "starved": (starved, 1.0, 1e-4, ("completeness", 0.9, False), True),
     "saturated": (saturated, 2.0, 100.0, ("position_rmse", 0.09, True), True),
+    "too much other light": (outshone, 2.0, 1.5e4, ("completeness", 0.9, False), True),
     "wrong peak": (lambda look, value: replace(look, ghosts=value), 0.0, 0.9, ("completeness", 0.8, False), False),
     "occluded": (lambda look, value: replace(look, hidden=value), 0.0, 0.9, ("visible_rows", 0.7, False), False),
     "out of focus or too wide": (out_of_focus, 1.0, 20.0, ("position_rmse", 0.15, True), True),
@@ -81,7 +89,7 @@ def measured(look: Look, random: np.random.Generator) -> dict[str, float]:
     x = look.baseline * (1.0 - z / DEPTH)  # the laser plane crosses the axis at DEPTH
     u = CAMERA.fx * x / z + CAMERA.cx
     seen = random.permutation(ROWS) >= round(look.hidden * ROWS)
-    mean = np.where(seen[:, None], expected(WIDTH, u, look.peak, look.width, 0.0), 0.0) + 2.0
+    mean = np.where(seen[:, None], expected(WIDTH, u, look.peak, look.width, 0.0), 0.0) + look.ambient
     ghost = random.permutation(ROWS) < round(look.ghosts * ROWS)
     mean += np.where(ghost[:, None], expected(WIDTH, u + 30.0, 2.0 * look.peak, look.width, 0.0), 0.0)
     image = np.minimum(exposed(mean, look.read_noise, random), FULL_WELL).astype(np.float32)

@@ -19,6 +19,7 @@ import studio.runtime.workers
 from render.base.errors import Cancelled, InputError
 from studio.runtime.workers import Engine
 from studio.study.answers import answers
+from studio.study.begin import begin
 from studio.study.cells import Shard
 from studio.study.page import write_page
 from studio.study.runner import run_study
@@ -201,6 +202,40 @@ def test_a_damaged_store_is_told(tmp_path: Path, content: bytes) -> None:
     (tmp_path / FILE).write_bytes(content)
     with pytest.raises(InputError, match=r"study\.sqlite"):
         described(tmp_path)
+
+
+def test_a_full_disk_harms_no_cell_that_is_there_and_the_study_goes_on_once_there_is_room(
+    whole: tuple[Path, bytes], tmp_path: Path
+) -> None:
+    chosen = study()
+    bases = chosen.bases(tmp_path)
+    digest = chosen.digest(bases)
+    with Store(whole[0], None) as store:
+        rows = store.rows()
+    with Store(tmp_path, digest) as store:
+        store.add([(key, row, {}) for key, row in list(rows.items())[:10]])
+        (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
+        store._connection.execute(f"PRAGMA max_page_count = {pages}")  # which to SQLite is a full disk
+        message = r"study\.sqlite: there is no room for the file"
+        with pytest.raises(InputError, match=message):
+            store.add([(key, row, {}) for key, row in rows.items()])
+        with pytest.raises(InputError, match=message):
+            store.merge(whole[0], digest)
+        assert store.count() == 10
+        store._connection.execute("PRAGMA max_page_count = 1000000")
+        store.merge(whole[0], digest)
+        assert table(tmp_path, store) == whole[1]
+
+
+def test_a_disk_without_room_for_the_study_is_told_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen, out = study(), tmp_path / "out"
+    monkeypatch.setattr("render.base.full_disk.free_bytes", lambda path: 100_000)
+    bases = chosen.bases(tmp_path)
+    with pytest.raises(InputError, match="no room for the study; found 100 kB free"), begin(out, chosen, bases, HERE):
+        pass
+    assert not out.exists()
 
 
 def command(*words: object) -> list[str]:

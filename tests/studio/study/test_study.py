@@ -79,6 +79,13 @@ def test_a_base_outside_the_studys_folder_is_not_read(tmp_path: Path) -> None:
         study.bases(tmp_path)
 
 
+def test_a_base_that_is_not_there_or_lacks_the_laser_is_told_with_what_there_is(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"no such base project; found plan; allowed: .*, plane"):
+        Study.model_validate({"base": "plan", "sweeps": [SWEEP]}).bases(tmp_path)
+    with pytest.raises(InputError, match=r"laser, of plane: there is no such laser.*found 1; allowed: 0"):
+        Study.model_validate({"base": "plane", "laser": 1, "sweeps": [SWEEP]}).bases(tmp_path)
+
+
 def test_an_unknown_study_is_told_with_the_ready_made_ones() -> None:
     with pytest.raises(InputError, match="quick"):
         Study.load("quik")
