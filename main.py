@@ -304,6 +304,7 @@ def chooser(recipes: tuple[Path, ...], **options: Any) -> None:
 def calibrate(what: str, folder: Path | None, **options: Any) -> None:
     """Calibrate a camera, its lasers, or both: camera|laser|scanner FOLDER of photographs, or a PROJECT in silico.
 
+    check FOLDER tells by one to three new photographs whether the calibration of --camera still holds.
     Photographs of one pose are named NAME_off and NAME_on (NAME_laser0, NAME_laser1, ...), or NAME for both in one.
     """
     require_system()

@@ -35,7 +35,8 @@ class Known:
 
     intrinsics: Float
     distortion: Float
-    covariance: Float
+    covariance: Float | None
+    """None: its errors were not told, and it is held."""
 
 
 @dataclass(frozen=True)
@@ -109,12 +110,14 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         guess, other_end = _carried(guess, request.told, seen.names, extent)
         ends = np.where(other_end[seen.view][:, None], extent.sum(axis=0) - seen.target, seen.target)
         seen, centroids = replace(seen, target=ends), replace(centroids, target=ends)
-    prior = None if known is None else _prior(known, guess)
+    held = known is not None and known.covariance is None
+    prior = None if known is None or known.covariance is None else _prior(known.covariance, guess)
+    free = free_parameters(guess, warp=request.warp, camera=not held)
     try:
-        adjusted = adjust_robustly(seen, guess, free_parameters(guess, warp=request.warp), prior)
+        adjusted = adjust_robustly(seen, guess, free, prior)
         if request.circle > 0.0:
             seen = _centred(centroids, adjusted.solution.estimate, adjusted.seen.names, request.circle, seen)
-            adjusted = adjust_robustly(seen, guess, free_parameters(guess, warp=request.warp), prior)
+            adjusted = adjust_robustly(seen, guess, free, prior)
     except (InputError, np.linalg.LinAlgError) as error:
         raise InputError(
             "the views do not determine the calibration",
@@ -149,6 +152,8 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         if not len(one.depth)
     ]
     faults += _wrong_scale(estimate, covariance)
+    if held:
+        faults.append("the camera came without its errors: sigmas and depth errors are those of an exact camera")
     advice = None
     if usable:
         advice = advise(
@@ -212,12 +217,12 @@ def _wrong_scale(estimate: Estimate, covariance: Float) -> list[str]:
     ]
 
 
-def _prior(known: Known, guess: Estimate) -> Prior:
+def _prior(covariance: Float, guess: Estimate) -> Prior:
     size = len(guess.shared)
     information = np.zeros((size, size))
     count = guess.camera_count
-    spread = np.sqrt(np.maximum(np.diag(known.covariance), 1e-30))
-    scaled = known.covariance / np.outer(spread, spread)
+    spread = np.sqrt(np.maximum(np.diag(covariance), 1e-30))
+    scaled = covariance / np.outer(spread, spread)
     np.fill_diagonal(scaled, 1.0)
     information[:count, :count] = np.linalg.inv(scaled) / np.outer(spread, spread)
     return Prior(guess.shared.copy(), information)

@@ -217,7 +217,7 @@ def _held_out(seen: Observations, start: Estimate, folds: int) -> tuple[Float, F
         except InputError:
             continue  # too few of the other views have lines
         lines = without_views(seen, ~test)
-        away = _depth_from_board(lines, replace(posed, planes=planes.planes)) ** 2
+        away = depth_from_board(lines, replace(posed, planes=planes.planes)) ** 2
         # a wrong line is as far off for every lens: the median keeps it from counting for more than others
         for i in np.unique(lines.laser_view):
             depth[np.nonzero(test)[0][i]] = np.median(away[lines.laser_view == i])
@@ -226,12 +226,12 @@ def _held_out(seen: Observations, start: Estimate, folds: int) -> tuple[Float, F
 
 def _near(seen: Observations, estimate: Estimate) -> Observations:
     """Without points of lines that are far from the planes, which were found by most of them."""
-    off = np.abs(_depth_from_board(seen, estimate))
+    off = np.abs(depth_from_board(seen, estimate))
     typical = float(np.median(off)) / 0.6745 if len(off) else 0.0  # of a normal distribution
     return _with_lines(seen, np.nonzero(off <= STRAY * typical)[0])
 
 
-def _depth_from_board(seen: Observations, estimate: Estimate) -> Float:
+def depth_from_board(seen: Observations, estimate: Estimate) -> Float:
     """(m,) m, depth of the laser points by their plane less that of the flat board."""
     q = normalise(seen.laser_pixel, estimate.intrinsics, estimate.distortion)
     ray = np.column_stack([q, np.ones(len(q))])

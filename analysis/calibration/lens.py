@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from render.base.arrays import Float
@@ -102,4 +104,10 @@ def normalise(pixels: Float, intrinsics: Float, k: Float) -> Float:
         return q
     padded = np.zeros(14)
     padded[: len(k)] = k
-    return np.asarray(undistort_points(q, padded, fold_radii(padded), 1e-10 / float(intrinsics[:2].max()))[0])
+    return np.asarray(undistort_points(q, padded, _folds(padded.tobytes()), 1e-10 / float(intrinsics[:2].max()))[0])
+
+
+@lru_cache(maxsize=64)
+def _folds(k: bytes) -> Float:
+    """Those of a lens that one adjustment, check or drawing asks for again and again."""
+    return np.asarray(fold_radii(np.frombuffer(k).copy()))

@@ -58,7 +58,7 @@ def adjust_robustly(seen: Observations, start: Estimate, free: Bool, prior: Prio
         before, estimate = estimate, weighted
         if np.abs(estimate.shared - before.shared).max() < 1e-6 * np.abs(before.shared).max():
             break
-    corner_bad, laser_bad, view_bad, told = _outliers(seen, estimate)
+    corner_bad, laser_bad, view_bad, told = outliers(seen, estimate)
     kept = without_views(without(seen, corner_bad, laser_bad), view_bad)
     estimate = estimate.of_views(~view_bad)
     solution = adjust(kept, estimate, free, prior)
@@ -107,7 +107,7 @@ def _weighted(seen: Observations, estimate: Estimate, free: Bool, prior: Prior |
     return adjust(weighted, estimate, free, prior, steps=10).estimate
 
 
-def _outliers(seen: Observations, estimate: Estimate) -> tuple[Bool, Bool, Bool, tuple[str, ...]]:
+def outliers(seen: Observations, estimate: Estimate) -> tuple[Bool, Bool, Bool, tuple[str, ...]]:
     """Which corners (n,), laser points (m,) and views are left out, and why, in words."""
     corner, laser = _residuals(seen, estimate)
     corner_bad, laser_bad, view_bad = corner > STRAY, laser > STRAY, np.zeros(seen.count, dtype=bool)

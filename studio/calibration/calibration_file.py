@@ -82,7 +82,10 @@ def write_calibration(path: Path, data: dict[str, Any]) -> None:
 
 
 def read_calibration(path: Path) -> tuple[CalibratedCamera, Known, dict[str, Any]]:
-    """Camera, what is known of it, and the whole object. InputError: no calibration file, or a damaged one."""
+    """Camera, what is known of it, and the whole object; a covariance of zeros tells a camera that was held as exact.
+
+    InputError: no calibration file, or a damaged one.
+    """
     data = read_calibration_file(path, str(path))
     if "camera" not in data:
         cure = "make one by main.py calibrate"
@@ -103,9 +106,11 @@ def read_calibration(path: Path) -> tuple[CalibratedCamera, Known, dict[str, Any
         check_covariance(covariance, "it")
     except ValueError as error:
         raise InputError("not a covariance of the camera", where=where, found=str(error)) from None
+    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
+    if not np.any(covariance):
+        return camera, Known(intrinsics, np.array(camera.distortion), None), data
     if not np.all(np.diag(covariance) > 0.0):
         raise InputError("not a covariance of the camera", where=where, found="a parameter without an error")
-    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
     return camera, Known(intrinsics, np.array(camera.distortion), covariance), data
 
 

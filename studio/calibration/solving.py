@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Collection
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from analysis.calibration.board import Board
-from analysis.calibration.calibrate import Calibrated, Known, Request, calibrate
+from analysis.calibration.calibrate import Calibrated, Request, calibrate
 from analysis.calibration.estimate import Estimate
 from render.base.errors import InputError
-from studio.calibration.calibration_file import read_calibration
 from studio.calibration.drawings import DepthMap, depth_map
 from studio.calibration.in_silico import true_depth_error
 from studio.calibration.material import Material
@@ -48,17 +46,6 @@ def solve(
     true = None if truth is None else tuple(true_depth_error(result, truth))
     maps = tuple(depth_map(one, result.estimate) for one in result.depth)
     return Solved(result, tuple(rows), maps, true, board, material.size, len(kept.views))
-
-
-def held_camera(file: Path | None, size: tuple[int, int]) -> Known:
-    """The camera of a calibration file. InputError: none, a damaged one, or one of images of another size, px."""
-    if file is None:
-        raise InputError("lasers alone need a camera", allowed="a calibration file that has one")
-    camera, known, _ = read_calibration(file)
-    if (camera.width, camera.height) != size:
-        found, allowed = "{} x {} px".format(*size), f"{camera.width} x {camera.height} px"
-        raise InputError("the photographs are not of that camera", where=str(file), found=found, allowed=allowed)
-    return known
 
 
 def of_project(data: dict[str, Any]) -> Calibration:

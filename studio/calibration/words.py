@@ -7,6 +7,7 @@ import numpy as np
 from analysis.calibration.calibrate import Calibrated
 from analysis.calibration.estimate import unit_plane
 from analysis.calibration.next_pose import Advice
+from analysis.calibration.recheck import Part, Recheck
 from studio.calibration.motion_file import motion_rows
 
 SMALL_GAIN = 0.03
@@ -100,3 +101,29 @@ def next_sentence(advice: Advice, target_um: float | None) -> str:
     )
     little = advice.gain < SMALL_GAIN * advice.before
     return told + ("; one more view gains little" if little and target_um is None else "")
+
+
+def recheck_sentence(part: Part) -> str:
+    """How far new views are from a calibration, beside their own noise."""
+    chance = f"p = {part.p:.2g}" if part.p >= 1e-4 else "p < 0.0001"
+    if part.laser is None:
+        return f"corners {part.off:.3f} px rms from where it has them, {part.noise:.3f} of the best fit ({chance})"
+    off, noise = 1e6 * part.off, 1e6 * part.noise
+    return f"its line {off:.0f} um rms in depth from where it has it, {noise:.0f} of the best fit ({chance})"
+
+
+def recheck_verdict(result: Recheck) -> str:
+    """What to do."""
+    changed = result.changed
+    if not changed:
+        return "the calibration holds: the photographs are as far from it as its errors and their noise explain"
+    if changed[0].laser is None:
+        return (
+            "the camera is no longer as calibrated (focus, aperture or a lens that turned, or another board): "
+            "calibrate camera and lasers again"
+        )
+    names = " and ".join(part.name for part in changed)
+    return (
+        f"{names} no longer as calibrated: the laser moved against the camera, or the lens did by less than these "
+        "views of the board can tell; calibrate again"
+    )

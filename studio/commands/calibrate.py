@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibrated, Known
     from analysis.calibration.motion import Held
     from studio.calibration.material import Material
+    from studio.project.calibration import CalibratedCamera
 
 PARTS = ("camera", "laser", "scanner")
+BOARD = "checkerboard:13x9:25mm"
+"""The founding paper's."""
 
 
 @dataclass(frozen=True)
@@ -58,14 +61,20 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     from studio.calibration.calibration_file import file_data, write_calibration
     from studio.calibration.in_silico import true_depth_error
     from studio.calibration.into_project import into_project
+    from studio.calibration.known import check_size
     from studio.calibration.material import virtual, with_faults
     from studio.calibration.motion_file import motion_values
     from studio.commands.commands import load_project
 
-    options = CalibrateOptions(**given)
+    if what == "check":
+        from studio.commands.recheck import check_calibration
+
+        heard = {name: given[name] for name in ("camera", "board", "axis", "channel")}
+        return check_calibration(folder, **heard, quiet=quiet, as_json=as_json)
+    options = CalibrateOptions(**given | {"board": given["board"] or BOARD})
     _check_options(what, options)
     board, truth = parse_board(options.board), None
-    known = _known(options) if what == "laser" else None
+    camera, known = _known(options) if what == "laser" else (None, None)
     with stage_progress(quiet or as_json) as progress:
         if what in PARTS and folder is not None:
             material = _photographed(what, folder, options, progress)
@@ -84,9 +93,10 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
             )
             out = options.out or Path("scan-output") / "calibration.json"
         else:
-            allowed = "camera FOLDER, laser FOLDER, scanner FOLDER, or a project alone"
+            allowed = "camera, laser, scanner or check with a FOLDER, or a project alone"
             raise InputError("not known what to calibrate", where="calibrate", found=what, allowed=allowed)
-        _check_size(material, options)
+        if camera is not None:
+            check_size(camera, material.size, "--camera")
         progress("adjustment", 0.0)
         request = Request(
             material.size,
@@ -184,23 +194,13 @@ def _board(options: CalibrateOptions) -> Any:
     return parse_board(options.board)
 
 
-def _known(options: CalibrateOptions) -> Known:
-    from studio.calibration.calibration_file import read_calibration
+def _known(options: CalibrateOptions) -> tuple[CalibratedCamera, Known]:
+    from studio.calibration.known import known_camera
 
     if options.camera is None:
-        raise InputError("the laser alone needs a camera", where="--camera", allowed="a file of calibrate camera")
-    return read_calibration(options.camera)[1]
-
-
-def _check_size(material: Material, options: CalibrateOptions) -> None:
-    from studio.calibration.calibration_file import read_calibration
-
-    if options.camera is None:
-        return
-    camera = read_calibration(options.camera)[0]
-    if (camera.width, camera.height) != material.size:
-        found, allowed = "{} x {} px".format(*material.size), f"{camera.width} x {camera.height} px"
-        raise InputError("the photographs are not of that camera", where="--camera", found=found, allowed=allowed)
+        allowed = "a file of calibrate camera, of OpenCV, ROS, Kalibr or mrcal"
+        raise InputError("the laser alone needs a camera", where="--camera", allowed=allowed)
+    return known_camera(options.camera)
 
 
 def _exported(out: Path, data: dict[str, Any], forms: tuple[str, ...]) -> list[str]:

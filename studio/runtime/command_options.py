@@ -278,7 +278,9 @@ def real_views(command: Callable[..., Any]) -> Callable[..., Any]:
             help="CSV with view and position_mm, angle_deg, or a robot's x_mm, y_mm, z_mm, qx, qy, qz, qw.",
         ),
         click.option(
-            "--camera", type=click.Path(path_type=Path), help="Calibration file of the camera, for laser alone."
+            "--camera",
+            type=click.Path(path_type=Path),
+            help="That laser holds (ours, OpenCV, ROS, Kalibr, mrcal) or check is about.",
         ),
     ):
         command = option(command)
@@ -309,7 +311,8 @@ def calibrating(command: Callable[..., Any]) -> Callable[..., Any]:
             "--out", type=click.Path(path_type=Path), help="Calibration file  [default: FOLDER/calibration.json]."
         ),
         click.option(
-            "--board", default="checkerboard:13x9:25mm", show_default=True, help="Kind, counts and side; see board."
+            "--board",
+            help="Kind, counts and side; see board  [default: checkerboard:13x9:25mm; check: the calibration's].",
         ),
     ):
         command = option(command)

@@ -18,9 +18,9 @@ def asked_of(work: CalibrationWork, material: Material, board: Board) -> tuple[M
     InputError: what is asked for cannot be done with these views.
     """
     from analysis.calibration.calibrate import Request
+    from studio.calibration.known import held_camera
     from studio.calibration.material import need_a_line
     from studio.calibration.motion_file import told_of
-    from studio.calibration.solving import held_camera
 
     if work.what == "camera":
         material = material.without_lasers()

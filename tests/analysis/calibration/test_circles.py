@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import cv2
@@ -33,16 +34,23 @@ def scene(tilt: float, side: float = 0.6, z: float = 0.6) -> Estimate:
     return Estimate(camera, lens, np.zeros(2), np.zeros((0, 3)), turn[None], shift[None])
 
 
+@functools.cache
+def rays_of(camera: tuple[float, ...], lens: tuple[float, ...]) -> np.ndarray:
+    """(512 FINE 640 FINE, 3) directions of the pixels' parts, of the camera that all scenes have."""
+    u, v = np.meshgrid(*((np.arange(n * FINE) + 0.5) / FINE - 0.5 for n in (WIDTH, HEIGHT)))
+    q = normalise(np.column_stack([u.ravel(), v.ravel()]), np.array(camera), np.array(lens))
+    return np.column_stack([q, np.ones(len(q))])
+
+
 def photograph(there: Estimate, blur: float = 0.8) -> np.ndarray:
     """(512, 640) without noise, every pixel the mean of 16 parts of it."""
-    u, v = np.meshgrid(*((np.arange(n * FINE) + 0.5) / FINE - 0.5 for n in (WIDTH, HEIGHT)))
-    q = normalise(np.column_stack([u.ravel(), v.ravel()]), there.intrinsics, there.distortion)
-    rays = np.column_stack([q, np.ones(len(q))])
+    u = (np.arange(WIDTH * FINE) + 0.5) / FINE - 0.5
+    rays = rays_of(tuple(there.intrinsics), tuple(there.distortion))
     rotation, translation = there.rotation[0], there.translation[0]
     depth = (rotation[:, 2] @ translation) / (rays @ rotation[:, 2])
     place = (depth[:, None] * rays - translation) @ rotation[:, :2] / BOARD.square
     nearest = np.clip(np.rint(place), 0, [BOARD.columns - 1, BOARD.rows - 1])
-    beyond = np.linalg.norm(place - nearest, axis=1).reshape(u.shape) - BOARD.circle / BOARD.square
+    beyond = np.linalg.norm(place - nearest, axis=1).reshape(-1, len(u)) - BOARD.circle / BOARD.square
     # of a part that the edge cuts the share on either side, to first order in its distance
     bright = np.clip(0.5 + beyond / np.hypot(*np.gradient(beyond)), 0.0, 1.0)
     image = cv2.GaussianBlur((50.0 + 130.0 * bright) * (1.0 + 2e-4 * u), (0, 0), blur * FINE)

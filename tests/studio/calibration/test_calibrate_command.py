@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
 
 from analysis.calibration.estimate import unit_plane
 from analysis.line.result import Line
 from main import cli
 from render.base.errors import InputError
 from studio.calibration.calibration_file import read_calibration
+from studio.calibration.exchange import write_camera
 from studio.calibration.image_views import shots
 from studio.calibration.into_project import into_project
+from studio.project.calibration import CalibratedCamera
 from studio.project.project import Project
 from studio.scan.stages import triangulate_line
 from tests.analysis.calibration.test_circles import photograph, scene
@@ -94,6 +98,38 @@ def test_the_laser_alone_is_found_with_a_camera_that_is_known(folder: Path, tmp_
     assert np.abs(np.array(told["planes"][0]) - unit_plane(scanner(VIEWS).planes[0])).max() < 2e-3
 
 
+def test_a_camera_of_another_program_is_held_as_exact_and_said_to_be(folder: Path, tmp_path: Path) -> None:
+    there, camera, out = scanner(VIEWS), tmp_path / "camera.yaml", tmp_path / "laser.json"
+    fx, fy, cx, cy = there.intrinsics
+    k = tuple(there.distortion.tolist())
+    write_camera(camera, CalibratedCamera(width=640, height=512, fx=fx, fy=fy, cx=cx, cy=cy, distortion=k), "opencv")
+    code, told = run("calibrate", "laser", str(folder), "--board", BOARD, "--camera", str(camera), "--out", str(out))
+    assert code == 0, told
+    assert told["camera"]["fx"] == fx and not np.any(told["camera_covariance"])
+    spread = np.sqrt(np.diag(np.array(told["covariances"][0]))[4:8])
+    assert np.all(np.abs(np.array(told["planes"][0]) - unit_plane(there.planes[0])) < 4.0 * spread)
+    assert any("came without its errors" in fault for fault in told["checks"]["faults"])
+    assert read_calibration(out)[1].covariance is None  # held again where the file is the known camera
+
+
+def test_new_photographs_tell_whether_the_calibration_holds(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "calibration.json"
+    code, _ = run("calibrate", "scanner", str(folder), "--board", BOARD, "--lens", "4", "--out", str(out))
+    assert code == 0
+    new = scanner(2, seed=7)
+    turned = Rotation.from_rotvec([0.0, 3e-3, 0.0]).as_matrix()
+    for name, there in (("again", new), ("moved", replace(new, planes=new.planes @ turned.T))):
+        (tmp_path / name).mkdir()
+        write_folder(tmp_path / name, there)
+        # the board is the one that the calibration was made with
+        code, told = run("calibrate", "check", str(tmp_path / name), "--camera", str(out))
+        assert code == 0 and [part["part"] for part in told["parts"]] == ["camera", "laser 0"]
+        assert told["holds"] == (name == "again")
+    assert "laser 0 no longer" in told["verdict"]
+    code, told = run("calibrate", "check", str(tmp_path / "again"), "--camera", str(tmp_path / "again" / "none.json"))
+    assert code == 2 and "none.json" in told["error"]["message"]
+
+
 def test_a_bad_photograph_is_named_and_the_rest_goes_on(tmp_path: Path) -> None:
     write_folder(tmp_path, scanner(6), pairs=False)
     (tmp_path / "broken.png").write_bytes(b"no image")
@@ -124,6 +160,8 @@ def test_a_bad_photograph_is_named_and_the_rest_goes_on(tmp_path: Path) -> None:
         (["camera", ".", "--board", BOARD, "--camera", "camera.json"], "laser alone"),
         (["laser", ".", "--board", BOARD, "--camera", "camera.json", "--lens", "5"], "has its lens"),
         (["camera", ".", "--board", BOARD, "--nearest", "1", "--farthest", "0.5"], "not beyond"),
+        (["check", "."], "no calibration to check"),
+        (["check", "--camera", "camera.json"], "no folder of new photographs"),
         (["everything", ".", "--board", BOARD], "not known what to calibrate"),
     ],
 )
@@ -191,7 +229,8 @@ def test_a_known_camera_has_a_whole_covariance(tmp_path: Path) -> None:
     path, good = tmp_path / "camera.json", np.diag([1.0, 1.0, 0.5, 0.5]).tolist()
     path.write_text(json.dumps(file_of(good)))
     assert read_calibration(path)[1].covariance[0, 0] == 1.0
-    wrong: list[object] = [np.diag([1.0, 1.0, 0.5, -0.5]).tolist(), np.zeros((4, 4)).tolist(), np.eye(3).tolist()]
+    wrong: list[object] = [np.diag([1.0, 1.0, 0.5, -0.5]).tolist(), np.eye(3).tolist()]
+    wrong.append(np.diag([1.0, 1.0, 0.5, 0.0]).tolist())
     wrong += [(np.eye(4) + np.eye(4, k=1)).tolist(), (np.eye(4) + 2.0 * np.eye(4)[::-1]).tolist(), None, "x"]
     for covariance in wrong:
         path.write_text(json.dumps(file_of(good) | {"camera_covariance": covariance}))
