@@ -133,7 +133,9 @@ def _soft(rng: np.random.Generator, h: int, w: int, scale: float) -> Floats:
     factor = max(int(scale / 3.0), 1)
     small = rng.normal(size=(h // factor + 8, w // factor + 8))
     small = cv2.GaussianBlur(small, (0, 0), scale / factor)
-    large = cv2.resize(small / small.std(), ((w // factor + 8) * factor, (h // factor + 8) * factor), interpolation=3)
+    large = cv2.resize(
+        small / small.std(), ((w // factor + 8) * factor, (h // factor + 8) * factor), interpolation=cv2.INTER_CUBIC
+    )
     return np.asarray(large[:h, :w], np.float64)
 
 
