@@ -5,8 +5,9 @@ point off it, on a reflection that outshines the line, say, errs by a thousand t
 decide a sigma, and whether it is there hangs on a little noise. So wrong rows are a share of their own, of the rows on
 which the line can be seen, and so are the rows that are measured on it. A point whose predicted sigma is more than a
 pixel tells itself that it may be anywhere, and is wrong wherever it lies. Right and wrong are told by the exact line
-and by each run's own sigma, never by how well the two agree, which would leave out the very changes that are asked for. Where a point tells itself to be ten times less sure than is
-usual in its run it is wrong as well: two or three of a thousand, hundreds of times less sure, would make most of sigma.
+and by each run's own sigma, never by how well the two agree, which would leave out the very changes that are asked for.
+Where a point tells itself to be ten times less sure than is usual in its run it is wrong as well: two or three of a
+thousand, hundreds of times less sure, would make most of sigma.
 """
 
 from __future__ import annotations
@@ -103,7 +104,9 @@ class Change:
 
     def size(self, less: float = 0.0) -> float:
         """The largest of the mean changes, each less so many of its standard errors, where these are known."""
-        return float(np.max([abs(one.mean) - less * _standard_error(one) for one in self.intervals]))  # NaN where one is
+        return float(
+            np.max([abs(one.mean) - less * _standard_error(one) for one in self.intervals])
+        )  # NaN where one is
 
 
 def change(before: Sequence[Run], after: Sequence[Run]) -> Change:
