@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.calibration.estimate import Estimate
-from analysis.calibration.lens import project
+from analysis.calibration.lens import normalise, project
 from render.base.arrays import Float
 
 ROWS, DEPTHS = 25, 25
@@ -49,12 +49,25 @@ def depth_jacobian(estimate: Estimate, volume: Volume, q: Float) -> Float:
     """(n, p) derivative of depth, m, at the volume's pixels by all shared parameters; q (n, 2) their rays."""
     m = estimate.planes[volume.laser]
     _, by_q, by_camera = project(q, estimate.intrinsics, estimate.distortion)
-    depth = 1.0 / (q @ m[:2] + m[2])
+    depth = _depth(estimate, volume, q)
     out = np.zeros((len(q), len(estimate.shared)))
     dq = -np.linalg.solve(by_q, by_camera)
     out[:, : estimate.camera_count] = -(depth**2)[:, None] * np.einsum("i,nij->nj", m[:2], dq)
     out[:, estimate.plane_slice(volume.laser)] = -(depth**2)[:, None] * np.column_stack([q, np.ones(len(q))])
     return out
+
+
+def depth_off(estimate: Estimate, truth: Estimate, volume: Volume) -> Float:
+    """(n,) m, depth at the volume's pixels by an estimate less the true one."""
+    found, exact = (
+        _depth(each, volume, normalise(volume.pixel, each.intrinsics, each.distortion)) for each in (estimate, truth)
+    )
+    return found - exact
+
+
+def _depth(estimate: Estimate, volume: Volume, q: Float) -> Float:
+    m = estimate.planes[volume.laser]
+    return np.asarray(1.0 / (q @ m[:2] + m[2]))
 
 
 def pixel_gain(estimate: Estimate, volume: Volume, q: Float) -> Float:
@@ -64,7 +77,7 @@ def pixel_gain(estimate: Estimate, volume: Volume, q: Float) -> Float:
     _, by_q, _ = project(q, estimate.intrinsics, estimate.distortion)
     unit = np.zeros((len(q), 2, 1))
     unit[:, along] = 1.0
-    depth = 1.0 / (q @ m[:2] + m[2])
+    depth = _depth(estimate, volume, q)
     return np.asarray(np.abs(depth**2 * (np.linalg.solve(by_q, unit)[:, :, 0] @ m[:2])))
 
 
@@ -86,8 +99,6 @@ class DepthError:
 
 def depth_error(estimate: Estimate, covariance: Float, volume: Volume, line_sigma: float) -> DepthError:
     """covariance (p, p) of the shared parameters; line_sigma px of the line's position."""
-    from analysis.calibration.lens import normalise
-
     q = normalise(volume.pixel, estimate.intrinsics, estimate.distortion)
     jacobian = depth_jacobian(estimate, volume, q)
     variance = np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from analysis.calibration.board import Board
 from analysis.calibration.calibrate import Calibrated
+from analysis.calibration.depth import Volume, depth_off
 from analysis.calibration.estimate import Estimate, plane_vector
-from analysis.calibration.lens import normalise
 from analysis.calibration.observations import View
+from analysis.calibration.sequential import WAYS
 from analysis.calibration.virtual import exact_view, noisy
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -98,15 +102,24 @@ def virtual_views(
 
 def true_depth_error(result: Calibrated, truth: Estimate) -> list[tuple[float, float]]:
     """Root mean square of the true depth error over each laser's volume, m, and the one told beforehand."""
-    out = []
-    for one in result.depth:
-        pixel, laser = one.volume.pixel, one.volume.laser
-        depths = []
-        for each in (result.estimate, truth):
-            q = normalise(pixel, each.intrinsics, each.distortion)
-            depths.append(1.0 / (q @ each.planes[laser][:2] + each.planes[laser][2]))
-        out.append((float(np.sqrt(np.mean((depths[0] - depths[1]) ** 2))), one.rms))
-    return out
+    return [(_rms(result.estimate, truth, one.volume), one.rms) for one in result.depth]
+
+
+def other_ways(
+    views: Sequence[View], board: Board, size: tuple[int, int], result: Calibrated, truth: Estimate
+) -> dict[str, list[float]]:
+    """The same of the usual ways, one after the other, on the same views; those that find nothing are missing."""
+    terms, lasers = len(result.estimate.distortion), len(truth.planes)
+    found = {}
+    for name, way in WAYS.items() if board.circle == 0.0 else ():
+        with suppress(InputError):
+            estimate = way(views, board.target, size, terms, lasers)
+            found[name] = [_rms(estimate, truth, one.volume) for one in result.depth]
+    return found
+
+
+def _rms(estimate: Estimate, truth: Estimate, volume: Volume) -> float:
+    return float(np.sqrt(np.mean(depth_off(estimate, truth, volume) ** 2)))
 
 
 def _pose(

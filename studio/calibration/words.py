@@ -53,6 +53,12 @@ def depth_rows(result: Calibrated, true: list[tuple[float, float]] | None) -> li
     return rows
 
 
+def other_rows(others: dict[str, list[float]], jointly: list[tuple[float, float]]) -> list[tuple[str, ...]]:
+    """True depth error of each laser, um, by every way, all at once last."""
+    ways = {**others, "all at once": [true for true, _ in jointly]}
+    return [(name, *(f"{1e6 * value:.1f}" for value in values)) for name, values in ways.items()]
+
+
 def check_rows(result: Calibrated, views: int) -> list[tuple[str, str]]:
     """Sentences: residuals, halves, whiteness, choice of lens."""
     adjusted = result.adjusted

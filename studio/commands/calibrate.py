@@ -59,11 +59,12 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     from analysis.calibration.calibrate import Request, calibrate
     from studio.calibration.board_text import board_text, parse_board
     from studio.calibration.calibration_file import file_data, write_calibration
-    from studio.calibration.in_silico import true_depth_error
+    from studio.calibration.in_silico import other_ways, true_depth_error
     from studio.calibration.into_project import into_project
     from studio.calibration.known import check_size
     from studio.calibration.material import virtual, with_faults
     from studio.calibration.motion_file import motion_values
+    from studio.calibration.words import other_rows
     from studio.commands.commands import load_project
 
     if what == "check":
@@ -120,6 +121,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     if options.project is not None:
         files.append(str(into_project(options.project, data)))
     true = None if truth is None else true_depth_error(result, truth)
+    others = {} if truth is None else other_ways(material.views, board, material.size, result, truth)
     if as_json:
         extra = {"errors": list(material.errors), "notes": list(material.notes), "files": files}
         print_json(
@@ -129,11 +131,16 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
                 **extra,
                 "next_pose": _advice_data(result),
                 "true_depth_rms_m": None if true is None else [one for one, _ in true],
+                "true_depth_rms_m_by_other_ways": others,
                 "true_motion": None if truth is None else motion_values(truth),
             }
         )
     else:
         _print(result, material, true, options, quiet)
+        if others and true:
+            print()
+            header = ("way", *(f"laser {one.volume.laser} um" for one in result.depth))
+            print_table("True depth error by the usual ways", other_rows(others, true), header=header)
         for file in files:
             print(f"wrote {file}")
     for fault in material.errors:
