@@ -15,6 +15,7 @@ from analysis.line.choose import choose_method
 from analysis.line.detection.channel import check_image, scan_lines
 from analysis.line.detection.noise import NoiseModel
 from analysis.line.estimate import estimate_noise
+from analysis.line.hidden_peaks import with_hidden
 from analysis.line.measure import measure
 from analysis.line.mosaic import seen_only
 from analysis.line.result import Line
@@ -74,6 +75,8 @@ def extract(
     wanted = chosen if alone else chosen.model_copy(update={"peaks": max(chosen.peaks, CANDIDATES)})
     # fused exposures hold so many electrons that no lens draws a line which is a Gaussian to their noise
     line = replace(measure(lines, wanted, threads, judge=judged and variance is None), note=note)
+    if chosen.select == "learned":
+        line = with_hidden(line, lines, wanted, threads)
     check_finite("line", positions=line.u[line.valid])
     line = line if alone else select(line, chosen.select, volume, chosen.chooser)
     if noise.alike:

@@ -209,10 +209,10 @@ def measure_with_neighbours(
         keep_doubtful(out, flags, alone, double)
     lost = out[..., 1] > farthest
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
-    return _line_of(out, flags, settings, together, lines), Neighbours(priors, leaning, parted)
+    return line_of(out, flags, settings, together, lines), Neighbours(priors, leaning, parted)
 
 
-def _line_of(
+def line_of(
     out: NDArray[np.float64],
     flags: NDArray[np.uint8],
     settings: ExtractionSettings,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,3 +139,19 @@ class Line:
         along = self.u[index, rank]
         pairs = (along, index.astype(np.float64)) if self.axis == "rows" else (index.astype(np.float64), along)
         return np.stack(pairs, axis=1), index, rank
+
+
+NUMBERS = ("u", "sigma_u", "width", "amplitude", "background", "chi2", "length_apart", "shared_u")
+"""Of a line, (n, k) each or None."""
+
+
+def side_by_side(lines: Sequence[Line]) -> Line:
+    """Lines (n, k), (n, m) .. of the same scan lines -> (n, k + m ..), in all else the first one."""
+    together: dict[str, Any] = {"flag": np.concatenate([one.flag for one in lines], axis=1)}
+    for name in NUMBERS:
+        values = [getattr(one, name) for one in lines]
+        nothing = 0.0 if name == "shared_u" else np.nan
+        if any(one is not None for one in values):
+            filled = [np.full(lines[k].u.shape, nothing) if one is None else one for k, one in enumerate(values)]
+            together[name] = np.concatenate(filled, axis=1)
+    return replace(lines[0], **together)

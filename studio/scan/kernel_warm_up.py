@@ -266,6 +266,7 @@ def beside() -> None:
     image = Image(pixels, sensor.bits, gain, sensor.black_level, float(top), noise, None, sensor.exposure_time)
     for method in METHODS:
         extract_line(project, image, 0, None, method)
+    extract_line(project.replaced({"extraction.select": "learned"}), image, 0)
     scene = _blocks(CAMERA, (Glass(), Conductor(), WAX, Emitter()), 0.05)
     _rendered(scene.model_copy(update={"rig": Rig(camera=CAMERA)}), "subsurface")
     _aim(_blocks(CAMERA, (), 0.05), never)
