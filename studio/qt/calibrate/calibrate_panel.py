@@ -33,7 +33,17 @@ EMPTY = (
     "a_laser0.png, a_laser1.png; a plain a.png shows board and line in one. In silico takes virtual boards before the "
     "open project's camera."
 )
-PARTS = (("Camera and lasers", "scanner"), ("Camera alone", "camera"), ("Lasers, camera known…", "laser"))
+PARTS = (
+    ("Camera and lasers", "scanner"),
+    ("Camera alone", "camera"),
+    ("Lasers, camera known…", "laser"),
+    ("Whether one still holds…", "check"),
+)
+OF_A_FILE = {
+    "laser": ("Calibration file of the camera", "Lasers, {}"),
+    "check": ("Calibration file to check", "Whether {} still holds"),
+}
+"""What a person is asked for, and what is shown of the answer."""
 LENSES = (("Lens by held-out views", None), *((f"{terms} distortion terms", terms) for terms in (0, 4, 5, 8, 12, 14)))
 CARRIED = (("Board put by hand", None), ("Carried by…", "camera"), ("Carried by a robot's hand…", "board"))
 TABLES = "Tables (*.csv);;All files (*)"
@@ -65,7 +75,10 @@ class CalibratePanel(QWidget):
             self.what.addItem(text, part)
         for text, terms in LENSES:
             self.lens.addItem(text, terms)
-        self.what.setToolTip("What is found; lasers alone need the calibration file of a camera")
+        self.what.setToolTip(
+            "<p>What is found; lasers alone need the calibration file of a camera, and one to three new photographs "
+            "tell whether a calibration file still holds</p>"
+        )
         self.lens.setToolTip("How many terms the lens has; by held-out views: the fewest that are not worse")
         for text, holds in CARRIED:
             self.carried.addItem(text, holds)
@@ -129,15 +142,16 @@ class CalibratePanel(QWidget):
         self.use.setEnabled(work.solved is not None)
         if not self.board.hasFocus():
             self.board.setText(work.board_text)
-        self.lens.setEnabled(work.what != "laser")  # the known camera has its own
+        self.lens.setEnabled(work.what not in OF_A_FILE)  # the known camera has its own
         table, holds = work.motion_file, None if work.motion_file is None else work.holds
         for i, (text, which) in enumerate(CARRIED):
             self.carried.setItemText(i, text if table is None or which != holds else f"{text[:-1]}: {table.name}")
         with QSignalBlocker(self.carried):
             self.carried.setCurrentIndex(next(i for i, (_, which) in enumerate(CARRIED) if which == holds))
         self.carried.setEnabled(not work.virtual)
-        file = work.camera_file
-        self.what.setItemText(len(PARTS) - 1, f"Lasers, {file.name}" if file is not None else PARTS[-1][0])
+        for i, (text, part) in enumerate(PARTS):
+            named = work.camera_file if part == work.what and part in OF_A_FILE else None
+            self.what.setItemText(i, text if named is None else OF_A_FILE[part][1].format(named.name))
         with QSignalBlocker(self.what):
             self.what.setCurrentIndex(next(i for i, (_, part) in enumerate(PARTS) if part == work.what))
 
@@ -179,12 +193,12 @@ class CalibratePanel(QWidget):
 
     def _choose_what(self, index: int) -> None:
         part = self.what.itemData(index)
-        if part == "laser":
-            file = self._calibration_file("Calibration file of the camera")
+        if part in OF_A_FILE:
+            file = self._calibration_file(OF_A_FILE[part][0])
             if file is None:
                 self.refresh()
                 return
-            self.work.choose_what("laser", file)
+            self.work.choose_what(part, file)
         else:
             self.work.choose_what(part)
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from analysis.calibration.board import Board
     from analysis.calibration.estimate import Estimate
     from analysis.calibration.motion import Held
+    from analysis.calibration.recheck import Recheck
     from studio.calibration.image_views import Shot
     from studio.calibration.material import Material
     from studio.calibration.solving import Solved
@@ -30,7 +31,7 @@ LANE = "calibration"
 """Photographs take minutes: renders go on beside them."""
 REST_MS = 250
 """Without a change before the rest is adjusted again."""
-What = Literal["scanner", "camera", "laser"]
+What = Literal["scanner", "camera", "laser", "check"]
 BOARD = "checkerboard:13x9:25mm"
 
 
@@ -38,7 +39,7 @@ class CalibrationWork(QObject):
     """Never asks a person anything: what cannot be done is told in `problem`."""
 
     material_changed, solved_changed, counted_changed, shown_changed = Signal(), Signal(), Signal(), Signal()
-    """`material`, `solved`, `dropped`, `shown` is another one, or none."""
+    """`material`, `solved` or `checked`, `dropped`, `shown` is another one, or none."""
     state_changed = Signal()
     """Work began or ended, `problem` is another one, or what is asked for."""
 
@@ -56,7 +57,7 @@ class CalibrationWork(QObject):
         self.farthest: float | None = None
         """m, between which depth is measured; None: as far as the boards are."""
         self.camera_file: Path | None = None
-        """Of the camera that is held, for lasers alone."""
+        """Of the camera that is held, for lasers alone, or of the calibration that is checked."""
         self.motion_file: Path | None = None
         """Of what carried the board between photographs; None: nothing did."""
         self.holds: Held = "camera"
@@ -69,6 +70,8 @@ class CalibrationWork(QObject):
         self.truth: Estimate | None = None
         self.dropped: set[str] = set()
         self.solved: Solved | None = None
+        self.checked: Recheck | None = None
+        """Whether the calibration that was chosen still holds."""
         self.shown = ""
         """The view that is looked at."""
         self.problem = ""
@@ -178,7 +181,7 @@ class CalibrationWork(QObject):
             self._anew()
 
     def choose_what(self, what: What, camera_file: Path | None = None) -> None:
-        """What is calibrated; camera_file: of the camera that is held, for lasers alone."""
+        """What is calibrated or checked; camera_file: of the camera that is held, or of what is checked."""
         self.what, self.camera_file = what, camera_file
         if self.shots and what != "camera" and not self._with_lines:
             self._anew()
@@ -232,14 +235,16 @@ class CalibrationWork(QObject):
     # the calibration
 
     def solve(self) -> None:
-        """Adjust what counts."""
+        """Adjust what counts, or hold it against the calibration that is checked."""
+        from studio.qt.calibrate.asked import task_of
+
         if self.material is None or self._unread:
             return  # it follows when they are read
         board = self.board()
         if board is None:
             return
         try:
-            task = self._task(board)
+            task = task_of(self, self.material, board)
         except InputError as error:
             self._fail(str(error))
             return
@@ -311,27 +316,6 @@ class CalibrationWork(QObject):
         self._unread, self._with_lines = list(taken), lasers
         self._start("look for boards", work, then)
 
-    def _task(self, board: Board) -> Callable[[Progress, Cancel], Solved | str]:
-        """InputError: what is asked for cannot be done with these views."""
-        from studio.calibration.solving import solve
-        from studio.qt.calibrate.asked import asked_of
-
-        assert self.material is not None
-        dropped, truth = frozenset(self.dropped), self.truth
-        material, request = asked_of(self, self.material, board)
-
-        def work(progress: Progress, cancelled: Cancel) -> Solved | str:
-            progress("adjustment", 0.0)
-            try:
-                found = solve(material, dropped, board, request, truth)
-            except InputError as error:
-                return str(error)
-            if cancelled():
-                raise Cancelled
-            return found
-
-        return work
-
     def _start(self, name: str, work: Callable[[Progress, Cancel], Any], then: Callable[[Any], None]) -> None:
         if self.jobs is None:
             return
@@ -357,11 +341,13 @@ class CalibrationWork(QObject):
         self.shown_changed.emit()
         self.solve()
 
-    def _take_solved(self, found: Solved | str) -> None:
+    def _take_solved(self, found: Solved | Recheck | str) -> None:
+        from studio.calibration.solving import Solved
+
         if isinstance(found, str):
             self._fail(found)
             return
-        self.solved = found
+        self.solved, self.checked = (found, None) if isinstance(found, Solved) else (None, found)
         self.solved_changed.emit()
 
     def _forget(self) -> None:
@@ -372,7 +358,7 @@ class CalibrationWork(QObject):
         self._turn += 1
         self.job, self._unread = None, []
         self.shots, self.source, self.dropped, self.shown, self.virtual = [], "", set(), "", False
-        self.material, self.truth, self.solved = None, None, None
+        self.material, self.truth, self.solved, self.checked = None, None, None, None
         self.material_changed.emit()
         self.solved_changed.emit()
         self.shown_changed.emit()
@@ -386,7 +372,7 @@ class CalibrationWork(QObject):
 
     def _fail(self, problem: str) -> None:
         """There is no calibration, and why."""
-        self.solved = None
+        self.solved = self.checked = None
         self.solved_changed.emit()
         self.tell(problem)
 

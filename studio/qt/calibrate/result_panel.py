@@ -15,6 +15,7 @@ from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import flush
 
 if TYPE_CHECKING:
+    from analysis.calibration.recheck import Recheck
     from studio.calibration.solving import Solved
 
 EMPTY = "What is found is told here: parameters with their sigmas, the depth error that they make together, and checks."
@@ -40,7 +41,9 @@ class CalibrationPanel(QWidget):
     def refresh(self) -> None:
         solved = self.work.solved
         place = self.text.verticalScrollBar().value()
-        if solved is None:
+        if self.work.checked is not None:
+            self.text.setHtml(check_page(self.work.checked))
+        elif solved is None:
             self.text.setHtml(f"<p style='color: {theme.colours().muted}'>{EMPTY}</p>")
         else:
             self.text.setHtml(page(solved, self.work.target_um))
@@ -67,6 +70,21 @@ def page(solved: Solved, target_um: float | None) -> str:
     for name, sentence in check_rows(result, solved.views):
         parts.append(f"<p><b>{escape(name)}</b> {escape(sentence)}</p>")
     parts += ["<p></p>", _table(["Parameter", "value", "sigma"], parameter_rows(result))]
+    return "".join(parts).replace(" um", " µm")
+
+
+def check_page(checked: Recheck) -> str:
+    """Whether a calibration still holds, and how far each part of it is off."""
+    from studio.calibration.words import recheck_sentence, recheck_verdict
+
+    c = theme.colours()
+    verdict, _, why = recheck_verdict(checked).partition(": ")
+    colour = c.warning if checked.changed else c.good
+    parts = [f"<p><b style='color: {colour}'>{escape(verdict)}</b> {escape(why)}</p>", "<p></p>"]
+    for part in checked.parts:
+        mark = c.warning if part in checked.changed else c.text
+        parts.append(f"<p><b style='color: {mark}'>{escape(part.name)}</b> {escape(recheck_sentence(part))}</p>")
+    parts += [f"<p style='color: {c.muted}'>{escape(told)}</p>" for told in checked.left_out]
     return "".join(parts).replace(" um", " µm")
 
 

@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from studio.calibration import material
 from studio.calibration.material import Material
 from studio.qt.calibrate.calibration_work import CalibrationWork
+from studio.qt.calibrate.keeping import save
 from studio.qt.core.session import one_of
 from studio.qt.shell.window import MainWindow
 from tests.studio.calibration import photographed_boards
@@ -32,6 +33,25 @@ class TestSources:
         # of the few parameters that make the depth error the rms is a chi variable: within 2.5 of what was told
         assert true < 2.5 * told
         assert "true" in desk.found.text.toPlainText()
+
+    def test_new_views_tell_whether_a_calibration_still_holds(self, qtbot: QtBot, solved: Desk, tmp_path: Path) -> None:
+        file = tmp_path / "calibration.json"
+        save(solved.work, file)
+        solved.work.choose_what("check", file)
+        settled(qtbot, solved)
+        assert solved.work.solved is None and not solved.panel.save.isEnabled()
+        assert "the calibration holds" in solved.found.text.toPlainText()
+        assert "calibration.json" in solved.panel.what.currentText()
+        data = json.loads(file.read_text())
+        data["planes"][0][3] *= 1.002  # 0.4 mm away
+        file.write_text(json.dumps(data))
+        solved.work.choose_what("check", file)
+        settled(qtbot, solved)
+        text = solved.found.text.toPlainText()
+        assert "laser 0 no longer as calibrated" in text and "um" not in text.split()
+        solved.work.choose_what("scanner")
+        settled(qtbot, solved)
+        assert solved.work.checked is None and solved.work.solved is not None
 
     def test_what_is_no_board_is_told_as_it_is_typed(self, qtbot: QtBot, desk: Desk) -> None:
         desk.panel.board.setText("chess:3")
