@@ -12,7 +12,9 @@ WORKERS ?= 2
 run: $(INSTALLED)
 	$(BIN)/python main.py
 
-test: system-tests lint kernels
+# The types are checked by one processor while the others compile.
+test: system-tests $(INSTALLED)
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint kernels
 	$(BIN)/pytest -n $(WORKERS) --dist worksteal
 
 # Compiled once by all processors: each of the test's processes would compile them again for itself.

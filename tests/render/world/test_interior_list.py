@@ -196,8 +196,8 @@ def test_light_that_wanders_in_wax_goes_on_through_a_boundary_that_is_hidden_the
         scene = scene_of(paper_camera(0.05), paper_laser(), objects=count, environment=Environment(radiance=(1, 1, 1)))
         materials = [wax] if priority is None else [wax, Glass(index=1.5, priority=priority)]
         scene, world = placed(scene, materials, block, *(() if priority is None else (core,)))
-        image = indirect(scene, world, target=0.02, most_paths=1 << 19)
-        ambient = ambient_image(world, scene, scene.camera, scene.T_world_camera(), samples=32, surfaces=None)
+        image = indirect(scene, world, target=0.02, most_paths=1 << 18)
+        ambient = ambient_image(world, scene, scene.camera, scene.T_world_camera(), samples=16, surfaces=None)
         found.append((image.radiance.sum(), ambient.sum()))
     alone, within, displacing = found
     assert within == pytest.approx(alone, rel=0.02)
