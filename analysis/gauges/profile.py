@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_banded
 
 from analysis.error import Errors
 from analysis.triangulate import Points
@@ -76,6 +75,8 @@ class Profile:
         """Random and systematic sigma of a quantity whose derivative by the points' positions is (m, 2)."""
         diagonal, below = self.whitening()
         amplitude = np.einsum("ij,ij->i", gradient, self.random)
+        from scipy.linalg import solve_banded  # slow to load
+
         banded = np.stack([np.append(0.0, below[1:]), diagonal])
         random = float(np.linalg.norm(solve_banded((0, 1), banded, amplitude)))
         systematic = float(np.linalg.norm(np.einsum("ij,ijk->k", gradient, self.systematic)))

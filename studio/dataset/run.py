@@ -18,7 +18,6 @@ from studio.project.project import Project
 from studio.runtime.workers import EVERY_PROCESSOR, Engine, team
 from studio.scan.folder_lock import hold
 from studio.study.cells import WHOLE, Shard
-from studio.study.measuring import warm_up
 
 Progress = Callable[[int, int], None]
 """Scenes done, of how many."""
@@ -101,4 +100,6 @@ def _task(dataset: Dataset, root: Path) -> Task:
 
 
 def _warm_up(text: str, folder: str) -> None:
+    from studio.study.measuring import warm_up  # takes a while: a window opens without it
+
     warm_up(Project.from_text(text).in_folder(Path(folder)))

@@ -19,8 +19,6 @@ from render.camera.camera import Camera
 from render.frame import Frame, LaserCurve
 from render.output.light_record import plan_record
 from render.plan import Plan
-from render.products import expected_plan
-from render.render import render_world
 from render.run import Run
 from render.scene.lights import Environment
 from render.scene.motion import NoMotion
@@ -103,6 +101,9 @@ class Inspection:
 
 def inspect(project: Project, root: Path, threads: int | None = None) -> Inspection:
     """Load the meshes below `root` and look. InputError: what rendering would refuse as well."""
+    from render.products import expected_plan  # these take a while: a window opens without them
+    from render.render import render_world
+
     scene = project.scene
     world = build_world(scene, root, 0)
     check_placement(world, scene, 0)

@@ -17,7 +17,6 @@ import numpy as np
 from analysis.report.light_text import STAGES
 from analysis.report.record import ScanRecord
 from render.plan import Group, GroupQuality
-from render.products import expected_plan
 from studio.preview.preview import Preview
 from studio.preview.readouts import readouts
 from studio.project.project import Project
@@ -49,6 +48,8 @@ def foreseen_noise(project: Project, root: Path, threads: int | None = None) -> 
 
     InputError: a mesh or texture below `root` that does not load.
     """
+    from render.products import expected_plan
+
     goal, scene = project.render.goal, project.scene
     if goal is None or not scene.lasers:
         return ()

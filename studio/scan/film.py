@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from analysis.cloud import Cloud, merge, ply_pieces
 from analysis.report.colour import DIVERGING
-from analysis.report.error_figures import nice_limit
 from render.base.arrays import Float
 from render.base.errors import Cancelled, InputError
 from render.base.files import atomic_write, read_bytes
@@ -109,6 +108,8 @@ class _Growing:
         self.pitch = max(float((high - low).max()), 1e-9) / (0.9 * HEIGHT)
         middle = 0.5 * (low + high)
         self.place = np.round((place - middle) / self.pitch * [1.0, -1.0] + 0.5 * HEIGHT).astype(np.intp)
+        from analysis.report.error_figures import nice_limit
+
         self.limit = nice_limit(points["error_depth"])
         self.colour = _colours(points["error_depth"], self.limit)
         self.size = 3

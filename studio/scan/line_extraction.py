@@ -10,7 +10,6 @@ from typing import Any
 from numpy.typing import NDArray
 
 from analysis.line.detection.noise import NoiseModel
-from analysis.line.extract import extract
 from analysis.line.result import Line
 from analysis.line.selection.geometry import WorkingVolume
 from analysis.line.selection.learned import READY_MADE, load_chooser
@@ -73,6 +72,8 @@ def extract_line(
 
     InputError: as `extract` and `fuse`.
     """
+    from analysis.line.extract import extract  # takes a while: not before there is an image
+
     settings = extraction_of(project)
     # what a camera has processed is a photograph like a stranger's, which tells its noise itself
     noise = None if image.processed else noise_model(image, project, laser)

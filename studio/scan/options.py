@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from analysis.report.model import FrameResult
 from render.base.threads import Cancel
 from render.frame import Frame
 from render.run import Run, never
-from render.scan_plan import ScanPlan
 from studio.project.project import Project
 from studio.runtime.console import StageProgress, silent
 from studio.scan.depth_noise import DepthNoise
 from studio.scan.scan_folder import Begun
 from studio.scan.stages import Clock
+
+if TYPE_CHECKING:
+    from render.scan_plan import ScanPlan
 
 Keep = Literal["all", "band", "none"]
 

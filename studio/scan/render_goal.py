@@ -14,9 +14,7 @@ from typing import Any
 import numpy as np
 
 from analysis.error import MATCH_SIGMAS
-from analysis.line.detection.rivals import rival_weights
 from analysis.line.error_weights import Weights
-from analysis.line.influence import influence
 from analysis.line.methods.narrow_line import COARSE
 from analysis.line.result import Line
 from render.base.arrays import Bool, Float32
@@ -148,6 +146,9 @@ def _weigh(
 ) -> None:
     """The weights of one laser -> out; allowed: shares of a scan line's sigma, of what moves the line, and of the noise
     of each pixel that a narrow line is measured on."""
+    from analysis.line.detection.rivals import rival_weights  # these take a while: not before something is rendered
+    from analysis.line.influence import influence
+
     electrons = _electrons(project, frame, laser, threads)
     image = _expected_image(project, electrons, threads)
     noise = noise_model(image, project, laser)

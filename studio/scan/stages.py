@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +19,7 @@ from render.base.errors import Cancelled
 from render.base.progress import Clock as RenderClock
 from render.base.threads import Cancel
 from render.frame import Frame
-from render.progressive import frames
 from render.run import Run, never
-from render.scan_plan import ScanPlan
 from render.scene.motion import NoMotion
 from render.scene.settings import DepthGoal
 from render.sensor.develop import Image
@@ -34,6 +33,9 @@ from studio.scan.exposure import expose
 from studio.scan.line_extraction import extract_line
 from studio.scan.render_goal import goal_of, undecided_rows
 from studio.scan.spacetime_window import Passing, along_time
+
+if TYPE_CHECKING:
+    from render.scan_plan import ScanPlan
 
 JUDGING = "rows that hang on little"
 """Stage in which rows are looked for that noise as small as the goal decides."""
@@ -137,6 +139,8 @@ def render_step(
 
     refined: hears of every frame as it gets better, the last is the result. scan: the plan of a whole scan.
     """
+    from render.progressive import frames  # takes a while, and a window opens before anything is rendered
+
     cancelled = clock.cancelled if run.cancelled is never else run.cancelled
     run = replace(run, seed=project.seed, cancelled=cancelled, goal=goal_of(project, run.threads))
     placed, watch = PlacedScene(world, project.scene, step), RenderClock(clock.progress)

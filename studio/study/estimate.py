@@ -12,7 +12,6 @@ from analysis.study.breakdown import EXTRA
 from studio.project.project import Project
 from studio.study.begin import study_bytes
 from studio.study.cells import cells_at, check_size, lattice_of, methods_of, next_cells, points
-from studio.study.measuring import measure_task, warm_up
 from studio.study.store import Row
 from studio.study.study import SEARCHES, Study
 from studio.study.tables import CALIBRATING, SECONDS, measured_cells
@@ -70,6 +69,8 @@ def costs(study: Study, bases: Mapping[str, Project], number: int) -> Costs:
 
     InputError: a field or value that does not fit.
     """
+    from studio.study.measuring import measure_task, warm_up  # takes a while: not before a cell is measured
+
     sweep = study.sweeps[number]
     wanted = [(sweep.vary[0].low,)] if sweep.sampling == "bisection" else points(sweep)[:1]
     cells = [cell for cell in cells_at(study, number, bases, wanted) if cell.repeat == 0]

@@ -15,7 +15,6 @@ from studio.scan.folder_lock import hold
 from studio.study.answers import Answer, answers
 from studio.study.begin import begin
 from studio.study.cells import Cell, cells_at
-from studio.study.runner import run_study
 from studio.study.store import Row, Store, described
 from studio.study.study import Study
 from studio.study.tables import values_of, write_tables
@@ -65,6 +64,8 @@ def run_into(
 
     InputError: as `begin` and `run_study`. Cancelled: so asked; what has been measured is kept.
     """
+    from studio.study.runner import run_study  # takes a while: not before a study runs
+
     progress("preparing", 0.0)
     with begin(folder, study, bases, engine) as store:
         before, next_look = store.count(), 0.0

@@ -18,7 +18,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
-from scipy.special import softmax
 
 from analysis.line.result import Line
 from analysis.line.selection.features import FEATURES, candidate_features
@@ -70,6 +69,7 @@ class Chooser:
         if not len(features):
             return np.zeros((0, len(CLASSES)))
         import cv2  # slow to load
+        from scipy.special import softmax
 
         network = cv2.dnn.readNetFromONNX(np.frombuffer(self.weights, np.uint8))
         network.setInput(features.astype(np.float32), "features")

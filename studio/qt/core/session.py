@@ -23,8 +23,8 @@ from render.world.world import World
 from studio.project.document import Document, FieldPath
 from studio.project.project import Project
 from studio.scan.redevelop import Development, is_stale
-from studio.scan.scan import Measurement
 from studio.scan.scan_results import ScanResults
+from studio.scan.stages import Measurement
 
 Follower = TypeVar("Follower", bound=QObject)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
@@ -34,10 +35,12 @@ from studio.qt.core.step_bar import StepBar
 from studio.runtime.console import FRAMES, frame_of
 from studio.runtime.jobs import Job, Progress
 from studio.scan.options import Listener, ScanOptions
-from studio.scan.scan import ScanResult, run_scan
 from studio.scan.scan_folder import open_folder
 from studio.scan.scan_results import is_unfinished
 from studio.scan.stages import scaled
+
+if TYPE_CHECKING:
+    from studio.scan.scan import ScanResult
 
 SCALES = {"full size": 1.0, "half size": 0.5, "quarter size": 0.25}
 
@@ -138,6 +141,8 @@ class MotionPanel(QWidget):
                 self._measured.emit(order, points)
 
         def work(progress: Progress, cancelled: Cancel) -> ScanResult:
+            from studio.scan.scan import run_scan  # takes a while: not before a scan
+
             at, where = 0.0, ""
 
             def tell(stage: str, done: float) -> None:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from render.frame import Frame
-from render.progressive import refine
 from render.run import Run
 from render.world.world import World, build_world
 from studio.preview.inspection import view_warnings
@@ -31,6 +30,8 @@ def render_frames(
 
     run: with the project's seed, whatever its own.
     """
+    from render.progressive import refine  # takes a while: not before something is rendered
+
     # what is compiled is loaded where it is called: most projects need a part of it
     for_line, for_all = ((), ()) if all_compiled() else needed(project)
     # what the live picture waits for goes first

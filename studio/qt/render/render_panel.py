@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import time
-from html import escape
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QCloseEvent, QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QDoubleSpinBox,
@@ -20,12 +19,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.report.light_text import foretold_lines, plan_lines, quality_lines
 from render.base.threads import Cancel
 from render.checkpoint import RenderState
 from render.frame import Frame
-from render.plan import Plan
-from render.products import expected_plan
 from render.run import Memory, Run
 from render.world.world import World
 from studio.editing.forms import choice_label
@@ -35,11 +31,11 @@ from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import text_button, thin_bar
 from studio.qt.render.history import History
 from studio.qt.render.render_job import can_go_on, render_frames
+from studio.qt.render.render_texts import error_text, plan_text
 from studio.runtime.jobs import Job, Progress, State
 from studio.scan.stages import scaled
 
 SCALES = (0.125, 0.25, 0.5, 1.0)
-LONGEST_HEAD = 20
 TRANSPORT = {
     "auto": "A pilot measures what each further step adds, and leaves out what is negligible",
     "direct": "To one surface",
@@ -117,6 +113,11 @@ class RenderPanel(QWidget):
         self._connect()
         self._follow_project()
         self._show_state()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        super().showEvent(event)
+        self._show_plan()
+        self._tell_render()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         self.cancel()
@@ -288,6 +289,10 @@ class RenderPanel(QWidget):
         self._show_plan()
 
     def _show_plan(self) -> None:
+        if not self.isVisible():
+            return
+        from render.products import expected_plan  # takes a while: a window opens without this panel
+
         project = self.session.project
         scale = self.scale.currentData()
         scene = project.scene.scaled(scale if scale is not None else 1.0)
@@ -381,19 +386,3 @@ class RenderPanel(QWidget):
         if not running:
             self.bar.setValue(0)
             self.stage.clear()
-
-
-def plan_text(plan: Plan) -> str:
-    """Rich text: what a line is about stands out."""
-    shown = []
-    for line in plan_lines(plan):
-        head, colon, rest = line.partition(":")
-        bold = f"<b>{escape(head)}</b>" if len(head) <= LONGEST_HEAD else escape(head)
-        shown.append(f"<p style='margin: 3px 0'>{bold}{colon}{escape(rest)}</p>")
-    return "".join(shown)
-
-
-def error_text(render: Render) -> str:
-    """Error so far of every light group, and what it is to become."""
-    known = [f"{escape(name)}: {escape(text)}" for name, text in quality_lines(render.frame.quality)]
-    return "<br>".join([*known, *map(escape, foretold_lines(render.frame.foretold))])

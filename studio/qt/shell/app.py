@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from studio.qt.shell.quick_start import no_collection, plain_imports
+from studio.qt.shell.quick_start import no_collection, plain_imports, pyplot_when_asked_for
 from studio.runtime.display import INSTEAD, why_no_display
 from studio.runtime.fault_log import last_fault, watch
 from studio.runtime.preferences import state_folder
@@ -70,6 +70,7 @@ def application() -> QApplication:
     from PySide6.QtCore import Qt
 
     plain_imports()
+    pyplot_when_asked_for()
     from PySide6.QtGui import QGuiApplication, QSurfaceFormat
     from PySide6.QtWidgets import QApplication
 

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import builtins
 import gc
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
+from types import ModuleType
+
+PYPLOT = "matplotlib.pyplot"
 
 
 def plain_imports() -> None:
@@ -13,6 +18,23 @@ def plain_imports() -> None:
     of its optional naming styles. Nobody does here, and it takes a third of a second.
     """
     builtins.__import__ = getattr(builtins, "__orig_import__", builtins.__import__)
+
+
+def pyplot_when_asked_for() -> None:
+    """PyVista imports `matplotlib.pyplot`, a tenth of the start, for a cycle of colours that nobody here draws with."""
+    if PYPLOT not in sys.modules:
+        sys.modules[PYPLOT] = _Later(PYPLOT)
+
+
+class _Later(ModuleType):
+    """Imported when something of it is asked for. `importlib.util.LazyLoader` would be by a second import already."""
+
+    def __getattr__(self, name: str) -> object:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        sys.modules.pop(self.__name__, None)
+        self.__dict__.update(import_module(self.__name__).__dict__)
+        return self.__dict__[name]
 
 
 @contextmanager

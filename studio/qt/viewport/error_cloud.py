@@ -25,7 +25,7 @@ from studio.scan.point_sample import PointSample
 from studio.scan.redevelop import is_stale
 from studio.scan.remarks import best
 from studio.scan.result_series import ERROR_VIEWS, ErrorView
-from studio.scan.scan import Measurement
+from studio.scan.stages import Measurement
 
 POINT_PX, RIM_PX, MARK_PX, NEAR_PX = 3.5, 5.5, 9.0, 9.0
 OFFSET, RIM_OFFSET = -80.0, -60.0

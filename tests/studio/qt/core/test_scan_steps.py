@@ -17,7 +17,6 @@ from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.jobs import RENDER
 from studio.qt.core.session import Render
-from studio.qt.render import motion_panel
 from studio.qt.render.history import describe
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.results.results_panel import ResultsPanel
@@ -268,7 +267,7 @@ class TestRun:
             tell("writing points", 0.0)
             raise InputError("enough")
 
-        monkeypatch.setattr(motion_panel, "run_scan", scan)
+        monkeypatch.setattr("studio.scan.scan.run_scan", scan)
         with qtbot.waitSignal(moving.runner.failed):
             moving.run_into(tmp_path / "scan")
         assert told[1::2] == [*(f"frame {i} of 3: line extraction" for i in (1, 2, 3)), "writing points"]
@@ -317,7 +316,7 @@ class TestRun:
             asked.append(options.resume)
             raise Cancelled
 
-        monkeypatch.setattr(motion_panel, "run_scan", scan)
+        monkeypatch.setattr("studio.scan.scan.run_scan", scan)
         for place in (folder, tmp_path / "another"):
             with qtbot.waitSignal(moving.runner.cancelled):
                 moving.run_into(place)

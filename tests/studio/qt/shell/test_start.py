@@ -13,6 +13,18 @@ import pytest
 
 from studio.project.templates import new_project
 
+LATER = {
+    "analysis.line.extract",
+    "matplotlib.figure",
+    "render.products",
+    "render.progressive",
+    "scipy.ndimage",
+    "scipy.optimize",
+    "scipy.special",
+    "studio.scan.scan",
+    "studio.study.runner",
+}
+"""Imported when something is rendered, measured, drawn or run."""
 ROOT = Path(__file__).resolve().parents[4]
 CHILD = """
 import json, sys
@@ -28,7 +40,7 @@ def start(path):
 
     def end():
         log = window.panels["log"].as_text()
-        print(json.dumps({"title": window.windowTitle(), "log": log}), flush=True)
+        print(json.dumps({"title": window.windowTitle(), "log": log, "modules": sorted(sys.modules)}), flush=True)
         window.files.count_as_saved(window.session.project)
         window.close()
 
@@ -77,5 +89,6 @@ def test_with_a_pipe_in_place_of_the_preferences(home: Path) -> None:
     path.parent.mkdir(parents=True)
     os.mkfifo(path)
     found = opened(home)
+    assert not set(found["modules"]) & LATER, "these take a third of the start, and no window needs them"
     assert "preferences could not be read" in found["log"] and "preferences.damaged.json" in found["log"]
     assert path.is_file() and path.with_suffix(".damaged.json").is_fifo()
