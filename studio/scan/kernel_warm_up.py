@@ -56,8 +56,6 @@ LASER = LineLaser(T_rig_laser=Pose(translation=(0.1, 0.0, 0.0), rotation=(0.0, -
 PLATE = SceneObject(name="plate", shape=Plane(), T_world_object=Pose(translation=(0.0, 0.0, 0.5)))
 WAX = Subsurface(mean_free_path=0.01, scattering_albedo=0.5)
 SENSOR = Sensor(efficiency=(SpectralCurve(wavelength_nm=(400.0, 700.0), value=(0.5, 0.5)),))
-
-
 LAST = "scan"
 """The step that waits for what another process has compiled."""
 
@@ -101,7 +99,8 @@ def all_compiled() -> bool:
 def needed(project: Project) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The steps whose kernels the line of a project needs, and those of what is drawn and measured after it."""
     pinhole = project.scene.camera.lens.model == "pinhole"
-    return ("draw",) if pinhole else ("draw", "lens"), ("light", "scan")
+    chosen = ("learned",) if project.extraction.select == "learned" else ()
+    return ("draw",) if pinhole else ("draw", "lens"), ("light", "scan", *chosen)
 
 
 def _run(name: str, before: list[Future[None]]) -> None:
@@ -266,11 +265,18 @@ def beside() -> None:
     image = Image(pixels, sensor.bits, gain, sensor.black_level, float(top), noise, None, sensor.exposure_time)
     for method in METHODS:
         extract_line(project, image, 0, None, method)
-    extract_line(project.replaced({"extraction.select": "learned"}), image, 0)
     scene = _blocks(CAMERA, (Glass(), Conductor(), WAX, Emitter()), 0.05)
     _rendered(scene.model_copy(update={"rig": Rig(camera=CAMERA)}), "subsurface")
     _aim(_blocks(CAMERA, (), 0.05), never)
     lens(never)
+
+
+def learned(cancelled: Cancel) -> None:
+    """What chooses among peaks, those that brighter light hides as well."""
+    from studio.scan.line_extraction import extract_line
+
+    project, _, _, images, _ = _drawn(cancelled, None)
+    extract_line(project.replaced({"extraction.select": "learned"}), images[0], 0)
 
 
 def lens(cancelled: Cancel) -> None:
@@ -381,6 +387,7 @@ STEPS: dict[str, Callable[[Cancel], None]] = {
     "light": light,
     "lens": lens,
     "scan": scan,
+    "learned": learned,
 }
 
 

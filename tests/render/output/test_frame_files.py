@@ -393,5 +393,5 @@ write_frame(Path({str(tmp_path / "out")!r}), "x", frame_of(scene_of()), None, sc
     assert resource.RLIMIT_FSIZE is not None
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment)
-    assert "InputError" in result.stderr and "cannot be written" in result.stderr
+    assert "InputError" in result.stderr and "allowed: at most 20 kB a file" in result.stderr
     assert list((tmp_path / "out").iterdir()) == []

@@ -105,7 +105,8 @@ def test_a_lens_that_blurs_is_prepared_where_there_is_one():
     camera = camera.model_copy(update={"lens": camera.lens.model_copy(update={"model": "thin-lens"})})
     scene = project.scene.model_copy(update={"rig": project.scene.rig.model_copy(update={"camera": camera})})
     for_line, for_all = kernel_warm_up.needed(project.model_copy(update={"scene": scene}))
-    assert for_line == ("draw", "lens") and {*for_line, *for_all, "look"} == set(kernel_warm_up.STEPS)
+    assert for_line == ("draw", "lens") and {*for_line, *for_all, "look", "learned"} == set(kernel_warm_up.STEPS)
+    assert "learned" in kernel_warm_up.needed(project.replaced({"extraction.select": "learned"}))[1]
 
 
 @pytest.fixture
