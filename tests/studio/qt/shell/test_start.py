@@ -20,7 +20,6 @@ LATER = {
     "render.progressive",
     "scipy.ndimage",
     "scipy.optimize",
-    "scipy.special",
     "studio.scan.scan",
     "studio.study.runner",
 }
