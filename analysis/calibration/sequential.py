@@ -20,6 +20,7 @@ from analysis.calibration.lens import normalise
 from analysis.calibration.observations import View, gather
 from analysis.calibration.start import laser_places, start
 from render.base.arrays import Float
+from render.base.errors import InputError
 
 FREE = {
     0: cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3,
@@ -37,7 +38,10 @@ def by_homographies(views: Sequence[View], target: Float, size: tuple[int, int],
     start(views, size, terms, lasers)  # what it refuses has no answer by this way either
     flat = [np.column_stack([view.target, np.zeros(len(view.target))]).astype(np.float32) for view in views]
     pixels = [view.pixel.astype(np.float32).reshape(-1, 1, 2) for view in views]
-    _, matrix, k, _, _ = cv2.calibrateCamera(flat, pixels, size, None, None, flags=FREE[terms])
+    try:
+        _, matrix, k, _, _ = cv2.calibrateCamera(flat, pixels, size, None, None, flags=FREE[terms])
+    except cv2.error as error:
+        raise InputError("the views do not determine the camera", found=error.err) from None
     intrinsics = np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]])
     distortion = np.ravel(k)[:terms].astype(np.float64)
     poses = [_pose(view.target, normalise(view.pixel, intrinsics, distortion)) for view in views]

@@ -73,10 +73,10 @@ class Profile:
 
     def sigmas(self, gradient: Float) -> tuple[float, float]:
         """Random and systematic sigma of a quantity whose derivative by the points' positions is (m, 2)."""
-        diagonal, below = self.whitening()
-        amplitude = np.einsum("ij,ij->i", gradient, self.random)
         from scipy.linalg import solve_banded  # slow to load
 
+        diagonal, below = self.whitening()
+        amplitude = np.einsum("ij,ij->i", gradient, self.random)
         banded = np.stack([np.append(0.0, below[1:]), diagonal])
         random = float(np.linalg.norm(solve_banded((0, 1), banded, amplitude)))
         systematic = float(np.linalg.norm(np.einsum("ij,ijk->k", gradient, self.systematic)))

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from analysis.line.detection.channel import Lines, smoothed_covariances, smoothing_correlation
 from analysis.line.detection.detect import SEED_COLUMNS
 from analysis.line.detection.hidden import Sought, bend_gain, detect_hidden
-from analysis.line.measure import CHUNK, METHODS, line_of
-from analysis.line.methods.seed_loop import ROOM, SHARED, TOLD, Options, Pixels, seed_kernel
+from analysis.line.measure import CHUNK, METHODS, line_of, options_of
+from analysis.line.methods.seed_loop import ROOM, SHARED, TOLD, Pixels, seed_kernel
 from analysis.line.result import Flag, Line, positioned, side_by_side
 from analysis.line.settings import ExtractionSettings
 from render.base.arrays import Float
@@ -38,13 +38,7 @@ def with_hidden(line: Line, lines: Lines, settings: ExtractionSettings, threads:
         scattered=float(light[0, 0]) if light.shape[1] else 0.0,
         width=settings.width or 0.0,
     )
-    options = Options(
-        variant=estimator.variant,
-        integrated=settings.profile == "integrated",
-        known_width=settings.width is not None,
-        max_width=settings.max_width,
-        filter_scale=settings.filter_scale,
-    )
+    options = options_of(settings)
     run = seed_kernel(estimator.measure)
     out = np.empty((lines.count, HIDDEN, TOLD))
     flags = np.empty((lines.count, HIDDEN), np.uint8)

@@ -140,14 +140,7 @@ def measure_with_neighbours(
     out = np.empty((lines.count, settings.peaks, COLUMNS if tells_width else TOLD))
     flags = np.empty((lines.count, settings.peaks), np.uint8)
     limits = limits_of(lines, settings)
-    options = Options(
-        variant=estimator.variant,
-        integrated=settings.profile == "integrated",
-        known_width=settings.width is not None,
-        max_width=settings.max_width,
-        filter_scale=settings.filter_scale,
-        judge=UNLIKELY if judge else math.inf,
-    )
+    options = options_of(settings)._replace(judge=UNLIKELY if judge else math.inf)
 
     light = smoothed_covariances(lines.noise, settings.smoothing)
     scattering = light, lines.noise.table, lines.noise.fineness, 1.0 / correlation[0] ** 0.5
@@ -210,6 +203,17 @@ def measure_with_neighbours(
     lost = out[..., 1] > farthest
     out[lost], flags[lost] = np.nan, Flag.NOT_CONVERGED
     return line_of(out, flags, settings, together, lines), Neighbours(priors, leaning, parted)
+
+
+def options_of(settings: ExtractionSettings) -> Options:
+    """What a kernel is told of the settings; it judges nothing."""
+    return Options(
+        variant=METHODS[settings.method].variant,
+        integrated=settings.profile == "integrated",
+        known_width=settings.width is not None,
+        max_width=settings.max_width,
+        filter_scale=settings.filter_scale,
+    )
 
 
 def line_of(

@@ -112,7 +112,7 @@ def other_ways(
     terms, lasers = len(result.estimate.distortion), len(truth.planes)
     found = {}
     for name, way in WAYS.items() if board.circle == 0.0 else ():
-        with suppress(InputError):
+        with suppress(InputError, np.linalg.LinAlgError):
             estimate = way(views, board.target, size, terms, lasers)
             found[name] = [_rms(estimate, truth, one.volume) for one in result.depth]
     return found

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.line.result import Line
-
-NUMBERS = ("u", "sigma_u", "width", "amplitude", "background", "chi2", "length_apart", "shared_u")
+from analysis.line import result
+from analysis.line.result import NUMBERS, Line
 
 
 def changed(line: Line, change: Callable[[NDArray[Any]], NDArray[Any]], flag: NDArray[np.uint8]) -> Line:
@@ -30,8 +29,6 @@ def side_by_side(lines: Sequence[Line], candidates: Line) -> Line:
     """Lines (n, 1) of the candidates -> (n, k)."""
     if len(lines) == 1:
         return lines[0]
-    together: dict[str, Any] = {}
-    for name in (*NUMBERS, "flag"):
-        values = [getattr(line, name) for line in lines]
-        together[name] = None if values[0] is None else np.concatenate(values, axis=1)
-    return replace(candidates, **together, candidates=candidates)
+    together = result.side_by_side(lines)
+    numbers = {name: getattr(together, name) for name in (*NUMBERS, "flag")}
+    return replace(candidates, **numbers, candidates=candidates)

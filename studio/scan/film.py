@@ -99,6 +99,8 @@ class _Growing:
     """Points from above, drawn once each."""
 
     def __init__(self, points: Cloud) -> None:
+        from analysis.report.error_figures import nice_limit  # slow to load
+
         self.order = np.argsort(points["step"], kind="stable")
         self.step = points["step"][self.order]
         self.done = 0
@@ -108,8 +110,6 @@ class _Growing:
         self.pitch = max(float((high - low).max()), 1e-9) / (0.9 * HEIGHT)
         middle = 0.5 * (low + high)
         self.place = np.round((place - middle) / self.pitch * [1.0, -1.0] + 0.5 * HEIGHT).astype(np.intp)
-        from analysis.report.error_figures import nice_limit
-
         self.limit = nice_limit(points["error_depth"])
         self.colour = _colours(points["error_depth"], self.limit)
         self.size = 3

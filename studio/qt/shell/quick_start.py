@@ -32,7 +32,8 @@ class _Later(ModuleType):
     def __getattr__(self, name: str) -> object:
         if name.startswith("__"):
             raise AttributeError(name)
-        sys.modules.pop(self.__name__, None)
+        if sys.modules.get(self.__name__) is self:  # else another thread imports it, and this one waits for that
+            del sys.modules[self.__name__]
         self.__dict__.update(import_module(self.__name__).__dict__)
         return self.__dict__[name]
 
