@@ -107,12 +107,12 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         padded[: min(terms, 1)] = guess.distortion[: min(terms, 1)]
         guess = replace(guess, distortion=padded)
     if request.told is not None:
+        if odd := _refocused_on_the_way(seen, guess, request):
+            return _without(odd, views, target, request)
         guess, other_end = _carried(guess, request.told, seen.names, extent)
         ends = np.where(other_end[seen.view][:, None], extent.sum(axis=0) - seen.target, seen.target)
         seen, centroids = replace(seen, target=ends), replace(centroids, target=ends)
-    held = known is not None and known.covariance is None
-    prior = None if known is None or known.covariance is None else _prior(known.covariance, guess)
-    free = free_parameters(guess, warp=request.warp, camera=not held)
+    free, prior = _free_and_prior(guess, request)
     try:
         adjusted = adjust_robustly(seen, guess, free, prior)
         if request.circle > 0.0:
@@ -124,11 +124,8 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
             found="; ".join(faults) if faults else str(error),
             cure="" if faults else "photograph the board at other tilts and distances",
         ) from None
-    odd = mirrored(views, adjusted, extent, request.size[0]) or refocused(adjusted)
-    if odd:
-        found = calibrate([view for view in views if view.name not in odd], target, request)
-        told = (*odd.values(), *found.adjusted.left_out)
-        return replace(found, adjusted=replace(found.adjusted, left_out=told))
+    if odd := mirrored(views, adjusted, extent, request.size[0]) or refocused(adjusted):
+        return _without(odd, views, target, request)
     estimate, covariance = adjusted.solution.estimate, adjusted.solution.covariance
     middle = np.append(0.5 * (target.min(axis=0) + target.max(axis=0)), 0.0)
     distance = (estimate.rotation @ middle + estimate.translation)[:, 2]
@@ -152,7 +149,7 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         if not len(one.depth)
     ]
     faults += _wrong_scale(estimate, covariance)
-    if held:
+    if known is not None and known.covariance is None:
         faults.append("the camera came without its errors: sigmas and depth errors are those of an exact camera")
     advice = None
     if usable:
@@ -176,6 +173,25 @@ def calibrate(views: Sequence[View], target: Float, request: Request) -> Calibra
         advice,
         request.circle,
     )
+
+
+def _without(odd: dict[str, str], views: Sequence[View], target: Float, request: Request) -> Calibrated:
+    """The calibration of the other views; odd: name of each that is left out, and the sentence."""
+    found = calibrate([view for view in views if view.name not in odd], target, request)
+    told = (*odd.values(), *found.adjusted.left_out)
+    return replace(found, adjusted=replace(found.adjusted, left_out=told))
+
+
+def _refocused_on_the_way(seen: Observations, guess: Estimate, request: Request) -> dict[str, str]:
+    """As `refocused`, of boards that were carried, each taken as if it stood free.
+
+    A motion shares what a moved focus does among all its views, and the odd ones are hidden by it. Nothing is told
+    where the boards do not determine a camera without it.
+    """
+    try:
+        return refocused(adjust_robustly(seen, guess, *_free_and_prior(guess, request)))
+    except (InputError, np.linalg.LinAlgError):
+        return {}
 
 
 def _centred(
@@ -215,6 +231,16 @@ def _wrong_scale(estimate: Estimate, covariance: Float) -> list[str]:
         f"the board went {way:.4g} times as far as the stage was told: its squares are {1.0 / way:.4g} times as large "
         "as was said, or the stage's scale is off; measure the board"
     ]
+
+
+def _free_and_prior(guess: Estimate, request: Request) -> tuple[Bool, Prior | None]:
+    """Which parameters are estimated, and what is known of them before."""
+    known = request.known
+    if known is None:
+        return free_parameters(guess, warp=request.warp), None
+    if known.covariance is None:
+        return free_parameters(guess, warp=request.warp, camera=False), None
+    return free_parameters(guess, warp=request.warp), _prior(known.covariance, guess)
 
 
 def _prior(covariance: Float, guess: Estimate) -> Prior:

@@ -47,7 +47,7 @@ def mirrored(views: Sequence[View], adjusted: Adjusted, extent: Float, width: in
 
 
 def refocused(adjusted: Adjusted) -> dict[str, str]:
-    """Name of each view of another focal length than most, and the sentence; none where a motion carried the board."""
+    """Name of each view of another focal length than most, and the sentence; none where a motion holds the boards."""
     estimate, seen = adjusted.solution.estimate, adjusted.seen
     if estimate.motion is not None or len(seen.names) < FEWEST + 1:
         return {}

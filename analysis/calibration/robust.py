@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
 
 from analysis.calibration.adjust import (
     Prior,
@@ -27,6 +28,8 @@ STRAY = 5.0
 """Standard deviations, by what is typical of all, at which a single corner or laser point is left out."""
 BAD = 4.0
 """Times the typical residual at which a view's corners, or a stripe, are bad as a whole."""
+CHANCE = 1e-6
+"""That noise alone takes so much of a stripe so far off: the median of one point or two says little."""
 MOST_BENT = 2.0
 """Rise of chi-square one sigma away, 1 where errors are linear: sets whose sigmas hold have 1.0 to 1.6."""
 
@@ -125,8 +128,9 @@ def outliers(seen: Observations, estimate: Estimate) -> tuple[Bool, Bool, Bool, 
             line = (seen.laser_view == number) & (seen.laser == one)
             if not line.any():
                 continue
-            away = float(np.median(laser[line])) / 0.6745
-            if away > BAD:
+            middle = float(np.median(laser[line]))
+            away = middle / 0.6745
+            if away > BAD and _chance(middle, int(np.count_nonzero(line))) < CHANCE:
                 laser_bad |= line
                 told.append(
                     f"{name}: the line of laser {one} is {away:.0f} times as far off as is typical, as a reflection "
@@ -135,3 +139,8 @@ def outliers(seen: Observations, estimate: Estimate) -> tuple[Bool, Bool, Bool, 
             elif np.count_nonzero(laser_bad & line):
                 told.append(f"{name}: {np.count_nonzero(laser_bad & line)} stray points of laser {one} left out")
     return corner_bad, laser_bad, view_bad, tuple(told)
+
+
+def _chance(off: float, count: int) -> float:
+    """That of so many normal residuals half or more are beyond a number of standard deviations."""
+    return float(stats.binom.sf((count + 1) // 2 - 1, count, 2.0 * stats.norm.sf(off)))

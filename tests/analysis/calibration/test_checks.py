@@ -46,6 +46,22 @@ def test_a_wrong_line_a_bad_view_and_stray_corners_are_left_out_by_name() -> Non
     assert found.corner_scale < 1.1 and found.laser_scale < 1.1
 
 
+def test_a_line_of_one_or_two_points_is_left_out_for_what_noise_does_not_make() -> None:
+    there = truth(1, 12)
+    exact = views_of(there, laser_step=64)
+    blamed = []
+    for seed in range(30):
+        views = noisy(exact, np.random.default_rng(seed))
+        for i, view in enumerate(views):
+            few = slice(0, 1 + i % 2)
+            stripes = [replace(one, pixel=one.pixel[few].copy(), sigma=one.sigma[few]) for one in view.stripes]
+            views[i] = replace(view, stripes=tuple(stripes))
+        blamed += [text for text in adjusted(there, views).left_out if "laser 0" in text]
+        views[4].stripes[0].pixel[:, 0] += 3.0
+        assert any(text.startswith("view 4: the line of laser 0") for text in adjusted(there, views).left_out)
+    assert blamed == []
+
+
 def test_clean_views_lose_nothing() -> None:
     there = truth(2, 12, terms=4, lasers=2)
     assert adjusted(there, noisy(views_of(there), np.random.default_rng(3))).left_out == ()

@@ -142,6 +142,21 @@ def test_a_view_whose_position_was_told_wrongly_is_named() -> None:
     assert len(found.adjusted.left_out) == 1 and found.adjusted.left_out[0].startswith("view 2: its corners are")
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_moved_focus_is_named_where_boards_were_carried(kind: Kind) -> None:
+    there = carried(kind, views=14)
+    motion = there.motion
+    by_name = {f"view {i}": (str(motion.group[i]), motion.given[i]) for i in range(2 * PLACED)}
+    refocused = replace(there, intrinsics=there.intrinsics * [1.004, 1.004, 1.0, 1.0])
+    views = noisy(views_of(there, laser_step=64), np.random.default_rng(1))
+    odd = {6, 7}
+    for i, view in enumerate(noisy(views_of(refocused, laser_step=64), np.random.default_rng(2))):
+        views[i] = view if i in odd else views[i]
+    found = calibrate(views, target(), Request(SIZE, 1, 4, told=Told(kind, by_name)))
+    named = {text.split(":")[0] for text in found.adjusted.left_out if "focal length is longer" in text}
+    assert named == {f"view {i}" for i in odd}
+
+
 def test_motions_that_show_nothing_are_refused() -> None:
     there = carried("hand_eye")
     motion = there.motion
