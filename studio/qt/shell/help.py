@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from PySide6.QtCore import QUrl
@@ -86,11 +87,11 @@ class Help(QDialog):
         self.open_page(url.fileName().removesuffix(".md"))
 
 
-def panel_with_focus(panels: dict[str, QWidget]) -> str:
+def panel_with_focus(panels: Iterable[tuple[str, QWidget]]) -> str:
     """The panel that has the focus, or else the one under the mouse."""
     for widget in (QApplication.focusWidget(), QApplication.widgetAt(QCursor.pos())):
         while widget is not None:
-            for key, panel in panels.items():
+            for key, panel in panels:
                 if widget is panel:
                     return key
             widget = widget.parentWidget()

@@ -10,7 +10,9 @@ from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QToolBar, QToolButton, QWidget
 
+from studio.editing.forms import FieldSpec
 from studio.project.autosave import Autosave
+from studio.project.document import FieldPath
 from studio.project.mesh_import import is_mesh
 from studio.qt.calibrate.calibrate_actions import CalibrateActions, is_photograph
 from studio.qt.core import theme
@@ -31,7 +33,7 @@ from studio.qt.shell.command_search import CommandSearch
 from studio.qt.shell.file_actions import FileActions
 from studio.qt.shell.help import Help, panel_with_focus
 from studio.qt.shell.memory import return_what_is_free
-from studio.qt.shell.panels import PANELS, Making, make_panels
+from studio.qt.shell.panels import PANELS, Making, Panels
 from studio.qt.shell.preferring import Preferring
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.status import StatusBar
@@ -85,7 +87,7 @@ class MainWindow(QMainWindow):
         self.resize(1440, 900)
         self.commands = Actions(self)
         self.runner = JobRunner(self)
-        self.panels = make_panels(session, self.runner, making)
+        self.panels = Panels(session, self.runner, making)
         self.docks = self._make_docks()
         self.status = StatusBar(session, self.runner, self)
         self.setStatusBar(self.status)
@@ -159,7 +161,7 @@ class MainWindow(QMainWindow):
             self.tour.end()
         self.runner.close()
         live(self.session).close()
-        for panel in self.panels.values():
+        for _, panel in self.panels:
             panel.close()
         self.files.close()
         event.accept()
@@ -193,7 +195,8 @@ class MainWindow(QMainWindow):
                 continue
             dock = QDockWidget(panel.title, self)
             dock.setObjectName(panel.key)
-            dock.setWidget(Scrolled(self.panels[panel.key]) if panel.key in TALL else self.panels[panel.key])
+            place = self.panels.place(panel.key)
+            dock.setWidget(Scrolled(place) if panel.key in TALL else place)
             # added here once; from now on Qt moves docks only by restoring a state
             self.addDockWidget(Qt.DockWidgetArea.RightDockWidgetArea, dock)
             dock.hide()
@@ -250,7 +253,7 @@ class MainWindow(QMainWindow):
         if step.panel in self.docks:
             self.show_panel(step.panel)
             return self.docks[step.panel]
-        return self.panels.get(step.panel)
+        return self.panels[step.panel] if step.panel else None
 
     def _end_tour(self) -> None:
         self.tour = None
@@ -317,6 +320,7 @@ class MainWindow(QMainWindow):
         session.selection_changed.connect(self._tell_selection)
         session.step_changed.connect(lambda: live(session).show_step(session.step))
         session.render_asked.connect(lambda: self.call_panel("render"))
+        session.vary_asked.connect(self._vary)
         runner.failed.connect(self._tell_failure)
         self._tell_selection()
 
@@ -335,6 +339,11 @@ class MainWindow(QMainWindow):
     def _scan(self) -> None:
         self.call_panel("motion")
         self.panels["motion"].ask_and_run()  # type: ignore[attr-defined]
+
+    def _vary(self, path: FieldPath, spec: FieldSpec) -> None:
+        from studio.qt.study.study_work import StudyWork
+
+        one_of(StudyWork, self.session).vary(path, spec)
 
     def _tell_selection(self) -> None:
         for key in ("duplicate", "delete", "rename", "hide"):

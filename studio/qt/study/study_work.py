@@ -76,7 +76,6 @@ class StudyWork(LongWork):
         self._rest = QTimer(self, singleShot=True, interval=REST_MS)
         self._rest.timeout.connect(self.look_ahead)
         self._grew.connect(self._take_growth)
-        session.vary_asked.connect(self.vary)
         session.project_changed.connect(self._follow_project)
         session.document_replaced.connect(self._follow_document)
 

@@ -45,6 +45,7 @@ class Desk:
         self.panel, self.charts = StudyPanel(self.session, self.runner), ChartsPanel(self.session, self.runner)
         self.inspector = Inspector(self.session)
         self.work = one_of(StudyWork, self.session)
+        self.session.vary_asked.connect(self.work.vary)
         self.work.engine = Engine(workers=1)
 
     def vary(self, item: tuple[Any, ...], *path: Any) -> None:
