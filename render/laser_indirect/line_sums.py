@@ -6,7 +6,6 @@ from functools import partial
 
 import numba
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from render.base.arrays import Bool, Float, Float32, Long
 from render.base.threads import map_chunks
@@ -15,8 +14,6 @@ from render.laser_indirect.connection_buffer import BLOCK, PassBuffer
 
 BLOCKS_A_CHUNK = 1 << 12
 """Blocks that a thread does at a time."""
-LINES_A_CHUNK = 256
-"""Rows or columns, likewise."""
 
 
 def block_sums(values: Float, blocks: int) -> Float:
@@ -39,19 +36,12 @@ def scale_blocks(values: Float, factors: Float, most: float) -> None:
 
 
 def smoothed(image: Float32, sigma: float) -> Float32:
-    """(h, w) convolved with a Gaussian."""
-    height, width = image.shape
-    down, out = np.empty((height, width), np.float32), np.empty((height, width), np.float32)
+    """(h, w) convolved with a Gaussian that ends at four sigmas; beyond its edges the image goes on as in a mirror."""
+    import cv2
 
-    def columns(start: int, stop: int) -> None:
-        gaussian_filter1d(image[:, start:stop], sigma, axis=0, output=down[:, start:stop])
-
-    def rows(start: int, stop: int) -> None:
-        gaussian_filter1d(down[start:stop], sigma, axis=1, output=out[start:stop])
-
-    map_chunks(columns, width, LINES_A_CHUNK)
-    map_chunks(rows, height, LINES_A_CHUNK)
-    return out
+    reach = int(4 * sigma + 0.5)
+    weights = cv2.getGaussianKernel(2 * reach + 1, sigma, cv2.CV_32F)
+    return cv2.sepFilter2D(image, -1, weights, weights, borderType=cv2.BORDER_REFLECT)
 
 
 def mean_image(buffers: list[PassBuffer]) -> Float32:
