@@ -52,6 +52,7 @@ def logarithms() -> dict[str, list[float]]:
     return found
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("group", ["indirect", "ambient"])
 def test_pilots_foretell_the_processor_seconds_of_their_light(group):
     """Each within three times the scatter told, a factor of 3.3, and their mean within three standard errors."""
