@@ -18,14 +18,13 @@ def made(window: MainWindow) -> set[str]:
     return {key for key, _ in window.panels}
 
 
-def test_a_panel_of_a_later_workspace_is_made_when_it_is_seen(window: MainWindow, qtbot: QtBot) -> None:
-    assert made(window).isdisjoint(LATER)
-    window.switch_to("study")
-    assert {"study", "charts"} <= made(window)
-    assert not made(window) & {"nominal", "recipe", "calibration"}
-    room = window.docks["study"].findChild(Room)
-    assert window.panels["study"].parentWidget() is room
-    qtbot.waitUntil(window.panels["study"].isVisible)
+def test_a_panel_of_a_later_workspace_is_made_when_it_is_seen(own_window: MainWindow, qtbot: QtBot) -> None:
+    assert made(own_window).isdisjoint(LATER)
+    own_window.switch_to("study")
+    assert {"study", "charts"} <= made(own_window)
+    assert not made(own_window) & {"nominal", "recipe", "calibration"}
+    assert own_window.panels["study"].parentWidget() is own_window.docks["study"].findChild(Room)
+    qtbot.waitUntil(own_window.panels["study"].isVisible)
 
 
 def test_it_is_made_once(window: MainWindow) -> None:
@@ -41,8 +40,10 @@ def test_an_unknown_panel_is_none(window: MainWindow) -> None:
         window.panels["nothing"]
 
 
-def test_a_field_is_varied_before_the_study_workspace_was_seen(window: MainWindow) -> None:
+def test_a_field_is_varied_before_the_study_workspace_was_seen(own_window: MainWindow) -> None:
     path = ("scene", "rig", "lasers", 0, "power")
-    spec = next(each for each in describe(window.session.project.scene.rig.lasers[0]) if each.name == "power")
-    window.session.vary_asked.emit(path, spec)
-    assert [each["field"] for each in one_of(StudyWork, window.session).sweep["vary"]] == ["scene.rig.lasers[0].power"]
+    spec = next(each for each in describe(own_window.session.project.scene.rig.lasers[0]) if each.name == "power")
+    own_window.session.vary_asked.emit(path, spec)
+    assert [each["field"] for each in one_of(StudyWork, own_window.session).sweep["vary"]] == [
+        "scene.rig.lasers[0].power"
+    ]
