@@ -38,8 +38,9 @@ DRAG_SECONDS, REST_SECONDS = 0.016, 0.08
 HOVER_HZ = 30
 LOW = 400
 """px of height, for picture and profile together."""
-WIDE, NARROW, TINY, LEAST_CHOICE = 1100, 600, 480, 124
-"""px, for the name of every box; below which lines' boxes take room of the choice, which keeps so much; of zooming."""
+NARROW, TINY, LEAST_CHOICE = 600, 480, 124
+"""px, below which lines' boxes take room of the choice, which keeps so much; of zooming."""
+SATURATED_NAME = "Saturated"
 LIVE = "Live estimate"
 
 
@@ -58,7 +59,7 @@ class CameraView(QWidget):
         self.choice.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
         self.bright = QCheckBox("Brighten")
         self.bright.setChecked(True)
-        self.saturated = QCheckBox("Saturated")
+        self.saturated = QCheckBox(SATURATED_NAME)
         self.saturated.setIcon(swatch(SATURATED))
         self.saturated.setChecked(True)
         self.zooms = QToolButton(), QToolButton()
@@ -176,8 +177,7 @@ class CameraView(QWidget):
         self.render_button.clicked.connect(session.render_asked)
 
     def _colour(self) -> None:
-        colours = theme.colours()
-        self.view.setBackground(colours.base)
+        self.view.setBackground(theme.colours().base)
         self._colour_badge()
 
     def _colour_badge(self) -> None:
@@ -325,8 +325,11 @@ class CameraView(QWidget):
         self.choice.setMaximumWidth(LEAST_CHOICE if self.width() < NARROW else self.choice.sizeHint().width())
         for button in self.zooms:
             button.setVisible(self.width() >= TINY)
-        self.saturated.setText("Saturated" if self.width() >= (NARROW if self.is_live else WIDE) else "")
-        self.overlay.show_names_within(self.lines.width())
+        name = self.saturated.fontMetrics().horizontalAdvance(SATURATED_NAME)
+        room = self.lines.width() + (name if self.saturated.text() else 0)
+        named = self.width() >= NARROW and (self.is_live or room >= name + self.overlay.width_within(room))
+        self.saturated.setText(SATURATED_NAME if named else "")
+        self.overlay.show_names_within(room - (name if named else 0))
 
     def _draw_overlay(self) -> None:
         shown = self.session.shown
@@ -340,8 +343,7 @@ class CameraView(QWidget):
     # under the cursor
 
     def _draw_hover(self) -> None:
-        axis = self.session.project.extraction.axis
-        self.overlay.show_hover(self.session.hovered, axis)
+        self.overlay.show_hover(self.session.hovered, self.session.project.extraction.axis)
 
     def _hover_changed(self) -> None:
         """What is read out is on the hovered scan line, or on none."""
@@ -350,8 +352,7 @@ class CameraView(QWidget):
             self._read_out(None)
 
     def _scan_line(self, column: int, row: int) -> int:
-        shown = self.session.shown
-        project = self.session.project if shown is None else shown.project
+        project = (self.session.shown or self.session).project
         return row if project.extraction.axis == "rows" else column
 
     def _moved(self, event: tuple[QPointF]) -> None:

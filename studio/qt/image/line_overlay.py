@@ -81,12 +81,16 @@ class LineOverlay:
         self._switch()
         self._zoomed()
 
-    def show_names_within(self, width: int) -> None:
-        """The boxes with their names where there is room for all of them, else with their colours alone."""
-        boxes = (self.truth_box, *self.method_boxes.values())
+    def width_within(self, width: int) -> int:
+        """px that the boxes take: with their names where there is room for all, else with their colours alone."""
         metrics = self.truth_box.fontMetrics()
-        needed = sum(BOX_PX + metrics.horizontalAdvance(box.property("name")) for box in boxes if not box.isHidden())
-        self._named = needed <= width
+        names = [box.property("name") for box in (self.truth_box, *self.method_boxes.values()) if not box.isHidden()]
+        named = sum(BOX_PX + metrics.horizontalAdvance(name) for name in names)
+        return named if named <= width else BOX_PX * len(names)
+
+    def show_names_within(self, width: int) -> None:
+        boxes = (self.truth_box, *self.method_boxes.values())
+        self._named = self.width_within(width) > BOX_PX * sum(not box.isHidden() for box in boxes)
         for box in boxes:
             box.setText(str(box.property("name")) if self._named else "")
 

@@ -188,6 +188,15 @@ def test_lines_of_each_method_are_switched_on_their_own(qtbot, made):
     assert len(overlay.methods["gaussian"].xData) > 0.9 * len(np.unique(curve.index))
 
 
+def test_boxes_have_their_names_as_far_as_there_is_room(qtbot, made):
+    needed = made.overlay.width_within(10_000)
+    for width, names in ((1400, (True, True)), (800, (False, True)), (560, (False, False)), (1400, (True, True))):
+        made.resize(width, 700)
+        qtbot.wait(20)
+        assert (made.overlay.truth_box.text() != "", made.saturated.text() != "") == names
+        assert (made.lines.width() >= needed) == names[0]
+
+
 def test_keeping_the_place_when_the_size_changes(qtbot, made):
     view = made.view
     view.box.setRange(xRange=(99.5, 199.5), yRange=(99.5, 149.5), padding=0)
