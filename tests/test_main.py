@@ -230,12 +230,12 @@ class TestStudio:
 
 class TestProcess:
     def test_json_is_alone_on_standard_output(self) -> None:
-        process = spawn("inspect", "--json")
+        process = spawn("inspect", "plane", "--json")
         text, _ = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0 and json.loads(text)["ok"]
 
     def test_a_reader_that_goes_away_is_no_error(self) -> None:
-        process = spawn("inspect", "--json")
+        process = spawn("inspect", "plane", "--json")
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
         errors = process.stderr.read()

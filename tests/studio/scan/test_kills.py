@@ -23,6 +23,9 @@ from studio.scan.reconstruct import reconstruct_folder
 from studio.scan.stages import Clock
 from tests.studio.small_scan import contents, scan, small_project
 
+EACH = pytest.mark.parametrize("each", [3, pytest.param(1, marks=pytest.mark.validation)])
+"""Killed at every third operation, or at every one, which takes minutes."""
+
 
 class Killed(BaseException):
     """The program is gone: nothing catches it, and no file changes any more."""
@@ -100,7 +103,10 @@ def powered(file: Path, power: float) -> Project:
     return replaced(Project.load(file), ("scene", "rig", "lasers", 0, "power"), power)
 
 
-def test_a_scan_over_another_one_is_whole_or_unfinished_wherever_it_is_killed(made: Path, tmp_path: Path) -> None:
+@EACH
+def test_a_scan_over_another_one_is_whole_or_unfinished_wherever_it_is_killed(
+    made: Path, tmp_path: Path, each: int
+) -> None:
     file, out = made / "project" / "project.json", tmp_path / "out"
     strong = powered(file, 0.01)
     wholes = [contents(made / name) for name in ("weak", "strong")]
@@ -113,7 +119,7 @@ def test_a_scan_over_another_one_is_whole_or_unfinished_wherever_it_is_killed(ma
     many = operations(lambda: scan(file, out, project=strong))
     assert contents(out) == wholes[1] and many > 50
     refused = finished = 0
-    for n in range(1, many + 1):
+    for n in range(1, many + 1, each):
         begin_anew()
         kill(lambda: scan(file, out, project=strong), n)
         try:
@@ -130,7 +136,7 @@ def test_a_scan_over_another_one_is_whole_or_unfinished_wherever_it_is_killed(ma
             scan(file, out, project=strong)
         assert contents(out) == wholes[1], n
         assert [path.name for path in out.iterdir() if path.name.startswith(".")] == [], n
-    assert 0 < finished < refused < many / 2
+    assert 0 < finished < refused < many / 2 / each
 
 
 def test_a_scan_that_is_resumed_again_and_again_ends_in_the_same_bytes(made: Path, tmp_path: Path) -> None:
@@ -147,7 +153,8 @@ def test_a_scan_that_is_resumed_again_and_again_ends_in_the_same_bytes(made: Pat
     assert contents(out) == contents(made / "strong")
 
 
-def test_points_measured_again_are_the_manifest_s_or_it_tells_of_none(made: Path, tmp_path: Path) -> None:
+@EACH
+def test_points_measured_again_are_the_manifest_s_or_it_tells_of_none(made: Path, tmp_path: Path, each: int) -> None:
     out = tmp_path / "out"
 
     def measure(method: str) -> None:
@@ -162,7 +169,7 @@ def test_points_measured_again_are_the_manifest_s_or_it_tells_of_none(made: Path
         measure(method)
         points[method] = {name: data for name, data in contents(out).items() if name.startswith("points")}
     many = operations(lambda: measure("gaussian"))
-    for n in range(1, many + 1):
+    for n in range(1, many + 1, each):
         measure("likelihood")
         kill(lambda: measure("gaussian"), n)
         scan_folder.open_folder(out)  # the frames are whole all the time

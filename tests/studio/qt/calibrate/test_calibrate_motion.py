@@ -37,7 +37,7 @@ def carried() -> Material:
 
 
 def test_the_project_s_own_motion_is_found_and_used_in_it(qtbot: QtBot, desk: Desk) -> None:
-    moved = LinearStage(moves="objects", step=(0.002, 0.001, 0.0), steps=60)
+    moved = LinearStage(moves="objects", step=(0.006, 0.003, 0.0), steps=20)
     desk.session.set(("scene", "motion"), moved, "move")
     qtbot.mouseClick(desk.panel.simulate, Qt.MouseButton.LeftButton)
     settled(qtbot, desk)

@@ -121,31 +121,34 @@ def calibrate_virtual_boards(window: MainWindow, qtbot: QtBot) -> None:
     work.tell("What cannot be done is told in as many lines as it takes: " + "a long reason, " * 5)
 
 
-@pytest.mark.parametrize("screen", SCREENS.values(), ids=list(SCREENS))
-def test_no_text_of_any_panel_is_cut_off(window: MainWindow, qtbot: QtBot, screen: tuple[int, int]) -> None:
-    width, height = screen
+def test_no_text_of_any_panel_is_cut_off(window: MainWindow, qtbot: QtBot) -> None:
     before = window.size()
     found: dict[object, list[str]] = {}
     open_measured(window, qtbot)
     calibrate_virtual_boards(window, qtbot)
-    for each in WORKSPACES:
-        window.switch_to(each.key)
-        window.rearrange()
-        window.resize(width, height - BAR)
-        items = ITEMS if each.key == "setup" else ITEMS[:1]
-        if each.key == "measure":  # the render is of another scene from here on, which is told
-            window.session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5, "fan angle")
-        for item, extra in [*((item, ()) for item in items), (ITEMS[0], ("motion", "log")), (ITEMS[0], ("nominal",))]:
-            window.session.select(item)
-            for key in extra:
-                window.show_panel(key)
-            for _ in range(3):
-                QApplication.processEvents()
-            assert window.width() <= width and window.height() <= height, f"{each.key} is larger than the screen"
-            cut = cut_off(window)
-            if cut:
-                found[each.key, item, extra] = cut
-        window.rearrange()
+    for name, (width, height) in SCREENS.items():
+        for each in WORKSPACES:
+            window.switch_to(each.key)
+            window.rearrange()
+            window.resize(width, height - BAR)
+            items = ITEMS if each.key == "setup" else ITEMS[:1]
+            if each.key == "measure":  # the render is of another scene from here on, which is told
+                window.session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5, "fan angle")
+            for item, extra in [
+                *((item, ()) for item in items),
+                (ITEMS[0], ("motion", "log")),
+                (ITEMS[0], ("nominal",)),
+            ]:
+                window.session.select(item)
+                for key in extra:
+                    window.show_panel(key)
+                for _ in range(3):
+                    QApplication.processEvents()
+                assert window.width() <= width and window.height() <= height, f"{each.key} is larger than {name}"
+                cut = cut_off(window)
+                if cut:
+                    found[name, each.key, item, extra] = cut
+            window.rearrange()
     window.resize(before)
     assert not found, "\n".join(f"{where}: {text}" for where, texts in found.items() for text in texts)
 
