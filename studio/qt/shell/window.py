@@ -7,8 +7,8 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
-from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QToolBar, QToolButton, QWidget
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QWidget
 
 from studio.editing.forms import FieldSpec
 from studio.project.autosave import Autosave
@@ -22,7 +22,7 @@ from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import Scrolled, spring
+from studio.qt.core.widgets import Scrolled
 from studio.qt.render.python_copy import copy_as_python
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
@@ -37,9 +37,9 @@ from studio.qt.shell.panels import PANELS, Making, Panels
 from studio.qt.shell.preferring import Preferring
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.status import StatusBar
+from studio.qt.shell.toolbar import SWITCH, add_toolbar
 from studio.qt.shell.tour import Step, Tour
 from studio.qt.shell.workspaces import (
-    WORKSPACES,
     arrange,
     hide_stray_tabs,
     remembered,
@@ -55,13 +55,10 @@ from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
 from studio.runtime.preferences import PreferencesFile
 
-TOOLBAR = ("new", "open", "save", "", "undo", "redo", "", "render")
 TALL = ("render", "develop")
 """Panels that scroll."""
 TRIM_MS = 1000
 """From opening another project until the memory of the former one is given back."""
-SWITCH = {each.key: "render_workspace" if each.key == "render" else each.key for each in WORKSPACES}
-"""Workspace -> command."""
 
 
 class MainWindow(QMainWindow):
@@ -99,7 +96,7 @@ class MainWindow(QMainWindow):
         self.help = Help(self)
         self.tour: Tour | None = None
         self.cloud = self._make_cloud()
-        self._make_toolbar()
+        add_toolbar(self, self.commands, self.preferences.values.theme)
         self._connect()
         self._restore()
         self._tell_document()
@@ -204,31 +201,6 @@ class MainWindow(QMainWindow):
             dock.toggleViewAction().triggered.connect(lambda _on, key=panel.key: self._called.discard(key))
             docks[panel.key] = dock
         return docks
-
-    def _make_toolbar(self) -> None:
-        bar = QToolBar("Main", self)
-        bar.setObjectName("toolbar")
-        bar.setMovable(False)
-        group = QActionGroup(self)
-        for key in TOOLBAR:
-            bar.addSeparator() if not key else bar.addAction(self.commands[key])
-        bar.addWidget(spring())
-        for each in WORKSPACES:
-            action = self.commands[SWITCH[each.key]]
-            group.addAction(action)
-            action.setToolTip(f"{each.tip} ({action.shortcut().toString()})")
-            button = QToolButton()
-            button.setObjectName("workspace")
-            button.setDefaultAction(action)
-            button.setText(each.title)
-            bar.addWidget(button)
-        bar.addWidget(spring())
-        bar.addAction(self.commands["help"])
-        self.addToolBar(bar)
-        themes = QActionGroup(self)
-        for choice in theme.CHOICES:
-            themes.addAction(self.commands[f"theme_{choice}"])
-        self.commands[f"theme_{self.preferences.values.theme}"].setChecked(True)
 
     def _make_cloud(self) -> ErrorCloud:
         """The points in the 3D view: of the shown render as the results show them, or of a running scan."""
