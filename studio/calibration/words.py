@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from analysis.calibration.calibrate import Calibrated
+from analysis.calibration.checks import LensTrial
 from analysis.calibration.estimate import unit_plane
 from analysis.calibration.next_pose import Advice
 from analysis.calibration.recheck import Part, Recheck
 from studio.calibration.motion_file import motion_rows
 
+LEAST_SHOWN = 0.05
+"""Standard errors that would be written as none."""
 SMALL_GAIN = 0.03
 """Of the depth error: what one more view should take off it to be worth while."""
 
@@ -78,13 +83,22 @@ def check_rows(result: Calibrated, views: int) -> list[tuple[str, str]]:
         rows.append(("halves", result.halves.sentence))
     rows.append(("residuals", result.whiteness.sentence))
     if result.lens_trials:
-        tried = ", ".join(
-            f"{one.terms}: {one.held_out:.3g}" + (f" and {1e6 * one.depth:.0f} um" if one.depth else "")
-            for one in result.lens_trials
-        )
-        terms = len(result.estimate.distortion)
-        rows.append(("lens", f"{terms} distortion terms, the fewest that are not worse on held-out views ({tried})"))
+        rows.append(("lens", lens_sentence(len(result.estimate.distortion), result.lens_trials)))
     return rows
+
+
+def lens_sentence(terms: int, trials: Sequence[LensTrial]) -> str:
+    """Which lens was chosen, and how every lens that was tried did at views that it was not fitted to."""
+    tried = "; ".join(
+        f"{one.terms}: {one.held_out:.3g}"
+        + (f" and {1e6 * one.depth:.0f} um" if one.depth else "")
+        + (f", {one.worse_by:.1f} se worse" if one.worse_by >= LEAST_SHOWN else "")
+        for one in trials
+    )
+    # each may be the best at corners and not in depth
+    alike = min(one.worse_by for one in trials) <= 1.0
+    which = "the fewest within one standard error (se) of" if alike else "the closest to"
+    return f"{terms} distortion terms, {which} the best on held-out views ({tried})"
 
 
 def next_sentence(advice: Advice, target_um: float | None) -> str:
