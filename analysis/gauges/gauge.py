@@ -9,7 +9,20 @@ from pydantic import Field, model_validator
 
 from render.base.model import Model, quantity
 
-Kind = Literal["step", "width", "angle", "radius", "v_depth", "peak", "straightness", "point_to_point"]
+Kind = Literal[
+    "step",
+    "width",
+    "angle",
+    "radius",
+    "v_depth",
+    "peak",
+    "straightness",
+    "point_to_point",
+    "thickness",
+    "gap",
+    "flush",
+    "area",
+]
 Verdict = Literal["pass", "fail", "undecided"]
 REGIONS: dict[Kind, tuple[str, ...]] = {
     "step": ("lower side", "upper side"),
@@ -20,6 +33,10 @@ REGIONS: dict[Kind, tuple[str, ...]] = {
     "peak": ("reference", "peak"),
     "straightness": ("line",),
     "point_to_point": ("first point", "second point"),
+    "thickness": ("datum", "surface"),
+    "gap": ("left edge", "right edge"),
+    "flush": ("first sheet", "second sheet"),
+    "area": ("reference", "section"),
 }
 """Kind -> what each of its regions is."""
 TITLES: dict[Kind, str] = {
@@ -31,6 +48,10 @@ TITLES: dict[Kind, str] = {
     "peak": "Peak height",
     "straightness": "Straightness (bow)",
     "point_to_point": "Point to point",
+    "thickness": "Thickness",
+    "gap": "Gap",
+    "flush": "Flush",
+    "area": "Area",
 }
 MOST_GAUGES = 64
 Place = Annotated[float, Field(ge=-100.0, le=100.0)]
@@ -38,7 +59,7 @@ Region = tuple[Place, Place]
 
 
 class Gauge(Model):
-    """A measure of the part. Its sizes are m, an angle's rad."""
+    """A measure of the part. Its sizes are m, an angle's rad, an area's m^2."""
 
     name: str = quantity("measure", label="Name", min_length=1, max_length=80)
     kind: Kind = quantity("step", label="Kind", help="What is measured.")
@@ -47,12 +68,24 @@ class Gauge(Model):
     regions: tuple[Region, ...] = quantity(
         unit="m", label="Regions", help="From and to across the fan, as the profile's plot has it.", max_length=3
     )
-    nominal: float | None = quantity(None, unit="m", label="Nominal", help="m; of an angle rad.", ge=-100, le=100)
+    nominal: float | None = quantity(
+        None, unit="m", label="Nominal", help="m; of an angle rad, of an area m².", ge=-100, le=100
+    )
     lower: float | None = quantity(
-        None, unit="m", label="Lower limit", help="Deviation from the nominal: m; of an angle rad.", ge=-100, le=100
+        None,
+        unit="m",
+        label="Lower limit",
+        help="Deviation from the nominal: m, rad, m².",
+        ge=-100,
+        le=100,
     )
     upper: float | None = quantity(
-        None, unit="m", label="Upper limit", help="Deviation from the nominal: m; of an angle rad.", ge=-100, le=100
+        None,
+        unit="m",
+        label="Upper limit",
+        help="Deviation from the nominal: m, rad, m².",
+        ge=-100,
+        le=100,
     )
 
     @model_validator(mode="after")
@@ -72,9 +105,9 @@ class Gauge(Model):
         return self
 
     @property
-    def unit(self) -> Literal["m", "rad"]:
+    def unit(self) -> Literal["m", "rad", "m2"]:
         """Of the value."""
-        return "rad" if self.kind == "angle" else "m"
+        return "rad" if self.kind == "angle" else "m2" if self.kind == "area" else "m"
 
     def verdict(self, value: float, sigma: float) -> Verdict | None:
         """ISO 14253-1 with U = 2 sigma: proved within, proved outside, or neither; None: no tolerance, or no value."""

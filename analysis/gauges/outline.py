@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.gauges.area import section, section_points
 from analysis.gauges.fit import Fit
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.profile import Profile
-from analysis.gauges.read import crossing, curves_of, line_of, parts_of
+from analysis.gauges.read import crossing, curves_of, far_point, line_of, parts_of
 from render.base.arrays import Float
 
 ARC_POINTS = 65
@@ -33,6 +34,10 @@ def outline(gauge: Gauge, profile: Profile) -> tuple[list[Float], Float]:
             return _bow(fits[0], gauge.regions[0])
         case "peak":
             return _peak(fits, profile)
+        case "gap":
+            return _gap(fits, profile)
+        case "area":
+            return _area(fits[0], gauge.regions[1], profile)
     curves = [_polynomial(one, *_span(one, profile, one.here)) for one in fits]
     return curves, _between_lines(gauge, fits)
 
@@ -89,6 +94,27 @@ def _peak(fits: list[Fit], profile: Profile) -> tuple[list[Float], Float]:
     return curves, np.stack([point + along * float((top - point) @ along), top])
 
 
+def _gap(fits: list[Fit], profile: Profile) -> tuple[list[Float], Float]:
+    arcs = [_arc(one, profile)[0][0] for one in fits]
+    centres = [one.frame.out(one.theta[:2]) for one in fits]
+    across = (centres[1] - centres[0]) / np.linalg.norm(centres[1] - centres[0])
+    ends = [
+        centre + side * abs(one.theta[2]) * across for centre, one, side in zip(centres, fits, (1, -1), strict=True)
+    ]
+    return arcs, np.stack(ends)
+
+
+def _area(reference: Fit, region: tuple[float, float], profile: Profile) -> tuple[list[Float], Float]:
+    """The reference over its own region, the section's outline, and the reference below it; an area is no length."""
+    order = section_points(profile, region, reference.frame)
+    along, across = reference.frame.local(profile.position[order]).T
+    ends = np.clip(section(region, reference.frame), along[0], along[-1])
+    within = np.concatenate([ends[:1], along[(along > ends[0]) & (along < ends[1])], ends[1:]])
+    outline = reference.frame.out(np.column_stack([within, np.interp(within, along, across)]))
+    own = _polynomial(reference, *_span(reference, profile, reference.here))
+    return [own, outline, _polynomial(reference, *ends)], np.empty((0, 2))
+
+
 def _between_lines(gauge: Gauge, fits: list[Fit]) -> Float:
     """Where the value of two or three lines is measured."""
     lines = [line_of(one, one.theta) for one in fits]
@@ -99,6 +125,10 @@ def _between_lines(gauge: Gauge, fits: list[Fit]) -> Float:
             (point, along), flanks = lines[0], lines[1:]
             vertex = crossing(*flanks[0], *flanks[1])
             return np.stack([point + along * float((vertex - point) @ along), vertex])
+        case "thickness" | "flush":
+            (point, along), second = lines
+            top = far_point(gauge, second)
+            return np.stack([point + along * float((top - point) @ along), top])
         case "point_to_point":
             middles = [0.5 * (low + high) for low, high in gauge.regions]
             ends = zip(middles, lines, strict=True)

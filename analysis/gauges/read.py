@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.gauges.area import area_above, section
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import REGIONS, Gauge, Verdict
 from analysis.gauges.profile import Profile
@@ -18,13 +19,13 @@ FLATTEST = 1e-6
 """Angle, rad, between two lines below which they do not cross anywhere near."""
 SPARE = 2
 """Points that a curve needs beyond its parameters."""
-PARAMETERS = {"radius": 3, "straightness": 3, "peak": 3}
+PARAMETERS = {"radius": 3, "straightness": 3, "peak": 3, "gap": 3}
 """Of the curve in the last region; elsewhere, and in the others, lines."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """One measure in one frame; m, of an angle rad. NaN where there is none."""
+    """One measure in one frame; m, of an angle rad, of an area m^2. NaN where there is none."""
 
     gauge: Gauge
     step: int
@@ -115,6 +116,8 @@ def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | s
 NOTHING = {
     "peak": "the profile has no peak within its region",
     "radius": "no circle fits the points",
+    "gap": "no circles fit the points",
+    "area": "its points end before the section does",
     "step": "no two levels fit the points",
 }
 """Kind -> why a value is none; the others are of lines that cross."""
@@ -139,6 +142,15 @@ def curves_of(gauge: Gauge, profile: Profile, parts: list[Float]) -> tuple[list[
             line = _polynomial(profile, parts[0], 1)
             fits = [line, _polynomial(profile, parts[1], 2, line.frame.axes)]
             return fits, lambda theta: _height_of_peak(fits, theta, gauge.regions[1])
+        case "gap":
+            edges = [fit(profile, part, lambda here: circle, circle_start) for part in parts]
+            return edges, lambda theta: _between_circles(edges, theta)
+        case "area":
+            line = _polynomial(profile, parts[0], 1)
+            above = area_above(profile, gauge.regions[1], line.frame)
+            low, high = section(gauge.regions[1], line.frame)
+            below = np.array([high - low, 0.5 * (high**2 - low**2)])  # of a line, by its constant and its slope
+            return [line, above], lambda theta: float(theta[1][0] - below @ theta[0])
         case _:
             fits = [_polynomial(profile, part, 1) for part in parts]
             return fits, lambda theta: _of_lines(gauge, [line_of(*pair) for pair in zip(fits, theta, strict=True)])
@@ -167,10 +179,26 @@ def _of_lines(gauge: Gauge, lines: list[tuple[Float, Float]]) -> float:
         middles = [0.5 * (low + high) for low, high in gauge.regions]
         ends = [point + along * _over(x - point[0], along[0]) for x, (point, along) in zip(middles, lines, strict=True)]
         return float(np.linalg.norm(ends[1] - ends[0]))
+    if gauge.kind in ("thickness", "flush"):
+        return _cross(u, far_point(gauge, lines[1]) - p)
     r, w = lines[2]
     if gauge.kind == "width":
         return float(np.linalg.norm(crossing(p, u, r, w) - crossing(p, u, q, v)))
     return -_cross(u, crossing(q, v, r, w) - p)
+
+
+def _between_circles(fits: list[Fit], theta: Sequence[Float]) -> float:
+    first, second = (one.frame.out(values[:2]) for one, values in zip(fits, theta, strict=True))
+    return float(np.linalg.norm(second - first) - abs(theta[0][2]) - abs(theta[1][2]))
+
+
+def far_point(gauge: Gauge, line: tuple[Float, Float]) -> Float:
+    """Of the second line: its middle for a thickness, for a flush its end beside the first region."""
+    (first_low, first_high), (low, high) = gauge.regions
+    q, v = line
+    beside = low if first_low + first_high <= low + high else high
+    x = 0.5 * (low + high) if gauge.kind == "thickness" else beside
+    return q + v * _over(x - q[0], v[0])
 
 
 def _height_of_peak(fits: list[Fit], theta: Sequence[Float], region: tuple[float, float]) -> float:

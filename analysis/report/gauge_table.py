@@ -12,14 +12,15 @@ from analysis.report.units import NONE, digits
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
 MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0undecided"}
 """Never by colour alone."""
-PLAIN = str.maketrans({"µ": "u", "°": " deg", "–": "-", "✓": "", "✗": "", "?": "", "\u00a0": " "})  # noqa: RUF001
+PLAIN = str.maketrans({"µ": "u", "²": "2", "°": " deg", "–": "-", "✓": "", "✗": "", "?": "", "\u00a0": " "})  # noqa: RUF001
 FEWEST, MOST = 2, 6
-"""Digits after the point, of mm or degrees."""
+"""Digits after the point, of mm, mm² or degrees."""
+UNITS = {"m": (1e3, "\u00a0mm"), "rad": (math.degrees(1.0), "°"), "m2": (1e6, "\u00a0mm²")}
 
 
 def scale_and_unit(unit: str) -> tuple[float, str]:
-    """Factor from SI, and what follows the number that people read: mm or degrees."""
-    return (math.degrees(1.0), "°") if unit == "rad" else (1e3, "\u00a0mm")
+    """Factor from SI, and what follows the number that people read: mm, mm² or degrees."""
+    return UNITS[unit]
 
 
 def value_text(value: float | None, sigma: float | None, unit: str) -> str:
@@ -38,10 +39,11 @@ def decimals(sigma: float | None, unit: str) -> int:
 
 
 def small_text(value: float | None, unit: str) -> str:
-    """A sigma or an error: um, or thousandths of a degree as degrees."""
+    """A sigma or an error: um, or small parts of a degree or mm² as such."""
     if value is None or not math.isfinite(value):
         return NONE
-    return f"{digits(math.degrees(value))}°" if unit == "rad" else f"{digits(value * 1e6)}\u00a0µm"
+    scale, name = (1e6, "\u00a0µm") if unit == "m" else scale_and_unit(unit)
+    return f"{digits(scale * value)}{name}"
 
 
 def tolerance_text(lower: float | None, upper: float | None, unit: str) -> str:

@@ -68,8 +68,12 @@ PART_MEASURES: dict[str, Measure] = {
     "angle_value": Measure("value", "°", 180.0 / np.pi, signed=True),
     "angle_error": Measure("error against the truth", "°", 180.0 / np.pi, signed=True),
     "angle_sigma": Measure("predicted sigma", "°", 180.0 / np.pi),
+    "area_value": Measure("value", "mm²", 1e6, signed=True),
+    "area_error": Measure("error against the truth", "mm²", 1e6, signed=True),
+    "area_sigma": Measure("predicted sigma", "mm²", 1e6),
 }
-"""Of the project's own measures of the part: "length_error:NAME", or "angle_error:NAME" of an angle."""
+"""Of the project's own measures of the part: "length_error:NAME", "angle_error:NAME" or "area_error:NAME"."""
+OF_UNIT = {"m": "length", "rad": "angle", "m2": "area"}
 
 
 def measure_of(name: str) -> Measure:
@@ -84,7 +88,7 @@ def measure_of(name: str) -> Measure:
 def part_names(gauges: Sequence[Gauge]) -> list[str]:
     """What a study may ask of a project's measures of the part, in their order."""
     kinds = ("value", "error", "sigma")
-    return [f"{'angle' if one.kind == 'angle' else 'length'}_{kind}:{one.name}" for one in gauges for kind in kinds]
+    return [f"{OF_UNIT[one.unit]}_{kind}:{one.name}" for one in gauges for kind in kinds]
 
 
 def of_the_part(found: Sequence[Reading]) -> dict[str, float]:

@@ -19,6 +19,10 @@ REGION = {
     "peak": ((-0.02, -0.01), (-0.004, 0.004)),
     "straightness": ((-0.01, 0.01),),
     "point_to_point": ((-0.015, -0.013), (0.009, 0.011)),
+    "thickness": ((-0.015, -0.003), (0.003, 0.015)),
+    "gap": ((-0.0115, -0.0065), (0.0065, 0.0115)),
+    "flush": ((-0.015, -0.003), (0.003, 0.015)),
+    "area": ((0.012, 0.02), (-0.009, -0.002)),
 }
 BENT = 0.02
 """1/m, half the curvature of the bent shape."""
@@ -39,6 +43,13 @@ def shape(kind: str) -> tuple[np.ndarray, float]:
             return far + np.where(x > 0.0, 0.5, -0.2) * x, np.arctan(0.5) + np.arctan(0.2)
         case "width":
             return far + groove, 0.02
+        case "area":  # the wall's middle lies 4.5 mm deep
+            return far + groove, -0.0045 * 0.007
+        case "thickness" | "flush":  # sheets that are not parallel
+            at = 0.009 if kind == "thickness" else 0.003
+            return far + np.where(x > 0.0, 0.002 + 0.12 * x, 0.1 * x), (0.002 + 0.02 * at) / np.sqrt(1.01)
+        case "gap":
+            return far + np.sqrt(0.004**2 - np.minimum((np.abs(x) - 0.009) ** 2, 0.0039**2)), 0.01
         case "v_depth":
             return far + groove, 0.01
         case "radius":

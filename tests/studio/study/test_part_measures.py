@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from analysis.gauges.gauge import Gauge
 from render.base.errors import InputError
 from studio.project.project import Project
 from studio.study.cells import next_cells
@@ -72,6 +73,9 @@ def test_names_say_what_is_there_and_others_are_refused() -> None:
     shown = measure_of("length_error:First step")
     assert (shown.label, shown.unit, shown.signed) == ("First step, error against the truth", "µm", True)
     assert measure_of("depth_rmse").unit == "µm"
+    section = {"name": "seam", "kind": "area", "regions": [[0.0, 0.01], [0.02, 0.03]]}
+    assert part_names([Gauge.model_validate(section)])[0] == "area_value:seam"
+    assert measure_of("area_value:seam").unit == "mm²"
     for name in ("length_error:", "volume_error:x", "depth"):
         with pytest.raises(KeyError):
             measure_of(name)

@@ -1,0 +1,77 @@
+"""The area between a profile and a reference line, with its derivative by every point."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.gauges.fit import OUTLIER_SIGMAS, Fit, Frame
+from analysis.gauges.profile import Profile
+from analysis.measures import robust_sigma
+from render.base.arrays import Float
+
+NEIGHBOURS = 5
+"""Points in a row whose median tells a spike from a step."""
+MISSING = 0.05
+"""Of a section's length at either end, beyond which a section without points has no area."""
+
+
+def section(region: tuple[float, float], frame: Frame) -> tuple[float, float]:
+    """A region's ends along the frame's axis, m."""
+    low, high = ((x - frame.centre[0]) / max(frame.axes[0, 0], 1e-6) for x in region)
+    return float(low), float(high)
+
+
+def section_points(profile: Profile, region: tuple[float, float], frame: Frame) -> NDArray[np.intp]:
+    """The points within a region and one beyond each of its ends, by their order along the frame, without spikes."""
+    local = frame.local(profile.position)
+    low, high = section(region, frame)
+    order = np.argsort(local[:, 0], kind="stable")
+    first, last = np.searchsorted(local[order, 0], [low, high])
+    order = order[max(first - 1, 0) : last + 1]
+    own = np.linalg.norm(profile.random[order], axis=1)
+    off = _off_neighbours(local[order])
+    return np.asarray(order[off <= OUTLIER_SIGMAS * np.maximum(robust_sigma(off), own)])
+
+
+def _off_neighbours(local: Float) -> Float:
+    """(n,) m of each of (n, 2) points in their order off the median of its neighbours, or off a line through them.
+
+    The less of both: the median keeps the edges of a step, the line (Sen, J. Am. Stat. Assoc. 63, 1968) a slope.
+    """
+    half = NEIGHBOURS // 2
+    x, y = (np.lib.stride_tricks.sliding_window_view(np.pad(one, half, mode="edge"), NEIGHBOURS) for one in local.T)
+    i, j = np.triu_indices(NEIGHBOURS, 1)
+    run = x[:, j] - x[:, i]
+    slope = np.median((y[:, j] - y[:, i]) / np.where(run > 0.0, run, np.inf), axis=1)
+    beside = y - slope[:, None] * (x - x[:, [half]])
+    middle = y[:, half]
+    return np.asarray(np.minimum(np.abs(middle - np.median(y, axis=1)), np.abs(middle - np.median(beside, axis=1))))
+
+
+def area_above(profile: Profile, region: tuple[float, float], frame: Frame) -> Fit:
+    """theta: m^2 between the profile and the frame's axis; what lies towards the laser counts positive.
+
+    The integral of straight lines between points, also where some are missing, over a section with fixed ends, so that
+    noise does not choose what counts. NaN where the points end before the section does.
+    """
+    order = section_points(profile, region, frame)
+    gradient, here = np.zeros((1, len(profile.index), 2)), np.zeros(len(profile.index), dtype=np.bool_)
+    here[order] = True
+    along, across = frame.local(profile.position[order]).T
+    low, high = section(region, frame)
+    if len(order) < 2 or max(along[0] - low, high - along[-1]) > MISSING * (high - low):
+        return Fit(np.array([math.nan]), np.zeros(1), gradient, here, frame, 1.0)
+    p, q = np.clip(along[:-1], low, high), np.clip(along[1:], low, high)
+    span = np.maximum(np.diff(along), 1e-15)
+    # of every straight line, the integrals of what its two points are weighed by
+    first = ((along[1:] - p) ** 2 - (along[1:] - q) ** 2) / (2.0 * span)
+    second = ((q - along[:-1]) ** 2 - (p - along[:-1]) ** 2) / (2.0 * span)
+    by_across = np.append(first, 0.0) + np.append(0.0, second)
+    slope = np.diff(across) / span
+    by_along = -np.append(slope * first, 0.0) - np.append(0.0, slope * second)
+
+    gradient[0, order] = np.stack([by_along, by_across], axis=1) @ frame.axes
+    return Fit(np.array([by_across @ across]), np.array([profile.sigmas(gradient[0])[0]]), gradient, here, frame, 1.0)
