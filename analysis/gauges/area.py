@@ -14,6 +14,8 @@ from render.base.arrays import Float
 
 NEIGHBOURS = 5
 """Points in a row whose median tells a spike from a step."""
+UNSURE = 10.0
+"""Times the section's median sigma: a straight line over such a point's place knows more than the point."""
 MISSING = 0.05
 """Of a section's length at either end, beyond which a section without points has no area."""
 
@@ -22,6 +24,14 @@ def section(region: tuple[float, float], frame: Frame) -> tuple[float, float]:
     """A region's ends along the frame's axis, m."""
     low, high = ((x - frame.centre[0]) / max(frame.axes[0, 0], 1e-6) for x in region)
     return float(low), float(high)
+
+
+def without_unsure(profile: Profile, region: tuple[float, float]) -> Profile:
+    """The profile less the points of the region that are far less sure than is usual there."""
+    inside = profile.weight(*region) > 0.0
+    sigma = np.linalg.norm(profile.random, axis=1)
+    usual = float(np.median(sigma[inside])) if inside.any() else 0.0
+    return profile.taken(~inside | (sigma <= UNSURE * usual))
 
 
 def section_points(profile: Profile, region: tuple[float, float], frame: Frame) -> NDArray[np.intp]:

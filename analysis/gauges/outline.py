@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.gauges.area import section, section_points
+from analysis.gauges.area import section, section_points, without_unsure
 from analysis.gauges.fit import Fit
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.profile import Profile
@@ -21,6 +21,8 @@ def outline(gauge: Gauge, profile: Profile) -> tuple[list[Float], Float]:
     In the profile's coordinates, m. The dimension is of shape (0, 2) where the kind has none that is a length; where
     the measure has no value there is nothing at all.
     """
+    if gauge.kind == "area":
+        profile = without_unsure(profile, gauge.regions[1])
     parts = parts_of(gauge, profile)
     if isinstance(parts, str):
         return [], np.empty((0, 2))

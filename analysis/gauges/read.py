@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.gauges.area import area_above, section
+from analysis.gauges.area import area_above, section, without_unsure
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import REGIONS, Gauge, Verdict
 from analysis.gauges.profile import Profile
@@ -62,6 +62,8 @@ class Reading:
 
 def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> Reading:
     """The gauge's value in the profile of its laser at a step, and in the exact one."""
+    if gauge.kind == "area":
+        measured = without_unsure(measured, gauge.regions[1])
     found = _value(gauge, measured)
     if isinstance(found, str):
         return Reading(gauge, step, truth=_true_value(gauge, truth), reason=found)

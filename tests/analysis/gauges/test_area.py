@@ -52,6 +52,17 @@ def test_spikes_are_left_out_and_holes_are_bridged() -> None:
     assert holed.value == pytest.approx(exact, rel=1e-7)
 
 
+def test_points_that_are_far_less_sure_than_the_others_are_bridged() -> None:
+    height, exact = shape("area")
+    points = profile(height)
+    clean = read(gauge("area"), 0, points, None)
+    points.random[[60, 61, 75]] *= 1000.0
+    reading = read(gauge("area"), 0, points, points)
+    assert reading.value == pytest.approx(exact, rel=1e-7)
+    assert reading.points == clean.points - 3
+    assert reading.sigma < 1.05 * clean.sigma
+
+
 def test_the_edges_of_steps_are_no_spikes() -> None:
     """Three plates of 2 mm, 2 mm apart, and a rod of three points."""
     comb = 0.002 * ((np.abs(ACROSS) % 0.004) < 0.002) + 0.003 * (np.abs(ACROSS - 0.0125) < 0.0003)
