@@ -133,6 +133,10 @@ class Session(QObject):
     """The selection is to fill the 3D view."""
     hover_changed = Signal()
     """`hovered` is another scan line."""
+    range_changed = Signal()
+    """`range` is another."""
+    range_dragged = Signal(float, float)
+    """From and to: scan lines that were dragged over in the picture, for results to tell of."""
     step_changed = Signal()
     """`step`, the step of the motion that is looked at, is another one."""
     renders_changed = Signal()
@@ -163,6 +167,8 @@ class Session(QObject):
         self.dragging = False
         self.selection: FieldPath = ()
         self.hovered: int | None = None
+        self.range: tuple[float, float] | None = None
+        """From and to: the scan lines that the results tell of; None: all, or no range of them."""
         self.step = 0
         self.renders: list[Render] = []
         self.shown: Render | None = None
@@ -182,6 +188,12 @@ class Session(QObject):
         if deviation is not self.deviation:
             self.deviation = deviation
             self.deviation_changed.emit()
+
+    def show_range(self, ends: tuple[float, float] | None) -> None:
+        """None: no range of scan lines."""
+        if ends != self.range:
+            self.range = ends
+            self.range_changed.emit()
 
     def show_section(self, section: ShownSection | None) -> None:
         """None hides it."""

@@ -30,6 +30,7 @@ from studio.qt.core.widgets import flush, upper_and_lower
 from studio.qt.image.image_item import PictureView
 from studio.qt.image.line_overlay import LineOverlay, swatch
 from studio.qt.image.row_profile import RowProfile
+from studio.qt.image.scan_line_marks import ScanLineMarks
 from studio.runtime.jobs import Progress
 from studio.scan.frame_views import SATURATED, at_pixel, live_picture, picture, views
 
@@ -54,6 +55,7 @@ class CameraView(QWidget):
         self.live = live(session)
         self.view = PictureView()
         self.overlay = LineOverlay(self.view.box)
+        self.marks = ScanLineMarks(session, self.view)
         self.profile = RowProfile(session)
         self.choice = QComboBox()
         self.choice.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToContents)
@@ -278,7 +280,6 @@ class CameraView(QWidget):
         self.overlay.show_truth(curves)
         self.overlay.show_methods([])
         self._name_boxes()
-        self._draw_hover()
 
     # the render
 
@@ -338,16 +339,11 @@ class CameraView(QWidget):
         self.overlay.show_truth(list(shown.frame.curves))
         self.overlay.show_methods([item.line for items in shown.measurements.values() for item in items])
         self._name_boxes()
-        self._draw_hover()
 
     # under the cursor
 
-    def _draw_hover(self) -> None:
-        self.overlay.show_hover(self.session.hovered, self.session.project.extraction.axis)
-
     def _hover_changed(self) -> None:
         """What is read out is on the hovered scan line, or on none."""
-        self._draw_hover()
         if self._cursor is not None and self.session.hovered != self._scan_line(*self._cursor) and not self.is_live:
             self._read_out(None)
 

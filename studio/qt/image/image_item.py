@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pyqtgraph as pg
-from PySide6.QtCore import QLineF, QRectF, Qt
+from PySide6.QtCore import QLineF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
@@ -99,12 +100,28 @@ class PictureItem(pg.GraphicsObject):  # type: ignore[misc]
         painter.drawLines(lines)
 
 
+class PictureBox(pg.ViewBox):  # type: ignore[misc]
+    """A drag moves the picture; with Shift it chooses a part of it."""
+
+    boxed = Signal(object, object, bool)
+    """Columns and rows where the drag began and is, and whether it is over."""
+
+    def mouseDragEvent(self, event: Any, axis: int | None = None) -> None:
+        shift = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+        if axis is not None or event.button() != Qt.MouseButton.LeftButton or not shift:
+            super().mouseDragEvent(event, axis)
+            return
+        event.accept()
+        begin, end = (self.mapToView(place) for place in (event.buttonDownPos(), event.pos()))
+        self.boxed.emit((begin.x(), end.x()), (begin.y(), end.y()), event.isFinish())
+
+
 class PictureView(pg.GraphicsView):  # type: ignore[misc]
     """A view box in pixel coordinates, v downwards: wheel zooms at the cursor, drag pans."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False, defaultPadding=0.01)
+        self.box = PictureBox(lockAspect=True, invertY=True, enableMenu=False, defaultPadding=0.01)
         self.setCentralItem(self.box)
         self.item = PictureItem()
         self.box.addItem(self.item)

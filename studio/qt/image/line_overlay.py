@@ -14,7 +14,6 @@ from analysis.line.result import Line
 from analysis.report.colour import TRUTH, method_colour, method_name
 from render.base.arrays import Float
 from render.frame import LaserCurve
-from studio.qt.core import theme
 
 SYMBOLS_FROM = 6.0
 """Screen pixels a pixel from which single positions are marked."""
@@ -44,10 +43,6 @@ class LineOverlay:
         self.truth = self._item(TRUTH, 2.0, 10, 13)
         self.methods: dict[str, pg.PlotDataItem] = {}
         self.method_boxes: dict[str, QCheckBox] = {}
-        self.hover = pg.InfiniteLine(angle=0, pen=pg.mkPen(theme.colours().accent, width=1))
-        self.hover.setZValue(9)
-        self.hover.hide()
-        box.addItem(self.hover, ignoreBounds=True)
         self.truth_box = self._box("true line", TRUTH, "The exact line", True)
         box.sigRangeChanged.connect(lambda *changed: self._zoomed())
         self._switch()
@@ -93,14 +88,6 @@ class LineOverlay:
         self._named = self.width_within(width) > BOX_PX * sum(not box.isHidden() for box in boxes)
         for box in boxes:
             box.setText(str(box.property("name")) if self._named else "")
-
-    def show_hover(self, index: int | None, axis: str) -> None:
-        """Mark a scan line; None: none."""
-        self.hover.setVisible(index is not None)
-        if index is not None:
-            self.hover.setAngle(0 if axis == "rows" else 90)
-            self.hover.setPen(pg.mkPen(theme.colours().accent, width=1))
-            self.hover.setValue(float(index))
 
     def _item(self, colour: str, width: float, z: float, size: int) -> pg.PlotDataItem:
         pens = {"pen": pg.mkPen(colour, width=width), "symbolPen": pg.mkPen(colour, width=1.5)}

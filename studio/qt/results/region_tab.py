@@ -1,4 +1,4 @@
-"""A range dragged in the row charts or the profile: what its errors come to, and its points as a table."""
+"""A range dragged in the row charts, the profile or the picture: what its errors come to, and its points as a table."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from studio.scan.result_series import ErrorView
 from studio.scan.stages import Measurement
 
 HINT = (
-    "Drag across the row charts or the profile: the errors of what lies within are told here. "
-    "The edges can be moved; Shift or the middle button shifts the view."
+    "Drag across the row charts or the profile, or with Shift over the picture: the errors of what lies within are "
+    "told here. The edges can be moved in the charts; there Shift or the middle button shifts the view."
 )
 EXPLAINED = (
     "Value ± one sigma of chance: neighbouring scan lines that err alike count as one, by the predicted length of "
@@ -61,10 +61,17 @@ class RegionTab(QWidget):
         self.region = region
         if region is None or region.along != "scan lines":
             self.rows.hide_range()
+            self.session.show_range(None)
+        else:
+            self.rows.show_range(region.low, region.high)
+            self.session.show_range((region.low, region.high))
         if region is None or region.along != "fan":
             self.profile.hide_range()
         self._tell()
         self.changed.emit()
+        panel = self.parentWidget()
+        if region is not None and panel is not None and not panel.isVisible():
+            self.session.message.emit("info", f"Measure, Region tells of {region.title}")
 
     def show_measurements(self, shown: dict[str, Measurement], view: ErrorView) -> None:
         """By method, of one laser of the shown render."""

@@ -111,7 +111,8 @@ class ResultsPanel(QWidget):
         for plot in (self.rows, self.profile):
             plot.hovered.connect(self._hover)
             plot.chosen.connect(self.pin)
-        self.rows.ranged.connect(lambda low, high: self._choose(Region("scan lines", low, high)))
+        for ranged in (self.rows.ranged, session.range_dragged):
+            ranged.connect(lambda low, high: self._choose(Region("scan lines", low, high)))
         self.profile.ranged.connect(lambda low, high: self._choose(Region("fan", 1e-3 * low, 1e-3 * high)))
         self.region.changed.connect(self._show_region)
         self.part.placing_changed.connect(self._follow_placing)

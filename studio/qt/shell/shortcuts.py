@@ -13,7 +13,7 @@ from studio.qt.core.actions import COMMANDS, VIEW_KEYS, Command
 
 MOUSE = (
     ("Drag", "turn the 3D view"),
-    ("Shift+drag, middle drag", "shift it"),
+    ("Shift+drag, middle drag", "shift it; Shift over the image: a region"),
     ("Wheel", "zoom"),
     ("Click", "select; in a plot: keep the row"),
     ("Double-click", "frame the part; a plot: all of it"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QApplication
 
 from analysis.line.result import Flag
 from studio.qt.core.live_preview import live
@@ -52,6 +54,23 @@ def grabbed(view):
     image = view.view.grab().toImage()
     pixels = np.frombuffer(image.bits(), np.uint8).reshape(image.height(), image.bytesPerLine() // 4, 4)
     return pixels[:, : image.width(), :3].astype(int)
+
+
+def drag_with_shift(view, start, end):
+    """Over the picture, from a pixel to another (column, row), through the event queue."""
+    places = [view.view.mapFromScene(view.view.box.mapViewToScene(QPointF(*pixel))) for pixel in (start, end)]
+    left, none, kinds = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton, QMouseEvent.Type
+    begin, end = (QPointF(place) for place in places)
+    middle = 0.5 * (begin + end)
+    steps = (
+        *((kinds.MouseButtonPress, begin, left, left), (kinds.MouseMove, middle, none, left)),
+        *((kinds.MouseMove, end, none, left), (kinds.MouseButtonRelease, end, left, none)),
+    )
+    pane = view.view.viewport()
+    for kind, at, button, held in steps:
+        shift = Qt.KeyboardModifier.ShiftModifier
+        QApplication.sendEvent(pane, QMouseEvent(kind, at, pane.mapToGlobal(at), button, held, shift))
+        QApplication.processEvents()
 
 
 def test_without_a_render_the_view_is_a_live_estimate(qtbot, unrendered):
@@ -133,7 +152,7 @@ def test_the_cursor_reads_the_pixel_and_tells_the_scan_line(qtbot, made):
     assert f"{column}, {row}" in text and "mm" in text and "DN" in text
     assert session.project.scene.visible_objects[int(curve.object_id[k])].name in text
     assert made.profile.row.value() == row
-    assert made.overlay.hover.isVisible() and made.overlay.hover.value() == row
+    assert made.marks.hover.isVisible() and made.marks.hover.value() == row
 
 
 def test_the_wheel_zooms_to_single_pixels(qtbot, made):
@@ -221,3 +240,21 @@ def test_what_is_fitted_stays_fitted_until_a_person_zooms(qtbot, made):
     made.resize(500, 900)
     qtbot.waitUntil(lambda: made.view.width() < 510)
     assert seen()[0] < 0.9, "what is zoomed to stays"
+
+
+def test_a_drag_with_shift_chooses_scan_lines_and_moves_nothing(qtbot, made):
+    made.view.fit()
+    before, told = made.view.box.viewRect(), []
+    made.session.range_dragged.connect(lambda low, high: told.append((low, high)))
+    drag_with_shift(made, (10, 40), (30, 20))
+    assert told == [(19.5, 40.5)]
+    assert made.view.box.viewRect() == before
+
+
+def test_a_range_that_results_tell_of_is_marked(qtbot, made):
+    band = made.marks.bands["rows"]
+    made.session.show_range((10.0, 20.5))
+    assert band.isVisible() and band.getRegion() == (10.0, 20.5)
+    assert not made.marks.bands["columns"].isVisible()
+    made.session.show_range(None)
+    assert not band.isVisible()

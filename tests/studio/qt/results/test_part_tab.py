@@ -17,6 +17,7 @@ from studio.qt.results.plots import PointedPlots
 from studio.qt.results.results_panel import PART, REGION, ResultsPanel
 from studio.scan.gauging import readings
 from studio.scan.redevelop import develop_again, development, measure_again
+from studio.scan.region import Region
 from studio.scan.stages import Measurement
 from tests.studio.qt.small_session import small_project, small_render, small_session
 
@@ -177,3 +178,26 @@ def test_a_drag_over_rows_tells_of_their_errors_and_writes_their_points(
     assert [int(row["row"]) for row in rows] == found.points.index[here].tolist()
     panel.region.clear.click()
     assert not panel.rows.spans[0].isVisible()
+
+
+def test_scan_lines_chosen_in_the_picture_are_marked_in_the_charts_and_back(panel: ResultsPanel, qtbot: QtBot) -> None:
+    session, told = panel.session, []
+    session.range_dragged.emit(39.5, 90.5)
+    assert panel.region.region == Region("scan lines", 39.5, 90.5) and panel.figures.currentIndex() == REGION
+    assert panel.rows.spans[0].isVisible() and panel.rows.spans[0].ends == (39.5, 90.5)
+    drag(qtbot, panel.rows, 40.0, 60.0, 2)
+    region = panel.region.region
+    assert region is not None and session.range == (region.low, region.high)
+    panel.region.clear.click()
+    assert session.range is None
+    session.message.connect(lambda level, text: told.append(text))
+    panel.hide()
+    session.range_dragged.emit(39.5, 90.5)
+    assert told == ["Measure, Region tells of scan lines 40 to 90"]
+
+
+def test_scan_lines_dragged_in_the_picture_are_a_measures_region_while_it_is_added(panel: ResultsPanel) -> None:
+    panel.part.start("straightness")
+    panel.session.range_dragged.emit(40.0, 90.0)
+    (made,) = panel.session.project.measures
+    assert made.kind == "straightness" and panel.session.range is None
