@@ -37,6 +37,8 @@ VIEW_KEYS = {
     "A": "frame everything",
     "X": "arrows along the part or the world",
     "T": "aim the laser at the next click",
+    "G": "move: then X, Y or Z and a number",
+    "R": "turn: then X, Y or Z and a number",
 }
 """Key -> what it does while the 3D view has the focus."""
 COMMANDS: tuple[Command | str, ...] = (

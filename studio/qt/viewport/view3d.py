@@ -61,6 +61,8 @@ class View3D(QtInteractor):  # type: ignore[misc]
         self.before_paint: Callable[[], None] = lambda: None
         self.takes_click: Callable[[float, float], bool] = lambda x, y: False
         """Whether something drawn over the scene is clicked, which the scene then does not hear of."""
+        self.typing: Callable[[QKeyEvent], bool] | None = None
+        """What takes the keys while something is moved by them; it says whether it wants this one."""
         self.paints = 0
         """How often the view has been drawn."""
         self.front = vtkRenderer()
@@ -175,6 +177,11 @@ class View3D(QtInteractor):  # type: ignore[misc]
         self.left.emit()
 
     def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ShortcutOverride and self.typing is not None:
+            assert isinstance(event, QKeyEvent)
+            if self.typing(event):
+                event.accept()
+                return True
         # while something is held Escape lets go of it, whatever it means to the window
         if event.type() == QEvent.Type.ShortcutOverride and self._grip == "tool":
             assert isinstance(event, QKeyEvent)
@@ -184,6 +191,8 @@ class View3D(QtInteractor):  # type: ignore[misc]
         return bool(super().event(event))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
+        if self.typing is not None and self.typing(event):
+            return
         if event.key() == Qt.Key.Key_Escape and self._grip == "tool" and self.tool is not None:
             self.tool.cancel()
             return
@@ -196,7 +205,7 @@ class View3D(QtInteractor):  # type: ignore[misc]
     def closeEvent(self, event: QCloseEvent) -> None:
         self.before_paint = lambda: None
         self.takes_click = lambda x, y: False
-        self.tool = None
+        self.tool = self.typing = None
         super().closeEvent(event)
 
     def let_go(self) -> None:

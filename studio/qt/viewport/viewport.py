@@ -26,6 +26,7 @@ from studio.qt.viewport.board_ghost import BoardGhost
 from studio.qt.viewport.gizmo import Gizmo
 from studio.qt.viewport.handle_tool import Tools
 from studio.qt.viewport.section_plane import SectionPlane
+from studio.qt.viewport.typed_move import TypedMove
 from studio.qt.viewport.view3d import View3D
 from studio.qt.viewport.viewport_bar import ViewportBar
 from studio.qt.viewport.viewport_scene import CAMERA, LASERS, ViewportScene, object_path
@@ -46,6 +47,7 @@ class Viewport(QWidget):
         self.ghost = BoardGhost(session, self.view)
         self.gizmo = Gizmo(session, self.live, self.view)
         self.section = SectionPlane(session, self.view)
+        self.typed = TypedMove(self.gizmo, self.view)
         self._tools = Tools(self.section, self.gizmo)
         self.view.tool = self._tools
         self.view.before_paint = self._tools.draw
@@ -138,7 +140,9 @@ class Viewport(QWidget):
         return selected[:4] if own else (*LASERS, 0) if count else ()
 
     def _clicked(self, x: float, y: float) -> None:
-        if self.bar.aim.isChecked():
+        if self.typed.active:
+            self.typed.accept()
+        elif self.bar.aim.isChecked():
             self.aim_at(x, y)
         else:
             self.session.select(self.path_at(x, y))
@@ -176,8 +180,8 @@ class Viewport(QWidget):
         view.hovered.connect(self._hover_later)
         view.left.connect(self._hover.stop)
         view.navigated.connect(self._leave)
-        for tool in self._tools.tools:
-            tool.told.connect(self.bar.tell)
+        for told in (*(tool.told for tool in self._tools.tools), self.typed.told):
+            told.connect(self.bar.tell)
         handlers: dict[str, Callable[[], None]] = {
             "1": lambda: self.look_along("front"),
             "2": lambda: self.look_along("left"),
@@ -190,6 +194,8 @@ class Viewport(QWidget):
             "A": self.frame,
             "X": lambda: self.set_local(not self.gizmo.local),
             "T": lambda: self.begin_aim(not self.bar.aim.isChecked()),
+            "G": lambda: self.typed.begin(turns=False),
+            "R": lambda: self.typed.begin(turns=True),
         }
         for key in VIEW_KEYS:
             shortcut = QShortcut(QKeySequence(key), self)

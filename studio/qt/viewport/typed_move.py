@@ -1,0 +1,176 @@
+"""G and R: what is selected follows the mouse, or a typed number, along or about an axis, until Return or a click."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtGui import QCursor, QKeyEvent
+
+from render.base.arrays import Float
+from render.base.errors import InputError
+from render.base.pose import rotation_matrix
+from studio.editing.units import Unit
+from studio.preview.gizmo_geometry import Drag, Frame, Handle, Kind
+from studio.qt.viewport.gizmo import Gizmo
+from studio.qt.viewport.view3d import Tool, View3D
+
+AXES = {Qt.Key.Key_X: 0, Qt.Key.Key_Y: 1, Qt.Key.Key_Z: 2}
+COMMANDS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
+NUMBER = "0123456789.,+-*/()"
+HINT = "X, Y, Z: the axis, twice for the part's own; a number; Return or a click: done; Esc: back"
+
+
+class TypedMove(QObject):
+    """One move or turn at a time, by what the gizmo moves, and one step to undo."""
+
+    told = Signal(str)
+    """How far it has come, in words; empty when it is over."""
+
+    def __init__(self, gizmo: Gizmo, view: View3D) -> None:
+        super().__init__(view)
+        self.gizmo, self.view = gizmo, view
+        self.turns = False
+        self.axis: int | None = None
+        self.own = False
+        """Along the axes of the item in place of the world's."""
+        self.text = ""
+        """The number as far as it is typed, mm or degrees."""
+        self._at: Frame | None = None
+        """Where the item stood; the world's axes. None: nothing is being moved."""
+        self._own_axes = np.eye(3)
+        self._drag: Drag | None = None
+        self._tool: Tool | None = None
+        view.hovered.connect(self._follow_mouse)
+        gizmo.session.selection_changed.connect(self.cancel)
+        gizmo.session.document_replaced.connect(self.accept)
+        view.installEventFilter(self)
+
+    @property
+    def active(self) -> bool:
+        return self._at is not None
+
+    def begin(self, turns: bool) -> None:
+        """Of what is selected; while one goes on, the other kind takes its place."""
+        self.cancel()
+        target, session = self.gizmo.target, self.gizmo.session
+        if target is None:
+            session.message.emit("error", "nothing that can be moved is selected; click on it")
+            return
+        if session.dragging:
+            return
+        T = target.T_world_item
+        pixel = self.view.eye.metres_per_pixel(T[:3, 3], self.view.pixels)
+        self.turns, self.axis, self.own, self.text = turns, None, False, ""
+        self._at, self._own_axes = Frame(T[:3, 3].copy(), np.eye(3), pixel), T[:3, :3].copy()
+        self.gizmo.begin()
+        # the click that ends it may be on a handle
+        self.view.typing, self.view.tool, self._tool = self.type, None, self.view.tool
+        self._begin_drag()
+        self.told.emit(HINT)
+
+    def accept(self) -> None:
+        """It stays where it is."""
+        if self.active:
+            self._at = self._drag = None
+            self.view.typing, self.view.tool = None, self._tool
+            self.gizmo.end()
+            self.told.emit("")
+
+    def cancel(self) -> None:
+        """As it was before."""
+        if self.active:
+            self.accept()
+            self.gizmo.put_back()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Who turns to something else is done."""
+        if event.type() == QEvent.Type.FocusOut:
+            self.accept()
+        return super().eventFilter(watched, event)
+
+    def type(self, event: QKeyEvent) -> bool:
+        """Take a key: every plain one, so that none does something else meanwhile; a command ends it."""
+        key, text = Qt.Key(event.key()), event.text()
+        if text and event.modifiers() & COMMANDS:
+            self.accept()
+            return False
+        if event.type() == QEvent.Type.ShortcutOverride:
+            return bool(text) or key == Qt.Key.Key_Escape
+        if key in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.accept()
+        elif key == Qt.Key.Key_Escape:
+            self.cancel()
+        elif key in AXES:
+            self.own = not self.own if self.axis == AXES[key] else False
+            self.axis = AXES[key]
+            self._begin_drag()
+            self._move()
+        elif key == Qt.Key.Key_Backspace:
+            self.text = self.text[:-1]
+            self._move()
+        elif text and text in NUMBER:
+            self.text += text
+            self.axis = 0 if self.axis is None else self.axis
+            self._move()
+        elif key in (Qt.Key.Key_G, Qt.Key.Key_R):
+            self.begin(key == Qt.Key.Key_R)
+        return bool(text)
+
+    def _frame(self) -> Frame:
+        """The axes that it goes along: the view's while none is chosen."""
+        assert self._at is not None
+        axes = self.view.eye.rotation if self.axis is None else self._own_axes if self.own else np.eye(3)
+        return Frame(self._at.centre, axes, self._at.pixel)
+
+    def _begin_drag(self) -> None:
+        """From where the mouse is now."""
+        kind: Kind = "ring" if self.turns else "plane" if self.axis is None else "axis"
+        at = QPointF(self.view.mapFromGlobal(QCursor.pos()))
+        ray = self.view.eye.ray(at.x(), at.y(), self.view.pixels)
+        self._drag = Drag(self._frame(), Handle(kind, 2 if self.axis is None else self.axis), *ray)
+
+    def _follow_mouse(self, x: float, y: float) -> None:
+        if self._drag is not None and not self.text:
+            motion = self._drag.to(*self.view.eye.ray(x, y, self.view.pixels))
+            if motion is not None:
+                self._apply(motion, self._drag.angle)
+
+    def _move(self) -> None:
+        """By the number, if there is one."""
+        if not self.text:
+            self._apply(np.eye(4), 0.0)
+            return
+        unit = Unit.of("rad" if self.turns else "m")
+        try:
+            amount = unit.parse(self.text)
+        except InputError:
+            self.told.emit(f"{self._words()} {self.text}…")
+            return
+        frame, motion = self._frame(), np.eye(4)
+        axis = frame.axes[:, self.axis or 0]
+        if self.turns:
+            motion[:3, :3] = rotation_matrix(axis * amount)
+            motion[:3, 3] = frame.centre - motion[:3, :3] @ frame.centre
+        else:
+            motion[:3, 3] = amount * axis
+        self._apply(motion, amount if self.turns else 0.0)
+
+    def _apply(self, motion: Float, angle: float) -> None:
+        self.gizmo.follow(motion, self.turns)
+        frame = self._frame()
+        if self.turns:
+            far = f"{math.degrees(angle):+.4g}°"
+        elif self.axis is None:
+            far = f"{1e3 * np.linalg.norm(motion[:3, 3]):.2f} mm"
+        else:
+            far = f"{1e3 * motion[:3, 3] @ frame.axes[:, self.axis]:+.6g} mm"
+        typed = f" ({self.text})" if self.text else ""
+        self.told.emit(f"{self._words()} {far}{typed}")
+
+    def _words(self) -> str:
+        verb = "turn about" if self.turns else "move along"
+        if self.axis is None:
+            return "turn" if self.turns else "move"
+        return f"{verb} {'its own ' if self.own else ''}{'xyz'[self.axis]}"
