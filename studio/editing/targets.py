@@ -61,6 +61,20 @@ def target(project: Project, selection: FieldPath, step: int = 0) -> Target | No
     return None
 
 
+def other_frame(project: Project, path: FieldPath, step: int = 0) -> tuple[str, Float] | None:
+    """The pose at a path in the other of the two frames that people think in: "world" or "rig", and T_other_parent.
+
+    None: of the rig itself and of poses that nothing in the scene has there is no other.
+    """
+    head = path[:-1]
+    if head == RIG or not head or _pose_name(head) != path[-1]:
+        return None
+    T_world_parent = _parent(project.scene, head, step)
+    if head[:2] == RIG:
+        return "world", T_world_parent
+    return "rig", np.asarray(invert(project.scene.T_world_rig(step)) @ T_world_parent)
+
+
 def rounded(values: Float) -> Vector3:
     """To a nanometre: what a mouse says is no finer."""
     x, y, z = (round(float(value), 9) + 0.0 for value in values)

@@ -12,14 +12,18 @@ from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QVBoxLayout,
 
 from render.base.errors import InputError
 from studio.editing.forms import Alternative, FieldSpec, describe_item, edited, field_path, start_value
+from studio.editing.targets import other_frame
 from studio.project.document import FieldPath, value_at
 from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.forms.fields import ChoiceField, TextField, reason, tool_button
-from studio.qt.forms.form_rows import LABEL_WIDTH, RESET_WIDTH, SPACING, PositionRow, RotationRow, Row
+from studio.qt.forms.form_rows import LABEL_WIDTH, RESET_WIDTH, SPACING, Row
+from studio.qt.forms.pose_rows import PositionRow, RotationRow
 
 GROUPS = ("model", "union", "list", "pose")
 """Kinds that stand in a section of their own."""
+PLACES = {"world": "Pose in the world", "rig": "Pose on the rig"}
+"""What a pose is called by its frame."""
 MAX_ITEMS = 12
 """Of a list, shown."""
 ChooseFile = Callable[[FieldPath, Alternative | None], object]
@@ -98,6 +102,9 @@ class Section(QWidget):
 class Form(QWidget):
     """The fields of one item of the project."""
 
+    elsewhere: set[str] = set()  # noqa: RUF012 - shared on purpose, as what is folded
+    """Names of poses that are shown in the other frame, the world's or the rig's."""
+
     def __init__(self, session: Session, choose: ChooseFile) -> None:
         super().__init__()
         self.session, self.choose_file = session, choose
@@ -110,6 +117,7 @@ class Form(QWidget):
         self._column.setContentsMargins(0, 0, 0, 0)
         self._column.setSpacing(4)
         self._content: QWidget | None = None
+        session.step_changed.connect(self._follow_step)
 
     def show_item(self, path: FieldPath, spec: FieldSpec) -> None:
         """Show an item; in place where only values differ, so that focus and folding stay."""
@@ -179,7 +187,13 @@ class Form(QWidget):
         poses = spec.kind == "list" and all(item.kind == "pose" for item in spec.fields)
         if poses:
             tools = (self._tool("+", "Add a pose like the last one", lambda: self._add_item(path)),)
-        section = Section(spec.label, spec.help, tools)
+        title, other = spec.label, other_frame(self.session.project, path, self.session.step)
+        if spec.kind == "pose" and other is not None:
+            there, frame = spec.name in self.elsewhere, other[0]
+            here = "rig" if frame == "world" else "world"
+            title = PLACES[frame] if there else title
+            tools = (*tools, self._frame_switch(spec.name, here if there else frame))
+        section = Section(title, spec.help, tools)
         if spec.kind == "pose":
             self._add_row(section.rows, PositionRow(self, owner, spec))
             self._add_row(section.rows, RotationRow(self, owner, spec))
@@ -205,6 +219,24 @@ class Form(QWidget):
         button.setFixedSize(RESET_WIDTH, RESET_WIDTH)
         button.clicked.connect(lambda _checked=False: handler())
         return button
+
+    def _frame_switch(self, name: str, frame: str) -> QWidget:
+        """Shows poses of this name in the other frame."""
+        button = tool_button(frame.capitalize(), f"{PLACES[frame]} in place of this")
+        button.clicked.connect(lambda _checked=False: self._switch_frame(name))
+        return button
+
+    def _switch_frame(self, name: str) -> None:
+        self.elsewhere.symmetric_difference_update({name})
+        path = self._structure[0]
+        self._rebuild(path, describe_item(self.session.project, path))
+
+    def _follow_step(self) -> None:
+        """Where a motion carries what is shown in the other frame."""
+        for rows in self.rows.values():
+            for row in rows:
+                if row.is_stale(row.spec):
+                    row.refresh(row.spec)
 
     def _add_item(self, path: FieldPath) -> None:
         items = value_at(self.session.project, path)
@@ -253,7 +285,7 @@ class Form(QWidget):
         for field in spec.fields:
             path = field_path(owner, field)
             for row in self.rows.get(path, ()):
-                if row.spec.value != field.value or row.spec.default != field.default:
+                if row.is_stale(field):
                     row.refresh(field)
             if field.kind in GROUPS:
                 self._refresh(path, field)

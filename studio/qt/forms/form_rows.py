@@ -1,4 +1,4 @@
-"""The rows of a form: label, editor, reset and the reason why a value was refused; poses have two of them."""
+"""The rows of a form: label, editor, reset and the reason why a value was refused."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QMenu, QVBoxLayout, QWidget
 
-from studio.editing.euler_angles import euler_angles, rotation_from_euler
 from studio.editing.forms import REQUIRED, FieldSpec, field_path
-from studio.editing.units import SHOWN, Unit
 from studio.project.document import FieldPath
 from studio.qt.forms.fields import ChoiceField, CurveField, CurvePlot, FlagField, NumbersField, TextField, tool_button
 from studio.qt.forms.number_field import NumberField, VectorField
@@ -23,8 +21,6 @@ if TYPE_CHECKING:
     from studio.qt.forms.form import Form
 
 LABEL_WIDTH, RESET_WIDTH, SPACING = 100, 20, 5
-AXES = ("x", "y", "z")
-DEGREES = Unit("", "deg", 1.0)
 
 
 def _itself(value: Any) -> Any:
@@ -73,6 +69,10 @@ class Row(QWidget):
         self.reset.setVisible(known)
         if known:
             self.reset.setToolTip(f"Back to the default: {self._text(default)}")
+
+    def is_stale(self, spec: FieldSpec) -> bool:
+        """Whether something else is to be shown, now that the field is this."""
+        return bool(self.spec.value != spec.value or self.spec.default != spec.default)
 
     def change(self, value: Any, label: str = "", merge: str = "") -> bool:
         """Ask the form for the change; a refusal is told under the field."""
@@ -249,73 +249,3 @@ class Row(QWidget):
         line.addWidget(self.text)
         line.addWidget(browse)
         return holder
-
-
-class PositionRow(Row):
-    """The translation of a pose, mm."""
-
-    def _title(self) -> tuple[str, str]:
-        return "Position", SHOWN["m"]
-
-    def _value(self) -> Any:
-        return self.spec.value.translation
-
-    def _default(self) -> Any:
-        return (0.0, 0.0, 0.0)
-
-    def _text(self, value: Any) -> str:
-        return " ".join(Unit.of("m").format(part) for part in value) + f" {SHOWN['m']}"
-
-    def _help(self) -> str:
-        return "<b>Position</b><br>x, y, z of its origin. Drag sideways, or click to type."
-
-    def _make_editor(self) -> QWidget:
-        length = replace(self.spec, kind="number", unit=Unit.of("m"), optional=False)
-        specs = [replace(length, name=axis, value=v) for axis, v in zip(AXES, self._value(), strict=True)]
-        return self._vector(specs, self._with_part)
-
-    def change(self, value: Any, label: str = "", merge: str = "") -> bool:
-        return super().change(self.spec.value.model_copy(update={"translation": value}), label, merge)
-
-
-class RotationRow(Row):
-    """The rotation of a pose as angles about the fixed axes x, then y, then z; deg."""
-
-    def __init__(self, form: Form, owner: FieldPath, spec: FieldSpec) -> None:
-        self.angles = euler_angles(spec.value.rotation)
-        super().__init__(form, owner, spec)
-
-    def varied(self) -> list[tuple[FieldPath, FieldSpec]]:
-        return []  # the project holds no angles
-
-    def refresh(self, spec: FieldSpec) -> None:
-        # near the angles that are shown, so that turning one leaves the others alone
-        self.angles = euler_angles(spec.value.rotation, near=self.angles)
-        super().refresh(spec)
-
-    def _title(self) -> tuple[str, str]:
-        return "Rotation", "deg"
-
-    def _value(self) -> Any:
-        return self.angles
-
-    def _default(self) -> Any:
-        return (0.0, 0.0, 0.0)
-
-    def _text(self, value: Any) -> str:
-        return " ".join(DEGREES.format(part) for part in value) + " deg"
-
-    def _help(self) -> str:
-        return "<b>Rotation</b><br>About the fixed axes x, then y, then z. Drag sideways, or click to type."
-
-    def _make_editor(self) -> QWidget:
-        angle = replace(self.spec, kind="number", unit=DEGREES, optional=False)
-        specs = [replace(angle, name=axis, value=v) for axis, v in zip(AXES, self.angles, strict=True)]
-        return self._vector(specs, self._with_part)
-
-    def change(self, value: Any, label: str = "", merge: str = "") -> bool:
-        before, self.angles = self.angles, value
-        made = super().change(self.spec.value.model_copy(update={"rotation": rotation_from_euler(value)}), label, merge)
-        if not made:
-            self.angles = before
-        return made
