@@ -74,9 +74,14 @@ def test_a_time_limit_leaves_a_frame_and_what_it_takes_to_go_on(project: Project
     groups = {one["group"]: one for one in done.manifest["light"][0]["groups"]}
     assert groups["indirect"]["error"] > groups["indirect"]["target"] == 2e-4
     assert groups["indirect"]["reason"] == "unfinished" and groups["direct"]["reason"] == "target"
-    scan(slow, tmp_path, seconds=0.5, resume=True)
-    second = read_frame(tmp_path / "frame_0000.json")
-    assert second.quality_of("indirect", "laser").work > first.quality_of("indirect", "laser").work > 0
+    begun = first.quality_of("indirect", "laser").work
+    second = first
+    for _ in range(20):  # a busy machine may spend a whole limit on what was there
+        scan(slow, tmp_path, seconds=0.5, resume=True)
+        second = read_frame(tmp_path / "frame_0000.json")
+        if second.quality_of("indirect", "laser").work > begun:
+            break
+    assert second.quality_of("indirect", "laser").work > begun > 0
     names = [name for name, _ in quality_lines(second.quality)]
     assert names == ["laser, direct", "laser, reflected on", "ambient"]
     assert all(one.invalid == 0 for one in second.quality)

@@ -94,10 +94,11 @@ def test_progress_is_told_at_most_ten_times_a_second(qtbot, runner):
 
     runner.progress.connect(lambda job: told.append(job.stage))
     runner.run("a", "count", work)
-    qtbot.waitUntil(lambda: len(told) >= 3)
+    qtbot.waitUntil(lambda: told.count("counting") >= 3)
     end.set()
     qtbot.waitUntil(lambda: not runner.busy)
-    assert len(told) <= 1 + 10 * (time.monotonic() - began) and set(told) == {"counting"}
+    # before its thread has begun a job is in no stage
+    assert len(told) <= 1 + 10 * (time.monotonic() - began) and set(told) <= {"", "counting"}
 
 
 def test_closing_stops_and_joins_everything(qtbot, runner):
