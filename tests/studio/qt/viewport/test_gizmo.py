@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,15 +13,11 @@ from pytestqt.qtbot import QtBot
 from render.base.pose import Pose, rotation_vector
 from render.scene.motion import LinearStage
 from studio.preview.gizmo_geometry import Frame, Handle, arm_end, plane_corners, ring_points
-from studio.project.document import Document, FieldPath, value_at
-from studio.project.project import Project
-from studio.qt.core import theme
-from studio.qt.core.session import Session
+from studio.project.document import FieldPath, value_at
 from studio.qt.results.readout_panel import ReadoutPanel
 from studio.qt.viewport.viewport import Viewport
 from tests.studio.qt.viewport.viewport_hands import drag, mouse, pixel
 
-SAMPLE = Path(__file__).parents[4] / "assets/projects/plane/project.json"
 RIG, CAMERA, LASER, PLATE, LAMP = (
     ("scene", "rig"),
     ("scene", "rig", "camera"),
@@ -33,19 +27,6 @@ RIG, CAMERA, LASER, PLATE, LAMP = (
 )
 POSE = {RIG: "T_world_rig", CAMERA: "T_rig_camera", LASER: "T_rig_laser", PLATE: "T_world_object",
         LAMP: "T_world_light"}  # fmt: skip
-
-
-@pytest.fixture
-def viewport(qtbot: QtBot) -> Iterator[Viewport]:
-    theme.apply("dark")
-    project = Project.load(SAMPLE)
-    made = Viewport(Session(Document(project, SAMPLE)))
-    made.resize(700, 560)
-    made.show()
-    qtbot.addWidget(made)
-    qtbot.waitUntil(lambda: len(made.live.look.placed) == 1 and not made._frame_soon and made.view.paints > 0)
-    yield made
-    made.close()
 
 
 def pose_of(viewport: Viewport, path: FieldPath) -> Pose:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,33 +10,17 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
-from pytestqt.qtbot import QtBot
 
 from render.base.pose import rotation_matrix
-from studio.project.document import Document
-from studio.project.project import Project
-from studio.qt.core import theme
-from studio.qt.core.session import Session
 from studio.qt.viewport.viewport import Viewport
 
 SAMPLE = Path(__file__).parents[4] / "assets/projects/plane/project.json"
 LASER = ("scene", "rig", "lasers", 0)
 
 
-@pytest.fixture
-def viewport(qtbot: QtBot) -> Iterator[Viewport]:
-    theme.apply("dark")
-    made = Viewport(Session(Document(Project.load(SAMPLE), SAMPLE)))
-    made.resize(700, 560)
-    made.show()
-    qtbot.addWidget(made)
-    qtbot.waitUntil(lambda: len(made.live.look.placed) == 1 and not made._frame_soon and made.view.paints > 0)
-    made.activateWindow()
-    made.view.setFocus()
-    qtbot.waitUntil(made.view.hasFocus)
-    made.session.select(LASER)
-    yield made
-    made.close()
+@pytest.fixture(autouse=True)
+def selected(viewport: Viewport) -> None:
+    viewport.session.select(LASER)
 
 
 def type_keys(viewport: Viewport, text: str) -> None:
