@@ -25,6 +25,8 @@ ROUNDS = 4
 OUTLIER_SIGMAS = 5.0
 GRAZING = 1e-3
 """Sine of the angle between curve and d below which a point slides along the curve and tells nothing of it."""
+FOOT_STEPS = 3
+"""Of Newton's method, for the foot of a point's ray: of a line the second is exact."""
 BEYOND_CHANCE = 3.0
 """Sigmas by which the sum of squares exceeds its mean before it tells of more than the predicted noise."""
 
@@ -155,12 +157,22 @@ def fit(
 
 
 def _misses(curve: Curve, local: Float, direction: Float, theta: Float) -> tuple[Float, Float, Float]:
-    """Of (n,) points, in sigmas: e, and its derivatives by theta (n, p) and by the local position (n, 2)."""
-    value, by_point, by_theta = curve(local, theta)
-    step = np.einsum("ij,ij->i", by_point, direction)
-    least = GRAZING * np.linalg.norm(by_point, axis=1) * np.linalg.norm(direction, axis=1)
-    step = np.where(np.abs(step) < least, np.copysign(least, step), step)
-    return value / step, by_theta / step[:, None], by_point / step[:, None]
+    """Of (n,) points, in sigmas: e, and its derivatives by theta (n, p) and by the local position (n, 2).
+
+    A point's true place is the foot of its own ray on the curve, P - e d. Derivatives are taken there: where the point
+    was seen they hold its noise, and correlate with e, which made flanks steeper by up to 0.4 sigma.
+    """
+    e = np.zeros(len(local))
+    for _ in range(FOOT_STEPS):
+        value, by_point, by_theta = curve(local - e[:, None] * direction, theta)
+        step = np.einsum("ij,ij->i", by_point, direction)
+        least = GRAZING * np.linalg.norm(by_point, axis=1) * np.linalg.norm(direction, axis=1)
+        step = np.where(np.abs(step) < least, np.copysign(least, step), step)
+        e = e + value / step
+        # the foot of a wild point, which is left out soon, may be anywhere
+        reach = OUTLIER_SIGMAS * max(1.0, robust_sigma(e))
+        miss, e = e, np.clip(e, -reach, reach)
+    return miss, by_theta / step[:, None], by_point / step[:, None]
 
 
 def _weighted(whitening: tuple[Float, Float], weight: Float) -> tuple[Float, Float]:
