@@ -7,13 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.gauges.fit import OUTLIER_SIGMAS, Fit, Frame
+from analysis.gauges.fit import Fit, Frame
 from analysis.gauges.profile import Profile
-from analysis.measures import robust_sigma
-from render.base.arrays import Float
+from analysis.gauges.spikes import NEIGHBOURS, spikes
 
-NEIGHBOURS = 5
-"""Points in a row whose median tells a spike from a step."""
 UNSURE = 10.0
 """Times the section's median sigma: a straight line over such a point's place knows more than the point."""
 MISSING = 0.05
@@ -40,25 +37,12 @@ def section_points(profile: Profile, region: tuple[float, float], frame: Frame) 
     low, high = section(region, frame)
     order = np.argsort(local[:, 0], kind="stable")
     first, last = np.searchsorted(local[order, 0], [low, high])
-    order = order[max(first - 1, 0) : last + 1]
-    own = np.linalg.norm(profile.random[order], axis=1)
-    off = _off_neighbours(local[order])
-    return np.asarray(order[off <= OUTLIER_SIGMAS * np.maximum(robust_sigma(off), own)])
-
-
-def _off_neighbours(local: Float) -> Float:
-    """(n,) m of each of (n, 2) points in their order off the median of its neighbours, or off a line through them.
-
-    The less of both: the median keeps the edges of a step, the line (Sen, J. Am. Stat. Assoc. 63, 1968) a slope.
-    """
-    half = NEIGHBOURS // 2
-    x, y = (np.lib.stride_tricks.sliding_window_view(np.pad(one, half, mode="edge"), NEIGHBOURS) for one in local.T)
-    i, j = np.triu_indices(NEIGHBOURS, 1)
-    run = x[:, j] - x[:, i]
-    slope = np.median((y[:, j] - y[:, i]) / np.where(run > 0.0, run, np.inf), axis=1)
-    beside = y - slope[:, None] * (x - x[:, [half]])
-    middle = y[:, half]
-    return np.asarray(np.minimum(np.abs(middle - np.median(y, axis=1)), np.abs(middle - np.median(beside, axis=1))))
+    # judged among neighbours beyond the ends as well: of two points at an end either may be the false one
+    begin = max(first - 1 - NEIGHBOURS, 0)
+    wide = order[begin : last + 1 + NEIGHBOURS]
+    false = spikes(local[wide], np.linalg.norm(profile.random[wide], axis=1))
+    taken = slice(max(first - 1, 0) - begin, last + 1 - begin)
+    return np.asarray(wide[taken][~false[taken]])
 
 
 def area_above(profile: Profile, region: tuple[float, float], frame: Frame) -> Fit:

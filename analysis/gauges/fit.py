@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.gauges.profile import Profile
+from analysis.gauges.spikes import spikes
 from analysis.measures import robust_sigma
 from render.base.arrays import Float
 
@@ -126,6 +127,9 @@ def fit(
     frame, in place of those of the points.
     """
     here = weight > 0.0
+    # a false point far off draws a curve so near that it is no outlier of it
+    places, sigma = profile.position[here], np.linalg.norm(profile.random[here], axis=1)
+    here[np.flatnonzero(here)[spikes(places, sigma)]] = False
     frame = frame_of(profile.position[here])
     frame = frame if axes is None else Frame(frame.centre, axes)
     for round_left in reversed(range(ROUNDS)):

@@ -75,10 +75,12 @@ def regions(kind: Kind, project: Project, frame: Frame) -> Regions:
     if kind == "angle":
         half = shape.depth * math.tan(0.5 * shape.angle)
         return ((middle - 0.85 * half, middle - 0.15 * half), (middle + 0.15 * half, middle + 0.85 * half))
-    edges = across[:-1][np.abs(np.diff(height)) > 0.5 * shape.rise]
+    # an edge may lie between two scan lines or on one
+    jumps = np.abs(height[2:] - height[:-2]) > 0.5 * shape.rise
+    edges = across[1:-1][jumps & ~np.append(False, jumps[:-1])]
     first = len(edges) // 2 - 1
-    margins = 0.1 * np.diff(edges[first : first + 3])
     low, edge, high = edges[first : first + 3]
+    margins = 0.1 * (edge - low), 0.1 * (high - edge)
     return ((low + margins[0], edge - margins[0]), (edge + margins[1], high - margins[1]))
 
 

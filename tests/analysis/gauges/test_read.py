@@ -84,6 +84,19 @@ def test_a_few_wild_points_are_left_out() -> None:
     assert reading.points == clean.points - 3
 
 
+@pytest.mark.parametrize("kind", ["radius", "straightness", "angle", "step", "gap"])
+@pytest.mark.parametrize("place", [0, 3])
+def test_a_false_point_far_off_draws_nothing_to_it(kind: str, place: int) -> None:
+    """At the end of a region, where it has most say: a circle that took one in was three times too large."""
+    height, exact = shape(kind)
+    points = profile(height, noise=noises(1, 1.0, seed=5)[0])
+    last = np.flatnonzero(points.weight(*REGION[kind][0]) > 0.0)[-1 - place]
+    points.position[last, 1] += 0.166
+    reading = read(gauge(kind), 0, points, None)
+    assert abs(reading.value - exact) < 4.0 * reading.sigma
+    assert reading.sigma < 1.5 * read(gauge(kind), 0, profile(height), None).sigma
+
+
 def test_residuals_beyond_the_noise_widen_sigma() -> None:
     height, _ = shape("step")
     wavy = height + 1e-4 * np.sin(ACROSS / 7e-4)
