@@ -12,7 +12,7 @@ from tests.mutations.runner import Runner, run_all, share
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="cases run in forks of one process")
 
-FEW = 150
+FEW = 75
 MANY = int(os.environ.get("MUTATIONS", 10_000))
 """Cases under `make validate`."""
 SHOWN = 20

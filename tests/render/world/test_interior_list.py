@@ -186,6 +186,7 @@ def test_what_is_hidden_within_a_body_changes_nothing(hidden):
         assert with_hidden.sum() == pytest.approx(alone.sum(), rel=0.02)
 
 
+@pytest.mark.validation
 def test_light_that_wanders_in_wax_goes_on_through_a_boundary_that_is_hidden_there():
     block = moved(primitive_mesh(Box(size_x=0.1, size_y=0.1, size_z=0.05)), (0.0, 0.0, 0.8))
     core = moved(primitive_mesh(Box(size_x=0.09, size_y=0.09, size_z=0.045)), (0.0, 0.0, 0.7995))

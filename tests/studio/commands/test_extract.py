@@ -112,6 +112,7 @@ def test_a_sweep_tells_when_the_sheet_passes_each_pixel(tmp_path: Path) -> None:
     assert np.sqrt(np.mean((time[:, inside] - truth[inside]) ** 2)) < 0.05
 
 
+@pytest.mark.validation
 def test_photographs_of_a_rig_with_its_geometry_and_exposures_and_along_time(tmp_path: Path) -> None:
     root = template_folder("plane")
     project = scaled(Project.load(root / "project.json"), 0.25)

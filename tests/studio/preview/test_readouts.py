@@ -34,7 +34,7 @@ def row(project: Project, name: str, key: str) -> Row:
     return next(found for found in rows(read(project, name)) if found.key == key)
 
 
-@pytest.mark.parametrize("name", ["plane", "weld_seam"])
+@pytest.mark.parametrize("name", ["plane", pytest.param("weld_seam", marks=pytest.mark.validation)])
 def test_they_agree_with_the_rendered_inspection(name: str) -> None:
     project = sample(name)
     dark = replaced(project, ("scene", "lights"), ())
