@@ -96,6 +96,14 @@ def handle_at(
     return line if line is not None and (best <= TOUCH_PX or square is None) else square
 
 
+def turned_about(frame: Frame, axis: int, angle: float) -> Float:
+    """(4, 4) motion in the world: by an angle, rad, about an axis through the centre."""
+    motion = np.eye(4)
+    motion[:3, :3] = rotation_matrix(frame.axes[:, axis] * angle)
+    motion[:3, 3] = frame.centre - motion[:3, :3] @ frame.centre
+    return motion
+
+
 class Drag:
     """One drag of a handle, from the ray at its start."""
 
@@ -112,15 +120,12 @@ class Drag:
         if now is None or self._start is None:
             return None
         motion = np.eye(4)
-        axis = self.frame.axes[:, self.handle.axis]
         if self.handle.kind == "ring":
             # the way round that is nearer to the angle so far, so that a drag can turn more than once
             change = float(now[0] - self._start[0]) - self._angle
             self._angle += math.remainder(change, 2.0 * math.pi)
             self.angle = _stepped(self._angle, turn_step)
-            rotation = rotation_matrix(axis * self.angle)
-            motion[:3, :3] = rotation
-            motion[:3, 3] = self.frame.centre - rotation @ self.frame.centre
+            motion = turned_about(self.frame, self.handle.axis, self.angle)
         else:
             directions = [self.handle.axis] if self.handle.kind == "axis" else self._across
             for value, k in zip(now - self._start, directions, strict=True):

@@ -9,6 +9,7 @@ import numpy as np
 from PySide6.QtWidgets import QWidget
 
 from render.base.arrays import Float
+from render.base.model import Vector3
 from render.base.pose import Pose
 from studio.editing.euler_angles import euler_angles, rotation_from_euler
 from studio.editing.forms import REQUIRED, FieldSpec, field_path
@@ -28,13 +29,15 @@ class PoseRow(Row):
     """Of a pose as it is given, or in the other frame that people think in."""
 
     def __init__(self, form: Form, owner: FieldPath, spec: FieldSpec) -> None:
-        self.form, self.owner = form, owner
-        self.T_shown_given = self._frame(spec)
+        self._last_frame = np.eye(4)
         super().__init__(form, owner, spec)
 
+    def refresh(self, spec: FieldSpec) -> None:
+        self._last_frame = self._frame(spec)
+        super().refresh(spec)
+
     def is_stale(self, spec: FieldSpec) -> bool:
-        before, self.T_shown_given = self.T_shown_given, self._frame(spec)
-        return super().is_stale(spec) or not np.array_equal(before, self.T_shown_given)
+        return super().is_stale(spec) or not np.array_equal(self._last_frame, self._frame(spec))
 
     def varied(self) -> list[tuple[FieldPath, FieldSpec]]:
         return [] if self._elsewhere(self.spec) else super().varied()  # the project has it as it is given
@@ -43,6 +46,7 @@ class PoseRow(Row):
         return spec.name in self.form.elsewhere
 
     def _frame(self, spec: FieldSpec) -> Float:
+        """T_shown_given, (4, 4)."""
         session = self.form.session
         path = field_path(self.owner, spec)
         found = other_frame(session.project, path, session.step) if self._elsewhere(spec) else None
@@ -50,7 +54,7 @@ class PoseRow(Row):
 
     def _shown(self, pose: Pose) -> Pose:
         """In the frame that is shown; as it stands where that is its own."""
-        T = self.T_shown_given
+        T = self._frame(self.spec)
         return pose if np.array_equal(T, np.eye(4)) else Pose.from_matrix(T @ pose.matrix)
 
 
@@ -79,7 +83,7 @@ class PositionRow(PoseRow):
 
     def change(self, value: Any, label: str = "", merge: str = "") -> bool:
         if self._elsewhere(self.spec):
-            T = self.T_shown_given
+            T = self._frame(self.spec)
             value = rounded(T[:3, :3].T @ (np.array(value) - T[:3, 3]))
         return super().change(self.spec.value.model_copy(update={"translation": value}), label, merge)
 
@@ -88,7 +92,7 @@ class RotationRow(PoseRow):
     """The rotation of a pose as angles about the fixed axes x, then y, then z; deg."""
 
     def __init__(self, form: Form, owner: FieldPath, spec: FieldSpec) -> None:
-        self.angles = (0.0, 0.0, 0.0)
+        self.angles: Vector3 | None = None
         super().__init__(form, owner, spec)
 
     def varied(self) -> list[tuple[FieldPath, FieldSpec]]:
@@ -103,7 +107,7 @@ class RotationRow(PoseRow):
         return "Rotation", "deg"
 
     def _value(self) -> Any:
-        return self.angles
+        return self.angles or (0.0, 0.0, 0.0)
 
     def _default(self) -> Any:
         return REQUIRED if self._elsewhere(self.spec) else (0.0, 0.0, 0.0)
@@ -116,7 +120,7 @@ class RotationRow(PoseRow):
 
     def _make_editor(self) -> QWidget:
         angle = replace(self.spec, kind="number", unit=DEGREES, optional=False)
-        specs = [replace(angle, name=axis, value=v) for axis, v in zip(AXES, self.angles, strict=True)]
+        specs = [replace(angle, name=axis, value=v) for axis, v in zip(AXES, self._value(), strict=True)]
         return self._vector(specs, self._with_part)
 
     def change(self, value: Any, label: str = "", merge: str = "") -> bool:
@@ -124,7 +128,7 @@ class RotationRow(PoseRow):
         rotation = rotation_from_euler(value)
         if self._elsewhere(self.spec):
             turned = np.eye(4)
-            turned[:3, :3] = self.T_shown_given[:3, :3].T @ Pose(rotation=rotation).matrix[:3, :3]
+            turned[:3, :3] = self._frame(self.spec)[:3, :3].T @ Pose(rotation=rotation).matrix[:3, :3]
             rotation = Pose.from_matrix(turned).rotation
         made = super().change(self.spec.value.model_copy(update={"rotation": rotation}), label, merge)
         if not made:

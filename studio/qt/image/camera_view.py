@@ -348,8 +348,7 @@ class CameraView(QWidget):
             self._read_out(None)
 
     def _scan_line(self, column: int, row: int) -> int:
-        project = (self.session.shown or self.session).project
-        return row if project.extraction.axis == "rows" else column
+        return row if self.marks.axis == "rows" else column
 
     def _moved(self, event: tuple[QPointF]) -> None:
         where = self.view.box.mapSceneToView(event[0])

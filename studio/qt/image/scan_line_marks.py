@@ -40,12 +40,12 @@ class ScanLineMarks(QObject):
     def _colour(self) -> None:
         accent = QColor(theme.colours().accent)
         self.hover.setPen(pg.mkPen(accent, width=1))
+        ground = QColor(accent)
+        ground.setAlpha(48)
         for band in self.bands.values():
+            band.setBrush(ground)
             for line in band.lines:
                 line.setPen(pg.mkPen(accent, width=1))
-        accent.setAlpha(48)
-        for band in self.bands.values():
-            band.setBrush(accent)
 
     def _show_hover(self) -> None:
         hovered = self.session.hovered

@@ -5,7 +5,6 @@ from __future__ import annotations
 from PySide6.QtGui import QActionGroup
 from PySide6.QtWidgets import QMainWindow, QToolBar, QToolButton
 
-from studio.qt.core import theme
 from studio.qt.core.actions import Actions
 from studio.qt.core.widgets import spring
 from studio.qt.shell.workspaces import WORKSPACES
@@ -16,8 +15,8 @@ SWITCH = {each.key: "render_workspace" if each.key == "render" else each.key for
 """Workspace -> command."""
 
 
-def add_toolbar(window: QMainWindow, commands: Actions, chosen: theme.Choice) -> None:
-    """chosen: the theme that is marked in the menu; one theme and one workspace at a time."""
+def add_toolbar(window: QMainWindow, commands: Actions) -> None:
+    """One workspace is marked at a time."""
     bar = QToolBar("Main", window)
     bar.setObjectName("toolbar")
     bar.setMovable(False)
@@ -37,7 +36,3 @@ def add_toolbar(window: QMainWindow, commands: Actions, chosen: theme.Choice) ->
     bar.addWidget(spring())
     bar.addAction(commands["help"])
     window.addToolBar(bar)
-    themes = QActionGroup(window)
-    for choice in theme.CHOICES:
-        themes.addAction(commands[f"theme_{choice}"])
-    commands[f"theme_{chosen}"].setChecked(True)

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
+from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QWidget
 
 from studio.editing.forms import FieldSpec
@@ -96,7 +96,7 @@ class MainWindow(QMainWindow):
         self.help = Help(self)
         self.tour: Tour | None = None
         self.cloud = self._make_cloud()
-        add_toolbar(self, self.commands, self.preferences.values.theme)
+        add_toolbar(self, self.commands)
         self._connect()
         self._restore()
         self._tell_document()
@@ -270,8 +270,11 @@ class MainWindow(QMainWindow):
             self.commands.connect(key, handler)
         for key, command in SWITCH.items():
             self.commands.connect(command, partial(self.switch_to, key))
+        themes = QActionGroup(self)
         for choice in theme.CHOICES:
+            themes.addAction(self.commands[f"theme_{choice}"])
             self.commands.connect(f"theme_{choice}", partial(self.choose_theme, choice))
+        self.commands[f"theme_{self.preferences.values.theme}"].setChecked(True)
         menus = self.commands.submenus
         filled: dict[str, Callable[[QMenu], None]] = {
             "recent": files.fill_recent,

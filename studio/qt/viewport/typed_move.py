@@ -10,9 +10,8 @@ from PySide6.QtGui import QCursor, QKeyEvent
 
 from render.base.arrays import Float
 from render.base.errors import InputError
-from render.base.pose import rotation_matrix
 from studio.editing.units import Unit
-from studio.preview.gizmo_geometry import Drag, Frame, Handle, Kind
+from studio.preview.gizmo_geometry import Drag, Frame, Handle, Kind, turned_about
 from studio.qt.viewport.gizmo import Gizmo
 from studio.qt.viewport.view3d import Tool, View3D
 
@@ -36,7 +35,7 @@ class TypedMove(QObject):
         self.own = False
         """Along the axes of the item in place of the world's."""
         self.text = ""
-        """The number as far as it is typed, mm or degrees."""
+        """The number as far as it is typed, in the unit that lengths are shown in, or degrees."""
         self._at: Frame | None = None
         """Where the item stood; the world's axes. None: nothing is being moved."""
         self._own_axes = np.eye(3)
@@ -148,14 +147,13 @@ class TypedMove(QObject):
         except InputError:
             self.told.emit(f"{self._words()} {self.text}…")
             return
-        frame, motion = self._frame(), np.eye(4)
-        axis = frame.axes[:, self.axis or 0]
+        frame, axis = self._frame(), self.axis or 0
         if self.turns:
-            motion[:3, :3] = rotation_matrix(axis * amount)
-            motion[:3, 3] = frame.centre - motion[:3, :3] @ frame.centre
+            self._apply(turned_about(frame, axis, amount), amount)
         else:
-            motion[:3, 3] = amount * axis
-        self._apply(motion, amount if self.turns else 0.0)
+            motion = np.eye(4)
+            motion[:3, 3] = amount * frame.axes[:, axis]
+            self._apply(motion, 0.0)
 
     def _apply(self, motion: Float, angle: float) -> None:
         self.gizmo.follow(motion, self.turns)

@@ -1,4 +1,4 @@
-"""The toolbar holds what it promises, and marks one workspace and one theme at a time."""
+"""The toolbar holds what it promises, and marks one workspace at a time."""
 
 from __future__ import annotations
 

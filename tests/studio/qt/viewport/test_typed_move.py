@@ -12,6 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from render.base.pose import rotation_matrix
+from studio.preview.gizmo_geometry import Drag
 from studio.qt.viewport.viewport import Viewport
 
 SAMPLE = Path(__file__).parents[4] / "assets/projects/plane/project.json"
@@ -85,9 +86,7 @@ def test_it_follows_the_mouse_along_the_axis_until_a_click(viewport: Viewport) -
     eye, size = viewport.view.eye, viewport.view.pixels
     pixel = eye.project(np.stack([before[:3, 3], before[:3, 3] + (0.04, 0.0, 0.0)]), size)
     # what lies under the mouse when the key is pressed goes with it
-    viewport.typed._drag = type(start)(
-        start.frame, start.handle, *viewport.view.eye.ray(*pixel[0], viewport.view.pixels)
-    )
+    viewport.typed._drag = Drag(start.frame, start.handle, *eye.ray(*pixel[0], size))
     viewport.view.hovered.emit(*pixel[1])
     np.testing.assert_allclose(laser_in_world(viewport)[:3, 3] - before[:3, 3], (0.04, 0.0, 0.0), atol=1e-6)
     viewport.view.clicked.emit(*pixel[1])
