@@ -93,10 +93,15 @@ def cloud(points: Points, errors: Errors | None, laser: int, step: int, scene: S
 
 def at_first_step(world: Float, scene: Scene, step: int) -> Float:
     """(m, 3) world points of a step, moved with the objects to where they are at step 0."""
+    return transform_points(T_first_step(scene, step), world)
+
+
+def T_first_step(scene: Scene, step: int) -> Float:
+    """(4, 4) from the world of a step to where its objects are at step 0."""
     motion = scene.motion
     if motion.kind == "none" or motion.moves != "objects":
-        return world
-    return transform_points(motion.displacement(0) @ invert(motion.displacement(step)), world)
+        return np.eye(4)
+    return np.asarray(motion.displacement(0) @ invert(motion.displacement(step)))
 
 
 def at_step(first: Float, scene: Scene, step: int) -> Float:

@@ -153,11 +153,15 @@ def fit(
     solved = np.asarray(np.linalg.pinv(_white(whitening, by_theta)), dtype=np.float64)
     gradient = np.zeros((len(theta), len(profile.index), 2))
     gradient[:, here] = -(_gain(whitening, solved)[:, :, None] * by_point) @ frame.axes
-    free = float(weight[here].sum()) - len(theta)
+    ratio = birge(white, float(weight[here].sum()) - len(theta))
+    return Fit(theta, np.linalg.norm(solved, axis=1), gradient, here, frame, ratio)
+
+
+def birge(white: Float, free: float) -> float:
+    """As of `Fit.ratio`; white: (n,) whitened residuals, of which as many are free."""
     chi2 = float(white @ white)
     excess = chi2 > free + BEYOND_CHANCE * math.sqrt(2.0 * max(free, 0.0))
-    ratio = math.sqrt(chi2 / free) if excess and free > 0.0 else 1.0
-    return Fit(theta, np.linalg.norm(solved, axis=1), gradient, here, frame, ratio)
+    return math.sqrt(chi2 / free) if excess and free > 0.0 else 1.0
 
 
 def _misses(curve: Curve, local: Float, direction: Float, theta: Float) -> tuple[Float, Float, Float]:

@@ -17,6 +17,7 @@ Kind = Literal[
     "v_depth",
     "peak",
     "straightness",
+    "flatness",
     "point_to_point",
     "thickness",
     "gap",
@@ -32,6 +33,7 @@ REGIONS: dict[Kind, tuple[str, ...]] = {
     "v_depth": ("reference", "left flank", "right flank"),
     "peak": ("reference", "peak"),
     "straightness": ("line",),
+    "flatness": ("surface",),
     "point_to_point": ("first point", "second point"),
     "thickness": ("datum", "surface"),
     "gap": ("left edge", "right edge"),
@@ -47,6 +49,7 @@ TITLES: dict[Kind, str] = {
     "v_depth": "V depth",
     "peak": "Peak height",
     "straightness": "Straightness (bow)",
+    "flatness": "Flatness (bow and twist)",
     "point_to_point": "Point to point",
     "thickness": "Thickness",
     "gap": "Gap",
@@ -95,6 +98,8 @@ class Gauge(Model):
             raise ValueError(
                 f"regions: {len(self.regions)} of them; allowed for {self.kind}: {len(wanted)} ({', '.join(wanted)})"
             )
+        if self.of_scan and self.step is not None:
+            raise ValueError(f"step is {self.step}; allowed for {self.kind}, which is of all steps: none")
         for i, (low, high) in enumerate(self.regions):
             if not high > low:
                 raise ValueError(f"regions[{i}] goes from {low} m to {high} m; allowed: the second is the larger")
@@ -103,6 +108,11 @@ class Gauge(Model):
         if self.lower is not None and self.upper is not None and self.lower > self.upper:
             raise ValueError(f"lower is {self.lower} and upper {self.upper}; allowed: lower is not above upper")
         return self
+
+    @property
+    def of_scan(self) -> bool:
+        """It is read off all steps together, not off each."""
+        return self.kind == "flatness"
 
     @property
     def unit(self) -> Literal["m", "rad", "m2"]:

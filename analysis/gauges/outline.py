@@ -21,6 +21,8 @@ def outline(gauge: Gauge, profile: Profile) -> tuple[list[Float], Float]:
     In the profile's coordinates, m. The dimension is of shape (0, 2) where the kind has none that is a length; where
     the measure has no value there is nothing at all.
     """
+    if gauge.of_scan:
+        return [], np.empty((0, 2))
     if gauge.kind == "area":
         profile = without_unsure(profile, gauge.regions[1])
     parts = parts_of(gauge, profile)

@@ -73,14 +73,18 @@ class Profile:
 
     def sigmas(self, gradient: Float) -> tuple[float, float]:
         """Random and systematic sigma of a quantity whose derivative by the points' positions is (m, 2)."""
+        random = float(np.linalg.norm(self.spread(gradient[None])))
+        systematic = float(np.linalg.norm(np.einsum("ij,ijk->k", gradient, self.systematic)))
+        return random, systematic
+
+    def spread(self, gradients: Float) -> Float:
+        """(m, c): S of which S^T S is the random covariance of c quantities, from their derivatives (c, m, 2)."""
         from scipy.linalg import solve_banded  # slow to load
 
         diagonal, below = self.whitening()
-        amplitude = np.einsum("ij,ij->i", gradient, self.random)
+        amplitude = np.einsum("cij,ij->ic", gradients, self.random)
         banded = np.stack([np.append(0.0, below[1:]), diagonal])
-        random = float(np.linalg.norm(solve_banded((0, 1), banded, amplitude)))
-        systematic = float(np.linalg.norm(np.einsum("ij,ijk->k", gradient, self.systematic)))
-        return random, systematic
+        return np.asarray(solve_banded((0, 1), banded, amplitude))
 
 
 def measured_profile(points: Points, errors: Errors | None, T_laser_camera: Float) -> Profile:

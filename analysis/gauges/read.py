@@ -28,7 +28,8 @@ class Reading:
     """One measure in one frame; m, of an angle rad, of an area m^2. NaN where there is none."""
 
     gauge: Gauge
-    step: int
+    step: int | None
+    """None: of all steps."""
     value: float = NAN
     sigma_random: float = NAN
     """Of the line's position in the image, with its correlation along the line."""

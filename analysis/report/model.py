@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.error import Errors
+from analysis.gauges.of_scan import Patch
 from analysis.gauges.read import Reading
 from analysis.line.result import Line
 from analysis.report.delivery import Delivery
@@ -65,6 +66,8 @@ class FrameResult:
     """Wall time by stage, s, of this frame: those of `Frame.seconds` and those after it. Summed over the frames."""
     readings: tuple[Reading, ...] = field(default=(), kw_only=True)
     """Of the project's measures, by the first method."""
+    patches: tuple[Patch, ...] = field(default=(), kw_only=True)
+    """Of those that are of all steps, by the first method."""
     counts: Counts = field(default_factory=dict)
     """`Frame.counts`; over the frames they are summed or averaged as their kind says."""
 

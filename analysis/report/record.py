@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.gauges.of_scan import Patch, read_scan
 from analysis.gauges.read import Reading
 from analysis.measures import Measures
 from analysis.report.model import FrameResult, frame_rmse
@@ -52,8 +53,8 @@ class ScanRecord:
         """folder: for the files of frames and sample, as `Spool`. most_lines: scan lines that the sample holds."""
         self.scene = scene
         self.steps: list[StepResult] = []
-        self.readings: list[Reading] = []
-        """Of the project's measures, in the order of the steps."""
+        self._readings: list[Reading] = []
+        self._patches: list[Patch] = []
         self.seconds: dict[str, float] = {}
         """Wall time of the frames by stage, s."""
         self.counts: dict[Quantity, tuple[float, int]] = {}
@@ -76,12 +77,18 @@ class ScanRecord:
             self._sample.add(i, max(len(one.line.u) for one in laser.extractions), rows)
             firsts.append(rows[0])
         self.steps.append(_step(frame, firsts))
-        self.readings += frame.readings
+        self._readings += frame.readings
+        self._patches += frame.patches
         for stage, spent in frame.seconds.items():
             self.seconds[stage] = self.seconds.get(stage, 0.0) + spent
         for quantity, value in (*frame.counts.items(), *self._group_counts(frame)):
             so_far, frames = self.counts.get(quantity, (0.0, 0))
             self.counts[quantity] = so_far + value, frames + 1
+
+    @property
+    def readings(self) -> list[Reading]:
+        """Of the project's measures: in the order of the steps, then those of all steps."""
+        return [*self._readings, *read_scan(self._patches)]
 
     @staticmethod
     def _group_counts(frame: FrameResult) -> Iterator[tuple[Quantity, float]]:

@@ -9,16 +9,22 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from analysis.cloud import T_first_step
 from analysis.gauges.gauge import Gauge
+from analysis.gauges.of_scan import Patch, patch
 from analysis.gauges.profile import Profile, measured_profile, true_profile
 from analysis.gauges.read import Reading, read
 from render.base.files import atomic_write
 from render.base.pose import invert
 from render.frame import Frame
+from studio.project.found_motion import measured_pose
 from studio.project.project import Project
 from studio.scan.own_files import MEASURE_COLUMNS
 from studio.scan.stages import Measurement
 
+OF_SCAN = "it is of a whole scan: run one (F6, Motion), or measure its folder again"
 FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error", "error_in_sigmas")
 
 
@@ -31,22 +37,58 @@ def profiles(project: Project, frame: Frame, found: Measurement) -> tuple[Profil
 
 def readings(project: Project, frame: Frame, found: Sequence[Measurement]) -> tuple[Reading, ...]:
     """Of the measures that are of this frame's step; found: of each laser."""
-    wanted = [gauge for gauge in project.measures if gauge.step in (None, frame.step) and gauge.laser < len(found)]
+    there = [gauge for gauge in project.measures if not gauge.of_scan and gauge.laser < len(found)]
+    wanted = [gauge for gauge in there if gauge.step in (None, frame.step)]
     both = {laser: profiles(project, frame, found[laser]) for laser in {gauge.laser for gauge in wanted}}
     return tuple(read(gauge, frame.step, *both[gauge.laser]) for gauge in wanted)
+
+
+def patches(project: Project, frame: Frame, found: Sequence[Measurement]) -> tuple[Patch, ...]:
+    """Of the measures that are of all steps, what this frame has of them."""
+    scene, kept = project.scene, []
+    for gauge in project.measures:
+        if gauge.of_scan and gauge.laser < len(found):
+            there = T_first_step(scene, frame.step), scene.T_camera_laser(gauge.laser)
+            poses = measured_pose(scene, project.calibration.motion, frame.step), scene.T_world_camera(frame.step)
+            both = profiles(project, frame, found[gauge.laser])
+            kept.append(patch(gauge, *both, *(there[0] @ pose @ there[1] for pose in poses)))
+    return tuple(kept)
 
 
 def read_each(gauges: Sequence[Gauge], step: int, of: Mapping[int, tuple[Profile, Profile]]) -> tuple[Reading, ...]:
     """One for each measure, those of another step or laser without a value; of: `profiles` by laser."""
     found = []
     for gauge in gauges:
-        if gauge.step not in (None, step):
+        if gauge.of_scan:
+            found.append(Reading(gauge, None, reason=OF_SCAN))
+        elif gauge.step not in (None, step):
             found.append(Reading(gauge, step, reason=f"it is of step {gauge.step} alone"))
         elif gauge.laser not in of:
             found.append(Reading(gauge, step, reason=f"laser {gauge.laser} was not rendered"))
         else:
             found.append(read(gauge, step, *of[gauge.laser]))
     return tuple(found)
+
+
+def kept_readings(gauges: Sequence[Gauge], scanned: Sequence[Gauge], rows: object) -> dict[Gauge, Reading]:
+    """Of the gauges that are of all steps, as a scan has recorded those that it was measured with.
+
+    scanned: these; rows: `measures_record` of them, as read from a file that may be damaged.
+    """
+    found = {}
+    entries = [row if isinstance(row, dict) else {} for row in rows] if isinstance(rows, list) else []
+    for gauge in (one for one in gauges if one.of_scan):
+        for was, row in zip(scanned, entries, strict=False):
+            if (was.kind, was.laser, was.regions) == (gauge.kind, gauge.laser, gauge.regions):
+                names = ("value", "sigma_random", "sigma_systematic", "truth")
+                value, random, systematic, truth = (_number(row.get(name)) for name in names)
+                points, reason = int(np.nan_to_num(_number(row.get("points")))), str(row.get("reason") or "")
+                found[gauge] = Reading(gauge, None, value, random, systematic, points, truth, reason)
+    return found
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else math.nan
 
 
 def worst(found: Sequence[Reading]) -> Reading:
@@ -66,7 +108,7 @@ def measures_record(gauges: Sequence[Gauge], found: Sequence[Reading]) -> list[d
     rows = []
     for gauge in gauges:
         own = [one for one in found if one.gauge == gauge]
-        shown = worst(own) if own else Reading(gauge, gauge.step or 0, reason="no frame of its step was measured")
+        shown = worst(own) if own else Reading(gauge, gauge.step, reason="no frame of its step was measured")
         counts = Counter("none" if one.reason else one.verdict or "no tolerance" for one in own)
         rows.append({**_row(shown), "readings": len(own), "verdicts": dict(sorted(counts.items()))})
     return rows

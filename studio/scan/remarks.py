@@ -13,7 +13,7 @@ from render.base.errors import InputError
 from render.frame import Frame
 from render.sensor.develop import Image
 from studio.project.project import Project
-from studio.scan.gauging import readings
+from studio.scan.gauging import patches, readings
 from studio.scan.stages import Measurement
 
 __all__ = ["best", "frame_remarks", "frame_result", "result_remarks", "scale_head", "scale_name", "scale_notes"]
@@ -62,6 +62,7 @@ def frame_result(
         quality=frame.quality,
         seconds=frame.seconds,
         readings=readings(project, frame, best(measurements, project)),
+        patches=patches(project, frame, best(measurements, project)),
         counts=frame.counts,
     )
 

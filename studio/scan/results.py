@@ -17,7 +17,7 @@ from render.sensor.develop import Image
 from render.world.world import World
 from studio.project.found_motion import true_motion, values_of
 from studio.project.project import Project
-from studio.scan.gauging import measures_record, readings
+from studio.scan.gauging import measures_record, patches, readings
 from studio.scan.logo import logo_uri
 from studio.scan.spacetime_window import Passing
 from studio.scan.stages import Clock, Measurement, measure_step
@@ -63,6 +63,7 @@ def measure_frame(  # noqa: PLR0913
         quality=frame.quality,
         seconds=seconds,
         readings=readings(project, frame, own),
+        patches=patches(project, frame, own),
         counts=frame.counts,
     )
 

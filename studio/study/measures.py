@@ -86,9 +86,9 @@ def measure_of(name: str) -> Measure:
 
 
 def part_names(gauges: Sequence[Gauge]) -> list[str]:
-    """What a study may ask of a project's measures of the part, in their order."""
+    """What a study may ask of a project's measures of the part, in their order; its cells are frames, not scans."""
     kinds = ("value", "error", "sigma")
-    return [f"{OF_UNIT[one.unit]}_{kind}:{one.name}" for one in gauges for kind in kinds]
+    return [f"{OF_UNIT[one.unit]}_{kind}:{one.name}" for one in gauges if not one.of_scan for kind in kinds]
 
 
 def of_the_part(found: Sequence[Reading]) -> dict[str, float]:

@@ -103,7 +103,11 @@ def _of_the_part(
     project: Project, frame: RenderedFrame, line: ExtractedLine, points: TriangulatedPoints, errors: PointErrors
 ) -> dict[str, float]:
     """The project's measures of this laser's profile."""
-    gauges = [one for one in project.measures if one.laser == points.laser and one.step in (None, frame.step)]
+    gauges = [
+        one
+        for one in project.measures
+        if one.laser == points.laser and one.step in (None, frame.step) and not one.of_scan
+    ]
     if not gauges or line.image is None:
         return {}
     found = Measurement(frame.step, points.laser, line.image, line, points, errors)

@@ -58,7 +58,7 @@ class PartDrawing(QObject):
                 self._line(curve, pg.mkPen(colour, width=3.0 if is_chosen else 1.6))
             if len(dimension):
                 self._line(dimension, pg.mkPen(colour, width=1.6, style=Qt.PenStyle.DashLine))
-            if is_chosen:
+            if is_chosen and (curves or len(dimension)):
                 at = dimension.mean(axis=0) if len(dimension) else curves[0][-1]
                 self._text(f"{one.gauge.name}: {value_text(one.value, one.sigma, one.gauge.unit)}", at, colour)
 

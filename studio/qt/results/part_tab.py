@@ -30,8 +30,9 @@ from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing, verdict_colour
 from studio.qt.results.part_editor import PartEditor
 from studio.qt.results.results_profile import ProfilePlot
-from studio.scan.gauging import profiles, read_each
+from studio.scan.gauging import kept_readings, profiles, read_each
 from studio.scan.remarks import best
+from studio.scan.scan_folder import measured_project
 
 HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
 NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
@@ -90,6 +91,10 @@ class PartTab(QWidget):
         self.chosen = min(self.chosen, len(self._read) - 1)
         step = 0 if render is None else render.frame.step
         self.readings = read_each(self._read, step, self._profiles) if self._profiles else ()
+        if self.readings and render is not None and render.scan is not None:
+            scan = render.scan.found
+            kept = kept_readings(self._read, measured_project(scan).measures, scan.manifest.get("measures"))
+            self.readings = tuple(kept.get(one.gauge, one) for one in self.readings)
         self._show()
         self._show_regions()
 

@@ -18,6 +18,7 @@ REGION = {
     "v_depth": ((0.012, 0.02), (-0.009, -0.002), (0.002, 0.009)),
     "peak": ((-0.02, -0.01), (-0.004, 0.004)),
     "straightness": ((-0.01, 0.01),),
+    "flatness": ((-0.01, 0.01),),
     "point_to_point": ((-0.015, -0.013), (0.009, 0.011)),
     "thickness": ((-0.015, -0.003), (0.003, 0.015)),
     "gap": ((-0.0115, -0.0065), (0.0065, 0.0115)),
@@ -88,4 +89,4 @@ def noises(trials: int, length: float, seed: int) -> np.ndarray:
     return lfilter([1.0], [1.0, -r], white, axis=1)
 
 
-KINDS = tuple(REGIONS)
+KINDS = tuple(kind for kind in REGIONS if kind != "flatness")

@@ -16,7 +16,7 @@ from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import Reading
 from render.base.errors import InputError
 from studio.project.project import Project
-from studio.scan.gauging import measures_record, read_each, worst
+from studio.scan.gauging import kept_readings, measures_record, read_each, worst
 from studio.scan.scan_folder import measured_project, open_folder
 from tests.studio.small_scan import scan, small_project
 
@@ -108,3 +108,33 @@ def test_a_window_is_told_why_a_measure_is_not_of_its_frame() -> None:
     found = read_each((other_step, other_laser), 0, {})
     assert [one.reason for one in found] == ["it is of step 2 alone", "laser 1 was not rendered"]
     assert not any(one.verdict for one in found)
+
+
+def test_a_scan_has_one_flatness_which_is_kept_for_who_looks_at_it(tmp_path: Path) -> None:
+    file = small_project(tmp_path)
+    flat = {"name": "flat", "kind": "flatness", "regions": [[-0.08, 0.08]], "nominal": 0.0, "upper": 0.01}
+    project = with_measures(Project.load(file), {"name": "level", **LEVEL}, flat)
+    motion = project.scene.motion.model_copy(update={"steps": 4})
+    scan(file, tmp_path / "out", project=project.replaced({"scene": {**project.scene.model_dump(), "motion": motion}}))
+    with open(tmp_path / "out" / "measures.csv", encoding="utf-8", newline="") as table:
+        rows = list(csv.DictReader(table))
+    assert [(row["name"], row["step"]) for row in rows] == [*(("level", str(k)) for k in range(4)), ("flat", "")]
+    row = rows[-1]
+    assert abs(float(row["truth"])) < 1e-9 and int(row["points"]) > 20
+    assert 0.0 < float(row["value"]) < 4.0 * float(row["sigma"]) < 0.01 and row["verdict"] == "pass"
+    shown = call("reconstruct", tmp_path / "out", "--out", tmp_path / "again")
+    assert "Flatness (bow and twist)" in shown and "worst" not in shown.split("Flatness")[1]
+
+    record = open_folder(tmp_path / "out").manifest["measures"]
+    wider = project.measures[1].model_copy(update={"name": "renamed", "upper": 0.2})
+    elsewhere = wider.model_copy(update={"regions": ((-0.05, 0.05),)})
+    kept = kept_readings([wider, elsewhere], project.measures, record)
+    assert list(kept) == [wider] and kept[wider].value == pytest.approx(float(row["value"]))
+    assert kept_readings([wider], project.measures, [{"value": "damaged"}, None])[wider].reason == ""
+    assert kept_readings([wider], project.measures, "damaged") == {}
+
+
+def test_a_flatness_of_one_step_is_refused_with_what_is_allowed(tmp_path: Path) -> None:
+    project = Project.load(small_project(tmp_path))
+    with pytest.raises(InputError, match="allowed for flatness, which is of all steps: none"):
+        with_measures(project, {"name": "flat", "kind": "flatness", "regions": [[-0.08, 0.08]], "step": 1})

@@ -201,3 +201,11 @@ def test_scan_lines_dragged_in_the_picture_are_a_measures_region_while_it_is_add
     panel.session.range_dragged.emit(40.0, 90.0)
     (made,) = panel.session.project.measures
     assert made.kind == "straightness" and panel.session.range is None
+
+
+def test_a_flatness_of_a_still_frame_says_that_it_wants_a_scan(panel: ResultsPanel) -> None:
+    flat = Gauge(name="flat", kind="flatness", regions=((-0.25, 0.25),))
+    assert panel.session.set(("measures",), (flat,), "add a flatness")
+    panel.part.table.selectRow(0)
+    assert "whole scan" in panel.part.told.text()
+    assert [panel.part.table.item(0, k).text() for k in (0, 4)] == ["flat", "not measured"]

@@ -1,0 +1,111 @@
+"""The flatness of a scanned surface: exact without noise, its sigma true with noise, and told where it cannot be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.gauges.flatness import CELLS, Cells, Form, cells, flatness
+from analysis.gauges.of_scan import patch, read_scan
+from tests.analysis.gauges.profiles import ACROSS, gauge, noises, profile
+
+REGION = (-0.01, 0.01)
+PITCH = 1e-3
+SIGMA = 1e-5
+
+
+def places(steps: int) -> np.ndarray:
+    return (np.arange(steps) - 0.5 * (steps - 1)) * PITCH
+
+
+def pose(along: float) -> np.ndarray:
+    """Of the laser on the part, shifted across its own plane."""
+    found = np.eye(4)
+    found[0, 3] = along
+    return found
+
+
+def saddle(along: float, rise: float) -> np.ndarray:
+    """Heights of a tilted surface that rises along the fan as much as it falls along the way."""
+    return -0.5 + 0.05 * ACROSS + 0.02 * along + rise * ((ACROSS / 0.01) ** 2 - (along / 0.01) ** 2)
+
+
+def scan(rise: float, noise: np.ndarray | None, steps: int = 21, length: float = 1.0) -> list[Cells]:
+    return [
+        cells(profile(saddle(y, rise), SIGMA, length, None if noise is None else noise[k]), REGION, pose(y))
+        for k, y in enumerate(places(steps))
+    ]
+
+
+def form(profiles: list[Cells], like: Form | None = None) -> Form:
+    found = flatness(profiles, like)
+    assert isinstance(found, Form), found
+    return found
+
+
+def test_a_saddle_has_the_flatness_of_its_corners_and_edges() -> None:
+    found = form(scan(5e-5, None))
+    x = max(np.abs(one.position[:, 1]).max() for one in scan(5e-5, None)) / 0.01
+    # off the least-squares plane the saddle keeps its form; its tilt takes the cosine of the slope off
+    assert found.value == pytest.approx(5e-5 * (x**2 + 1.0) / np.hypot(1.0, np.hypot(0.05, 0.02)), rel=2e-3)
+    assert found.points > 90 * 21
+
+
+@pytest.mark.parametrize("length", [1.0, 7.0])
+def test_its_sigma_is_that_of_its_errors(length: float) -> None:
+    trials, steps = 150, 21
+    truth = form(scan(5e-5, None)).value
+    found = [form(scan(5e-5, noises(steps, length, 100 + k), steps, length)) for k in range(trials)]
+    off = np.array([(one.value - truth) / one.sigma_random for one in found])
+    # peak and valley are chosen by the noise among neighbours, hence a little bias is allowed
+    assert abs(off.mean()) < 0.3 + 3.0 / np.sqrt(trials)
+    assert abs(off.std() - 1.0) < 3.0 / np.sqrt(2.0 * trials)
+
+
+def test_a_flat_surface_is_told_as_flat_within_three_of_its_sigmas() -> None:
+    found = [form(scan(0.0, noises(21, 1.0, 300 + k))) for k in range(100)]
+    off = np.array([one.value / one.sigma_random for one in found])
+    assert 0.5 < off.mean() < 2.5
+    assert np.mean(off < 3.5) > 0.9
+
+
+def test_a_false_cell_is_left_out() -> None:
+    clean = scan(5e-5, noises(21, 1.0, 5))
+    before = form(clean).value
+    height = saddle(0.0, 5e-5)
+    height[100:112] += 2e-3
+    clean[10] = cells(profile(height, SIGMA, 1.0, noises(1, 1.0, 6)[0]), REGION, pose(0.0))
+    assert form(clean).value == pytest.approx(before, abs=2e-6)
+
+
+def test_what_all_points_share_moves_the_form_only_where_it_bends_it() -> None:
+    lifted = np.zeros((len(ACROSS), 2, 1))
+    lifted[:, 1, 0] = 1e-4
+    bent = lifted * (ACROSS / 0.01)[:, None, None] ** 2
+    sigma = []
+    for shared in (lifted, bent):
+        parts = [cells(profile(saddle(y, 5e-5), SIGMA, systematic=shared), REGION, pose(y)) for y in places(21)]
+        sigma.append(form(parts).sigma_systematic)
+    assert sigma[0] < 1e-9
+    assert sigma[1] == pytest.approx(1e-4, rel=0.2)
+
+
+def test_two_profiles_have_no_flatness_and_say_what_it_needs() -> None:
+    for steps in (1, 2):
+        told = flatness(scan(5e-5, None, steps=steps))
+        assert isinstance(told, str) and "needs 3 steps" in told
+    assert "too few points" in str(flatness([]))
+
+
+def test_readings_of_a_scan_come_once_with_their_truth() -> None:
+    one = gauge("flatness")
+    noise = noises(21, 1.0, 9)
+    both = [
+        (profile(saddle(y, 5e-5), SIGMA, 1.0, noise[k]), profile(saddle(y, 5e-5))) for k, y in enumerate(places(21))
+    ]
+    kept = [patch(one, *two, pose(y), pose(y)) for two, y in zip(both, places(21), strict=True)]
+    (found,) = read_scan(kept)
+    assert found.step is None and found.points > 90 * 21
+    assert abs(found.error_in_sigmas) < 4.0
+    assert found.truth == pytest.approx(form(scan(5e-5, None)).value, rel=1e-3)
+    assert all(len(each.measured.position) <= CELLS for each in kept)
