@@ -157,6 +157,24 @@ def duplicate(project: Project, path: FieldPath) -> Result:
     return replaced(project, path[:-1], tuple(items)), (*path[:-1], _index(path) + 1)
 
 
+def remove_all(project: Project, paths: Sequence[FieldPath]) -> Result:
+    """Without several items; the path is that of who takes the last one's place, or the list's owner."""
+    for path in sorted(paths, key=lambda path: -_index(path)):
+        project, _ = remove(project, path)
+    items = value_at(project, paths[-1][:-1])
+    if not items:
+        return project, paths[-1][:-1]
+    place = min(_index(paths[-1]) - _before(paths[-1], paths), len(items) - 1)
+    return project, (*paths[-1][:-1], place)
+
+
+def duplicate_all(project: Project, paths: Sequence[FieldPath]) -> tuple[Project, list[FieldPath]]:
+    """Copies of several items as of `duplicate`, and their paths, in the order of the items given."""
+    for path in sorted(paths, key=lambda path: -_index(path)):
+        project, _ = duplicate(project, path)
+    return project, [(*path[:-1], _index(path) + _before(path, paths) + 1) for path in paths]
+
+
 def rename(project: Project, path: FieldPath, name: str) -> Project:
     """InputError: empty, too long, or taken."""
     name = name.strip()
@@ -205,3 +223,8 @@ def _items(project: Project, path: FieldPath) -> tuple[Any, ...]:
 
 def _index(path: FieldPath) -> int:
     return int(path[-1])
+
+
+def _before(path: FieldPath, paths: Sequence[FieldPath]) -> int:
+    """How many of the paths stand in the same list before one of them."""
+    return sum(1 for other in paths if other[:-1] == path[:-1] and _index(other) < _index(path))

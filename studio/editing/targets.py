@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from render.base.model import Vector3
 from render.base.pose import Pose, invert
 from render.scene.motion import NoMotion
 from render.scene.scene import Scene
-from studio.project.document import FieldPath, value_at
+from studio.project.document import FieldPath, replaced, value_at
 from studio.project.project import Project
 
 RIG: FieldPath = ("scene", "rig")
@@ -44,6 +45,12 @@ class Target:
         rotation = Pose.from_matrix(matrix).rotation
         return self.pose.model_copy(update={"rotation": rotation})
 
+    def turned_about(self, motion: Float) -> Pose:
+        """The pose after a motion (4, 4) in the world that turns about any other point, too."""
+        matrix = invert(self.T_world_parent) @ motion @ self.T_world_item
+        found = Pose.from_matrix(matrix)
+        return self.pose.model_copy(update={"rotation": found.rotation, "translation": rounded(matrix[:3, 3])})
+
 
 def target(project: Project, selection: FieldPath, step: int = 0) -> Target | None:
     """The pose of what is selected at a step of the motion; None: it has none, or is not there any more."""
@@ -59,6 +66,25 @@ def target(project: Project, selection: FieldPath, step: int = 0) -> Target | No
                 return None
             return Target((*head, name), _title(head, item), pose, _parent(scene, head, step))
     return None
+
+
+def targets(project: Project, selections: Sequence[FieldPath], step: int = 0) -> tuple[Target, ...]:
+    """Of all that is selected, without what another of them carries."""
+    free = [path for path in selections if not any(path != other == path[: len(other)] for other in selections)]
+    found = [target(project, path, step) for path in free]
+    return tuple({one.path: one for one in found if one is not None}.values())
+
+
+def carried(project: Project, before: Sequence[Target], motion: Float, turns: bool) -> Project:
+    """Targets as they were, moved by one motion (4, 4) in the world; the last turns about its own origin.
+
+    InputError: a pose is not allowed.
+    """
+    for one in before:
+        still = turns and np.array_equal(motion, np.eye(4))
+        own = one.turned(motion) if one is before[-1] else one.turned_about(motion)
+        project = replaced(project, one.path, one.pose if still else own if turns else one.moved(motion))
+    return project
 
 
 def other_frame(project: Project, path: FieldPath, step: int = 0) -> tuple[str, Float] | None:

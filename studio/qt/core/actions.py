@@ -39,6 +39,7 @@ VIEW_KEYS = {
     "T": "aim the laser at the next click",
     "G": "move: then X, Y or Z and a number",
     "R": "turn: then X, Y or Z and a number",
+    "V": "put a corner or face on another",
 }
 """Key -> what it does while the 3D view has the focus."""
 COMMANDS: tuple[Command | str, ...] = (

@@ -5,6 +5,7 @@ Panels never talk to each other: they change the session, and follow its signals
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,7 +21,7 @@ from render.checkpoint import RenderState
 from render.frame import Frame
 from render.sensor.develop import Image
 from render.world.world import World
-from studio.project.document import Document, FieldPath
+from studio.project.document import Document, FieldPath, value_at
 from studio.project.project import Project
 from studio.scan.redevelop import Development, is_stale
 from studio.scan.scan_results import ScanResults
@@ -166,6 +167,9 @@ class Session(QObject):
         super().__init__()
         self.dragging = False
         self.selection: FieldPath = ()
+        """The item that panels show, and about which several are turned."""
+        self._others: tuple[FieldPath, ...] = ()
+        """Items that are selected beside it."""
         self.hovered: int | None = None
         self.range: tuple[float, float] | None = None
         """From and to: the scan lines that the results tell of; None: all, or no range of them."""
@@ -216,6 +220,7 @@ class Session(QObject):
         self.document = document
         document.listeners.append(self.project_changed.emit)
         self.selection, self.hovered, self.step, self.renders, self.shown = (), None, 0, [], None
+        self._others = ()
         self.document_replaced.emit()
         self.project_changed.emit()
         self.selection_changed.emit()
@@ -225,9 +230,25 @@ class Session(QObject):
 
     def select(self, path: FieldPath) -> None:
         """Select an item of the scene by its path: ("scene", "objects", 0), ("scene", "rig", "camera"), ()."""
-        if path != self.selection:
-            self.selection = path
+        self.select_all((path,))
+
+    def select_also(self, path: FieldPath) -> None:
+        """Take an item to those that are selected, or out of them."""
+        now = self.selections
+        self.select_all(tuple(one for one in now if one != path) if path in now else (*now, path))
+
+    def select_all(self, paths: Sequence[FieldPath]) -> None:
+        """Several items; the last is the one that panels show."""
+        others, chosen = tuple(paths[:-1]), paths[-1] if paths else ()
+        if (others, chosen) != (self._others, self.selection):
+            self._others, self.selection = others, chosen
             self.selection_changed.emit()
+
+    @property
+    def selections(self) -> tuple[FieldPath, ...]:
+        """All that is selected and there, the one that panels show last."""
+        there = tuple(path for path in self._others if _is_there(self.project, path))
+        return (*there, self.selection) if self.selection else there
 
     def hover(self, scan_line: int | None) -> None:
         if scan_line != self.hovered:
@@ -295,6 +316,14 @@ class Session(QObject):
                 self.shown = self.renders[i] if self.shown is other else self.shown
                 self.renders_changed.emit()
                 return
+
+
+def _is_there(project: Project, path: FieldPath) -> bool:
+    try:
+        value_at(project, path)
+    except KeyError:
+        return False
+    return True
 
 
 def one_of(kind: type[Follower], session: Session) -> Follower:

@@ -105,7 +105,10 @@ class Inspector(QWidget):
         name = getattr(value, "name", None)
         self.title.setText(name or TITLES.get(str(path[-1]), str(path[-1]).capitalize()))
         self.icon.setPixmap(item_icon(self.session.project, path).pixmap(20, 20))
-        self.kind.setText("" if name is None else _kind(self.session.project, path))
+        others = len(self.session.selections) - 1
+        more = f", and {others} more selected" if others > 0 else ""
+        self.kind.setText("" if name is None else _kind(self.session.project, path) + more)
+        self.kind.setToolTip("The fields are of this one; moves, turns, copies and Delete are of all" if more else "")
         hint = LIST_HINTS.get(str(path[-1]), "") if is_list else ""
         if not is_list and spec.kind != "union" and not spec.fields:
             hint = spec.help

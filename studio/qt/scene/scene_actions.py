@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QWidget
@@ -43,29 +43,32 @@ def can_change(session: Session) -> bool:
 
 
 def remove(session: Session) -> None:
-    """Remove the selection; its neighbour is selected."""
-    path = session.selection
+    """Remove all that is selected; a neighbour is selected."""
     if can_change(session):
-        name = value_at(session.project, path).name
-        apply(session, f"delete {name}", lambda project: scene_edits.remove(project, path))
+        paths = _changeable(session)
+        what = _name_of(session, paths)
+        apply(session, f"delete {what}", lambda project: scene_edits.remove_all(project, paths))
 
 
 def duplicate(session: Session) -> None:
-    path = session.selection
+    """A copy of each that is selected; the copies are selected."""
     if can_change(session):
-        name = value_at(session.project, path).name
-        apply(session, f"duplicate {name}", lambda project: scene_edits.duplicate(project, path))
+        paths = _changeable(session)
+        project, copies = scene_edits.duplicate_all(session.project, paths)
+        session.document.apply(f"duplicate {_name_of(session, paths)}", project)
+        session.select_all(copies)
 
 
 def toggle_visible(session: Session, path: FieldPath | None = None) -> None:
-    """Hide or show an object, the selected one unless another is given."""
-    path = session.selection if path is None else path
-    if not scene_edits.in_list(path):
+    """Hide or show an object; unless one is given, all that are selected, as the one that panels show is not."""
+    given, path = path, session.selection if path is None else path
+    if not scene_edits.in_list(path) or not isinstance(item := value_at(session.project, path), SceneObject):
         return
-    item = value_at(session.project, path)
-    if isinstance(item, SceneObject):
-        label = f"{'hide' if item.visible else 'show'} {item.name}"
-        session.document.apply(label, scene_edits.set_visible(session.project, path, not item.visible))
+    chosen = [path] if given else [one for one in session.selections if one[:-1] == scene_edits.OBJECTS]
+    project = session.project
+    for one in chosen:
+        project = scene_edits.set_visible(project, one, not item.visible)
+    session.document.apply(f"{'hide' if item.visible else 'show'} {_name_of(session, chosen)}", project)
 
 
 def move(session: Session, by: int) -> None:
@@ -134,6 +137,15 @@ def fill_presets_menu(menu: QMenu, session: Session) -> None:
         _entry(menu, preset.name, "", use).setToolTip(f"<p>{preset.source}</p>")
     if not found:
         menu.addAction("Select the camera, the sensor, a laser or an object").setEnabled(False)
+
+
+def _changeable(session: Session) -> list[FieldPath]:
+    """All that is selected and can be removed or copied, the one that panels show last."""
+    return [path for path in session.selections if scene_edits.in_list(path)]
+
+
+def _name_of(session: Session, paths: Sequence[FieldPath]) -> str:
+    return str(value_at(session.project, paths[-1]).name) if len(paths) == 1 else f"{len(paths)} items"
 
 
 def _exists(session: Session) -> bool:

@@ -89,7 +89,7 @@ class _Delegate(QStyledItemDelegate):
 
 
 class SceneTree(QTreeWidget):
-    """The tree of the session's project; shares the selection."""
+    """The tree of the session's project; shares the selection, of several items with Ctrl or Shift."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -101,6 +101,7 @@ class SceneTree(QTreeWidget):
         self.setFrameShape(QTreeWidget.Shape.NoFrame)
         self.setEditTriggers(QAbstractItemView.EditTrigger.EditKeyPressed)
         self.setExpandsOnDoubleClick(False)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setItemDelegate(_Delegate(self))
         self.setAcceptDrops(True)
         self.setDragEnabled(True)
@@ -206,17 +207,21 @@ class SceneTree(QTreeWidget):
 
     def _follow_selection(self) -> None:
         item = self._items.get(self.session.selection)
+        chosen = {*self.session.selections, self.session.selection}
         self._filling = True
-        if item is None:
-            self.clearSelection()
-        elif not item.isSelected():
+        if item is not None and self.currentItem() is not item:
             self.setCurrentItem(item)
+        for path, other in self._items.items():
+            if other.isSelected() != (path in chosen):
+                other.setSelected(path in chosen)
         self._filling = False
 
     def _selected(self) -> None:
         chosen = self.selectedItems()
         if chosen and not self._filling:
-            self.session.select(_path(chosen[0]))
+            current = self.currentItem()
+            last = current if current is not None and current in chosen else chosen[-1]
+            self.session.select_all([*(_path(item) for item in chosen if item is not last), _path(last)])
 
     def _renamed(self, item: QTreeWidgetItem, column: int) -> None:
         if self._filling or column != NAME:
@@ -256,7 +261,7 @@ class SceneTree(QTreeWidget):
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         item = self.itemAt(event.pos())
-        if item is not None:
+        if item is not None and not item.isSelected():
             self.setCurrentItem(item)
         menu = self.menu_for(() if item is None else _path(item))
         menu.exec(event.globalPos())
@@ -289,7 +294,8 @@ class SceneTree(QTreeWidget):
         menu.addAction("Duplicate\tCtrl+D", lambda: scene_actions.duplicate(session))
         if _is_object(session.project, path):
             shown = value_at(session.project, path).visible
-            menu.addAction("Hide" if shown else "Show", lambda: scene_actions.toggle_visible(session, path))
+            alone = None if path in session.selections else path
+            menu.addAction("Hide" if shown else "Show", lambda: scene_actions.toggle_visible(session, alone))
         if selected_mesh(session) is not None:
             menu.addAction("Replace mesh…", lambda: replace_mesh(session, self))
         menu.addAction("Move up", lambda: scene_actions.move(session, -1)).setEnabled(path[-1] != 0)

@@ -15,7 +15,7 @@ MOUSE = (
     ("Drag", "turn the 3D view"),
     ("Shift+drag, middle drag", "shift it; Shift over the image: a region"),
     ("Wheel", "zoom"),
-    ("Click", "select; in a plot: keep the row"),
+    ("Click", "select; Ctrl: several; in a plot: keep the row"),
     ("Double-click", "frame the part; a plot: all of it"),
     ("Hover", "the same row in every view"),
     ("Drag on a number", "change it; with Shift finer, with Ctrl coarser"),

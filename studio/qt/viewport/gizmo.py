@@ -1,6 +1,7 @@
-"""One gizmo for what is selected: three arms to move along, three squares to move across, three rings to turn about.
+"""One gizmo for all that is selected: three arms to move along, three squares to move across, three rings to turn by.
 
-It is made once and retargeted. A drag is one entry of the undo history.
+It is made once and retargeted; it stands where the item does that was selected last. A drag is one entry of the undo
+history.
 """
 
 from __future__ import annotations
@@ -8,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from render.base.arrays import Float
-from studio.editing.targets import Target, target
+from render.base.errors import InputError
+from studio.editing.targets import Target, carried, targets
 from studio.preview.gizmo_geometry import Frame
 from studio.qt.core.live_preview import Live
 from studio.qt.core.session import Session
@@ -17,16 +19,18 @@ from studio.qt.viewport.view3d import View3D
 
 
 class Gizmo(HandleTool):
-    """Moves an item of the scene."""
+    """Moves items of the scene."""
 
     def __init__(self, session: Session, live: Live, view: View3D) -> None:
         super().__init__(view)
         self.session, self._live = session, live
         self.local = False
         """Along the item's own axes instead of the world's."""
-        self.target: Target | None = None
-        self._before: Target | None = None
-        self._selection = session.selection
+        self.away = False
+        """Not shown, while something else is done with what is selected."""
+        self.targets: tuple[Target, ...] = ()
+        self._before: tuple[Target, ...] = ()
+        self._selections = session.selections
         self._count = 0
         session.selection_changed.connect(self.retarget)
         live.changed.connect(self.retarget)
@@ -34,14 +38,19 @@ class Gizmo(HandleTool):
 
     def retarget(self) -> None:
         """Stand at what is selected, wherever it is now."""
-        if self.dragging and self.session.selection != self._selection:
+        if self.dragging and self.session.selections != self._selections:
             self.cancel()
-        self.target = target(self.session.project, self.session.selection, self._live.step)
+        self.targets = targets(self.session.project, self.session.selections, self._live.step)
         self.hide(self.target is None)
         self.view.redraw()
 
+    @property
+    def target(self) -> Target | None:
+        """Where it stands."""
+        return self.targets[-1] if self.targets else None
+
     def frame(self) -> Frame | None:
-        if self.target is None or self.session.section is not None:
+        if self.target is None or self.away or self.session.section is not None:
             return None  # two sets of handles would lie over each other
         T = self.target.T_world_item
         return self.standing(T[:3, 3], T[:3, :3].copy() if self.local else np.eye(3))
@@ -51,24 +60,25 @@ class Gizmo(HandleTool):
         self.view.redraw()
 
     def begin(self) -> None:
-        self._before, self._selection = self.target, self.session.selection
+        self._before, self._selections = self.targets, self.session.selections
         self._count += 1
         self.session.begin_drag()
 
     def follow(self, motion: Float, turns: bool) -> None:
-        before = self._before
-        assert before is not None
-        pose = before.turned(motion) if turns else before.moved(motion)
-        if turns and np.array_equal(motion, np.eye(4)):
-            pose = before.pose
-        verb = "turn" if turns else "move"
-        self.session.set(before.path, pose, f"{verb} {before.name}", merge=f"gizmo {id(self)} {self._count}")
+        before, session = self._before, self.session
+        what = before[-1].name if len(before) == 1 else f"{len(before)} items"
+        try:
+            project = carried(session.project, before, motion, turns)
+        except InputError as error:
+            session.message.emit("error", str(error))
+            return
+        label = f"{'turn' if turns else 'move'} {what}"
+        session.document.apply(label, project, merge=f"gizmo {id(self)} {self._count}")
 
     def end(self) -> None:
         self.session.end_drag()
 
     def put_back(self) -> None:
-        before = self._before
-        moved = target(self.session.project, self._selection, self._live.step)
-        if before is not None and moved is not None and moved.pose != before.pose:
+        now = targets(self.session.project, self._selections, self._live.step)
+        if [one.pose for one in now] != [one.pose for one in self._before]:
             self.session.document.undo()

@@ -150,8 +150,14 @@ class View3D(QtInteractor):  # type: ignore[misc]
         if event.buttons() & (Qt.MouseButton.LeftButton | Qt.MouseButton.MiddleButton | Qt.MouseButton.RightButton):
             return
         grip, self._grip = self._grip, ""
+        far = (event.position() - self._start).manhattanLength() >= QApplication.startDragDistance()
         if grip == "tool" and self.tool is not None:
-            self.tool.release()
+            if not far and event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+                # what is to be selected as well may lie behind a handle
+                self.tool.cancel()
+                self.clicked.emit(event.position().x(), event.position().y())
+            else:
+                self.tool.release()
         elif grip == "click":
             x, y = event.position().x(), event.position().y()
             # without a tool the next click is another's: that of what the laser is to light

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 from PySide6.QtCore import QPoint, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
-from PySide6.QtWidgets import QToolTip, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QToolTip, QVBoxLayout, QWidget
 from vtkmodules.vtkRenderingCore import vtkActor, vtkCellPicker
 
 from render.base.arrays import Float
-from render.base.pose import transform_points
 from studio.editing.placement import working_distance
 from studio.editing.scene_edits import aim_laser
+from studio.preview.ray_pick import mesh_hit
 from studio.preview.view_camera import STANDARD, through, turntable
 from studio.project.document import FieldPath, value_at
 from studio.qt.core import theme
@@ -26,6 +26,7 @@ from studio.qt.viewport.board_ghost import BoardGhost
 from studio.qt.viewport.gizmo import Gizmo
 from studio.qt.viewport.handle_tool import Tools
 from studio.qt.viewport.section_plane import SectionPlane
+from studio.qt.viewport.snap_move import SnapMove
 from studio.qt.viewport.typed_move import TypedMove
 from studio.qt.viewport.view3d import View3D
 from studio.qt.viewport.viewport_bar import ViewportBar
@@ -37,7 +38,7 @@ PICK_TOLERANCE = 0.006
 
 
 class Viewport(QWidget):
-    """Left button: select, or turn the view; middle, right, or Shift and left: shift it; wheel: zoom."""
+    """Left: select (Ctrl: several), or turn the view; middle, right, or Shift and left: shift it; wheel: zoom."""
 
     def __init__(self, session: Session, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -48,6 +49,7 @@ class Viewport(QWidget):
         self.gizmo = Gizmo(session, self.live, self.view)
         self.section = SectionPlane(session, self.view)
         self.typed = TypedMove(self.gizmo, self.view)
+        self.snap = SnapMove(self.gizmo, self.live, self.view)
         self._tools = Tools(self.section, self.gizmo)
         self.view.tool = self._tools
         self.view.before_paint = self._tools.draw
@@ -142,10 +144,17 @@ class Viewport(QWidget):
     def _clicked(self, x: float, y: float) -> None:
         if self.typed.active:
             self.typed.accept()
+        elif self.snap.active:
+            self.snap.click(x, y)
         elif self.bar.aim.isChecked():
             self.aim_at(x, y)
         else:
-            self.session.select(self.path_at(x, y))
+            path = self.path_at(x, y)
+            several = QApplication.keyboardModifiers() & Qt.KeyboardModifier.ControlModifier
+            if not several:
+                self.session.select(path)
+            elif path:
+                self.session.select_also(path)
 
     def set_parallel(self, parallel: bool) -> None:
         """Parallel projection: lengths across the view compare."""
@@ -180,7 +189,7 @@ class Viewport(QWidget):
         view.hovered.connect(self._hover_later)
         view.left.connect(self._hover.stop)
         view.navigated.connect(self._leave)
-        for told in (*(tool.told for tool in self._tools.tools), self.typed.told):
+        for told in (*(tool.told for tool in self._tools.tools), self.typed.told, self.snap.told):
             told.connect(self.bar.tell)
         handlers: dict[str, Callable[[], None]] = {
             "1": lambda: self.look_along("front"),
@@ -196,6 +205,7 @@ class Viewport(QWidget):
             "T": lambda: self.begin_aim(not self.bar.aim.isChecked()),
             "G": lambda: self.typed.begin(turns=False),
             "R": lambda: self.typed.begin(turns=True),
+            "V": self.snap.begin,
         }
         for key in VIEW_KEYS:
             shortcut = QShortcut(QKeySequence(key), self)
@@ -207,7 +217,7 @@ class Viewport(QWidget):
             return
         look = self.live.look
         settled = not self.session.dragging
-        self.scene.draw(look, self.session.selection, settled=settled)
+        self.scene.draw(look, self.session.selections, settled=settled)
         self.bar.tell_spacing(self.scene.spacing)
         if self._frame_soon:
             self.view.look_from(replace(self.view.eye, rotation=turntable(*STANDARD["iso"])))
@@ -219,7 +229,7 @@ class Viewport(QWidget):
 
     def _highlight(self) -> None:
         if self.live.ready:
-            self.scene.highlight(self.live.look, self.session.selection)
+            self.scene.highlight(self.live.look, self.session.selections)
         self.view.redraw()
 
     def _paint(self) -> None:
@@ -273,15 +283,9 @@ class Viewport(QWidget):
 
     def _mesh_hit(self, origin: Float, direction: Float) -> tuple[FieldPath, float]:
         """The nearest mesh on a ray, by the preview's own embree scenes."""
-        found: FieldPath = ()
-        nearest, look = math.inf, self.live.look
-        for item in look.placed:
-            start = transform_points(item.T_object_world, origin) - item.body.rays.centre
-            local = item.T_object_world[:3, :3] @ direction
-            hit, far = item.body.rays.intersect(start[None].astype(np.float32), local[None].astype(np.float32))
-            if hit[0] >= 0 and far[0] < nearest:
-                found, nearest = object_path(look, item.index), float(far[0])
-        return found, nearest
+        look = self.live.look
+        hit = mesh_hit(look, origin, direction)
+        return ((), math.inf) if hit is None else (object_path(look, hit.placed.index), hit.distance)
 
     def _pick(self, actors: list[vtkActor], x: float, y: float) -> FieldPath | None:
         self.view.aim()

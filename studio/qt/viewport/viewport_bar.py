@@ -137,4 +137,6 @@ class ViewportBar(QWidget):
         action = QWidgetAction(menu)
         action.setDefaultWidget(inner)
         menu.addAction(action)
+        menu.addSeparator()
+        self._add(menu, "Put a corner or face on another", "V", self._viewport.snap.begin)
         return menu

@@ -5,6 +5,7 @@ Meshes are given to the graphics once; a move sets their matrix. What a laser dr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -113,7 +114,7 @@ class ViewportScene:
         for lines in (self._camera, self._plane, self._frustum):
             self.paths[lines.actor] = CAMERA
 
-    def draw(self, look: Look, selection: FieldPath, *, settled: bool) -> None:
+    def draw(self, look: Look, selections: Sequence[FieldPath], *, settled: bool) -> None:
         """Show a look. settled: nothing is being dragged, so that sizes and the grid may follow too."""
         if settled or not self.size:
             self.size = rig_drawing.glyph_size(look.scene)
@@ -123,7 +124,7 @@ class ViewportScene:
         self._draw_lamps(look)
         if settled:
             self._draw_grid(*self.bounds(look))
-        self.highlight(look, selection)
+        self.highlight(look, selections)
 
     def bounds(self, look: Look, path: FieldPath = (), *, lamps: bool = False) -> tuple[Float, Float]:
         """Lowest and highest coordinates, m: of one item, or of everything that has a size; lamps: of these too."""
@@ -158,31 +159,33 @@ class ViewportScene:
         """What it gets hold of where there is nothing else."""
         return [*(actors.sheet.actor for actors in self._lasers), self._plane.actor, self._frustum.actor]
 
-    def highlight(self, look: Look, selection: FieldPath) -> None:
+    def highlight(self, look: Look, selections: Sequence[FieldPath]) -> None:
         """Mark what is selected: a mesh by the edges of its box, the rest by the accent colour."""
         colours = self._colours
         if colours is None:
             return
-        self._outline.lines(np.zeros((0, 3)), [])
+        corners, edges = [np.zeros((0, 3))], []
         for item in look.placed:
-            if selection == object_path(look, item.index):
+            if object_path(look, item.index) in selections:
                 box, margin = item.body.bounds, 0.01 * np.ptp(item.body.bounds, axis=0).max()
                 wide = np.stack([box[0] - margin, box[1] + margin])
-                corners = np.array(np.meshgrid(*wide.T, indexing="ij")).reshape(3, -1).T
-                edges = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
-                self._outline.lines(transform_points(item.T_world_object, corners), edges)
+                first = 8 * (len(corners) - 1)
+                edges += [(first + i, first + (i | bit)) for i in range(8) for bit in (1, 2, 4) if not i & bit]
+                own = np.array(np.meshgrid(*wide.T, indexing="ij")).reshape(3, -1).T
+                corners.append(transform_points(item.T_world_object, own))
+        self._outline.lines(np.concatenate(corners), edges)
         self._outline.colour(colours.accent)
-        chosen = selection in (CAMERA, ("scene", "rig"))
+        chosen = CAMERA in selections or ("scene", "rig") in selections
         neutral = colours.muted
         self._camera.colour(colours.accent if chosen else neutral)
         self._frustum.colour(colours.accent if chosen else mixed(colours.text, colours.base, 0.5))
         self._plane.colour(colours.accent if chosen else neutral)
         for i, (actors, laser) in enumerate(zip(self._lasers, look.scene.lasers, strict=False)):
-            chosen = selection == (*LASERS, i)
+            chosen = (*LASERS, i) in selections
             actors.body.colour(colours.accent if chosen else wavelength_colour(laser.wavelength_nm))
             actors.sheet.look.SetOpacity(0.24 if chosen else 0.16)
         for i, lamp in enumerate(self._lamps):
-            lamp.colour(colours.accent if selection == (*LIGHTS, i) else colours.warning)
+            lamp.colour(colours.accent if (*LIGHTS, i) in selections else colours.warning)
 
     def paint(self, colours: Colours) -> None:
         """Take the colours of a theme."""

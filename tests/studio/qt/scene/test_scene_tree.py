@@ -380,3 +380,21 @@ class TestDropping:
         session.replace_document(Document(Project.load(template_folder("sphere") / "project.json")))
         qtbot.waitUntil(lambda: not mesh_importer.running)
         assert "part" not in names(session)
+
+
+def test_ctrl_selects_several_and_delete_is_of_all(tree: SceneTree, qtbot: QtBot) -> None:
+    session = tree.session
+    scene_actions.apply(session, "add box", lambda project: scene_edits.add_primitive(project, Box))
+    scene_actions.apply(session, "add box", lambda project: scene_edits.add_primitive(project, Box))
+    there = names(session)
+    last = len(there) - 1
+    click(qtbot, tree, (*OBJECTS, last - 1))
+    index = tree.indexFromItem(tree.item((*OBJECTS, last)), NAME)
+    control = Qt.KeyboardModifier.ControlModifier
+    qtbot.mouseClick(tree.viewport(), Qt.MouseButton.LeftButton, control, tree.visualRect(index).center())
+    assert session.selections == ((*OBJECTS, last - 1), (*OBJECTS, last))
+    assert {item.text(NAME) for item in tree.selectedItems()} == set(there[-2:])
+    key(qtbot, tree, Qt.Key.Key_Delete)
+    assert names(session) == there[:-2]
+    session.document.undo()
+    assert names(session) == there
