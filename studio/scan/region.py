@@ -1,4 +1,4 @@
-"""A range of one laser's measurement: its points, what their errors come to, and its table. Qt-free."""
+"""A part of what was measured, by scan lines, across the fan or as a box: its points and their errors. Qt-free."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.cloud import cloud, write_csv
+from analysis.cloud import Cloud, at_first_step, cloud, write_csv
 from analysis.measures import FEWEST, error_statistics, median_length
+from render.base.arrays import Float
 from render.base.errors import InputError
 from render.scene.scene import Scene
 from studio.project.input_files import input_files
 from studio.scan.own_files import check_not_read
 from studio.scan.result_series import ErrorView, error_values, measured_series
+from studio.scan.scan_results import COLUMNS
 from studio.scan.stages import Measurement
 
 
@@ -53,23 +55,82 @@ class Region:
         return 1e-3 * (float(place.min()) - margin), 1e-3 * (float(place.max()) + margin)
 
 
+@dataclass(frozen=True)
+class Box:
+    """Along the world's axes, on the part as it stands at step 0; its faces are part of it."""
+
+    low: tuple[float, float, float] = (-math.inf,) * 3
+    high: tuple[float, float, float] = (math.inf,) * 3
+    """m."""
+    along: Literal["space"] = "space"
+
+    @property
+    def title(self) -> str:
+        sides = " x ".join(f"{1e3 * (high - low):.2f}" for low, high in zip(self.low, self.high, strict=True))
+        return f"a box of {sides} mm"
+
+    def holds(self, points: Float) -> NDArray[np.bool_]:
+        """(n,) of (n, 3) points on the part at step 0."""
+        return np.asarray(np.all((points >= self.low) & (points <= self.high), axis=1))
+
+    def of(self, found: Measurement, scene: Scene) -> NDArray[np.bool_]:
+        """(m,) the points within it."""
+        points = found.points
+        return points.valid & self.holds(np.nan_to_num(at_first_step(points.world, scene, found.step), nan=np.inf))
+
+    def of_cloud(self, points: Cloud, laser: int) -> NDArray[np.bool_]:
+        """(n,) those of a scan's points that a laser has within it."""
+        here = self.holds(np.stack([points[name] for name in "xyz"], axis=1))
+        return np.asarray(here & (points["laser"] == laser))
+
+    def across(self, found: Measurement, scene: Scene) -> tuple[float, float] | None:
+        """As of `Region.across`."""
+        places = found.points.index[self.of(found, scene)]
+        return Region("scan lines", places.min(), places.max()).across(found, scene) if len(places) else None
+
+
 def region_table(
-    region: Region, found: list[Measurement], scene: Scene, view: ErrorView
+    region: Region | Box, found: list[Measurement], scene: Scene, view: ErrorView
 ) -> list[tuple[str, list[str]]]:
     """Name and, for each measurement, what is shown of the errors within the region: value and its sigma."""
-    columns = [_figures(region.of(one, scene), one, view) for one in found]
+    return _rows([_figures(region.of(one, scene), one, view) for one in found], view)
+
+
+def scan_errors(region: Box | None, points: Cloud, laser: int, view: ErrorView) -> Float:
+    """(n,) errors of a scan's points within a region, or of all, in the view's unit; NaN of those in the image."""
+    here = (region or Box()).of_cloud(points, laser)
+    if view.kind not in COLUMNS:
+        return np.full(np.count_nonzero(here), np.nan)
+    return np.asarray(points[COLUMNS[view.kind]][here] * view.scale)
+
+
+def scan_table(region: Box, points: Cloud, laser: int, view: ErrorView) -> list[tuple[str, list[str]]]:
+    """Likewise of all steps of a scan, by the method that its points are of; these have no error in the image."""
+    here = region.of_cloud(points, laser)
+    error = scan_errors(region, points, laser, view)
+    # in the order of the scan lines, those of two steps never side by side
+    line = points["row"][here].astype(np.intp) + points["step"][here] * (int(points["row"].max(initial=0)) + 2)
+    order = np.argsort(line, kind="stable")
+    lengths = points["correlation_length"][here] if "correlation_length" in points else np.ones(len(error))
+    return _rows([_statistics(error[order], line[order], lengths[order])], view)
+
+
+def _rows(columns: list[list[str]], view: ErrorView) -> list[tuple[str, list[str]]]:
     names = ("Points", *(f"{name} / {view.unit}" for name in ("Mean error", "RMSE", "Robust sigma")))
     return [(name, [column[i] for column in columns]) for i, name in enumerate(names)]
 
 
 def _figures(here: NDArray[np.bool_], found: Measurement, view: ErrorView) -> list[str]:
     points = found.points
-    error = error_values(found.errors, view)
-    known = here & np.isfinite(error)
+    return _statistics(error_values(found.errors, view)[here], points.index[here], points.correlation_length[here])
+
+
+def _statistics(error: Float, index: NDArray[np.intp], length: Float) -> list[str]:
+    known = np.isfinite(error)
     if np.count_nonzero(known) < FEWEST:
-        return [str(np.count_nonzero(here)), "-", "-", "-"]
-    figures = error_statistics(error[known], points.index[known], median_length(points.correlation_length[known]))
-    return [str(np.count_nonzero(here)), *(_with_sigma(*pair) for pair in figures)]
+        return [str(len(error)), "-", "-", "-"]
+    figures = error_statistics(error[known], index[known], median_length(length[known]))
+    return [str(len(error)), *(_with_sigma(*pair) for pair in figures)]
 
 
 def _with_sigma(value: float, sigma: float) -> str:
@@ -78,7 +139,7 @@ def _with_sigma(value: float, sigma: float) -> str:
     return f"{value:.{places}f} ± {sigma:.{places}f}"
 
 
-def export_region(path: Path, region: Region, found: Measurement, scene: Scene, root: Path) -> int:
+def export_region(path: Path, region: Region | Box, found: Measurement, scene: Scene, root: Path) -> int:
     """The region's points as points.csv has them; gives how many. InputError: none, or the file cannot be written."""
     here = region.of(found, scene)
     if not here.any():
@@ -88,3 +149,13 @@ def export_region(path: Path, region: Region, found: Measurement, scene: Scene, 
     kept = here[found.points.valid]
     write_csv(path, {name: column[kept] for name, column in columns.items()})
     return int(kept.sum())
+
+
+def export_box(path: Path, region: Box, points: Cloud, laser: int, scanned: Path) -> int:
+    """Likewise of all steps of a scan, whose file of points is `scanned`."""
+    here = region.of_cloud(points, laser)
+    if not here.any():
+        raise InputError("no point is within the region", where=region.title, cure="draw a wider one")
+    check_not_read([path], [scanned])
+    write_csv(path, {name: column[here] for name, column in points.items()})
+    return int(here.sum())

@@ -40,6 +40,7 @@ VIEW_KEYS = {
     "G": "move: then X, Y or Z and a number",
     "R": "turn: then X, Y or Z and a number",
     "V": "put a corner or face on another",
+    "B": "a box about points, to be told of",
 }
 """Key -> what it does while the 3D view has the focus."""
 COMMANDS: tuple[Command | str, ...] = (

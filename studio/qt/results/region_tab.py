@@ -13,13 +13,17 @@ from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
 from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.plots import PointedPlots
-from studio.scan.region import Region, export_region, region_table
+from studio.qt.results.scan_bar import ScanBar
+from studio.scan.deviation import read_cloud
+from studio.scan.height_map import points_of
+from studio.scan.region import Box, Region, export_box, export_region, region_table, scan_table
 from studio.scan.result_series import ErrorView
 from studio.scan.stages import Measurement
 
 HINT = (
-    "Drag across the row charts or the profile, or with Shift over the picture: the errors of what lies within are "
-    "told here. The edges can be moved in the charts; there Shift or the middle button shifts the view."
+    "Drag across the row charts or the profile, or with Shift over the picture, or press B in the 3D view and draw a "
+    "rectangle about points: the errors of what lies within are told here. The edges can be moved in the charts; there "
+    "Shift or the middle button shifts the view."
 )
 EXPLAINED = (
     "Value ± one sigma of chance: neighbouring scan lines that err alike count as one, by the predicted length of "
@@ -32,11 +36,19 @@ class RegionTab(QWidget):
 
     changed = Signal()
 
-    def __init__(self, session: Session, rows: PointedPlots, profile: PointedPlots) -> None:
+    def __init__(
+        self,
+        session: Session,
+        rows: PointedPlots,
+        profile: PointedPlots,
+        scan_bar: ScanBar,
+    ) -> None:
+        """scan_bar: whether boxes are of all steps."""
         super().__init__()
         self.session, self.rows, self.profile = session, rows, profile
-        self.region: Region | None = None
+        self.region: Region | Box | None = None
         self._shown: dict[str, Measurement] = {}
+        self._scan_bar, self._laser = scan_bar, 0
         self.title = QLabel(wordWrap=True)
         self.table = ReadOnlyTable()
         self.table.setToolTip(f"<p>{EXPLAINED}</p>")
@@ -56,16 +68,16 @@ class RegionTab(QWidget):
         self.clear.clicked.connect(lambda: self.choose(None))
         self._tell()
 
-    def choose(self, region: Region | None) -> None:
+    def choose(self, region: Region | Box | None) -> None:
         """Mark it where it was dragged, and tell of it."""
         self.region = region
-        if region is None or region.along != "scan lines":
+        if not isinstance(region, Region) or region.along != "scan lines":
             self.rows.hide_range()
             self.session.show_range(None)
         else:
             self.rows.show_range(region.low, region.high)
             self.session.show_range((region.low, region.high))
-        if region is None or region.along != "fan":
+        if not isinstance(region, Region) or region.along != "fan":
             self.profile.hide_range()
         self._tell()
         self.changed.emit()
@@ -73,14 +85,18 @@ class RegionTab(QWidget):
         if region is not None and panel is not None and not panel.isVisible():
             self.session.message.emit("info", f"Measure, Region tells of {region.title}")
 
-    def show_measurements(self, shown: dict[str, Measurement], view: ErrorView) -> None:
+    def show_measurements(self, shown: dict[str, Measurement], view: ErrorView, laser: int) -> None:
         """By method, of one laser of the shown render."""
-        self._shown = shown
+        self._shown, self._laser = shown, laser
         render, region = self.session.shown, self.region
         if render is None or region is None:
             return
-        rows = region_table(region, list(shown.values()), render.project.scene, view)
-        self.table.show_methods(list(shown), len(rows))
+        scan = self._scan_bar.whole
+        if isinstance(region, Box) and scan is not None:
+            methods, rows = scan.table(laser, view)[0][:1], scan_table(region, scan.points, laser, view)
+        else:
+            methods, rows = list(shown), region_table(region, list(shown.values()), render.project.scene, view)
+        self.table.show_methods(methods, len(rows))
         for i, (name, texts) in enumerate(rows):
             self.table.setVerticalHeaderItem(i, QTableWidgetItem(name))
             for k, text in enumerate(texts):
@@ -90,10 +106,14 @@ class RegionTab(QWidget):
     def write(self, path: Path) -> None:
         """InputError: there is nothing to write, or the file cannot be written."""
         render = self.session.shown
-        if render is None or self.region is None or not self._shown:
+        scan, first = self._scan_bar.whole, next(iter(self._shown.values()), None)
+        if isinstance(self.region, Box) and scan is not None:
+            points = points_of(scan.found.folder)
+            count = export_box(path, self.region, read_cloud(points), self._laser, points)
+        elif render is None or self.region is None or first is None:
             raise InputError("no region is chosen", cure="drag across the profile first")
-        first = next(iter(self._shown.values()))
-        count = export_region(path, self.region, first, render.project.scene, self.session.document.root)
+        else:
+            count = export_region(path, self.region, first, render.project.scene, self.session.document.root)
         self.session.message.emit("info", f"Wrote {path}: {count} points, {self.region.title}")
 
     def _ask(self) -> None:

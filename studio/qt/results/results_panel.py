@@ -29,7 +29,6 @@ from PySide6.QtWidgets import (
 
 from analysis.report.colour import TRUTH, method_colour, method_name
 from analysis.report.units import digits
-from render.base.arrays import Float
 from studio.qt.core import theme
 from studio.qt.core.icons import dot
 from studio.qt.core.scan_steps import scan_steps
@@ -44,7 +43,7 @@ from studio.qt.results.results_rows import RowPlots
 from studio.qt.results.results_steps import StepsPlot
 from studio.qt.results.scan_bar import ScanBar
 from studio.scan.redevelop import is_developed_otherwise
-from studio.scan.region import Region
+from studio.scan.region import Box, Region, scan_errors
 from studio.scan.remarks import frame_remarks, scale_head, scale_notes
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, error_values, measured_series, table, true_series
 from studio.scan.scan_results import COLUMNS, ScanResults
@@ -93,8 +92,8 @@ class ResultsPanel(QWidget):
         self.rows, self.profile, self.histogram, self.by_step = RowPlots(), ProfilePlot(), ErrorHistogram(), StepsPlot()
         self.table = MeasuresTable()
         self.part = PartTab(session, self.profile)
-        self.region = RegionTab(session, self.rows, self.profile)
         self.scan_bar = ScanBar(session)
+        self.region = RegionTab(session, self.rows, self.profile, self.scan_bar)
         self.scan_steps = scan_steps(session)
         self.head = QFrame()
         self.head_text = QLabel()
@@ -112,8 +111,8 @@ class ResultsPanel(QWidget):
             plot.hovered.connect(self._hover)
             plot.chosen.connect(self.pin)
         for ranged in (self.rows.ranged, session.range_dragged):
-            ranged.connect(lambda low, high: self._choose(Region("scan lines", low, high)))
-        self.profile.ranged.connect(lambda low, high: self._choose(Region("fan", 1e-3 * low, 1e-3 * high)))
+            ranged.connect(lambda low, high: self.choose(Region("scan lines", low, high)))
+        self.profile.ranged.connect(lambda low, high: self.choose(Region("fan", 1e-3 * low, 1e-3 * high)))
         self.region.changed.connect(self._show_region)
         self.part.placing_changed.connect(self._follow_placing)
         self.by_step.chosen.connect(session.look_at_step)
@@ -163,10 +162,10 @@ class ResultsPanel(QWidget):
         self.rows.show_series(curve.axis, truth, {method: (series[method], errors[method]) for method in shown}, view)
         self.profile.show_series(truth, series)
         self.part.follow(laser)
-        self.region.show_measurements(shown, view)
-        if render.scan is not None and self.scan_bar.all_steps:
-            self._show_all_steps(render.scan, laser)
-            remarks = render.scan.remarks()
+        self.region.show_measurements(shown, view, laser)
+        if (whole := self.scan_bar.whole) is not None:
+            self._show_all_steps(whole, laser)
+            remarks = whole.remarks()
             if is_developed_otherwise(render.project, self.session.project, render.image_scale):
                 remarks.insert(0, AS_SCANNED)
         else:
@@ -180,8 +179,10 @@ class ResultsPanel(QWidget):
 
     def _show_region(self) -> None:
         """Another region was chosen, or none."""
-        self.region.show_measurements(self.shown(), self.view)
-        if not self.scan_bar.all_steps:
+        self.region.show_measurements(self.shown(), self.view, self.part.laser)
+        if (whole := self.scan_bar.whole) is not None:
+            self._show_all_steps(whole, self.part.laser)
+        else:
             self._show_histogram()
             self._mark()
 
@@ -199,14 +200,14 @@ class ResultsPanel(QWidget):
         view = self.view
         methods, rows = scan.table(laser, view)
         kept = [i for i, method in enumerate(methods) if method not in self.hidden]
-        self.table.show_measures(
-            [methods[i] for i in kept], [(name, unit, [values[i] for i in kept]) for name, unit, values in rows]
-        )
-        errors: dict[str, Float] = {}
-        if view.kind in COLUMNS and kept[:1] == [0]:
-            column = np.asarray(scan.points[COLUMNS[view.kind]] * view.scale)
-            errors[methods[0]] = column[scan.points["laser"] == laser]
-        self.histogram.show_errors(errors, view, "" if view.kind in COLUMNS else BY_STEP_ONLY)
+        of_kept = [(name, unit, [values[i] for i in kept]) for name, unit, values in rows]
+        self.table.show_measures([methods[i] for i in kept], of_kept)
+        if view.kind not in COLUMNS:
+            self.histogram.show_errors({}, view, BY_STEP_ONLY)
+            return
+        region = self.region.region if isinstance(self.region.region, Box) else None
+        errors = {methods[0]: scan_errors(region, scan.points, laser, view)} if kept[:1] == [0] else {}
+        self.histogram.show_errors(errors, view, "" if region is None else f"Of {region.title}")
 
     def _show_by_step(self, scan: ScanResults | None, laser: int) -> None:
         self.tabs.setTabVisible(STEPS, scan is not None and scan.measured)
@@ -286,7 +287,7 @@ class ResultsPanel(QWidget):
         self.give_up.setEnabled(self.part.placing is not None)
         self.figures.setCurrentIndex(PART)
 
-    def _choose(self, region: Region) -> None:
+    def choose(self, region: Region | Box) -> None:
         """A range was dragged: of the measure that is being added, else to be told of."""
         if self.part.placing is None:
             self.region.choose(region)

@@ -43,9 +43,9 @@ class ScanBar(QWidget):
         self.follow()
 
     @property
-    def all_steps(self) -> bool:
-        """The measures are of all steps of a scan."""
-        return self.scan is not None and self.scan.measured and self.scope.currentIndex() == 0
+    def whole(self) -> ScanResults | None:
+        """The scan of which the measures are, all steps together; None: they are of one frame."""
+        return self.scan if self.scan is not None and self.scan.measured and self.scope.currentIndex() == 0 else None
 
     def follow(self) -> None:
         """The shown render is another one."""

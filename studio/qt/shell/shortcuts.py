@@ -26,7 +26,7 @@ FIELDS = (
     ("Up, Down", "a step; with Shift a tenth of it"),
 )
 LISTS = (("Return", "frame the part"), ("F2", "name a part or a render"), ("Del", "remove a part or a render"))
-COLUMNS = (("File", "Render"), ("Edit", "Scene", "Lists", "Help"), ("View", "Measure", "3D view"), ("Mouse", "Fields"))
+COLUMNS = (("File", "Render"), ("Edit", "Scene", "Lists", "Help"), ("View", "Measure"), ("Mouse", "Fields", "3D view"))
 
 
 class CheatSheet(QDialog):

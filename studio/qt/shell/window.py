@@ -209,6 +209,9 @@ class MainWindow(QMainWindow):
         results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
         results.scan_bar.scope_changed.connect(made.show_all_steps)  # type: ignore[attr-defined]
         made.pressed.connect(results.pin)  # type: ignore[attr-defined]
+        self.panels["viewport"].box.drawn.connect(made.take_box)  # type: ignore[attr-defined]
+        made.boxed.connect(results.choose)  # type: ignore[attr-defined]
+        results.region.changed.connect(lambda: made.show_box(results.region.region))  # type: ignore[attr-defined]
         motion.began.connect(made.begin_scan)  # type: ignore[attr-defined]
         motion.grew.connect(made.grow)  # type: ignore[attr-defined]
         return made

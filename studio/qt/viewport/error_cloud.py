@@ -10,7 +10,7 @@ from operator import is_
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, QRect, Signal
 from PySide6.QtGui import QColor
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
@@ -20,9 +20,11 @@ from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.viewport.colour_bar import ColourBar
 from studio.qt.viewport.view3d import View3D
+from studio.qt.viewport.viewport_scene import LINE_PX, Lines
 from studio.scan.colour_scale import PER_METRE, ColourScale
 from studio.scan.point_sample import PointSample
 from studio.scan.redevelop import is_stale
+from studio.scan.region import Box
 from studio.scan.remarks import best
 from studio.scan.result_series import ERROR_VIEWS, ErrorView
 from studio.scan.stages import Measurement
@@ -39,6 +41,8 @@ class ErrorCloud(QObject):
 
     pressed = Signal(int)
     """The scan line of the point that is clicked."""
+    boxed = Signal(object)
+    """A `Box` about points, to be told of."""
 
     def __init__(self, session: Session, view: View3D) -> None:
         super().__init__(view)
@@ -48,6 +52,8 @@ class ErrorCloud(QObject):
         self.all_steps = True
         """Of a scan, the points of all its steps; else those of the step that is looked at."""
         self.points: Float = np.zeros((0, 3))
+        self._first: Float = np.zeros((0, 3))
+        """Where they are at step 0."""
         self.errors: Float = np.zeros(0)
         self.rows: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
         self.steps: NDArray[np.int32] = np.zeros(0, dtype=np.int32)
@@ -64,6 +70,11 @@ class ErrorCloud(QObject):
         self._data, self._actor = _point_actor(POINT_PX)
         self._marks, self._mark_actor = _point_actor(MARK_PX)
         self._rim = _rim_actor(self._data)
+        self.box: Box | None = None
+        """Which is drawn about its points."""
+        self._edges = Lines(LINE_PX)
+        self._edges.actor.PickableOff()
+        view.renderer.AddActor(self._edges.actor)
         for actor in (self._rim, self._actor, self._mark_actor):
             view.renderer.AddActor(actor)
         self.bar = ColourBar(view)
@@ -143,6 +154,34 @@ class ErrorCloud(QObject):
             low, high = np.percentile(self.points, (1.0, 99.0), axis=0)
             self.view.look_from(self.view.eye.framed(low, high, self.view.pixels))
 
+    def take_box(self, rectangle: QRect) -> None:
+        """The box about the points within a rectangle of the view is the region to tell of."""
+        x, y = self.view.eye.project(self.points, self.view.pixels).T if len(self.points) else np.zeros((2, 0))
+        with np.errstate(invalid="ignore"):
+            inside = (x >= rectangle.left()) & (x <= rectangle.right())
+            inside &= (y >= rectangle.top()) & (y <= rectangle.bottom())
+        if not (self.visible and inside.any()):
+            self.session.message.emit("warning", "no point of the cloud is within the rectangle")
+            return
+        first = self._first[inside]
+        low, high = np.floor(first.min(axis=0) * 1e6) * 1e-6, np.ceil(first.max(axis=0) * 1e6) * 1e-6
+        self.boxed.emit(Box(_three(low), _three(high)))
+
+    def show_box(self, region: object) -> None:
+        """Draw a region that is a box; any other is drawn elsewhere."""
+        self.box = region if isinstance(region, Box) else None
+        self._draw_box()
+
+    def _draw_box(self) -> None:
+        corners = np.zeros((0, 3))
+        if self.box is not None:
+            ends = np.array([self.box.low, self.box.high]).T
+            corners = np.array(np.meshgrid(*ends, indexing="ij")).reshape(3, -1).T
+            corners = at_step(corners, self.session.project.scene, self.session.step)
+        self._edges.lines(corners, [(i, i | bit) for i in range(len(corners)) for bit in (1, 2, 4) if not i & bit])
+        self._edges.colour(theme.colours().accent)
+        self.view.redraw()
+
     def refresh(self) -> None:
         """The points of the shown render, by the project's own method; of a scan those of all its steps, or of one."""
         render = self.session.shown
@@ -175,11 +214,13 @@ class ErrorCloud(QObject):
         else:
             first, self.rows, self.steps = np.zeros((0, 3)), np.zeros(0, np.int32), np.zeros(0, np.int32)
         # on the part, wherever it stands now
+        self._first = first
         self.points = at_step(first, self.session.project.scene, self.session.step) if len(first) else first
         title, unit, self.errors = self._values(first)
         low, high = self.bar.show_scale(title, unit, self.scales[self.meaning], self.errors, self.image_scale)
         _give(self._data, self.points, self.scales[self.meaning].colours(self.errors, low, high))
         self._mark()
+        self._draw_box()
         self._show_or_hide()
 
     def _values(self, first: Float) -> tuple[str, str, Float]:
@@ -254,6 +295,11 @@ class ErrorCloud(QObject):
             if squared[nearest] < NEAR_PX**2:
                 return int(self.rows[nearest])
         return None
+
+
+def _three(vector: Float) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def _point_actor(size: float) -> tuple[pv.PolyData, vtkActor]:

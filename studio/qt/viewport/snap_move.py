@@ -99,7 +99,7 @@ class SnapMove(QObject):
             if event.type() == QEvent.Type.KeyPress:
                 self.end()
             return True
-        if Qt.Key(event.key()) in (Qt.Key.Key_G, Qt.Key.Key_R, Qt.Key.Key_T):
+        if Qt.Key(event.key()) in (Qt.Key.Key_B, Qt.Key.Key_G, Qt.Key.Key_R, Qt.Key.Key_T):
             self.end()
         return False
 

@@ -23,6 +23,7 @@ from studio.qt.core.actions import VIEW_KEYS
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session
 from studio.qt.viewport.board_ghost import BoardGhost
+from studio.qt.viewport.box_tool import BoxTool
 from studio.qt.viewport.gizmo import Gizmo
 from studio.qt.viewport.handle_tool import Tools
 from studio.qt.viewport.section_plane import SectionPlane
@@ -50,6 +51,7 @@ class Viewport(QWidget):
         self.section = SectionPlane(session, self.view)
         self.typed = TypedMove(self.gizmo, self.view)
         self.snap = SnapMove(self.gizmo, self.live, self.view)
+        self.box = BoxTool(self.view)
         self._tools = Tools(self.section, self.gizmo)
         self.view.tool = self._tools
         self.view.before_paint = self._tools.draw
@@ -189,7 +191,7 @@ class Viewport(QWidget):
         view.hovered.connect(self._hover_later)
         view.left.connect(self._hover.stop)
         view.navigated.connect(self._leave)
-        for told in (*(tool.told for tool in self._tools.tools), self.typed.told, self.snap.told):
+        for told in (*(tool.told for tool in self._tools.tools), self.typed.told, self.snap.told, self.box.told):
             told.connect(self.bar.tell)
         handlers: dict[str, Callable[[], None]] = {
             "1": lambda: self.look_along("front"),
@@ -206,6 +208,7 @@ class Viewport(QWidget):
             "G": lambda: self.typed.begin(turns=False),
             "R": lambda: self.typed.begin(turns=True),
             "V": self.snap.begin,
+            "B": self.box.begin,
         }
         for key in VIEW_KEYS:
             shortcut = QShortcut(QKeySequence(key), self)

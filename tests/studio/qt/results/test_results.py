@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from render.world.world import build_world
@@ -235,3 +236,55 @@ def test_a_click_on_a_point_in_3d_keeps_its_row_and_selects_nothing(
     assert np.linalg.norm(apart, axis=1).min() < 3.0
     results.pin(results.pinned)
     assert results.pinned is None
+
+
+def test_a_rectangle_about_points_is_a_region_of_them(
+    window: MainWindow, results: ResultsPanel, qtbot: QtBot, tmp_path: Path
+) -> None:
+    from studio.qt.viewport.viewport import Viewport
+    from studio.scan.region import Box
+
+    viewport, cloud = window.panels["viewport"], window.cloud
+    assert isinstance(viewport, Viewport)
+    cloud.frame()
+    QTest.keyClick(viewport.view, Qt.Key.Key_B)
+    places = cloud.view.eye.project(cloud.points, cloud.view.pixels)
+    ends = [QPoint(*(round(float(x)) for x in np.percentile(places, share, axis=0))) for share in (30.0, 70.0)]
+    low, high = np.minimum(_xy(ends[0]), _xy(ends[1])), np.maximum(_xy(ends[0]), _xy(ends[1]))
+    qtbot.mousePress(viewport.view, Qt.MouseButton.LeftButton, pos=ends[0])
+    qtbot.mouseMove(viewport.view, ends[1])
+    qtbot.mouseRelease(viewport.view, Qt.MouseButton.LeftButton, pos=ends[1])
+    box = results.region.region
+    assert isinstance(box, Box) and cloud.box == box and not viewport.box.active
+    inside = np.all((places > low + 1) & (places < high - 1), axis=1)
+    assert inside.any() and box.holds(cloud.points[inside]).all()
+    found = results.shown()["likelihood"]
+    count = np.count_nonzero(box.of(found, window.session.shown.project.scene))
+    assert int(results.region.table.item(0, 0).text()) == count >= np.count_nonzero(inside)
+    results.region.write(tmp_path / "box.csv")
+    assert len((tmp_path / "box.csv").read_text().splitlines()) == count + 1
+    results.region.clear.click()
+    assert cloud.box is None
+
+
+def test_a_rectangle_about_nothing_is_told_and_escape_gives_up(
+    window: MainWindow, results: ResultsPanel, qtbot: QtBot
+) -> None:
+    from studio.qt.viewport.viewport import Viewport
+
+    viewport, told = window.panels["viewport"], []
+    assert isinstance(viewport, Viewport)
+    window.session.message.connect(lambda level, text: told.append(text))
+    window.cloud.frame()
+    for key in (Qt.Key.Key_B, Qt.Key.Key_Escape):
+        QTest.keyClick(viewport.view, key)
+    assert not viewport.box.active and viewport.view.tool is not viewport.box
+    QTest.keyClick(viewport.view, Qt.Key.Key_B)
+    qtbot.mousePress(viewport.view, Qt.MouseButton.LeftButton, pos=QPoint(1, 1))
+    qtbot.mouseMove(viewport.view, QPoint(8, 8))
+    qtbot.mouseRelease(viewport.view, Qt.MouseButton.LeftButton, pos=QPoint(8, 8))
+    assert "no point" in told[-1] and results.region.region is None
+
+
+def _xy(point: QPoint) -> np.ndarray:
+    return np.array([point.x(), point.y()])
