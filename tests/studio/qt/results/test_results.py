@@ -247,7 +247,7 @@ def test_a_rectangle_about_points_is_a_region_of_them(
     viewport, cloud = window.panels["viewport"], window.cloud
     assert isinstance(viewport, Viewport)
     cloud.frame()
-    QTest.keyClick(viewport.view, Qt.Key.Key_B)
+    viewport.box.begin()
     places = cloud.view.eye.project(cloud.points, cloud.view.pixels)
     ends = [QPoint(*(round(float(x)) for x in np.percentile(places, share, axis=0))) for share in (30.0, 70.0)]
     low, high = np.minimum(_xy(ends[0]), _xy(ends[1])), np.maximum(_xy(ends[0]), _xy(ends[1]))
@@ -276,10 +276,10 @@ def test_a_rectangle_about_nothing_is_told_and_escape_gives_up(
     assert isinstance(viewport, Viewport)
     window.session.message.connect(lambda level, text: told.append(text))
     window.cloud.frame()
-    for key in (Qt.Key.Key_B, Qt.Key.Key_Escape):
-        QTest.keyClick(viewport.view, key)
+    viewport.box.begin()
+    QTest.keyClick(viewport.view, Qt.Key.Key_Escape)
     assert not viewport.box.active and viewport.view.tool is not viewport.box
-    QTest.keyClick(viewport.view, Qt.Key.Key_B)
+    viewport.box.begin()
     qtbot.mousePress(viewport.view, Qt.MouseButton.LeftButton, pos=QPoint(1, 1))
     qtbot.mouseMove(viewport.view, QPoint(8, 8))
     qtbot.mouseRelease(viewport.view, Qt.MouseButton.LeftButton, pos=QPoint(8, 8))

@@ -122,6 +122,16 @@ def test_a_laser_is_taken_by_its_origin(two: Viewport) -> None:
     np.testing.assert_allclose(two.session.project.scene.T_world_laser(0)[:3, 3], put, atol=3e-9)
 
 
+def test_another_tool_takes_its_place(two: Viewport) -> None:
+    QTest.keyClick(two.view, "v")
+    QTest.keyClick(two.view, "b")
+    assert two.box.active and not two.snap.active
+    QTest.keyClick(two.view, "v")
+    assert two.snap.active and not two.box.active
+    QTest.keyClick(two.view, "v")
+    assert not two.snap.active and two.view.tool is not None
+
+
 def test_escape_gives_up_and_a_miss_is_told(two: Viewport) -> None:
     before, messages = place(two), []
     two.session.message.connect(lambda level, text: messages.append(text))
