@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import re
 import subprocess
@@ -73,15 +74,25 @@ def read_step(file: Path, chord: float) -> list[Part]:
         chord_mm = repr(float(np.clip(chord, LEAST_CHORD, LARGEST_CHORD)) * 1e3)
         command = [sys.executable, "-c", CONVERT, str(file.resolve()), str(made), chord_mm]
         try:
-            done = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False, cwd=folder)
+            code = _run_beside_imports(command, folder)
         except subprocess.TimeoutExpired:
             cure = "export a simpler part, or a mesh"
             found = f"not read within {PATIENCE:g} s"
             raise InputError("the STEP file takes too long", where=str(file), found=found, cure=cure) from None
-        if done.returncode != 0 or not made.is_file() or made.stat().st_size == 0:
-            raise _damaged(file, f"OpenCASCADE ended with code {done.returncode}")
+        if code != 0 or not made.is_file() or made.stat().st_size == 0:
+            raise _damaged(file, f"OpenCASCADE ended with code {code}")
         data = read_bytes(made, MAX_FILE_BYTES, "mesh of the STEP file", str(file))
     return parts_of(data, str(file))
+
+
+def _run_beside_imports(command: list[str], folder: str) -> int:
+    """The exit code of a command; what reads its result, slow to load, is loaded meanwhile. TimeoutExpired."""
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder) as process:
+        try:
+            importlib.import_module("trimesh")
+            return process.wait(PATIENCE)
+        finally:
+            process.kill()
 
 
 def parts_of(data: bytes, where: str) -> list[Part]:
