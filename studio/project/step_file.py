@@ -30,6 +30,7 @@ DARKEST = 0.02
 """A part that is drawn black still reflects."""
 CONVERT = """
 import sys
+sys.modules["trimesh"] = None  # cascadio extends it where it is there, which would take longer to load than cascadio
 import cascadio
 source, target, chord_mm = sys.argv[1:]
 cascadio.step_to_glb(source, target, tol_linear=float(chord_mm))
