@@ -105,13 +105,15 @@ class Inspector(QWidget):
         name = getattr(value, "name", None)
         self.title.setText(name or TITLES.get(str(path[-1]), str(path[-1]).capitalize()))
         self.icon.setPixmap(item_icon(self.session.project, path).pixmap(20, 20))
-        others = len(self.session.selections) - 1
-        more = f", and {others} more selected" if others > 0 else ""
-        self.kind.setText("" if name is None else _kind(self.session.project, path) + more)
-        self.kind.setToolTip("The fields are of this one; moves, turns, copies and Delete are of all" if more else "")
+        self.kind.setText("" if name is None else _kind(self.session.project, path))
         hint = LIST_HINTS.get(str(path[-1]), "") if is_list else ""
         if not is_list and spec.kind != "union" and not spec.fields:
             hint = spec.help
+        others = len(self.session.selections) - 1
+        if others > 0:
+            hint = (
+                f"{others} more selected: all move, turn, are copied and deleted together; the fields are of this one."
+            )
         self.hint.setText(hint)
         self.hint.setVisible(bool(hint))
         self.form.show_item(path, spec)

@@ -278,3 +278,16 @@ class TestFollowing:
     def test_another_document_is_shown(self, session: Session, inspector: Inspector) -> None:
         session.replace_document(Document(Project.load(template_folder("sphere") / "project.json")))
         assert inspector.title.text() == session.project.name
+
+
+def test_several_selected_are_told_without_pushing_the_fields_out(session: Session, inspector: Inspector) -> None:
+    session.select(LASER)
+    before = inspector.form.parentWidget().minimumSizeHint().width()
+    session.select_also(CAMERA)
+    session.select_also(LASER)
+    session.select_also(LASER)
+    assert session.selections == (CAMERA, LASER)
+    assert inspector.hint.text().startswith("1 more selected") and not inspector.hint.isHidden()
+    assert inspector.form.parentWidget().minimumSizeHint().width() <= before
+    session.select(LASER)
+    assert "selected" not in inspector.hint.text()
