@@ -55,6 +55,8 @@ class ScanRecord:
         self.steps: list[StepResult] = []
         self._readings: list[Reading] = []
         self._patches: list[Patch] = []
+        self._of_all: tuple[Reading, ...] | None = None
+        """Read from these when they are asked for, once; None: not since the last frame."""
         self.seconds: dict[str, float] = {}
         """Wall time of the frames by stage, s."""
         self.counts: dict[Quantity, tuple[float, int]] = {}
@@ -79,6 +81,7 @@ class ScanRecord:
         self.steps.append(_step(frame, firsts))
         self._readings += frame.readings
         self._patches += frame.patches
+        self._of_all = None
         for stage, spent in frame.seconds.items():
             self.seconds[stage] = self.seconds.get(stage, 0.0) + spent
         for quantity, value in (*frame.counts.items(), *self._group_counts(frame)):
@@ -88,7 +91,9 @@ class ScanRecord:
     @property
     def readings(self) -> list[Reading]:
         """Of the project's measures: in the order of the steps, then those of all steps."""
-        return [*self._readings, *read_scan(self._patches)]
+        if self._of_all is None:
+            self._of_all = read_scan(self._patches)
+        return [*self._readings, *self._of_all]
 
     @staticmethod
     def _group_counts(frame: FrameResult) -> Iterator[tuple[Quantity, float]]:
