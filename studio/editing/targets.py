@@ -41,9 +41,7 @@ class Target:
 
     def turned(self, motion: Float) -> Pose:
         """The pose after a motion (4, 4) in the world that turns about the item's own origin, which stays."""
-        matrix = invert(self.T_world_parent) @ motion @ self.T_world_item
-        rotation = Pose.from_matrix(matrix).rotation
-        return self.pose.model_copy(update={"rotation": rotation})
+        return self.pose.model_copy(update={"rotation": self.turned_about(motion).rotation})
 
     def turned_about(self, motion: Float) -> Pose:
         """The pose after a motion (4, 4) in the world that turns about any other point, too."""

@@ -91,7 +91,8 @@ class PartTab(QWidget):
         self.chosen = min(self.chosen, len(self._read) - 1)
         step = 0 if render is None else render.frame.step
         self.readings = read_each(self._read, step, self._profiles) if self._profiles else ()
-        if self.readings and render is not None and render.scan is not None:
+        of_scan = any(gauge.of_scan for gauge in self._read)
+        if of_scan and self.readings and render is not None and render.scan is not None:
             scan = render.scan.found
             kept = kept_readings(self._read, measured_project(scan).measures, scan.manifest.get("measures"))
             self.readings = tuple(kept.get(one.gauge, one) for one in self.readings)
