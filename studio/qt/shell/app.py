@@ -75,7 +75,9 @@ def application() -> QApplication:
     from PySide6.QtWidgets import QApplication
 
     from studio.qt.shell.memory import return_large_blocks
+    from studio.qt.shell.overrides import let_faults_out
 
+    let_faults_out()
     there = QApplication.instance()
     if isinstance(there, QApplication):
         return there

@@ -58,14 +58,15 @@ class Panels:
     """Every panel by its key; one that comes later is made when it is asked for here or its room is first seen."""
 
     def __init__(self, session: Session, runner: object, making: Making = lambda title: None) -> None:
-        """making: hears the title of each panel before it is made."""
-        self._session, self._runner, self._making = session, runner, making
+        """making: hears the title of each panel that is made now; those made later are nobody's wait for a window."""
+        self._session, self._runner = session, runner
         self._made: dict[str, QWidget] = {}
         self._rooms: dict[str, Room] = {}
         for panel in PANELS:
             if panel.later:
                 self._rooms[panel.key] = Room(self, panel.key)
             else:
+                making(panel.title)
                 self._make(panel)
 
     def __getitem__(self, key: str) -> QWidget:
@@ -85,7 +86,6 @@ class Panels:
         return self._rooms[key] if key in self._rooms else self._made[key]
 
     def _make(self, panel: Panel) -> QWidget:
-        self._making(panel.title)
         kind = getattr(import_module(panel.module), panel.name)
         made = kind(self._session, self._runner) if panel.takes_runner else kind(self._session)
         self._made[panel.key] = made

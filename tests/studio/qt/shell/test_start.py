@@ -38,6 +38,7 @@ def start(path):
     window = made(path)
 
     def end():
+        VISIT
         log = window.panels["log"].as_text()
         print(json.dumps({"title": window.windowTitle(), "log": log, "modules": sorted(sys.modules)}), flush=True)
         window.files.count_as_saved(window.session.project)
@@ -50,15 +51,34 @@ app.start = start
 sys.exit(app.open_studio(*map(Path, sys.argv[1:])))
 """
 
+WALK = """
+        for command in ("render_workspace", "measure", "study", "calibrate", "dataset", "setup"):
+            window.commands[command].trigger()
+            app.application().processEvents()
+"""
+FAULT = """
+        from PySide6.QtWidgets import QMessageBox, QWidget
 
-def opened(home: Path, *arguments: str, cwd: Path | None = None) -> dict[str, Any]:
-    """What the window shows; it was closed in order."""
+        class Faulty(QWidget):
+            def showEvent(self, event):
+                int("nothing")
+
+        QTimer.singleShot(0, Faulty(window).show)
+        for _ in range(3):
+            app.application().processEvents()
+        for dialog in window.findChildren(QMessageBox):
+            dialog.close()
+"""
+
+
+def opened(home: Path, *arguments: str, cwd: Path | None = None, visit: str = "") -> dict[str, Any]:
+    """What the window shows after the visit, lines of Python; it was closed in order."""
     preferences = home / "config" / "blazer-studio" / "preferences.json"
     if not os.path.lexists(preferences):
         preferences.parent.mkdir(parents=True)
         preferences.write_text('{"toured": true}')
     done = subprocess.run(
-        [sys.executable, "-c", CHILD, *arguments],
+        [sys.executable, "-c", CHILD.replace("VISIT", visit.strip() or "pass"), *arguments],
         cwd=cwd,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -91,3 +111,11 @@ def test_with_a_pipe_in_place_of_the_preferences(home: Path) -> None:
     assert not set(found["modules"]) & LATER, "these take a third of the start, and no window needs them"
     assert "preferences could not be read" in found["log"] and "preferences.damaged.json" in found["log"]
     assert path.is_file() and path.with_suffix(".damaged.json").is_fifo()
+
+
+def test_every_workspace_opens_after_the_start(home: Path) -> None:
+    assert not set(opened(home, visit=WALK)["log"].split()) & {"error", "Error"}
+
+
+def test_a_fault_in_an_override_is_told_in_place_of_a_crash(home: Path) -> None:
+    assert "invalid literal for int() with base 10: 'nothing'" in opened(home, visit=FAULT)["log"]
