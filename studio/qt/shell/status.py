@@ -5,8 +5,8 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from PySide6.QtCore import Qt, QTimer, Signal
-from PySide6.QtGui import QMouseEvent, QMoveEvent, QResizeEvent
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QMouseEvent, QMoveEvent, QResizeEvent, QStatusTipEvent
 from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QWidget
 
 from studio.qt.core.icons import icon, icon_button
@@ -30,6 +30,8 @@ class StatusBar(QStatusBar):
         super().__init__(parent)
         self.session, self.runner = session, runner
         self.job: Job[Any] | None = None
+        self.tip = ""
+        """Of the command below the mouse."""
         self.setSizeGripEnabled(False)
         self.work = QLabel()
         self.bar = QProgressBar(maximum=1000)
@@ -59,6 +61,8 @@ class StatusBar(QStatusBar):
         self._fade = QTimer(self, singleShot=True)
         self._fade.timeout.connect(lambda: self._say("", "message"))
         self._show_work(False)
+        if parent is not None:
+            parent.installEventFilter(self)
         session.message.connect(self.show_text)
         runner.progress.connect(self.follow)
         for signal in (runner.finished, runner.failed, runner.cancelled):
@@ -116,6 +120,14 @@ class StatusBar(QStatusBar):
         self.text.setToolTip(f"<p>{escape(text)}</p>" if text else "")
         self._place_whole()
 
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Tips take the place of messages only: Qt's own way draws them over the work's progress."""
+        if isinstance(event, QStatusTipEvent):
+            self.tip = event.tip()
+            self._place_whole()
+            return True
+        return super().eventFilter(watched, event)
+
     def moveEvent(self, event: QMoveEvent) -> None:
         super().moveEvent(event)
         self._place_whole()
@@ -123,8 +135,9 @@ class StatusBar(QStatusBar):
     def _place_whole(self) -> None:
         """A message that is longer than the bar has room for stands above it, wrapped: the panels keep their sizes."""
         whole = self.whole
-        seen = self.text.fontMetrics().elidedText(whole.text(), Qt.TextElideMode.ElideRight, self.text.width())
-        cut = seen != whole.text() and self.isVisible()
+        line = self.tip or whole.text()
+        seen = self.text.fontMetrics().elidedText(line, Qt.TextElideMode.ElideRight, self.text.width())
+        cut = seen != line and not self.tip and self.isVisible()
         self.text.setText(seen)
         if cut:
             width = min(WIDEST, self.width() - 2 * MARGIN)

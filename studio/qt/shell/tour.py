@@ -55,8 +55,8 @@ STEPS = (
         "render",
         "render",
         "Render",
-        "F5 renders the frame. Choose how small the error of the light shall be; watch it fall; pause or stop when "
-        "it is good enough.",
+        "F5 renders the frame until its own noise no longer matters for the depth, or as far as you choose. Watch "
+        "it fall; pause or stop when it is good enough.",
     ),
     Step(
         "render",
@@ -128,7 +128,7 @@ class Tour(QWidget):
         self.target = self.place(step)
         self.title.setText(f"<span style='font-size: 13pt; font-weight: 600'>{step.title}</span>")
         self.text.setText(step.text)
-        self.count.setText(f"{self.index + 1} of {len(STEPS)} ")
+        self.count.setText(f"{self.index} of {len(STEPS) - 1} " if self.index else "")
         self.back.setEnabled(self.index > 0)
         self.next.setText("Done" if self.index == len(STEPS) - 1 else "Next")
         self.raise_()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtCore import QMargins, QSize, Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QWidget
 
@@ -57,6 +57,8 @@ from studio.runtime.preferences import PreferencesFile
 
 TALL = ("render", "develop")
 """Panels that scroll."""
+FRAME = QMargins(2, 32, 2, 2)
+"""px of the screen that a title bar and borders take, about."""
 TRIM_MS = 1000
 """From opening another project until the memory of the former one is given back."""
 
@@ -341,6 +343,15 @@ class MainWindow(QMainWindow):
         geometry = unsealed(values.geometry)
         if geometry is not None:
             self.restoreGeometry(geometry)
+        else:
+            self._fit_screen()
+
+    def _fit_screen(self) -> None:
+        """On a screen that is too small for the usual window, it takes all of it."""
+        room = self.screen().availableSize().shrunkBy(FRAME)
+        if self.size().boundedTo(room) != self.size():
+            self.resize(self.size().boundedTo(room))
+            self.setWindowState(Qt.WindowState.WindowMaximized)
 
     def _restore_panels(self) -> bool:
         return restore(self, self.preferences.values.arrangements.get(self.workspace, ""))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QSize, Qt
@@ -29,6 +31,7 @@ from studio.qt.core.widgets import ElidedLabel
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.window import MainWindow
 from studio.qt.shell.workspaces import WORKSPACES
+from tests.studio.qt.conftest import new_window
 from tests.studio.qt.small_session import FOLDER, small_project, small_render
 
 SCREENS = {"1366 x 768": (1366, 768), "1920 x 1200 at 1.5": (1280, 800), "1366 x 768 at 1.5": (911, 512)}
@@ -206,3 +209,16 @@ def test_a_panel_that_is_called_for_comes_before_another_and_leaves_nothing_behi
 def test_the_cheat_sheet_fits_on_a_small_screen(window: MainWindow) -> None:
     wanted = CheatSheet(window).sizeHint()
     assert wanted.width() <= 1366 - 32 and wanted.height() <= 768 - BAR
+
+
+@pytest.mark.parametrize(("screen", "maximized"), [(QSize(1366, 768), True), (QSize(1920, 1200), False)])
+def test_the_first_window_fits_its_screen(
+    screen: QSize, maximized: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(MainWindow, "screen", lambda _: SimpleNamespace(availableSize=lambda: screen))
+    made = new_window(tmp_path, "plane")
+    assert made.isMaximized() == maximized
+    size = made.size()
+    assert size.boundedTo(screen) == size
+    made.close()
+    made.deleteLater()
