@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_propagation
 
-from analysis.line.methods.misfit import UNLIKELY
+from analysis.line.methods.misfit import BESIDE_IT, ONE_PEAK, UNLIKELY
 from analysis.line.methods.seed_loop import LEAN, SHARED, WIDTH
 from analysis.line.result import NEIGHBOURS, Flag
 from render.base.arrays import Float
@@ -132,7 +132,7 @@ def keep_sure(out: Float, flags: NDArray[np.uint8], leaning: NDArray[np.bool_], 
     double, parted = out[leaning], flags[leaning] == Flag.OK
     sure = _most_part(flags, np.isinf(out[..., LEAN])) & _as_wide(out[..., WIDTH], flags == Flag.OK)
     doubtful = parted & ~sure[leaning]
-    double[doubtful] = _with_distance(double[doubtful], single[doubtful])
+    double[doubtful] = _doubtful(double[doubtful], single[doubtful])
     unsure = ~(double[:, 1] < farthest)
     out[leaning] = np.where(unsure[:, None], single, double)
     flags[leaning] = np.where(unsure | doubtful, Flag.BLENDED, flags[leaning])
@@ -145,17 +145,22 @@ def _as_wide(width: Float, among: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def keep_doubtful(out: Float, flags: NDArray[np.uint8], alone: NDArray[np.bool_], double: Float) -> None:
-    """Flag lines (n, k) that part by noise alone: where the brighter of the two is, double (m, columns), with how far
-    that is from the single line, which out (n, k, columns) holds.
+    """Flag lines (n, k) that part by noise alone, double (m, columns); out (n, k, columns) holds the single ones."""
+    out[alone], flags[alone] = _doubtful(double, out[alone]), Flag.BLENDED
+
+
+def _doubtful(double: Float, single: Float) -> Float:
+    """Of lines (m, columns) measured as two and as one: the single where these are comparable and have one peak, else
+    the brighter, with a sigma that holds the distance between single and brighter.
+
+    Their own distance d follows from width w and shift s of the single one, by moments: d = s + (w^2 - w_double^2) / s.
     """
-    out[alone], flags[alone] = _with_distance(double, out[alone]), Flag.BLENDED
-
-
-def _with_distance(double: Float, single: Float) -> Float:
-    """The brighter of two lines (m, columns) with a sigma that holds its distance from the single line."""
-    found = double.copy()
-    found[:, SHARED] = np.nan_to_num(single[:, 0] - double[:, 0])
-    found[:, 1] = np.hypot(double[:, 1], found[:, SHARED])
+    shift, width = single[:, 0] - double[:, 0], double[:, WIDTH]
+    distance = np.abs(shift) + (single[:, WIDTH] ** 2 - width**2) / np.maximum(np.abs(shift), UNIT)
+    one = (distance < ONE_PEAK * width) & (np.abs(shift) > BESIDE_IT * width) & np.isfinite(single[:, 1])
+    found = np.where(one[:, None], single, double)
+    found[:, LEAN], found[:, SHARED] = double[:, LEAN], np.nan_to_num(shift)
+    found[:, 1] = np.hypot(found[:, 1], found[:, SHARED])
     return found
 
 

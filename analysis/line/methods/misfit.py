@@ -23,6 +23,11 @@ PARTED, APART = 0.05, 1.2
 """Two lines part where sigma is less than this of their distance, so that the fit is linear, and the distance more than
 this of their own sigma: closer ones explain as well what is noise of another kind."""
 
+ONE_PEAK, BESIDE_IT = 2.0, 0.1
+"""Two lines closer than this many of their sigmas have one peak, also where both are alike. Mostly that is one line of
+another shape, which the single Gaussian measures ten times as well as the brighter of two does; but where this is
+known to be off the single one by less than so much of its sigma, what is beside it is faint, and the mean over lines
+that all have it is better."""
 EQUAL, DIP = 0.6, 3.0
 """Two lines are a single one with a flat top, out of focus, where the fainter has more than this of the other's height
 and they are closer than this many of their sigmas: no dip between them tells two."""
@@ -85,12 +90,13 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
     """A line that is no single Gaussian -> out (7,): as two, or as it is with a sigma that holds the misfit.
 
     pixels.room: what the fit of p (4,) left there. Returns OK for two lines that part. BLENDED for two that do not:
-    sigma holds how far the brighter one is from the single line. MISFIT for neither, or one with a flat top: sigma is
-    that of the fit times the root of chi-square (Birge, Phys. Rev. 40, 1932), of what runs smoothly over the pixels the
-    whole and not the reduced one (`distortions`; of a flat top its odd part), and holds the distance to the centre of
-    mass of the same pixels, by which another estimator differs. What neighbours have in common is to the side of the
-    other light. A line below COARSE parts from none, is no other line where the pixels do not tell that one to the
-    distance between both, and as a MISFIT holds how far the brighter of two lines is.
+    where they are comparable and have one peak the single line, whose sigma holds how far the brighter one is and may
+    be, up to its width; else the brighter one, whose sigma holds how far the single line is. MISFIT for neither, or one
+    with a flat top: sigma is that of the fit times the root of chi-square (Birge, Phys. Rev. 40, 1932), of what runs
+    smoothly over the pixels the whole and not the reduced one (`distortions`; of a flat top its odd part), and holds
+    the distance to the centre of mass of the same pixels, by which another estimator differs. What neighbours have in
+    common is to the side of the other light. A line below COARSE parts from none, is no other line where the pixels do
+    not tell that one to the distance between both, and as a MISFIT holds how far the brighter of two lines is.
     """
     pixel, weight, both, chi2 = pixels.room[:4], pixels.room[4], np.zeros(UNKNOWNS), math.inf
     shift = centroid(pixel, n, p) - p[1]
@@ -104,15 +110,21 @@ def measure_misfit(pixels: Pixels, seed: Array, n: int, p: Array, options: Optio
         sigma = math.sqrt(noise + slope_variance(seed, weight, pixel[POSITION], n))
         parted = sigma < PARTED * distance and distance > APART * both[2]
         parted = parted and not narrow and (options.known_width or both[2] > FINEST)
-        if math.isnan(out[CORRELATION_LENGTH]):  # no single line converged
+        converged = not math.isnan(out[CORRELATION_LENGTH])
+        if not converged:  # of a single line
             out[CORRELATION_LENGTH] = pixels.alike
         if not narrow or sigma < distance:
+            shift = p[1] - both[1]
+            off = math.hypot(shift, sigma)
+            if distance < ONE_PEAK * both[2] and off > BESIDE_IT * both[2] and converged and not parted:
+                out[SHARED] = math.copysign(min(off, max(abs(shift), both[2])), shift)
+                out[1] = math.hypot(out[1], out[SHARED])
+                return Flag.BLENDED.value
             out[0], out[2], out[3], out[4], out[5] = both[1], both[2], both[0], both[3], chi2 / max(n - UNKNOWNS, 1)
             if parted:
                 out[1] = sigma
                 return Flag.OK.value
-            out[SHARED] = p[1] - both[1]
-            out[1] = math.hypot(sigma, out[SHARED])
+            out[SHARED], out[1] = shift, off
             return Flag.BLENDED.value
     distorted = odd if flat else every
     side = shift if math.isnan(out[LEAN]) else out[LEAN]
