@@ -72,6 +72,12 @@ class Render:
         return self.image_scale if self.scan is None else self.scan.image_scale
 
     @property
+    def scan_lines(self) -> tuple[str, int, int]:
+        """Their direction and the image's size; where these are alike, so is what a number of a scan line means."""
+        camera = self.project.scene.camera
+        return self.project.extraction.axis, camera.width, camera.height
+
+    @property
     def refining(self) -> bool:
         """More of its light is to come by itself."""
         return not self.final and self.state is None

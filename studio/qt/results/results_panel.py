@@ -10,7 +10,7 @@ from functools import partial
 from html import escape
 
 import numpy as np
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
 from PySide6.QtWidgets import (
     QComboBox,
@@ -75,6 +75,7 @@ class ResultsPanel(QWidget):
         super().__init__(parent)
         self.session = session
         self.pinned: int | None = None
+        self.scan_lines: tuple[str, int, int] | None = None
         self.hidden: set[str] = set()
         """Methods that are switched off."""
         self.laser = QComboBox()
@@ -239,13 +240,13 @@ class ResultsPanel(QWidget):
         render = self.session.shown
         names = [] if render is None else [laser.name for laser in render.project.scene.lasers]
         if names != [self.laser.itemText(i) for i in range(self.laser.count())]:
-            self.laser.blockSignals(True)
-            self.laser.clear()
-            self.laser.addItems(names)
-            self.laser.blockSignals(False)
+            with QSignalBlocker(self.laser):
+                self.laser.clear()
+                self.laser.addItems(names)
         self.laser.setVisible(len(names) > 1)
-        if self.scan_bar.scan is None or render is None or render.scan is not self.scan_bar.scan:
-            self.pinned = None  # from step to step of a scan a row stays the same
+        before, self.scan_lines = self.scan_lines, None if render is None else render.scan_lines
+        if self.scan_lines != before:
+            self.pinned = None
             self.region.choose(None)
         self.scan_bar.follow()
         self.refresh()
@@ -271,8 +272,7 @@ class ResultsPanel(QWidget):
         if scan_line is None:
             self.reading.setText("")
             return
-        render = self.session.shown
-        name = "Column" if render is not None and render.project.extraction.axis == "columns" else "Row"
+        name = "Column" if self.scan_lines is not None and self.scan_lines[0] == "columns" else "Row"
         self.reading.setText(f"<b>{name} {scan_line}</b>&nbsp;&nbsp; {'&nbsp;&nbsp; '.join(parts) or 'no point'}")
 
     def _hover(self, scan_line: int | None) -> None:

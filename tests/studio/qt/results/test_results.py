@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from studio.qt.core.session import Render
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell.window import MainWindow
 from studio.qt.viewport.error_cloud import ErrorCloud
+from studio.scan.region import Region
 from studio.scan.stages import Clock, develop_step, measure_step, render_step
 
 METHODS = ("likelihood", "gaussian", "centre_of_mass")
@@ -288,3 +290,20 @@ def test_a_rectangle_about_nothing_is_told_and_escape_gives_up(
 
 def _xy(point: QPoint) -> np.ndarray:
     return np.array([point.x(), point.y()])
+
+
+def test_region_and_row_stay_where_the_next_render_has_the_same_scan_lines(
+    window: MainWindow, results: ResultsPanel, render: Render
+) -> None:
+    """They were lost when the rest of the light came."""
+    row = scan_line_in(window)
+    results.choose(Region("scan lines", row - 5, row + 5))
+    results.pin(row)
+    window.session.add_render(replace(render, number=2))
+    assert results.region.region == Region("scan lines", row - 5, row + 5) and results.pinned == row
+    assert results.region.table.rowCount() > 0
+    turned = render.project.model_copy(
+        update={"extraction": render.project.extraction.model_copy(update={"axis": "columns"})}
+    )
+    window.session.add_render(replace(render, number=3, project=turned))
+    assert results.region.region is None and results.pinned is None
