@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtCore import QEvent, QMargins, QObject, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -15,6 +15,14 @@ from PySide6.QtWidgets import (
     QSplitter,
     QWidget,
 )
+
+FRAME = QMargins(2, 32, 2, 2)
+"""px of the screen that a title bar and borders take, about."""
+
+
+def room_for_a_window(widget: QWidget) -> QSize:
+    """What the widget's screen has beside panels of the desktop and the window's frame."""
+    return widget.screen().availableSize().shrunkBy(FRAME)
 
 
 class ElidedLabel(QLabel):

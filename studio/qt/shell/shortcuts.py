@@ -6,10 +6,11 @@ import html
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence
-from PySide6.QtWidgets import QDialog, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from studio.qt.core import theme
 from studio.qt.core.actions import COMMANDS, VIEW_KEYS, Command
+from studio.qt.core.widgets import room_for_a_window
 
 MOUSE = (
     ("Drag", "turn the 3D view"),
@@ -30,7 +31,7 @@ COLUMNS = (("File", "Render"), ("Edit", "Scene", "Lists", "Help"), ("View", "Mea
 
 
 class CheatSheet(QDialog):
-    """Closes with any key or click."""
+    """Esc closes it; a screen that is smaller than the page shows a part of it."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -40,8 +41,13 @@ class CheatSheet(QDialog):
         label = QLabel(page())
         label.setTextFormat(Qt.TextFormat.RichText)
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(24, 16, 24, 20)
-        layout.addWidget(label)
+        layout.setContentsMargins(0, 0, 0, 0)
+        label.setContentsMargins(16, 12, 12, 16)
+        page_area = QScrollArea()
+        page_area.setFrameShape(QScrollArea.Shape.NoFrame)
+        page_area.setWidget(label)
+        layout.addWidget(page_area)
+        self.resize(label.sizeHint().boundedTo(room_for_a_window(self)))
 
 
 def page() -> str:
@@ -54,7 +60,7 @@ def page() -> str:
             groups.setdefault(command.menu.split("/")[0], []).append((keys, text))
     groups |= {"Mouse": list(MOUSE), "Fields": list(FIELDS), "Lists": list(LISTS), "3D view": list(VIEW_KEYS.items())}
     cells = "".join(
-        f"<td style='padding-right: 16px'>{''.join(_group(name, groups[name]) for name in column)}</td>"
+        f"<td style='padding-right: 12px'>{''.join(_group(name, groups[name]) for name in column)}</td>"
         for column in COLUMNS
     )
     return f"<table><tr>{cells}</tr></table>"
@@ -63,7 +69,7 @@ def page() -> str:
 def _group(name: str, rows: list[tuple[str, str]]) -> str:
     c = theme.colours()
     lines = "".join(
-        f"<tr><td style='padding-right: 14px; color: {c.accent}'><b>{html.escape(keys)}</b></td>"
+        f"<tr><td style='padding-right: 10px; color: {c.accent}'><b>{html.escape(keys)}</b></td>"
         f"<td>{html.escape(text)}</td></tr>"
         for keys, text in rows
     )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QMargins, QSize, Qt, QTimer
+from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
 from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QWidget
 
@@ -22,7 +22,7 @@ from studio.qt.core.drops import accept_copy, dragged_files
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
-from studio.qt.core.widgets import Scrolled
+from studio.qt.core.widgets import Scrolled, room_for_a_window
 from studio.qt.render.python_copy import copy_as_python
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
@@ -57,8 +57,6 @@ from studio.runtime.preferences import PreferencesFile
 
 TALL = ("render", "develop")
 """Panels that scroll."""
-FRAME = QMargins(2, 32, 2, 2)
-"""px of the screen that a title bar and borders take, about."""
 TRIM_MS = 1000
 """From opening another project until the memory of the former one is given back."""
 
@@ -348,9 +346,9 @@ class MainWindow(QMainWindow):
 
     def _fit_screen(self) -> None:
         """On a screen that is too small for the usual window, it takes all of it."""
-        room = self.screen().availableSize().shrunkBy(FRAME)
-        if self.size().boundedTo(room) != self.size():
-            self.resize(self.size().boundedTo(room))
+        fitting = self.size().boundedTo(room_for_a_window(self))
+        if fitting != self.size():
+            self.resize(fitting)
             self.setWindowState(Qt.WindowState.WindowMaximized)
 
     def _restore_panels(self) -> bool:

@@ -206,9 +206,16 @@ def test_a_panel_that_is_called_for_comes_before_another_and_leaves_nothing_behi
     window.resize(before)
 
 
-def test_the_cheat_sheet_fits_on_a_small_screen(window: MainWindow) -> None:
-    wanted = CheatSheet(window).sizeHint()
-    assert wanted.width() <= 1366 - 32 and wanted.height() <= 768 - BAR
+@pytest.mark.parametrize("screen", SCREENS.values(), ids=SCREENS)
+def test_the_cheat_sheet_fits_its_screen(
+    window: MainWindow, screen: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whole where 1280 px are, and never larger than the screen."""
+    monkeypatch.setattr(CheatSheet, "screen", lambda _: SimpleNamespace(availableSize=lambda: QSize(*screen)))
+    sheet = CheatSheet(window)
+    page = sheet.findChild(QLabel).sizeHint()
+    assert sheet.width() <= screen[0] and sheet.height() <= screen[1] - BAR
+    assert screen[0] < 1280 or sheet.size() == page
 
 
 @pytest.mark.parametrize(("screen", "maximized"), [(QSize(1366, 768), True), (QSize(1920, 1200), False)])
