@@ -103,7 +103,7 @@ def quality_text(quality: GroupQuality) -> str:
         if quality.unknown:
             parts.append(f"{quality.unknown} of {quality.lines} rows by more")
         if quality.image_error is not None and math.isfinite(quality.image_error):
-            end = "" if quality.image_target is None else f", which ends it at {quality.image_target:.0%}"
+            end = "" if quality.image_target is None else f" ({quality.image_target:.0%} would end it as well)"
             places = 2 if quality.group == "direct" else 0
             parts.append(f"image error {quality.image_error:.{places}%}{end}")
         if quality.coarse_error is not None:

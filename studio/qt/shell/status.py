@@ -112,6 +112,7 @@ class StatusBar(QStatusBar):
 
     def _say(self, text: str, name: str) -> None:
         line = text.splitlines()[0] if text else ""
+        self.tip = "" if line else self.tip
         for label in (self.text, self.whole):
             label.setObjectName(name)
             label.style().unpolish(label)
@@ -121,9 +122,10 @@ class StatusBar(QStatusBar):
         self._place_whole()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Tips take the place of messages only: Qt's own way draws them over the work's progress."""
+        """Tips take the place of what is no warning: Qt's own way draws them over everything."""
         if isinstance(event, QStatusTipEvent):
-            self.tip = event.tip()
+            warned = self.whole.text() and self.whole.objectName() != "message"
+            self.tip = "" if warned else event.tip()
             self._place_whole()
             return True
         return super().eventFilter(watched, event)

@@ -28,3 +28,15 @@ def test_a_tip_stands_beside_the_progress_and_a_message_comes_back_after_it(wind
     assert status.text.text() == "Saved."
     done.set()
     qtbot.waitUntil(lambda: not status.bar.isVisible())
+
+
+def test_what_is_said_after_a_tip_is_read_and_no_tip_hides_a_warning(window: MainWindow) -> None:
+    """The mouse rests on the command that was just clicked."""
+    show_tip(window, "Render the frame")
+    window.session.message.emit("warning", "A frame is being rendered.")
+    assert window.status.text.text() == "A frame is being rendered."
+    show_tip(window, "Pause")
+    assert window.status.text.text() == "A frame is being rendered."
+    window.session.message.emit("info", "Saved.")
+    show_tip(window, "Pause")
+    assert window.status.text.text() == "Pause"
