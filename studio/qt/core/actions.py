@@ -128,9 +128,9 @@ COMMANDS: tuple[Command | str, ...] = (
     Command(
         "deviation", "Measure", "&Deviation from nominal…", "Alt+D", "", "From the part or its CAD, with a tolerance"
     ),
-    Command("section", "Measure", "&Section…", "Alt+S", "", "Truth and points in a plane, as DXF or CSV"),
+    Command("section", "Measure", "&Section…", "Alt+X", "", "Truth and points in a plane, as DXF or CSV"),
     Command(
-        "heights", "Measure", "Height &map…", "Alt+H", "", "Of a scan: picture, profile along a line, 16 bit files"
+        "heights", "Measure", "Height &map…", "Alt+Z", "", "Of a scan: picture, profile along a line, 16 bit files"
     ),
     "Measure/-",
     Command("photographs", "Measure", "Line in p&hotographs…", "", "", "Of a real scanner, beside the rendered image"),
