@@ -18,7 +18,7 @@ from studio.scan.folder_lock import hold
 from studio.scan.interrupt import stop_on_interrupt
 from studio.study.begin import begin
 from studio.study.cells import Shard, next_cells
-from studio.study.labels import field_labels
+from studio.study.labels import as_read
 from studio.study.runner import run_study
 from studio.study.store import Store, described
 from studio.study.study import SEARCHES, Study, ready_made
@@ -111,8 +111,7 @@ def _write(folder: Path, study: Study, bases: dict[str, Project], store: Store, 
     rows = store.rows()
     written = write_tables(folder, study, bases, rows)
     page, found = write_page(folder, study, bases, rows)
-    labels = field_labels(bases.values(), [one.field for sweep in study.sweeps for one in sweep.vary])
-    said = {answer.sweep.name: sentences(answer, labels) for answer in found}
+    said = {answer.sweep.name: sentences(*as_read(answer, bases.values())) for answer in found}
     missing = len(next_cells(study, bases, rows))
     if as_json:
         files = [str(file) for file in (*written, page)]

@@ -1,41 +1,69 @@
-"""Names of a project's fields for charts, from the schema: "Exposure time (s)"."""
+"""What a study found as people read it: fields by their names in the inspector, their values in its units."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Collection
+from dataclasses import replace
 
-from pydantic import BaseModel
-
+from studio.editing.forms import FieldSpec
 from studio.project.project import Project
-from studio.study.boards import PREFIX, Boards
-from studio.study.study import parts_of
+from studio.study.answers import Answer, Broken
+from studio.study.draft import spec_of
+from studio.study.study import Parameter, Value
+
+Labels = dict[str, str]
+"""By the path of a field: "Power (mW)"."""
 
 
-def field_labels(bases: Iterable[Project], fields: Iterable[str]) -> dict[str, str]:
-    """Label and unit of each field by its path; what no project has keeps its path."""
-    projects, found = list(bases), dict[str, str]()
-    for path in fields:
-        boards = path.startswith(PREFIX)
-        owners: list[BaseModel] = [Boards()] if boards else list(projects)
-        inside = path.removeprefix(PREFIX)
-        labels = [label for owner in owners if (label := _label(owner, inside))]
-        found[path] = labels[0] if labels else path
-    return found
+def as_read(answer: Answer, bases: Collection[Project]) -> tuple[Answer, Labels]:
+    """The answer with its fields' values in the units of the inspector, and the labels with these units.
+
+    What the study labels itself, and what no project has, stays in the unit of the project file.
+    """
+    specs = [_spec(one, bases) for one in answer.sweep.vary]
+    factors = [1.0 if spec is None else spec.unit.factor for spec in specs]
+
+    def point(values: tuple[Value, ...]) -> tuple[Value, ...]:
+        return tuple(_scaled(value, factor) for value, factor in zip(values, factors, strict=True))
+
+    vary = tuple(_in_unit(one, factor) for one, factor in zip(answer.sweep.vary, factors, strict=True))
+    shown = replace(
+        answer,
+        sweep=answer.sweep.model_copy(update={"vary": vary}),
+        spots=tuple(replace(one, point=point(one.point)) for one in answer.spots),
+        broken=tuple(_broken(one, factors[0]) for one in answer.broken),
+        bounds=tuple(replace(one, point=point(one.point)) for one in answer.bounds),
+        kept=tuple(replace(one, point=point(one.point)) for one in answer.kept),
+        beside=tuple((one.model_copy(update={"point": point(one.point)}), ours) for one, ours in answer.beside),
+    )
+    pairs = zip(answer.sweep.vary, specs, strict=True)
+    return shown, {one.field: one.field if spec is None else _label(spec) for one, spec in pairs}
 
 
-def _label(owner: BaseModel, path: str) -> str:
-    place: Any = owner
-    label = ""
-    for part in parts_of(path):
-        if isinstance(place, BaseModel) and part in type(place).model_fields:
-            field = type(place).model_fields[str(part)]
-            extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
-            unit = f" ({extra['unit']})" if extra.get("unit") else ""
-            label = f"{field.title or str(part).replace('_', ' ')}{unit}"
-            place = getattr(place, str(part))
-        elif isinstance(place, list | tuple) and isinstance(part, int) and part < len(place):
-            place = place[part]
-        else:
-            return ""
-    return label
+def _spec(parameter: Parameter, bases: Collection[Project]) -> FieldSpec | None:
+    """Of the first project that has the field; None: it has a label of its own, or no project has it."""
+    if parameter.label:
+        return None
+    return next((spec for base in bases if (spec := spec_of(base, parameter.field)) is not None), None)
+
+
+def _label(spec: FieldSpec) -> str:
+    return f"{spec.label} ({spec.unit.shown})" if spec.unit.shown else spec.label
+
+
+def _in_unit(parameter: Parameter, factor: float) -> Parameter:
+    ends = {name: _scaled(getattr(parameter, name), factor) for name in ("low", "high")}
+    values = tuple(_scaled(value, factor) for value in parameter.values)
+    return parameter.model_copy(update={**ends, "values": values})
+
+
+def _scaled(value: Value | None, factor: float) -> Value | None:
+    if factor == 1.0 or isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    return float(f"{value * factor:.12g}")
+
+
+def _broken(found: Broken, factor: float) -> Broken:
+    one = found.breakdown
+    values = ("value", "low", "high", "last_good", "first_bad")
+    return replace(found, breakdown=replace(one, **{name: factor * getattr(one, name) for name in values}))

@@ -19,7 +19,7 @@ from studio.study.bounds import Bound
 from studio.study.budget_table import HEADER, page_rows, sentences_of, write_budgets
 from studio.study.charts import chart, field_label, shown
 from studio.study.kept import KEPT
-from studio.study.labels import field_labels
+from studio.study.labels import as_read
 from studio.study.measures import measure_of
 from studio.study.references import HEADER as BESIDE_HEADER
 from studio.study.references import Beside, beside, write_references
@@ -38,14 +38,14 @@ def write_page(
 ) -> tuple[Path, list[Answer]]:
     """Write `study.html` and one PNG a chart into a folder; the page's path, and what it says."""
     found = answers(study, bases, rows)
-    labels = field_labels(bases.values(), [one.field for sweep in study.sweeps for one in sweep.vary])
     parts = []
     for number, answer in enumerate(found):
         if not answer.spots or (answer.sweep.chart == "budget" and not answer.budgets):
             continue  # nothing is known of it yet
         if answer.sweep.chart in KEPT and not answer.kept:
             continue
-        picture = png_uri(chart(answer, labels), DPI)
+        read, labels = as_read(answer, bases.values())
+        picture = png_uri(chart(read, labels), DPI)
         with atomic_write(folder / f"chart_{number + 1}.png") as temporary:
             temporary.write_bytes(base64.b64decode(picture.partition(",")[2]))
         parts.append(
@@ -53,9 +53,9 @@ def write_page(
                 "name": answer.sweep.name,
                 "question": answer.sweep.question,
                 "picture": picture,
-                "lines": sentences(answer, labels),
-                "header": _header(answer, labels),
-                "table": _page_table(answer),
+                "lines": sentences(read, labels),
+                "header": _header(read, labels),
+                "table": _page_table(read),
             }
         )
         write_budgets(folder, answer.budgets, number + 1)

@@ -23,7 +23,6 @@ from studio.qt.study.cell_opener import CellOpener
 from studio.qt.study.chart_view import ChartView
 from studio.qt.study.study_work import StudyWork
 from studio.study.answers import Answer
-from studio.study.labels import field_labels
 
 NOTHING = (
     "Nothing is measured yet. Choose a field to vary and run the study: charts fill while it runs, "
@@ -98,9 +97,10 @@ class ChartsPanel(QWidget):
             self.chart.show_answer(None, {})
             return
         from studio.study.charts import field_label  # matplotlib takes a moment: not before there is a chart
+        from studio.study.labels import as_read
         from studio.study.page import columns, sentences, table
 
-        labels = field_labels(found.bases.values(), [one.field for one in answer.sweep.vary])
+        answer, labels = as_read(answer, found.bases.values())
         self.question.setText(answer.sweep.question)
         self.question.setVisible(bool(answer.sweep.question))
         said = sentences(answer, labels)

@@ -15,7 +15,6 @@ from studio.study.boards import Boards
 from studio.study.calibrating import calibrated
 from studio.study.cells import cells_at, points
 from studio.study.draft import board_fields, path_text, spec_of, suggested
-from studio.study.labels import field_labels
 from studio.study.measures import CALIBRATION_MEASURES
 from studio.study.measuring import measure_task
 from studio.study.study import Study, with_fields
@@ -91,10 +90,9 @@ def test_boards_that_cannot_be_are_told_before_anything_runs(field: str, value: 
         cells_of([5], **{field: value}) if field != "boards.views" else cells_of([value])
 
 
-def test_boards_are_no_field_of_the_project_and_have_their_own_label() -> None:
+def test_boards_are_no_field_of_the_project_and_no_project_is_changed() -> None:
     project = Project.load("plane")
     assert with_fields(project, {"boards.views": 3}, "here") == project
-    assert field_labels([project], ["boards.views"]) == {"boards.views": "Views of the board"}
 
 
 def test_the_window_offers_what_can_be_varied_of_the_boards() -> None:

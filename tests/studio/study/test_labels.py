@@ -1,0 +1,66 @@
+"""Charts, tables and sentences of a study in the words and units of the inspector, its files in the project's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from studio.study.answers import Answer, answers
+from studio.study.cells import next_cells
+from studio.study.charts import chart, places
+from studio.study.labels import as_read
+from studio.study.page import sentences, table, write_page
+from studio.study.study import Study
+
+EXPOSURE = "sensor.exposure_time"
+BASELINE = "scene.rig.lasers[0].T_rig_laser.translation[0]"
+
+
+def measured(*vary: dict[str, Any], **more: Any) -> tuple[Study, Any, Any]:
+    """A study of one sweep whose depth errs by 100 um times the first value over its smallest, from seed to seed a
+    little more."""
+    data = {"name": "s", "vary": list(vary), "measure": "depth_rmse", **more}
+    study = Study.model_validate({"base": "plane", "repeats": 3, "sweeps": [data]})
+    bases, rows = study.bases(Path()), dict[str, Any]()
+    while cells := next_cells(study, bases, rows):
+        for cell in cells:
+            error = 1e-4 * float(cell.point[0]) / 1e-3 * (1.0 + 0.01 * cell.repeat)
+            rows[cell.key] = {"depth_rmse": error, "reason": "", "seconds": 1.0}
+    return study, bases, rows
+
+
+def read(study: Study, bases: Any, rows: Any) -> tuple[Answer, dict[str, str]]:
+    return as_read(answers(study, bases, rows)[0], bases.values())
+
+
+def test_a_chart_has_the_inspectors_name_and_unit() -> None:
+    answer, labels = read(*measured({"field": EXPOSURE, "values": [0.001, 0.0023]}))
+    axes = chart(answer, labels).axes[0]
+    assert axes.get_xlabel() == "Exposure time (ms)"
+    assert sorted(places(answer)[:, 0]) == [1.0, 2.3]
+    assert any(np.allclose(line.get_xdata(), [1.0, 2.3]) for line in axes.lines if len(line.get_xdata()) == 2)
+    assert [row[0] for row in table(answer)] == ["1", "2.3"]
+
+
+def test_a_part_of_a_pose_has_a_name_and_what_the_study_names_stays_in_the_files_unit() -> None:
+    field = {"field": BASELINE, "values": [0.1, 0.2]}
+    answer, labels = read(*measured(field))
+    assert labels == {BASELINE: "Position x (mm)"} and [one.point for one in answer.spots] == [(100.0,), (200.0,)]
+    answer, _ = read(*measured({**field, "label": "Baseline (m)"}))
+    assert [one.point for one in answer.spots] == [(0.1,), (0.2,)]
+    assert chart(answer, {}).axes[0].get_xlabel() == "Baseline (m)"
+
+
+def test_a_breakdown_is_told_in_the_unit_of_its_axis(tmp_path: Path) -> None:
+    limit = {"measure": "depth_rmse", "value": 3e-4}
+    ends = {"field": EXPOSURE, "low": 0.001, "high": 0.01}
+    run = measured(ends, sampling="bisection", limit=limit)
+    answer, labels = read(*run)
+    (broken,), (stored,) = answer.broken, answers(*run)[0].broken
+    assert broken.breakdown.value == pytest.approx(1e3 * stored.breakdown.value) == pytest.approx(3.0, rel=0.05)
+    assert f"Exposure time (ms) {broken.breakdown.value:.3g}" in sentences(answer, labels)[0]
+    page, found = write_page(tmp_path, *run)
+    assert "Exposure time (ms)" in page.read_text() and found[0].spots[0].point[0] < 0.1
