@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from analysis.report.colour import INK, MUTED, PAPER, method_colour, method_name
 from analysis.report.labels import Name, name_marks
@@ -42,7 +42,10 @@ def chart(answer: Answer, labels: dict[str, str]) -> Any:
         for axis in (axes.xaxis, axes.yaxis):
             if axis.get_scale() == "log":  # matplotlib's own ticks are formulas
                 low, high = axis.get_view_interval()
-                if high < 100.0 * low:
+                if high < 5.0 * low:  # less than two of them may lie between
+                    axis.set_major_locator(MaxNLocator(6, steps=(1, 2, 5, 10)))
+                    axis.set_minor_locator(NullLocator())
+                elif high < 100.0 * low:
                     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
                 axis.set_major_formatter(_tick)
                 axis.set_minor_formatter(NullFormatter())

@@ -45,6 +45,14 @@ def test_a_chart_has_the_inspectors_name_and_unit() -> None:
     assert [row[0] for row in table(answer)] == ["1", "2.3"]
 
 
+@pytest.mark.parametrize("high", [0.0014, 0.004, 0.02])
+def test_a_logarithmic_axis_has_at_least_three_values_written_on_it(high: float) -> None:
+    answer, labels = read(*measured({"field": EXPOSURE, "low": 0.001, "high": high, "spacing": "logarithmic"}))
+    axis = chart(answer, labels).axes[0].xaxis
+    low, high = axis.get_view_interval()
+    assert sum(low <= place <= high for place in axis.get_majorticklocs()) >= 3
+
+
 def test_a_part_of_a_pose_has_a_name_and_what_the_study_names_stays_in_the_files_unit() -> None:
     field = {"field": BASELINE, "values": [0.1, 0.2]}
     answer, labels = read(*measured(field))
