@@ -2,51 +2,40 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QPoint, QRect, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPoint, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QRubberBand
 
-from studio.qt.viewport.view3d import Tool, View3D
+from studio.qt.viewport.view3d import View3D
+from studio.qt.viewport.view_mode import ViewMode
 
 HINT = "draw a rectangle about points; Esc: back"
 LEAST_PX = 3
 
 
-class BoxTool(QObject):
+class BoxTool(ViewMode):
     """One rectangle at a time; holds the left button while it is on, as `studio.qt.viewport.view3d.Tool`."""
 
-    told = Signal(str)
-    """What to do; empty when it is over."""
     drawn = Signal(QRect)
     """Of the view, in the pixels that mouse events count."""
 
     def __init__(self, view: View3D) -> None:
         super().__init__(view)
-        self.view = view
-        self.active = False
         self._band = QRubberBand(QRubberBand.Shape.Rectangle, view)
         self._start = QPoint()
-        self._tool: Tool | None = None
-        view.installEventFilter(self)
 
     def begin(self) -> None:
         """The next drag is the rectangle; once more: it is not."""
         if self.active:
             self.end()
             return
-        self.active = True
-        self.view.typing, self.view.tool, self._tool = self.type, self, self.view.tool
-        self.view.setCursor(Qt.CursorShape.CrossCursor)
-        self.told.emit(HINT)
+        self.enter(HINT, tool=self)
 
     def end(self) -> None:
         """The left button does again what it did."""
         if self.active:
-            self.active = False
             self._band.hide()
-            self.view.typing, self.view.tool = None, self._tool
-            self.view.setCursor(Qt.CursorShape.ArrowCursor)
-            self.told.emit("")
+            self.leave()
 
     def press(self, x: float, y: float) -> bool:
         self._start = QPoint(round(x), round(y))
@@ -72,12 +61,6 @@ class BoxTool(QObject):
 
     def draw(self) -> None:
         """Qt draws it."""
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Who turns to something else is done."""
-        if event.type() == QEvent.Type.FocusOut:
-            self.end()
-        return super().eventFilter(watched, event)
 
     def type(self, event: QKeyEvent) -> bool:
         """Escape ends it; other keys mean what they mean."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent
 
 from render.base.arrays import Float
@@ -11,7 +11,8 @@ from studio.preview.ray_pick import Spot, spot_at
 from studio.qt.core import theme
 from studio.qt.core.live_preview import Live
 from studio.qt.viewport.gizmo import Gizmo
-from studio.qt.viewport.view3d import Tool, View3D
+from studio.qt.viewport.view3d import View3D
+from studio.qt.viewport.view_mode import ViewMode
 from studio.qt.viewport.viewport_scene import LINE_PX, Lines, object_path
 
 MARK_PX = 7.0
@@ -22,27 +23,21 @@ PUT = "click where it goes: a corner, a face, or the ground; Esc: back"
 WORDS = {"corner": "this corner", "surface": "this face", "ground": "the ground"}
 
 
-class SnapMove(QObject):
+class SnapMove(ViewMode):
     """Two clicks, of which the second moves by the way between them: one step to undo."""
-
-    told = Signal(str)
-    """What the next click does; empty when it is over."""
 
     def __init__(self, gizmo: Gizmo, live: Live, view: View3D) -> None:
         super().__init__(view)
-        self.gizmo, self.view = gizmo, view
+        self.gizmo = gizmo
         self._live = live
-        self.active = False
         self._taken: Float | None = None
         """(3,) m, of what is selected, where it was taken."""
-        self._tool: Tool | None = None
         self._mark = Lines(2.0 * LINE_PX)
         self._mark.actor.PickableOff()
         view.front.AddActor(self._mark.actor)
         view.hovered.connect(self._show)
         gizmo.session.selection_changed.connect(self.end)
         gizmo.session.document_replaced.connect(self.end)
-        view.installEventFilter(self)
 
     def begin(self) -> None:
         """Of what is selected; what has no surface is taken by its origin at once."""
@@ -54,11 +49,9 @@ class SnapMove(QObject):
         if target is None:
             session.message.emit("error", "nothing that can be moved is selected; click on it")
             return
-        self.active = self.gizmo.away = True  # its handles would lie over the corners
+        self.gizmo.away = True  # its handles would lie over the corners
         self._taken = None if self._own_meshes() else target.T_world_item[:3, 3].copy()
-        self.view.typing, self.view.tool, self._tool = self.type, None, self.view.tool
-        self.view.setCursor(Qt.CursorShape.CrossCursor)
-        self.told.emit(TAKE if self._taken is None else PUT)
+        self.enter(TAKE if self._taken is None else PUT)
 
     def click(self, x: float, y: float) -> None:
         """Take it there, or put it there."""
@@ -81,17 +74,9 @@ class SnapMove(QObject):
     def end(self) -> None:
         """It stays where it is."""
         if self.active:
-            self.active = self.gizmo.away = False
-            self.view.typing, self.view.tool = None, self._tool
-            self.view.setCursor(Qt.CursorShape.ArrowCursor)
+            self.gizmo.away = False
+            self.leave()
             self._draw(None)
-            self.told.emit("")
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Who turns to something else is done."""
-        if event.type() == QEvent.Type.FocusOut:
-            self.end()
-        return super().eventFilter(watched, event)
 
     def type(self, event: QKeyEvent) -> bool:
         """Escape is taken; any other key keeps its meaning, but for those that would move it otherwise."""

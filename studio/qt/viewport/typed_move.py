@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from PySide6.QtCore import QEvent, QObject, QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QCursor, QKeyEvent
 
 from render.base.arrays import Float
@@ -13,7 +13,8 @@ from render.base.errors import InputError
 from studio.editing.units import Unit
 from studio.preview.gizmo_geometry import Drag, Frame, Handle, Kind, turned_about
 from studio.qt.viewport.gizmo import Gizmo
-from studio.qt.viewport.view3d import Tool, View3D
+from studio.qt.viewport.view3d import View3D
+from studio.qt.viewport.view_mode import ViewMode
 
 AXES = {Qt.Key.Key_X: 0, Qt.Key.Key_Y: 1, Qt.Key.Key_Z: 2}
 COMMANDS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
@@ -21,15 +22,12 @@ NUMBER = "0123456789.,+-*/()"
 HINT = "X, Y, Z: the axis, twice for the part's own; a number; Return or a click: done; Esc: back"
 
 
-class TypedMove(QObject):
+class TypedMove(ViewMode):
     """One move or turn at a time, by what the gizmo moves, and one step to undo."""
-
-    told = Signal(str)
-    """How far it has come, in words; empty when it is over."""
 
     def __init__(self, gizmo: Gizmo, view: View3D) -> None:
         super().__init__(view)
-        self.gizmo, self.view = gizmo, view
+        self.gizmo = gizmo
         self.turns = False
         self.axis: int | None = None
         self.own = False
@@ -40,15 +38,9 @@ class TypedMove(QObject):
         """Where the item stood; the world's axes. None: nothing is being moved."""
         self._own_axes = np.eye(3)
         self._drag: Drag | None = None
-        self._tool: Tool | None = None
         view.hovered.connect(self._follow_mouse)
         gizmo.session.selection_changed.connect(self.cancel)
-        gizmo.session.document_replaced.connect(self.accept)
-        view.installEventFilter(self)
-
-    @property
-    def active(self) -> bool:
-        return self._at is not None
+        gizmo.session.document_replaced.connect(self.end)
 
     def begin(self, turns: bool) -> None:
         """Of what is selected; while one goes on, the other kind takes its place."""
@@ -64,41 +56,33 @@ class TypedMove(QObject):
         self.turns, self.axis, self.own, self.text = turns, None, False, ""
         self._at, self._own_axes = Frame(T[:3, 3].copy(), np.eye(3), pixel), T[:3, :3].copy()
         self.gizmo.begin()
-        # the click that ends it may be on a handle
-        self.view.typing, self.view.tool, self._tool = self.type, None, self.view.tool
         self._begin_drag()
-        self.told.emit(HINT)
+        # without a tool, as the click that ends it may be on a handle
+        self.enter(HINT, cursor=Qt.CursorShape.ArrowCursor)
 
-    def accept(self) -> None:
+    def end(self) -> None:
         """It stays where it is."""
         if self.active:
             self._at = self._drag = None
-            self.view.typing, self.view.tool = None, self._tool
+            self.leave()
             self.gizmo.end()
-            self.told.emit("")
 
     def cancel(self) -> None:
         """As it was before."""
         if self.active:
-            self.accept()
+            self.end()
             self.gizmo.put_back()
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Who turns to something else is done."""
-        if event.type() == QEvent.Type.FocusOut:
-            self.accept()
-        return super().eventFilter(watched, event)
 
     def type(self, event: QKeyEvent) -> bool:
         """Take a key: every plain one, so that none does something else meanwhile; a command ends it."""
         key, text = Qt.Key(event.key()), event.text()
         if text and event.modifiers() & COMMANDS:
-            self.accept()
+            self.end()
             return False
         if event.type() == QEvent.Type.ShortcutOverride:
             return bool(text) or key == Qt.Key.Key_Escape
         if key in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            self.accept()
+            self.end()
         elif key == Qt.Key.Key_Escape:
             self.cancel()
         elif key in AXES:

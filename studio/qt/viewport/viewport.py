@@ -145,7 +145,7 @@ class Viewport(QWidget):
 
     def _clicked(self, x: float, y: float) -> None:
         if self.typed.active:
-            self.typed.accept()
+            self.typed.end()
         elif self.snap.active:
             self.snap.click(x, y)
         elif self.bar.aim.isChecked():
