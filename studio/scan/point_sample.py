@@ -13,13 +13,14 @@ class PointSample:
     def __init__(self, most: int = MOST_POINTS) -> None:
         self.most = most
         self._kept: list[Cloud] = []
-        self._stride = 1
+        self.one_in = 1
+        """Of how many points one is kept."""
 
     def add(self, points: Cloud) -> None:
-        self._kept.append({name: column[:: self._stride].copy() for name, column in points.items()})
+        self._kept.append({name: column[:: self.one_in].copy() for name, column in points.items()})
         while sum(len(part["x"]) for part in self._kept) > self.most:
             self._kept = [{name: column[::2].copy() for name, column in merge(self._kept).items()}]
-            self._stride *= 2
+            self.one_in *= 2
 
     @property
     def points(self) -> Cloud:

@@ -104,15 +104,19 @@ def scan_errors(region: Box | None, points: Cloud, laser: int, view: ErrorView) 
     return np.asarray(points[COLUMNS[view.kind]][here] * view.scale)
 
 
-def scan_table(region: Box, points: Cloud, laser: int, view: ErrorView) -> list[tuple[str, list[str]]]:
-    """Likewise of all steps of a scan, by the method that its points are of; these have no error in the image."""
+def scan_table(region: Box, points: Cloud, laser: int, view: ErrorView, one_in: int = 1) -> list[tuple[str, list[str]]]:
+    """Likewise of all steps of a scan, by the method that its points are of; these have no error in the image.
+
+    one_in: of how many points `points` has one, which is told.
+    """
     here = region.of_cloud(points, laser)
     error = scan_errors(region, points, laser, view)
     # in the order of the scan lines, those of two steps never side by side
     line = points["row"][here].astype(np.intp) + points["step"][here] * (int(points["row"].max(initial=0)) + 2)
     order = np.argsort(line, kind="stable")
     lengths = points["correlation_length"][here] if "correlation_length" in points else np.ones(len(error))
-    return _rows([_statistics(error[order], line[order], lengths[order])], view)
+    (count, figures), *rest = _rows([_statistics(error[order], line[order], lengths[order])], view)
+    return [(count if one_in == 1 else f"{count}, one in {one_in}", figures), *rest]
 
 
 def _rows(columns: list[list[str]], view: ErrorView) -> list[tuple[str, list[str]]]:

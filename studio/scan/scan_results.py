@@ -51,6 +51,8 @@ class ScanResults:
     """A sample, by the project's method, at the pose of the first step; no points where none were measured."""
     sums: dict[str, Float]
     """Kind of error -> (lasers, steps, 3): number, sum and sum of squares of the errors, m."""
+    one_in: int = 1
+    """Of how many points `points` has one."""
 
     @property
     def count(self) -> int:
@@ -138,7 +140,7 @@ def read_results(found: ScanFolder, cancelled: Cancel = never) -> ScanResults:
             raise InputError("the points lack columns", where=str(path), found=f"no {', '.join(missing)}")
         _add(sums, piece)
         sample.add(piece)
-    return ScanResults(found, image_scale_of(found), sample.points, sums)
+    return ScanResults(found, image_scale_of(found), sample.points, sums, sample.one_in)
 
 
 def is_scan_of(found: ScanFolder, project: Project) -> bool:

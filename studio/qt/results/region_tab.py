@@ -93,7 +93,8 @@ class RegionTab(QWidget):
             return
         scan = self._scan_bar.whole
         if isinstance(region, Box) and scan is not None:
-            methods, rows = scan.table(laser, view)[0][:1], scan_table(region, scan.points, laser, view)
+            methods = scan.table(laser, view)[0][:1]
+            rows = scan_table(region, scan.points, laser, view, scan.one_in)
         else:
             methods, rows = list(shown), region_table(region, list(shown.values()), render.project.scene, view)
         self.table.show_methods(methods, len(rows))

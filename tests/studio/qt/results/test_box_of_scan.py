@@ -62,6 +62,16 @@ def test_its_figures_are_of_all_steps(panel: ResultsPanel, tmp_path: Path) -> No
         assert sum(1 for _ in csv.reader(file)) == np.count_nonzero(here) + 1
 
 
+def test_figures_of_a_sample_say_of_which(panel: ResultsPanel) -> None:
+    shown = panel.session.shown
+    assert shown is not None and shown.scan is not None
+    names = [
+        scan_table(Box(low=(-9.0,) * 3, high=(9.0,) * 3), shown.scan.points, 0, ERROR_VIEWS[0], one_in)[0][0]
+        for one_in in (1, shown.scan.one_in, 4)
+    ]
+    assert names == ["Points", "Points", "Points, one in 4"]
+
+
 def test_a_box_beside_the_part_holds_nothing(panel: ResultsPanel) -> None:
     panel.choose(Box(low=(5.0, 5.0, 5.0), high=(6.0, 6.0, 6.0)))
     assert [panel.region.table.item(row, 0).text() for row in (0, 1)] == ["0", "-"]
