@@ -43,7 +43,8 @@ class Flag(IntEnum):
     UNRESOLVED = 12
     """The line is too narrow for its pixels: the position is a mean over where in the pixel it may be."""
     BLENDED = 13
-    """Two lines closer than they can be told apart; the position is that of the brighter one."""
+    """Two lines closer than they can be told apart; the position is that of a single one, or of the brighter one where
+    they have two peaks or the other is faint."""
     MISFIT = 14
     """The profile is not that of a line, nor of two; sigma_u holds what that may cost."""
     SPECKLED = 15
