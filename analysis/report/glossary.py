@@ -10,7 +10,7 @@ GLOSSARY = (
     ("Truth", "The exact line: the plane of the sheet cut with the part's triangles in double precision, only where "
      "the laser reaches and the camera sees it. It is computed, not taken from the image."),
     ("Error", "Measured minus true. In px along the scan line; in µm along the camera's axis (depth_z) at the same "
-     "scan line; and as the distance from the point to the nearest place of the part, positive towards the camera."),
+     "scan line; and as the distance from the point to the nearest place of the part. Positive is too far away."),
     ("Bias", "The mean error. It stays however often one measures."),
     ("Sigma", "The standard deviation of the errors about their mean: the scatter."),
     ("RMSE", "The root of the mean squared error: bias and scatter together."),
