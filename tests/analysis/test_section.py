@@ -38,7 +38,7 @@ def test_a_cut_of_a_sphere_is_a_circle() -> None:
 
 
 def test_a_cut_along_a_strip_of_many_facets_is_one_line_with_a_place_for_each_edge_that_it_crosses() -> None:
-    """Of 20,000 pieces; they were joined in minutes."""
+    """Of 20,000 pieces, none lost and none twice."""
     n = 10_000
     x, side = np.repeat(np.linspace(0.0, 1.0, n + 1), 2), np.tile([-1e-3, 1e-3], n + 1)
     vertices = np.column_stack([x, side, 1e-3 * np.sin(20.0 * x)])
