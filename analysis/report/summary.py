@@ -13,6 +13,8 @@ ENOUGH = 30
 """Least number of points from which a conclusion is drawn."""
 SHEET_PX = 0.01
 """Bias by the sheet's width, px, above which it is mentioned: the uncertainty of a good line."""
+DOMINATED = 3.0
+"""RMSE over robust sigma from which a few outliers are told: without any it is near 1, on textured parts near 2."""
 LITTLE = 0.5
 """Completeness below which the errors describe chance finds rather than the line."""
 
@@ -103,6 +105,14 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
         said.append(
             f"{percent(found.u.outlier_rate)} of the points are outliers, wrong by more than a pixel and five times "
             "the usual error: a wrong peak, or an edge. They dominate the RMSE; the robust sigma leaves them out."
+        )
+    elif found.outliers and found.depth_z.rmse > DOMINATED * found.depth_z.robust_sigma:
+        few = "1 point is an outlier" if found.outliers == 1 else f"{count(found.outliers)} points are outliers"
+        them = "it" if found.outliers == 1 else "them"
+        said.append(
+            f"{few}, wrong by more than a pixel and five times the usual error. Of {count(found.points)} points that "
+            f"is few, but the RMSE of {micrometres(found.depth_z.rmse)} is mostly of {them}; the robust sigma, which "
+            f"leaves {them} out, is {micrometres(found.depth_z.robust_sigma)}."
         )
     if abs(found.u.bias) > max(0.3 * found.u.robust_sigma, 5 * found.u.sigma / np.sqrt(found.u.count)):
         said.append(
