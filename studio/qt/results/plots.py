@@ -212,6 +212,13 @@ def dots(colour: str, size: float = 4.0) -> pg.ScatterPlotItem:
     return pg.ScatterPlotItem(pen=None, brush=pg.mkBrush(colour), size=size, pxMode=True)
 
 
+def crosses(colour: str) -> pg.ScatterPlotItem:
+    """Samples of one method beyond the ends of the axis, at whose end they are drawn."""
+    item = pg.ScatterPlotItem(pen=pg.mkPen(colour, width=1), brush=pg.mkBrush(colour), symbol="x", size=9, pxMode=True)
+    item.setZValue(10)
+    return item
+
+
 def ring() -> pg.ScatterPlotItem:
     """The mark around the hovered sample."""
     item = pg.ScatterPlotItem(brush=None, size=11, pxMode=True)

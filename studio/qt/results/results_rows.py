@@ -15,7 +15,7 @@ from studio.qt.results import plots
 from studio.scan.result_series import ErrorView, Series, symmetric_limit
 
 PLOTTED = 99.5
-"""Percent of the errors within the axis."""
+"""Percent of the errors within the axis; the others are crosses at its ends."""
 
 
 class RowPlots(plots.PointedPlots):
@@ -38,6 +38,7 @@ class RowPlots(plots.PointedPlots):
             plot.addItem(ring, ignoreBounds=True)
         self._drawn: list[tuple[pg.PlotItem, Any]] = []
         self._shown: dict[str, tuple[Series, Float]] = {}
+        self.limit = 1.0
         self.repaint_theme()
 
     def show_series(
@@ -48,21 +49,25 @@ class RowPlots(plots.PointedPlots):
             plot.removeItem(item)
         self._drawn = []
         self._shown = measured
+        errors = [error for _, error in measured.values()]
+        limit = self.limit = max([symmetric_limit(error, PLOTTED) for error in errors], default=1.0)
         self.error.setLabel("bottom", "Row" if axis == "rows" else "Column")
         self.position.setLabel("left", f"{'u' if axis == 'rows' else 'v'} / px")
         self.error.setLabel("left", f"Error / {view.unit}")
         for method, (series, error) in reversed(measured.items()):  # the first method on top
             for plot, values in ((self.position, series.position), (self.depth, series.depth), (self.error, error)):
-                here = np.isfinite(values)
+                here = np.isfinite(values) if plot is not self.error else np.abs(values) <= limit
                 self._add(plot, plots.dots(method_colour(method))).setData(series.index[here], values[here])
         if truth is not None:  # thin, over the dots, so that both can be seen
             for plot, values in ((self.position, truth.position), (self.depth, truth.depth)):
                 self._add(plot, plots.curve(TRUTH)).setData(truth.index, values)
-        errors = [error for _, error in measured.values()]
-        limit = max([symmetric_limit(error, PLOTTED) for error in errors], default=1.0)
+        for method, (series, error) in reversed(measured.items()):
+            off = np.abs(error) > limit
+            marks = series.index[off], np.sign(error[off]) * limit
+            self._add(self.error, plots.crosses(method_colour(method))).setData(*marks)
         for plot in self.plots:
             plot.enableAutoRange()
-        self.error.setYRange(-limit, limit, padding=0.02)
+        self.error.setYRange(-limit, limit, padding=0.06)
         self.mark(None)
 
     def mark(self, scan_line: int | None) -> None:
@@ -76,7 +81,7 @@ class RowPlots(plots.PointedPlots):
             y: list[float] = []
             for series, error in self._shown.values():
                 here = np.flatnonzero(series.index == scan_line) if scan_line is not None else np.zeros(0, dtype=int)
-                values = (series.position, series.depth, error)[k][here]
+                values = (series.position, series.depth, np.clip(error, -self.limit, self.limit))[k][here]
                 x += series.index[here][np.isfinite(values)].tolist()
                 y += values[np.isfinite(values)].tolist()
             ring.setData(x, y)

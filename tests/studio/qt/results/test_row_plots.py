@@ -1,0 +1,40 @@
+"""The charts along the line leave no point out, however far off it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from studio.qt.results.results_rows import RowPlots
+from studio.scan.result_series import ERROR_VIEWS, Series
+
+ROWS = np.arange(500.0)
+BAD = {100: -334_000.0, 400: 210.0}
+"""µm, by row."""
+
+
+@pytest.fixture
+def plots(qtbot: QtBot) -> RowPlots:
+    error = np.random.default_rng(3).normal(0.0, 15.0, len(ROWS))
+    for row, wrong in BAD.items():
+        error[row] = wrong
+    made = RowPlots()
+    qtbot.addWidget(made)
+    flat = np.zeros(len(ROWS))
+    made.show_series("rows", None, {"likelihood": (Series(ROWS, flat, flat, flat, flat), error)}, ERROR_VIEWS[0])
+    return made
+
+
+def test_points_beyond_the_axis_are_crosses_at_its_ends(plots: RowPlots) -> None:
+    dots, crosses = (item for plot, item in plots._drawn if plot is plots.error)
+    assert len(dots.data) == len(ROWS) - len(BAD)
+    x, y = crosses.getData()
+    assert dict(zip(x, y, strict=True)) == {100: -plots.limit, 400: plots.limit}
+    low, high = plots.error.vb.viewRange()[1]
+    assert low < -plots.limit and plots.limit < high < 100.0
+
+
+def test_the_ring_of_such_a_row_is_about_its_cross(plots: RowPlots) -> None:
+    plots.mark(100)
+    assert plots.rings[-1].getData()[1].tolist() == [-plots.limit]
