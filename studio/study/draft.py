@@ -45,7 +45,7 @@ def new_draft(base: str) -> Data:
 
 
 def new_sweep(name: str) -> Data:
-    return {"name": name, "vary": [], "sampling": "grid", "chart": "sweep", "measure": "depth_rmse"}
+    return {"name": name, "vary": [], "sampling": "grid", "chart": "sweep", "measure": "depth_p95"}
 
 
 def finished(draft: Data) -> Study:
