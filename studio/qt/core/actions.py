@@ -166,8 +166,10 @@ SUBMENUS = ("recent", "panels", "add", "presets", "motion")
 class Actions:
     """The menus of a window, and the action of every command by its key."""
 
-    def __init__(self, window: QMainWindow) -> None:
+    def __init__(self, window: QMainWindow, before: Callable[[], None] = lambda: None) -> None:
+        """before: called ahead of what any command does."""
         self.window = window
+        self.before = before
         self.by_key: dict[str, QAction] = {}
         self.submenus: dict[str, QMenu] = {}
         self._menus: dict[str, QMenu] = {}
@@ -184,7 +186,12 @@ class Actions:
 
     def connect(self, key: str, handler: Callable[[], object]) -> None:
         """Call the handler when the command is chosen."""
-        self.by_key[key].triggered.connect(lambda _checked=False: handler())
+
+        def call(_checked: bool = False) -> None:
+            self.before()
+            handler()
+
+        self.by_key[key].triggered.connect(call)
 
     def _menu(self, path: str) -> QMenu:
         if path not in self._menus:

@@ -22,7 +22,7 @@ from PySide6.QtGui import (
     QPen,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit, QToolButton, QWidget
+from PySide6.QtWidgets import QApplication, QCheckBox, QComboBox, QLineEdit, QToolButton, QWidget
 
 from render.base.errors import InputError
 from studio.editing.forms import FieldSpec, choice_label
@@ -36,6 +36,8 @@ class TextField(QLineEdit):
     entered = Signal(object)
     refused = Signal(str)
     """While typing: why the text will not do; empty when it will."""
+    given_up = Signal()
+    """What was typed will not do and is about to be dropped, as the field is left."""
     menu_asked = Signal(object)
     """A `QMenu` is about to open, for whoever has something to add."""
 
@@ -90,6 +92,14 @@ class TextField(QLineEdit):
         self.pending = False
         self.entered.emit(value)
 
+    def leave(self) -> None:
+        """Hand over what was typed, as something else is done now; what will not do is dropped."""
+        self.enter()
+        if self.pending:
+            self.given_up.emit()
+            self.revert()
+            self.refused.emit("")
+
     def reject(self) -> None:
         """The value was refused after all: it stays typed, to be mended."""
         self.pending = True
@@ -107,10 +117,19 @@ class TextField(QLineEdit):
         self.refused.emit("")
 
     def event(self, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self._document_undo(event):
-            event.ignore()
-            return False
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
+            if self._document_undo(event):
+                event.ignore()
+                return False
+            if self.takes_escape and event.key() == Qt.Key.Key_Escape:
+                event.accept()
+                return True
         return super().event(event)
+
+    @property
+    def takes_escape(self) -> bool:
+        """Whether Escape is this field's, before it is the window's."""
+        return self.pending
 
     def _document_undo(self, event: QKeyEvent) -> bool:
         """Undo or redo while nothing is being typed is the document's."""
@@ -135,10 +154,7 @@ class TextField(QLineEdit):
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if event.reason() not in (Qt.FocusReason.PopupFocusReason, Qt.FocusReason.ActiveWindowFocusReason):
-            self.enter()
-            if self.pending:
-                self.revert()
-                self.refused.emit("")
+            self.leave()
             self.deselect()
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
@@ -224,6 +240,13 @@ class CurvePlot(QWidget):
         painter.drawText(ends, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, f"{low:g} nm")
         painter.drawText(ends, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, f"{high:g} nm")
         painter.end()
+
+
+def leave_typing() -> None:
+    """What is being typed anywhere counts from now on, as if its field had been left."""
+    field = QApplication.focusWidget()
+    if isinstance(field, TextField):
+        field.leave()
 
 
 class FlagField(QCheckBox):

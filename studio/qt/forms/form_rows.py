@@ -201,20 +201,22 @@ class Row(QWidget):
             if self.change(whole(value)):
                 self.refresh(self.spec)  # as it is written here: 20 for 20.0
             else:
-                if isinstance(field, TextField) and not field.hasFocus():  # the old value comes back at once
-                    why = f"{self.spec.label}: {self.reason.text()} The value is as it was"
-                    self.form.session.message.emit("warning", why)
                 field.reject()
 
         field.entered.connect(enter)
         if isinstance(field, TextField):
             field.refused.connect(self.tell)
+            field.given_up.connect(self._tell_given_up)
             field.menu_asked.connect(self.fill_menu)
         if isinstance(field, NumberField):
             merge = f"drag {field_path(self.owner, self.spec)} {id(field)}"
             field.drag_began.connect(self.form.session.begin_drag)
             field.dragged.connect(lambda value: self.change(whole(value), merge=merge))
             field.drag_ended.connect(self._end_drag)
+
+    def _tell_given_up(self) -> None:
+        why = self.reason.text().rstrip(".")
+        self.form.session.message.emit("warning", f"{self.spec.label}: {why}. The value is as it was")
 
     def _end_drag(self, keep: bool) -> None:
         changed = self.form.session.document.undo_label is not None and self.form.dragged

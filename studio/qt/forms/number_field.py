@@ -52,6 +52,10 @@ class NumberField(TextField):
             width = self.fontMetrics().horizontalAdvance(self.suffix)
             self.setTextMargins(0, 0, width + 6, 0)
 
+    @property
+    def takes_escape(self) -> bool:
+        return self.pending or self._dragging
+
     def text_of(self, value: Any) -> str:
         if value is None:
             return ""

@@ -23,6 +23,7 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import Scrolled, room_for_a_window
+from studio.qt.forms.fields import leave_typing
 from studio.qt.render.python_copy import copy_as_python
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
@@ -82,7 +83,7 @@ class MainWindow(QMainWindow):
         self.setAcceptDrops(True)
         self.setDockOptions(QMainWindow.DockOption.AllowTabbedDocks | QMainWindow.DockOption.AllowNestedDocks)
         self.resize(1440, 900)
-        self.commands = Actions(self)
+        self.commands = Actions(self, before=leave_typing)
         self.runner = JobRunner(self)
         self.panels = Panels(session, self.runner, making)
         self.docks = self._make_docks()

@@ -1,0 +1,50 @@
+"""What is being typed in a field of the window: whose Escape it is, and what a command makes of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from studio.qt.shell.window import MainWindow
+from tests.studio.qt.scene.inspector_hands import LASER, field, row, type_into
+
+
+@pytest.fixture
+def power(window: MainWindow, qtbot: QtBot) -> Any:
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    window.session.select(LASER)
+    return field(inspector_of(window), *LASER, "power")
+
+
+def inspector_of(window: MainWindow) -> Any:
+    return window.panels["inspector"]
+
+
+def test_escape_is_the_fields_before_it_is_the_windows(window: MainWindow, power: Any, qtbot: QtBot) -> None:
+    before = power.text()
+    type_into(qtbot, power, "-500", key=None)
+    told = row(inspector_of(window), *LASER, "power").reason
+    assert told.isVisible()
+    qtbot.keyClick(power, Qt.Key.Key_Escape)
+    assert power.text() == before and not power.invalid and not told.isVisible()
+
+
+def test_a_command_takes_what_is_being_typed(window: MainWindow, power: Any, qtbot: QtBot) -> None:
+    type_into(qtbot, power, "35", key=None)
+    asked = []
+    window.commands["copy_python"].triggered.connect(lambda: asked.append(window.session.project))
+    qtbot.keyClick(power, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier)
+    assert asked[0].scene.lasers[0].power == pytest.approx(0.035)
+
+
+def test_a_command_drops_what_is_typed_in_vain_and_says_so(window: MainWindow, power: Any, qtbot: QtBot) -> None:
+    before = power.text()
+    type_into(qtbot, power, "-500", key=None)
+    with qtbot.waitSignal(window.session.message, check_params_cb=lambda kind, text: "Power" in text) as told:
+        window.commands["copy_python"].trigger()
+    assert told.args[0] == "warning" and "at least 0 mW. The value is as it was" in told.args[1]
+    assert power.text() == before and not power.invalid
