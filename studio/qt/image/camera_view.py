@@ -6,7 +6,6 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QCloseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
-    QBoxLayout,
     QCheckBox,
     QComboBox,
     QFrame,
@@ -28,7 +27,7 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import flush, upper_and_lower
 from studio.qt.image.image_item import PictureView
-from studio.qt.image.line_overlay import LineOverlay, swatch
+from studio.qt.image.line_overlay import BOX_PX, LineOverlay, swatch
 from studio.qt.image.row_profile import RowProfile
 from studio.qt.image.scan_line_marks import ScanLineMarks
 from studio.runtime.jobs import Progress
@@ -41,6 +40,9 @@ LOW = 400
 """px of height, for picture and profile together."""
 NARROW, TINY, LEAST_CHOICE = 600, 480, 124
 """px, below which lines' boxes take room of the choice, which keeps so much; of zooming."""
+MARGIN_PX, SPACE_PX = 6, 8
+NAMES_PX = 10_000
+"""Room for the names of all lines."""
 SATURATED_NAME = "Saturated"
 LIVE = "Live estimate"
 
@@ -120,20 +122,18 @@ class CameraView(QWidget):
         self.choice.setToolTip("What to look at")
         self.bright.setToolTip("Square root of the light, to see what is faint")
         self.saturated.setToolTip("Paint the pixels of an image that are saturated")
-        bar, self.bar = QHBoxLayout(), QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self.bar.setContentsMargins(6, 4, 6, 4)
+        self.bar, self.first, self.second = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
         for widget in (self.choice, self.bright, self.saturated):
-            bar.addWidget(widget)
-            bar.addSpacing(8)
+            self.bar.addWidget(widget)
+            self.bar.addSpacing(SPACE_PX)
         lines = self.lines
         lines.setLayout(self.overlay.bar)
         self.overlay.bar.setContentsMargins(0, 0, 0, 0)
         self.overlay.bar.addStretch(1)
         # many methods must not make the panel, and so the window, wider
         lines.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        bar.addStretch(1)
-        self.bar.addLayout(bar)
-        self.bar.addWidget(lines, 1)
+        self.first.addWidget(lines, 1)
+        self.bar.addLayout(self.first, 1)
         fit = "Fit", "The whole image (F)", self.view.fit
         one_to_one = "1:1", "One screen pixel a pixel", self.view.one_to_one
         for button, (text, tip, action) in zip(self.zooms, (fit, one_to_one), strict=True):
@@ -153,7 +153,11 @@ class CameraView(QWidget):
         column.addWidget(self.view, 1)
         column.addWidget(self.readout)
         layout = flush(QVBoxLayout(self))
-        layout.addLayout(self.bar)
+        bars = QVBoxLayout()
+        bars.setContentsMargins(MARGIN_PX, 4, MARGIN_PX, 4)
+        bars.addLayout(self.bar)
+        bars.addLayout(self.second)
+        layout.addLayout(bars)
         layout.addWidget(upper_and_lower(picture, self.profile, (300, 140)), 1)
         self._colour()
 
@@ -320,17 +324,21 @@ class CameraView(QWidget):
         self._read_out(self._cursor if before == size else None)
 
     def _name_boxes(self) -> None:
-        """As far as there is room, which the names of lines need first."""
-        one_row, two_rows = QBoxLayout.Direction.LeftToRight, QBoxLayout.Direction.TopToBottom
-        self.bar.setDirection(one_row if self.width() >= TINY else two_rows)
-        self.choice.setMaximumWidth(LEAST_CHOICE if self.width() < NARROW else self.choice.sizeHint().width())
+        """Lines' boxes have their names where there is room for them: beside the others, else in a row of their own."""
+        width, lines = self.width(), self.overlay.width_within(NAMES_PX)
+        self.choice.setMaximumWidth(LEAST_CHOICE if width < NARROW else self.choice.sizeHint().width())
         for button in self.zooms:
-            button.setVisible(self.width() >= TINY)
+            button.setVisible(width >= TINY)
+        shown = [box for box in (self.choice, self.bright, *self.zooms) if not box.isHidden()]
+        spaces = (len(shown) + 4) * max(self.bar.spacing(), 0) + 2 * SPACE_PX + 2 * MARGIN_PX
+        others = sum(min(box.sizeHint().width(), box.maximumWidth()) for box in shown) + spaces + BOX_PX
         name = self.saturated.fontMetrics().horizontalAdvance(SATURATED_NAME)
-        room = self.lines.width() + (name if self.saturated.text() else 0)
-        named = self.width() >= NARROW and (self.is_live or room >= name + self.overlay.width_within(room))
+        below = others + name + lines > width and (self.height() >= LOW or width < TINY)
+        (self.second if below else self.first).addWidget(self.lines, 1)
+        room = width - 2 * MARGIN_PX if below else width - others
+        named = others + name <= width if below else name + self.overlay.width_within(room) <= room
         self.saturated.setText(SATURATED_NAME if named else "")
-        self.overlay.show_names_within(room - (name if named else 0))
+        self.overlay.show_names_within(room - (name if named and not below else 0))
 
     def _draw_overlay(self) -> None:
         shown = self.session.shown

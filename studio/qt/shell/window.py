@@ -298,7 +298,6 @@ class MainWindow(QMainWindow):
         session.document_replaced.connect(lambda: QTimer.singleShot(TRIM_MS, self, return_what_is_free))
         session.selection_changed.connect(self._tell_selection)
         session.step_changed.connect(lambda: live(session).show_step(session.step))
-        session.render_asked.connect(lambda: self.call_panel("render"))
         session.vary_asked.connect(self._vary)
         runner.failed.connect(self._tell_failure)
         self._tell_selection()

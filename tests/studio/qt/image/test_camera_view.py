@@ -208,12 +208,19 @@ def test_lines_of_each_method_are_switched_on_their_own(qtbot, made):
 
 
 def test_boxes_have_their_names_as_far_as_there_is_room(qtbot, made):
-    needed = made.overlay.width_within(10_000)
-    for width, names in ((1400, (True, True)), (800, (False, True)), (560, (False, False)), (1400, (True, True))):
-        made.resize(width, 700)
+    """Beside the others, else in a row of their own, which a low panel has no height for."""
+    for size, names, below in (
+        ((1400, 700), (True, True), False),
+        ((700, 700), (True, True), True),
+        ((700, 300), (False, True), False),
+        ((400, 700), (False, True), True),
+        ((1400, 700), (True, True), False),
+    ):
+        made.resize(*size)
         qtbot.wait(20)
         assert (made.overlay.truth_box.text() != "", made.saturated.text() != "") == names
-        assert (made.lines.width() >= needed) == names[0]
+        assert (made.lines.y() > made.choice.y() + 10) == below
+        assert made.lines.width() >= made.overlay.width_within(made.lines.width())
 
 
 def test_keeping_the_place_when_the_size_changes(qtbot, made):

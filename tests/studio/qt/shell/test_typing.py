@@ -1,4 +1,4 @@
-"""What is being typed in a field of the window: whose Escape it is, and what a command makes of it."""
+"""What keys mean while something is typed in a field of the window, and what they leave as it is."""
 
 from __future__ import annotations
 
@@ -48,3 +48,17 @@ def test_a_command_drops_what_is_typed_in_vain_and_says_so(window: MainWindow, p
         window.commands["copy_python"].trigger()
     assert told.args[0] == "warning" and "at least 0 mW. The value is as it was" in told.args[1]
     assert power.text() == before and not power.invalid
+
+
+def test_a_render_leaves_the_panels_where_they_are(
+    window: MainWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it does is in the status bar; the Render panel between others cut their buttons off."""
+    started: list[str] = []
+    monkeypatch.setattr(window.runner, "run", lambda key, name, *rest: started.append(name))
+    for workspace in ("setup", "measure"):
+        window.switch_to(workspace)
+        shown = {key for key, dock in window.docks.items() if dock.isVisible()}
+        qtbot.keyClick(window, Qt.Key.Key_F5)
+        assert {key for key, dock in window.docks.items() if dock.isVisible()} == shown
+    assert started == ["render"] * 2

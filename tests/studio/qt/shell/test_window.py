@@ -66,9 +66,9 @@ class TestWorkspaces:
         window.rearrange()
         assert window.docks["readout"].isVisible()
 
-    @pytest.mark.parametrize("panel", ["render", "motion"])
+    @pytest.mark.parametrize("panel", ["nominal", "motion"])
     def test_a_panel_that_a_command_called_goes_with_the_workspace(self, window: MainWindow, panel: str) -> None:
-        """F5 in Set up showed the Render panel there at every later start as well."""
+        """It once stood there at every later start as well."""
         window.call_panel(panel)
         assert window.docks[panel].isVisible()
         window.switch_to("measure")
