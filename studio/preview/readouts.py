@@ -76,13 +76,15 @@ class Readouts:
     """Expected standard deviation of depth_z from photon and read noise (Cramer-Rao bound), median."""
     speckle_sigma: float | None = None
     """The same from fully developed speckle, whether or not the sensor shows it."""
+    speckled: bool = False
+    """The sensor shows speckle."""
 
     @property
     def depth_sigma(self) -> float | None:
-        """Both noises together."""
+        """Of all noise that the sensor, as it is set, puts into an image."""
         if self.photon_sigma is None or self.speckle_sigma is None:
             return None
-        return math.hypot(self.photon_sigma, self.speckle_sigma)
+        return math.hypot(self.photon_sigma, self.speckle_sigma) if self.speckled else self.photon_sigma
 
 
 def readouts(look: Look, laser: int) -> Readouts:
@@ -136,6 +138,7 @@ def readouts(look: Look, laser: int) -> Readouts:
         blur_px=_range(estimates.blur_px(camera, curve.point)),
         photon_sigma=_median(bound * depth),
         speckle_sigma=_median(speckle * depth[some]),
+        speckled=sensor.speckle != "off",
     )
 
 

@@ -58,8 +58,7 @@ def foreseen_noise(project: Project, root: Path, threads: int | None = None) -> 
     direct, other = shares(goal, reflected="indirect" in there, ambient="ambient" in there)
     look, found = Preview(threads).look(project, root), []
     for i, laser in enumerate(scene.lasers):
-        told = readouts(look, i)
-        sigma = told.photon_sigma if project.sensor.speckle == "off" else told.depth_sigma
+        sigma = readouts(look, i).depth_sigma
         for group in get_args(Group):
             allowed = direct if group == "direct" else other
             if group in there:

@@ -136,6 +136,16 @@ def test_four_times_the_exposure_halves_the_photon_noise_and_saturates() -> None
     assert short.speckle_sigma == pytest.approx(long.speckle_sigma, rel=0.01)
 
 
+def test_depth_noise_is_that_of_the_sensor_as_it_is_set() -> None:
+    smooth = replaced(sample("plane"), ("sensor", "speckle"), "off")
+    off, on = (read(replaced(smooth, ("sensor", "speckle"), how), "plane") for how in ("off", "polarised"))
+    told_off, told_on = (next(row for row in rows(r) if row.key == "sigma") for r in (off, on))
+    assert off.depth_sigma == off.photon_sigma == on.photon_sigma
+    assert on.depth_sigma == pytest.approx(math.hypot(on.photon_sigma, on.speckle_sigma))
+    assert told_off.note == f"with speckle {told_on.value.removesuffix(' µm')}"
+    assert "switch it on" in told_off.help.lower() and "switch it on" not in told_on.help.lower()
+
+
 def test_nothing_lit_leaves_what_the_rig_alone_decides() -> None:
     project = replaced(sample("plane"), ("scene", "objects"), ())
     r = read(project, "plane")
