@@ -20,6 +20,7 @@ from studio.dataset.field_names import field_name
 from studio.dataset.images import images_of
 from studio.dataset.recipe import MOST_VARIANTS, ready_made
 from studio.editing.forms import PLAIN
+from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.run_foot import RunFoot
 from studio.qt.core.session import Session, one_of
@@ -84,10 +85,11 @@ class RecipePanel(QWidget):
 
     def ask_folder(self) -> bool:
         """False: none was chosen."""
-        chosen = QFileDialog.getExistingDirectory(self, "Folder for the images", self._place())
-        if chosen:
-            self.work.choose_folder(Path(chosen))
-        return bool(chosen)
+        name = f"{self.work.name} images"
+        chosen = ask_results_folder(self, "Folder for the images", Path(self._place()), name)
+        if chosen is not None:
+            self.work.choose_folder(chosen)
+        return chosen is not None
 
     def _make_rows(self) -> None:
         for row in self.rows:

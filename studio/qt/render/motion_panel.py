@@ -10,7 +10,6 @@ from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QComboBox,
-    QFileDialog,
     QHBoxLayout,
     QLabel,
     QPushButton,
@@ -28,6 +27,7 @@ from render.scene.motion import LinearStage, NoMotion, Turntable
 from studio.editing.scene_edits import set_motion
 from studio.project.document import Document
 from studio.project.project import Project
+from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
@@ -113,10 +113,10 @@ class MotionPanel(QWidget):
     def ask_and_run(self) -> None:
         """Ask for the folder of the results, then run the scan."""
         start = self.session.document.path
-        base = (start.parent if start is not None else Path.home()) / f"{self.session.project.name} scan"
-        chosen = QFileDialog.getExistingDirectory(self, "Folder for the scan's results", str(base.parent))
-        if chosen:
-            self.run_into(Path(chosen))
+        place = start.parent if start is not None else Path.home()
+        chosen = ask_results_folder(self, "Folder for the scan's results", place, f"{self.session.project.name} scan")
+        if chosen is not None:
+            self.run_into(chosen)
 
     def run_into(self, folder: Path, report: bool = True) -> Job[ScanResult] | None:
         """Run the scan into a folder; None: something else is being rendered. What the folder holds of it is kept."""

@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 )
 
 from render.base.threads import thread_count
+from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.icons import icon_button
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.run_foot import RunFoot
@@ -122,13 +123,11 @@ class StudyPanel(QWidget):
 
     def ask_folder(self) -> bool:
         """False: none was chosen."""
-        start = self.session.document.path
-        chosen = QFileDialog.getExistingDirectory(
-            self, "Folder for the study's results", str(start.parent if start is not None else Path.home())
-        )
-        if chosen:
-            self.work.choose_folder(Path(chosen))
-        return bool(chosen)
+        name = f"{self.work.draft['name']} results"
+        chosen = ask_results_folder(self, "Folder for the study's results", Path(self._place()), name)
+        if chosen is not None:
+            self.work.choose_folder(chosen)
+        return chosen is not None
 
     def _fill_files(self, menu: QMenu) -> None:
         menu.clear()

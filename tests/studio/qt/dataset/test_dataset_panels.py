@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from studio.dataset.recipe import Draw, Recipe, ready_made
@@ -120,7 +119,7 @@ def test_pictures_stand_side_by_side_within_the_sheet(desk: Desk, qtbot: QtBot) 
 def test_images_are_made_stopped_and_gone_on_with(desk: Desk, qtbot: QtBot, tmp_path: Path,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:  # fmt: skip
     folder = tmp_path / "images"
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(folder))
+    monkeypatch.setattr("studio.qt.dataset.recipe_panel.ask_results_folder", lambda *_: folder)
     desk.panel.scenes.setValue(2)
     desk.panel.ask_and_run()
     qtbot.waitUntil(lambda: not desk.work.running)

@@ -1,0 +1,48 @@
+"""Asking for the folder that results go into: one that is there, or a new one by its name."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from studio.qt.core.dialogs import show_trouble
+from studio.runtime.error_messages import trouble
+
+LONGEST = 80
+
+
+class ResultsFolder(QFileDialog):
+    """Qt's own choice of a folder knows only those that there are; here a name that is new makes one."""
+
+    def __init__(self, parent: QWidget | None, title: str, suggested: Path) -> None:
+        super().__init__(parent, title, str(suggested.parent))
+        self.setFileMode(QFileDialog.FileMode.Directory)
+        self.setOption(QFileDialog.Option.ShowDirsOnly)
+        self.setLabelText(QFileDialog.DialogLabel.FileName, "Folder:")
+        self.setLabelText(QFileDialog.DialogLabel.Accept, "Choose")
+        self.selectFile(suggested.name)
+
+    def accept(self) -> None:
+        for path in map(Path, self.selectedFiles()):
+            if path.parent.is_dir() and not path.exists():
+                try:
+                    path.mkdir()
+                except OSError as error:
+                    show_trouble(self, trouble(error, "make the folder"))
+                    return
+        super().accept()
+
+
+def folder_name(name: str) -> str:
+    """A name of any characters as one that every system takes, still to be read."""
+    return re.sub(r"[\\/:*?\"<>|\x00-\x1f]+", "-", name).strip(". ")[:LONGEST] or "results"
+
+
+def ask_results_folder(parent: QWidget, title: str, place: Path, name: str) -> Path | None:
+    """None: the person thought better of it. place, name: where a new one is suggested, and what it could be called."""
+    dialog = ResultsFolder(parent, title, place / folder_name(name))
+    chosen = dialog.selectedFiles()[0] if dialog.exec() else ""
+    dialog.deleteLater()
+    return Path(chosen) if chosen else None
