@@ -72,7 +72,8 @@ def run_into(
 
         def tell(done: int, known: int) -> None:
             nonlocal next_look
-            progress(f"{done} of {known} cells", (done - before) / max(known - before, 1))
+            first = "" if done > before else "; the first ones wait for their workers to start"
+            progress(f"{done} of {known} cells{first}", (done - before) / max(known - before, 1))
             now = time.monotonic()
             if now >= next_look:
                 grew(found_in(study, bases, store.rows()))

@@ -55,6 +55,7 @@ def run_study(
         return tasks(cells, study.image_scale, study.laser)
 
     work = tasks(_searches_first(study, missing), study.image_scale, study.laser)
+    progress(done, known)
     with team(engine, _measure, begin, cancelled) as workers:
         for _, found in workers.results(work, cancelled, "the study", follow):
             store.add(found)

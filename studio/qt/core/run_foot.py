@@ -53,11 +53,13 @@ class RunFoot(QWidget):
         for widget in (self.bar, self.stage):
             widget.setVisible(running)
         if not running:
+            self.bar.setMaximum(1000)
             self.bar.setValue(0)
             self.stage.clear()
         self.folder.setText(str(folder) if folder is not None else "no folder yet")
 
     def tell_progress(self, job: Job[object]) -> None:
+        self.bar.setMaximum(1000 if job.done > 0.0 else 0)  # to and fro until there is a share to show
         self.bar.setValue(round(1000 * job.done))
         left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
         self.stage.setText("stopping" if job.cancel_asked else f"{job.stage}   {left}")
