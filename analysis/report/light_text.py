@@ -103,9 +103,13 @@ def quality_text(quality: GroupQuality) -> str:
         if quality.unknown:
             parts.append(f"{quality.unknown} of {quality.lines} rows by more")
         if quality.image_error is not None and math.isfinite(quality.image_error):
-            end = "" if quality.image_target is None else f" ({quality.image_target:.0%} would end it as well)"
+            end = "" if quality.image_target is None else f" (not needed; {quality.image_target:.0%} would end it too)"
             places = 2 if quality.group == "direct" else 0
-            parts.append(f"image error {quality.image_error:.{places}%}{end}")
+            known = (
+                quality.image_error < 1.0
+            )  # beyond, only a few paths have met the image, and the figure says no more
+            size = f"{quality.image_error:.{places}%}" if known else "over 100%"
+            parts.append(f"image error {size}{end}")
         if quality.coarse_error is not None:
             parts.append(f"elsewhere interpolated to {quality.coarse_error:.1%}")
     elif not math.isnan(quality.error):

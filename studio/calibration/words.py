@@ -92,6 +92,7 @@ def lens_sentence(terms: int, trials: Sequence[LensTrial]) -> str:
     tried = "; ".join(
         f"{one.terms}: {one.held_out:.3g}"
         + (f" and {1e6 * one.depth:.0f} um" if one.depth else "")
+        + (", chosen" if one.terms == terms else "")
         + (f", {one.worse_by:.1f} se worse" if one.worse_by >= LEAST_SHOWN else "")
         for one in trials
     )

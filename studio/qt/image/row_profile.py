@@ -34,7 +34,7 @@ REASONS = {
 CAUTIONS = {
     Flag.SATURATED: "saturated",
     Flag.UNRESOLVED: "narrower than its pixels",
-    Flag.BLENDED: "two lines in one",
+    Flag.BLENDED: "more than one line, or one on texture or at an edge",
     Flag.MISFIT: "not the profile of a line",
     Flag.SPECKLED: "made up of few speckle grains",
 }

@@ -132,3 +132,9 @@ def test_what_all_light_does_to_the_line_is_told_by_the_root_of_the_sum_of_squar
     # of light whose goal was given up for that of its image nobody knows
     assert "not known" in quality_lines((*lines[:2], AMBIENT))[-1][1]
     assert line_noise((DIRECT, INDIRECT, AMBIENT)) == {}
+
+
+def test_an_image_of_which_nothing_is_known_is_given_no_figure():
+    one = GroupQuality("indirect", "red", 0.08, 0.1, 2e6, "light paths", of="line", image_target=0.1)
+    assert "image error 42% (not needed; 10% would end it too)" in quality_text(replace(one, image_error=0.42))
+    assert "image error over 100% (not needed" in quality_text(replace(one, image_error=8.99))
