@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QTimer
-from PySide6.QtGui import QHideEvent
+from PySide6.QtGui import QHideEvent, QResizeEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
@@ -19,6 +20,7 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QHBoxLayout,
     QLabel,
+    QSizePolicy,
     QVBoxLayout,
     QWidget,
 )
@@ -42,6 +44,8 @@ from studio.scan.section import Section, from_pieces, write_section
 LANE = "section"
 NORMALS = {"across x": (1.0, 0.0, 0.0), "across y": (0.0, 1.0, 0.0), "level (across z)": (0.0, 0.0, 1.0)}
 REST_MS = 120
+LOW, WIDE = 330, 480
+"""px of height, below which the plot has no room under the fields; of width, from which it has some beside them."""
 FILES = "DXF drawing (*.dxf);;CSV table (*.csv)"
 World = tuple[Cloud, Float, Float, Int]
 """Points, (2, 3) least and largest coordinates of all but a few of them, vertices and triangles of the part."""
@@ -60,7 +64,7 @@ class SectionTab(QWidget):
             self.normal.addItem(name, normal)
         self.normal.addItem("by its normal", None)
         self.own = [_box(-1.0, 1.0, value, "", 5) for value in (1.0, 0.0, 0.0)]
-        self.through = [_box(-1e5, 1e5, 0.0, " mm") for _ in range(3)]
+        self.through = [_box(-1e5, 1e5, 0.0, "") for _ in range(3)]
         self.thickness = _box(0.001, 1000.0, 1.0, " mm")
         self.middle = text_button("To the middle", "The plane through the middle of the points")
         self.export = text_button("Export…", "DXF (mm, layers TRUE and MEASURED) or CSV")
@@ -69,7 +73,8 @@ class SectionTab(QWidget):
         self.in_view.setChecked(True)
         self.told = QLabel(wordWrap=True)
         self.view = pg.GraphicsLayoutWidget()
-        self.view.setMinimumHeight(120)
+        self.view.setMinimumSize(160, 120)
+        self.view.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
         self.plot = plots.new_plot("Across / mm", "Up", "mm")
         self.view.addItem(self.plot)
         self.plot.setAspectLocked(True)
@@ -244,19 +249,30 @@ class SectionTab(QWidget):
         self.normals = _row(self.own)
         self.form.addRow("Plane", self.normal)
         self.form.addRow("Normal", self.normals)
-        self.form.addRow("Through", _row(self.through))
+        self.form.addRow("Through / mm", _row(self.through))
         self.form.addRow("Slab", self.thickness)
         buttons = QHBoxLayout()
         buttons.addWidget(self.middle)
         buttons.addWidget(self.export)
         buttons.addWidget(self.in_view)
         buttons.addStretch(1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(8, 8, 8, 8)
-        column.addLayout(self.form)
-        column.addLayout(buttons)
-        column.addWidget(self.view, 1)
-        column.addWidget(self.told)
+        fields = QVBoxLayout()
+        fields.addLayout(self.form)
+        fields.addLayout(buttons)
+        fields.addWidget(self.told)
+        fields.addStretch(1)
+        self.column = QBoxLayout(QBoxLayout.Direction.TopToBottom, self)
+        self.column.setContentsMargins(8, 8, 8, 8)
+        self.column.addLayout(fields)
+        self.column.addWidget(self.view, 1)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """A low panel has the plot beside the fields, where it need not be scrolled to."""
+        super().resizeEvent(event)
+        room = self.parentWidget()
+        low = room is not None and room.height() < LOW and room.width() >= WIDE
+        direction = QBoxLayout.Direction.LeftToRight if low else QBoxLayout.Direction.TopToBottom
+        self.column.setDirection(direction)
 
 
 def _box(low: float, high: float, value: float, suffix: str, decimals: int = 3) -> QDoubleSpinBox:
@@ -266,6 +282,8 @@ def _box(low: float, high: float, value: float, suffix: str, decimals: int = 3) 
     box.setSuffix(suffix)
     box.setValue(value)
     box.setMinimumWidth(48)
+    box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+    box.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)  # three side by side have no room for arrows
     return box
 
 

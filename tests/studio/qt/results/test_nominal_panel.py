@@ -152,3 +152,14 @@ def test_an_end_of_the_colour_bar_is_dragged_to_another_value(session: Session, 
     assert cloud.meaning == "height" and bar.unit == "mm"
     np.testing.assert_allclose(cloud.errors, 1e3 * cloud._clouds[0]["z"])
     view.close()
+
+
+def test_a_low_panel_has_the_section_beside_its_fields(panel: NominalPanel, qtbot: QtBot) -> None:
+    tab = panel.section
+    panel.show_tab(tab)
+    for size, beside in (((420, 700), False), ((574, 250), True), ((300, 250), False), ((420, 700), False)):
+        panel.resize(*size)
+        qtbot.wait(20)
+        assert (tab.view.x() > tab.thickness.geometry().right()) == beside
+        scrolled = tab.height() > tab.parentWidget().height()
+        assert not scrolled or size == (300, 250)
