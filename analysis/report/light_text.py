@@ -105,10 +105,9 @@ def quality_text(quality: GroupQuality) -> str:
         if quality.image_error is not None and math.isfinite(quality.image_error):
             end = "" if quality.image_target is None else f" (not needed; {quality.image_target:.0%} would end it too)"
             places = 2 if quality.group == "direct" else 0
-            known = (
-                quality.image_error < 1.0
-            )  # beyond, only a few paths have met the image, and the figure says no more
-            size = f"{quality.image_error:.{places}%}" if known else "over 100%"
+            # beyond that only a few paths have met the image, and the figure says no more
+            is_known = quality.image_error < 1.0
+            size = f"{quality.image_error:.{places}%}" if is_known else "over 100%"
             parts.append(f"image error {size}{end}")
         if quality.coarse_error is not None:
             parts.append(f"elsewhere interpolated to {quality.coarse_error:.1%}")

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QLineEdit, QWidget
 
 from studio.qt.core.dialogs import show_trouble
 from studio.runtime.error_messages import trouble
@@ -23,6 +24,17 @@ class ResultsFolder(QFileDialog):
         self.setLabelText(QFileDialog.DialogLabel.FileName, "Folder:")
         self.setLabelText(QFileDialog.DialogLabel.Accept, "Choose")
         self.selectFile(suggested.name)
+        typed, buttons = self.findChild(QLineEdit), self.findChild(QDialogButtonBox)
+        if isinstance(typed, QLineEdit) and isinstance(buttons, QDialogButtonBox):  # no system's own dialog
+            # Qt switches the button off for what is not there yet: each time, so that it is switched on after each
+            for signal in (typed.textChanged, self.directoryEntered, self.currentChanged):
+                signal.connect(partial(self._allow, buttons))
+            self._allow(buttons)
+
+    def _allow(self, buttons: QDialogButtonBox, *_: str) -> None:
+        for button in buttons.buttons():
+            if buttons.buttonRole(button) == QDialogButtonBox.ButtonRole.AcceptRole:
+                button.setEnabled(True)
 
     def accept(self) -> None:
         for path in map(Path, self.selectedFiles()):

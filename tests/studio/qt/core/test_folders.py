@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLineEdit, QMessageBox
+from PySide6.QtWidgets import QAbstractButton, QDialogButtonBox, QLineEdit, QMessageBox
 from pytestqt.qtbot import QtBot
 
 from studio.qt.core.folders import ResultsFolder, folder_name
@@ -17,14 +17,22 @@ def choice(qtbot: QtBot, suggested: Path) -> ResultsFolder:
     dialog.setOption(ResultsFolder.Option.DontUseNativeDialog)
     qtbot.addWidget(dialog)
     dialog.show()
-    qtbot.waitExposed(dialog)
+    dialog.activateWindow()
+    qtbot.waitUntil(dialog.isActiveWindow)
+    dialog.findChild(QLineEdit).setFocus()
     return dialog
+
+
+def accept_button(dialog: ResultsFolder) -> QAbstractButton:
+    buttons = dialog.findChild(QDialogButtonBox)
+    accept = QDialogButtonBox.ButtonRole.AcceptRole
+    return next(button for button in buttons.buttons() if buttons.buttonRole(button) == accept)
 
 
 def test_a_suggested_folder_is_made_when_it_is_chosen(qtbot: QtBot, tmp_path: Path) -> None:
     dialog = choice(qtbot, tmp_path / "study results")
     assert not (tmp_path / "study results").exists()
-    dialog.accept()
+    qtbot.mouseClick(accept_button(dialog), Qt.MouseButton.LeftButton)
     assert dialog.selectedFiles() == [str(tmp_path / "study results")]
     assert (tmp_path / "study results").is_dir() and not dialog.isVisible()
 
@@ -35,7 +43,9 @@ def test_a_typed_name_makes_a_folder_and_one_that_is_there_is_taken(qtbot: QtBot
         dialog = choice(qtbot, tmp_path / "study results")
         line = dialog.findChild(QLineEdit)
         line.selectAll()
+        qtbot.keyClick(line, Qt.Key.Key_Delete)
         qtbot.keyClicks(line, name)
+        assert accept_button(dialog).isEnabled()
         qtbot.keyClick(line, Qt.Key.Key_Return)
         assert dialog.selectedFiles() == [str(tmp_path / name)] and (tmp_path / name).is_dir()
     assert not (tmp_path / "study results").exists()
