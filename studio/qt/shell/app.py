@@ -128,7 +128,7 @@ def start(path: Path | None) -> MainWindow:
         window.files.open(path, ask=False)
     elif not window.files.recover():
         # the first screen shows at once what the program is for: the sample with its errors
-        QTimer.singleShot(FIRST_LOOK_MS, window, window.render_first)
+        window.panels.when_made("viewport", lambda _: QTimer.singleShot(FIRST_LOOK_MS, window, window.render_first))
         if not preferences.values.toured:
             window.start_tour()
     if preferences.trouble:

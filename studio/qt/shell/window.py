@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QActionGroup, QCloseEvent, QDragEnterEvent, QDropEvent, QShortcut, QShowEvent
@@ -51,10 +52,12 @@ from studio.qt.shell.workspaces import (
     workspace,
 )
 from studio.qt.study.cell_opener import CellOpener
-from studio.qt.viewport.error_cloud import ErrorCloud
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
 from studio.runtime.preferences import PreferencesFile
+
+if TYPE_CHECKING:
+    from studio.qt.viewport.error_cloud import ErrorCloud
 
 TALL = ("render", "develop")
 """Panels that scroll."""
@@ -96,7 +99,8 @@ class MainWindow(QMainWindow):
         self.preferring = Preferring(self)
         self.help = Help(self)
         self.tour: Tour | None = None
-        self.cloud = self._make_cloud()
+        self._cloud: ErrorCloud | None = None
+        self.panels.when_made("viewport", self._join_cloud)
         add_toolbar(self, self.commands)
         self._connect()
         self._restore()
@@ -110,12 +114,13 @@ class MainWindow(QMainWindow):
         wanted, size = workspace(key), self.size()
         self.workspace = wanted.key
         # before the panels come: all together they may need more room than the window has, and it would grow
-        self.panels["viewport"].setVisible(wanted.viewport)
+        self.panels.place("viewport").setVisible(wanted.viewport)
         if not self._restore_panels():
             self.rearrange()
         QTimer.singleShot(0, self, partial(self._fit_panels, size))
         self.commands[SWITCH[wanted.key]].setChecked(True)
-        self.cloud.pin(wanted.key == "measure")
+        if self._cloud is not None:
+            self._cloud.pin(wanted.key == "measure")
         self.preferences.change(workspace=wanted.key)
 
     def rearrange(self) -> None:
@@ -158,6 +163,7 @@ class MainWindow(QMainWindow):
         if self.tour is not None:
             self.tour.end()
         self.runner.close()
+        self.panels.close()
         live(self.session).close()
         for _, panel in self.panels:
             panel.close()
@@ -186,7 +192,7 @@ class MainWindow(QMainWindow):
                 self.files.open(path)
 
     def _make_docks(self) -> dict[str, QDockWidget]:
-        self.setCentralWidget(self.panels["viewport"])
+        self.setCentralWidget(self.panels.place("viewport"))
         docks = {}
         for panel in PANELS:
             if panel.key == "viewport":
@@ -203,19 +209,18 @@ class MainWindow(QMainWindow):
             docks[panel.key] = dock
         return docks
 
-    def _make_cloud(self) -> ErrorCloud:
-        """The points in the 3D view: of the shown render as the results show them, or of a running scan."""
-        made = ErrorCloud(self.session, self.panels["viewport"].view)  # type: ignore[attr-defined]
-        results, motion = self.panels["results"], self.panels["motion"]
-        results.view_changed.connect(made.choose)  # type: ignore[attr-defined]
-        results.scan_bar.scope_changed.connect(made.show_all_steps)  # type: ignore[attr-defined]
-        made.pressed.connect(results.pin)  # type: ignore[attr-defined]
-        self.panels["viewport"].box.drawn.connect(made.take_box)  # type: ignore[attr-defined]
-        made.boxed.connect(results.choose)  # type: ignore[attr-defined]
-        results.region.changed.connect(lambda: made.show_box(results.region.region))  # type: ignore[attr-defined]
-        motion.began.connect(made.begin_scan)  # type: ignore[attr-defined]
-        motion.grew.connect(made.grow)  # type: ignore[attr-defined]
-        return made
+    @property
+    def cloud(self) -> ErrorCloud:
+        """The points in the 3D view, which comes with them."""
+        _ = self.panels["viewport"]
+        assert self._cloud is not None
+        return self._cloud
+
+    def _join_cloud(self, viewport: Any) -> None:
+        from studio.qt.shell.points_in_3d import points_in_3d
+
+        self._cloud = points_in_3d(self.session, self.panels, viewport)
+        self._cloud.pin(self.workspace == "measure")
 
     def start_tour(self) -> None:
         """Show the way around, from the start."""
@@ -254,7 +259,7 @@ class MainWindow(QMainWindow):
             "deselect": lambda: session.select(()),
             "import_mesh": lambda: choose_meshes(session, self),
             "replace_mesh": lambda: replace_mesh(session, self),
-            "aim": self.panels["viewport"].begin_aim,  # type: ignore[attr-defined]
+            "aim": lambda: self.panels["viewport"].begin_aim(),  # type: ignore[attr-defined]
             "arrange": self.rearrange,
             "full_screen": lambda: self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen),
             "render": session.render_asked.emit,
@@ -262,7 +267,7 @@ class MainWindow(QMainWindow):
             "pause": self.status.toggle_pause,
             "cancel": self.status.cancel_work,
             "scan": self._scan,
-            "frame_points": self.cloud.frame,
+            "frame_points": lambda: self.cloud.frame(),
             "log": lambda: self.show_panel("log"),
             "help": lambda: self.help.open_page(panel_with_focus(self.panels)),
             "search": lambda: CommandSearch(self).open(),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+from pathlib import Path
+
 import pytest
 from pytestqt.qtbot import QtBot
 
@@ -10,8 +13,9 @@ from studio.qt.core.session import one_of
 from studio.qt.shell.panels import PANELS, Room
 from studio.qt.shell.window import MainWindow
 from studio.qt.study.study_work import StudyWork
+from tests.studio.qt.conftest import new_window
 
-LATER = {panel.key for panel in PANELS if panel.later}
+LATER, SOON = ({panel.key for panel in PANELS if panel.when == when} for when in ("later", "soon"))
 
 
 def made(window: MainWindow) -> set[str]:
@@ -25,6 +29,43 @@ def test_a_panel_of_a_later_workspace_is_made_when_it_is_seen(own_window: MainWi
     assert not made(own_window) & {"nominal", "recipe", "calibration"}
     assert own_window.panels["study"].parentWidget() is own_window.docks["study"].findChild(Room)
     qtbot.waitUntil(own_window.panels["study"].isVisible)
+
+
+def test_the_window_comes_before_the_view_that_takes_longest(qtbot: QtBot, tmp_path: Path) -> None:
+    window = new_window(tmp_path, "plane")
+    qtbot.addWidget(window)
+    assert made(window).isdisjoint(SOON)
+    window.switch_to("measure")
+    window.show()
+    shown = window.winId()
+    qtbot.waitUntil(lambda: not window.panels._next.isActive() and made(window) >= SOON)
+    # the one window from first to last, not taken away and made anew when the view came
+    assert window.winId() == shown and window.isVisible()
+    assert window.centralWidget().isVisible() and window.panels["viewport"].isVisible()
+    assert window.cloud.pinned and gc.isenabled()
+    window.close()
+
+
+def test_what_is_asked_for_before_it_came_is_made_at_once(qtbot: QtBot, tmp_path: Path) -> None:
+    window = new_window(tmp_path, "plane")
+    qtbot.addWidget(window)
+    heard: list[object] = []
+    window.panels.when_made("results", heard.append)
+    window.cloud.boxed.emit(None)
+    assert heard == [window.panels["results"]] and made(window) >= SOON
+    window.show()
+    qtbot.waitUntil(lambda: not window.panels._next.isActive())
+    assert len(heard) == 1 and gc.isenabled()
+    window.close()
+
+
+def test_a_window_that_goes_before_its_panels_came_leaves_nothing_behind(qtbot: QtBot, tmp_path: Path) -> None:
+    window = new_window(tmp_path, "plane")
+    window.show()
+    qtbot.waitUntil(window.panels._next.isActive)
+    window.close()
+    assert not window.panels._next.isActive() and gc.isenabled()
+    window.deleteLater()
 
 
 def test_it_is_made_once(window: MainWindow) -> None:
