@@ -14,6 +14,7 @@ from render.base.files import atomic_write
 from studio.project.strict_json import pretty
 from studio.study.answers import ErrorBudget
 from studio.study.effects import OF_SIMULATION
+from studio.study.labels import interval_text, number_text
 
 HEADER = ("effect", "bias (µm)", "95 % interval", "alone", "variance (%)", "95 % interval", "alone", "among others")
 COLUMNS = (
@@ -111,8 +112,8 @@ def _three(one: Interval) -> list[float | None]:
 
 
 def _number(value: float, scale: float) -> str:
-    return f"{value * scale:.3g}" if math.isfinite(value * scale) else "-"
+    return number_text(value * scale, 3)
 
 
 def _interval(one: Interval, scale: float) -> str:
-    return f"{_number(one.low, scale)} to {_number(one.high, scale)}"
+    return interval_text(one.low * scale, one.high * scale, 3)

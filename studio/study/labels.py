@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import replace
 
@@ -67,3 +68,14 @@ def _broken(found: Broken, factor: float) -> Broken:
     one = found.breakdown
     values = ("value", "low", "high", "last_good", "first_bad")
     return replace(found, breakdown=replace(one, **{name: factor * getattr(one, name) for name in values}))
+
+
+def number_text(value: float, digits: int = 4) -> str:
+    """ "-" for none."""
+    return f"{value:.{digits}g}" if math.isfinite(value) else "-"
+
+
+def interval_text(low: float, high: float, digits: int = 4) -> str:
+    """ "-" where nothing is known, as of a single repeat."""
+    known = math.isfinite(low) or math.isfinite(high)
+    return f"{number_text(low, digits)} to {number_text(high, digits)}" if known else "-"

@@ -19,7 +19,7 @@ from studio.study.bounds import Bound
 from studio.study.budget_table import HEADER, page_rows, sentences_of, write_budgets
 from studio.study.charts import chart, field_label, shown
 from studio.study.kept import KEPT
-from studio.study.labels import as_read
+from studio.study.labels import as_read, interval_text, number_text
 from studio.study.measures import measure_of
 from studio.study.references import HEADER as BESIDE_HEADER
 from studio.study.references import Beside, beside, write_references
@@ -159,7 +159,7 @@ def _page_table(answer: Answer) -> list[list[str]]:
         return table(answer)
     rows = edge_rows(answer.sweep, answer.edges)
     return [
-        [shown(x), method_name(method), _number(y), f"{_number(low)} to {_number(high)}", ending]
+        [shown(x), method_name(method), number_text(y), interval_text(low, high), ending]
         for x, method, y, low, high, ending in rows
     ]
 
@@ -177,18 +177,14 @@ def table(answer: Answer) -> list[list[str]]:
     scale, rows = measure_of(answer.sweep.measure).scale, []
     for number, spot in enumerate(answer.spots):
         one = spot.measure
-        row: list[Any] = [*map(shown, spot.point), method_name(spot.method), _number(one.mean * scale)]
+        row: list[Any] = [*map(shown, spot.point), method_name(spot.method), number_text(one.mean * scale)]
         row += [
-            f"{_number(one.low * scale)} to {_number(one.high * scale)}",
+            interval_text(one.low * scale, one.high * scale),
             one.count,
-            _number(spot.seconds),
-            _number(spot.rays),
+            number_text(spot.seconds),
+            number_text(spot.rays),
         ]
         if answer.front is not None:
             row.append(f"{answer.front.member_probability[number]:.0%}")
         rows.append([str(cell) for cell in row])
     return rows
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}" if value == value else "-"

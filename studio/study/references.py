@@ -9,6 +9,7 @@ from pathlib import Path
 from analysis.study.intervals import Interval
 from render.base.csv_file import write_csv
 from studio.study.answers import Answer
+from studio.study.labels import interval_text, number_text
 from studio.study.measures import measure_of
 from studio.study.study import Reference
 
@@ -34,12 +35,11 @@ def page_rows(found: Sequence[Beside]) -> list[list[str]]:
     rows = []
     for one in found:
         measure = measure_of(one.reference.measure)
-        theirs, mean, low, high = (
-            f"{value * measure.scale:.3g}"
-            for value in (one.reference.value, one.ours.mean, one.ours.low, one.ours.high)
-        )
+        scale = measure.scale
+        theirs, mean = (number_text(value * scale, 3) for value in (one.reference.value, one.ours.mean))
+        within = interval_text(one.ours.low * scale, one.ours.high * scale, 3)
         unit = f" {measure.unit}".rstrip()
-        rows.append([one.reference.label, theirs + unit, mean + unit, f"{low} to {high}", str(one.ours.count)])
+        rows.append([one.reference.label, theirs + unit, mean + unit, within, str(one.ours.count)])
     return rows
 
 

@@ -11,7 +11,7 @@ import pytest
 from studio.study.answers import Answer, answers
 from studio.study.cells import next_cells
 from studio.study.charts import chart, places
-from studio.study.labels import as_read
+from studio.study.labels import as_read, interval_text
 from studio.study.page import sentences, table, write_page
 from studio.study.study import Study
 
@@ -72,3 +72,9 @@ def test_a_breakdown_is_told_in_the_unit_of_its_axis(tmp_path: Path) -> None:
     assert f"Exposure time (ms) {broken.breakdown.value:.3g}" in sentences(answer, labels)[0]
     page, found = write_page(tmp_path, *run)
     assert "Exposure time (ms)" in page.read_text() and found[0].spots[0].point[0] < 0.1
+
+
+def test_an_interval_of_a_single_repeat_is_none() -> None:
+    assert interval_text(float("nan"), float("nan")) == "-"
+    assert interval_text(0.0, float("inf")) == "0 to -"
+    assert interval_text(-1.23456, 2.0, 3) == "-1.23 to 2"
