@@ -108,14 +108,19 @@ class Panels:
             self._next.start()
 
     def close(self) -> None:
-        """Nothing is made any more unless it is asked for."""
+        """All that are made, and no more are."""
+        self._rest()
+        for panel in self._made.values():
+            panel.close()
+
+    def _rest(self) -> None:
         self._next.stop()
         self._quiet.close()
 
     def _make_next(self) -> None:
         left = [panel for panel in PANELS if panel.when == "soon" and panel.key not in self._made]
         if not left:
-            self.close()
+            self._rest()
         elif self._imports is None:
             self._imports = Thread(target=import_module, args=(left[0].module,), name="imports")
             self._imports.start()
@@ -162,7 +167,5 @@ class Room(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        if self._panel.when == "soon":
-            QTimer.singleShot(0, self, self._panels.make_soon)
-        else:
+        if self._panel.when == "later":
             _ = self._panels[self._panel.key]

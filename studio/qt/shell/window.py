@@ -152,6 +152,7 @@ class MainWindow(QMainWindow):
         super().showEvent(event)
         if not event.spontaneous():
             QTimer.singleShot(0, self, self._fit_panels)
+            QTimer.singleShot(0, self, self.panels.make_soon)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.files.may_close():
@@ -163,10 +164,8 @@ class MainWindow(QMainWindow):
         if self.tour is not None:
             self.tour.end()
         self.runner.close()
-        self.panels.close()
         live(self.session).close()
-        for _, panel in self.panels:
-            panel.close()
+        self.panels.close()
         self.files.close()
         event.accept()
 
