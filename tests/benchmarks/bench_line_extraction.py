@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from analysis.line.detection.noise import NoiseModel
-from analysis.line.extract import extract
+from analysis.line.extract import CANDIDATES, extract, select
 from analysis.line.ridges.ridges import find_ridges
 from analysis.line.settings import Method
 from tests.analysis.line.line_images import expected, exposed
@@ -27,7 +27,7 @@ ROWS, WIDTH, REPEATS = 2048, 2448, 15
 SIGMA, SOME = 1.5, 100
 """px; rows on which code that loops over rows is timed."""
 BARS_MS = {"likelihood": 60.0, "gaussian": 60.0, "steger_2d": 250.0, "centre_of_mass_normal": 250.0, "auto": 60.0}
-ROW_LOCAL_MS = 15.0
+ROW_LOCAL_MS, CHOOSER_MS = 15.0, 30.0
 Array = np.ndarray[Any, Any]
 
 
@@ -254,6 +254,20 @@ def ridges(image: Array, noise: NoiseModel) -> None:
     )
 
 
+def chooser(image: Array, noise: NoiseModel) -> None:
+    """The network among the candidates of a frame whose every row has a reflection half as bright beside its line."""
+    doubled = np.maximum(image, np.roll(image, 300, axis=1) // 2)
+    few = partial(extract, doubled, noise=noise, threads=2)
+    seen = few(peaks=CANDIDATES, shared=False)
+    alone, _ = milliseconds(lambda: select(seen, "learned"))
+    strongest, learned = (milliseconds(partial(few, select=how))[0] for how in ("strongest", "learned"))
+    verdict = "ok" if alone <= CHOOSER_MS else "MISSED"
+    print(
+        f"  {'the chooser':26} {alone:7.1f} ms among {int(seen.valid.sum())} candidates   bar {CHOOSER_MS:5.0f} ms  "
+        f"{verdict}; extraction with it {learned:.1f} ms, by the strongest peak {strongest:.1f} ms"
+    )
+
+
 def main() -> None:
     image, centre, noise = frame()
     print(f"8 bit, {WIDTH} x {ROWS}, one peak a row, 2 threads; best / median of {REPEATS}; rms error in px")
@@ -275,6 +289,7 @@ def main() -> None:
             f"plain {plain:8.1f} ms  rms {plain_rms:.4f}  {plain / best:6.1f} x  {verdict}"
         )
     ridges(image, noise)
+    chooser(image, noise)
     quick = milliseconds(lambda: image.argmax(axis=1))[0]
     print(f"  (numpy.argmax alone, with no background, threshold or reason: {quick:.1f} ms)")
 
