@@ -77,7 +77,7 @@ class Gauge(Model):
     lower: float | None = quantity(
         None,
         unit="m",
-        label="Lower limit",
+        label="Lower tolerance",
         help="Deviation from the nominal: m, rad, m².",
         ge=-100,
         le=100,
@@ -85,7 +85,7 @@ class Gauge(Model):
     upper: float | None = quantity(
         None,
         unit="m",
-        label="Upper limit",
+        label="Upper tolerance",
         help="Deviation from the nominal: m, rad, m².",
         ge=-100,
         le=100,

@@ -194,11 +194,11 @@ def _sigma(r: Readouts) -> Row:
         "Expected standard deviation of depth for the best possible extraction: Cramer-Rao bound of photon and read "
         "noise, and speckle (laser light on a rough surface, fully developed) where the sensor's is switched on."
     )
-    if r.photon_sigma is None or r.speckle_sigma is None or r.depth_sigma is None:
+    if r.photon_sigma is None or r.speckle_sigma is None or r.speckled_sigma is None:
         return Row("sigma", "Depth noise, sigma", NOTHING, "", "", help)
     photon, speckle = _micrometres(r.photon_sigma), _micrometres(r.speckle_sigma)
     if not r.speckled:
-        both = _micrometres(math.hypot(r.photon_sigma, r.speckle_sigma))
+        both = _micrometres(r.speckled_sigma)
         help += (
             f" The sensor's is off: images have none, where a laser on a rough surface would make it {both} µm. "
             "Switch it on in the sensor, under Laser speckle, for what a real scanner meets."
@@ -206,7 +206,7 @@ def _sigma(r: Readouts) -> Row:
         return Row("sigma", "Depth noise, sigma", f"{photon} µm", f"with speckle {both}", "", help)
     help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
     note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
-    return Row("sigma", "Depth noise, sigma", f"{_micrometres(r.depth_sigma)} µm", note, "", help)
+    return Row("sigma", "Depth noise, sigma", f"{_micrometres(r.speckled_sigma)} µm", note, "", help)
 
 
 def _micrometres(value: float) -> str:

@@ -80,11 +80,16 @@ class Readouts:
     """The sensor shows speckle."""
 
     @property
-    def depth_sigma(self) -> float | None:
-        """Of all noise that the sensor, as it is set, puts into an image."""
+    def speckled_sigma(self) -> float | None:
+        """Of both noises, whether or not the sensor shows speckle."""
         if self.photon_sigma is None or self.speckle_sigma is None:
             return None
-        return math.hypot(self.photon_sigma, self.speckle_sigma) if self.speckled else self.photon_sigma
+        return math.hypot(self.photon_sigma, self.speckle_sigma)
+
+    @property
+    def depth_sigma(self) -> float | None:
+        """Of all noise that the sensor, as it is set, puts into an image."""
+        return self.speckled_sigma if self.speckled else self.photon_sigma
 
 
 def readouts(look: Look, laser: int) -> Readouts:

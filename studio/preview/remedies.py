@@ -65,11 +65,18 @@ def remedies(look: Look, laser: int, look_at: Callable[[Project], Look]) -> tupl
             after = {one.key: one for one in rows(then)}
             if _helps(row.key, before, after):
                 gain = f"{row.label.lower()} {_value(row)} → {_value(after[row.key])}"
-                if now.depth_sigma and then.depth_sigma and abs(then.depth_sigma / now.depth_sigma - 1.0) > TOLD_FROM:
+                if _differ(now.depth_sigma, then.depth_sigma):
                     gain += f", depth noise {before['sigma'].value} → {after['sigma'].value}"
+                if not now.speckled and _differ(now.speckled_sigma, then.speckled_sigma):
+                    gain += f", {before['sigma'].note} → {after['sigma'].note.removeprefix('with speckle ')} µm"
                 found.append(Remedy(row.key, label, gain, project))
                 break
     return tuple(found)
+
+
+def _differ(before: float | None, after: float | None) -> bool:
+    """By more than is passed over."""
+    return bool(before and after) and abs((after or 0.0) / (before or 1.0) - 1.0) > TOLD_FROM
 
 
 def automatic_exposure(project: Project, now: Readouts) -> Change | None:

@@ -52,7 +52,7 @@ def speckle_px(
     """
     from scipy.special import ndtr
 
-    known = np.isfinite(position) & (sigma > 0.0) & (sigma < WIDEST)
+    known = np.isfinite(position) & (sigma > 0.0) & (sigma < WIDEST) & (amplitude > 0.0)
     found = np.full(len(sigma), np.nan)
     if not known.any():
         return found

@@ -27,6 +27,7 @@ from studio.scan.own_files import check_not_read, check_replaceable
 from studio.scan.remarks import Measurements, best, frame_result
 from studio.scan.results import report_input
 from studio.scan.run_record import run_text
+from studio.scan.speckle_remark import speckle_remark
 from studio.scan.summary import summarise
 
 
@@ -69,7 +70,8 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     cautions.look(what.frame, what.frame.warnings)
     result = frame_result(what.project, what.frame, what.measurements, what.images)
     with closing(record_of(what.project.scene, [result])) as record:
-        notes = cautions.notes(summarise(record))
+        speckle = speckle_remark(what.project, best(what.measurements, what.project))
+        notes = [*cautions.notes(summarise(record)), *filter(None, [speckle])]
         data = report_input(
             what.project.in_folder(what.root),
             first,

@@ -14,6 +14,7 @@ from render.frame import Frame
 from render.sensor.develop import Image
 from studio.project.project import Project
 from studio.scan.gauging import patches, readings
+from studio.scan.speckle_remark import speckle_remark
 from studio.scan.stages import Measurement
 
 __all__ = ["best", "frame_remarks", "frame_result", "result_remarks", "scale_head", "scale_name", "scale_notes"]
@@ -35,7 +36,8 @@ def scale_notes(image_scale: float) -> tuple[str, ...]:
 def frame_remarks(project: Project, frame: Frame, measurements: Measurements) -> list[str]:
     """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be."""
     with closing(record_of(project.scene, [frame_result(project, frame, measurements)])) as record:
-        return [*frame.warnings, *result_remarks(record)]
+        speckle = speckle_remark(project, best(measurements, project))
+        return [*frame.warnings, *result_remarks(record), *filter(None, [speckle])]
 
 
 def result_remarks(record: ScanRecord) -> list[str]:

@@ -98,6 +98,8 @@ class Answer:
     """Of a chart of profiles or pictures."""
     beside: tuple[tuple[Reference, Interval], ...] = ()
     """Figures of others, and what is measured there."""
+    image_scale: float = 1.0
+    """At which the cells were measured."""
 
 
 def answers(study: Study, bases: Mapping[str, Project], rows: Mapping[str, Row]) -> list[Answer]:
@@ -133,6 +135,7 @@ def _answer(study: Study, number: int, bases: Mapping[str, Project], rows: Mappi
         edges_of(study, number, bases, rows),
         tuple(KeptCell(*at, row[KEPT_ROW]) for at, found in groups.items() for row in found if row.get(KEPT_ROW)),
         _beside(sweep, methods_of(study, sweep)[0], groups),
+        study.image_scale,
     )
 
 

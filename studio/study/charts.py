@@ -59,8 +59,16 @@ def _repeats(answer: Answer) -> str:
     counts = [spot.measure.count for spot in answer.spots]
     low, high = min(counts, default=0), max(counts, default=0)
     number = f"N = {high}" if low == high else f"N = {low} to {high}"
+    if high == 1:
+        return f"{number}: no interval is known of a single repeat{_at_scale(answer)}"
     shown_as = {"map": "bands: 95 % intervals" if answer.edges else "means"}
-    return f"{number} repeats, {shown_as.get(answer.sweep.chart, 'bars: 95 % intervals')}"
+    return f"{number} repeats, {shown_as.get(answer.sweep.chart, 'bars: 95 % intervals')}{_at_scale(answer)}"
+
+
+def _at_scale(answer: Answer) -> str:
+    """That the figures are not the scanner's, where its image was another one."""
+    scale = answer.image_scale
+    return "" if scale == 1.0 else f"; measured at image scale {scale:.3g}: not the scanner's own figures"
 
 
 def places(answer: Answer) -> np.ndarray:

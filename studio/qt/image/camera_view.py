@@ -41,6 +41,8 @@ LOW = 400
 NARROW, TINY, LEAST_CHOICE = 600, 480, 124
 """px, below which lines' boxes take room of the choice, which keeps so much; of zooming."""
 MARGIN_PX, SPACE_PX = 6, 8
+LEAST_HEIGHT = 260
+"""px, from which names of lines may have a row of their own."""
 NAMES_PX = 10_000
 """Room for the names of all lines."""
 SATURATED_NAME = "Saturated"
@@ -333,7 +335,7 @@ class CameraView(QWidget):
         spaces = (len(shown) + 4) * max(self.bar.spacing(), 0) + 2 * SPACE_PX + 2 * MARGIN_PX
         others = sum(min(box.sizeHint().width(), box.maximumWidth()) for box in shown) + spaces + BOX_PX
         name = self.saturated.fontMetrics().horizontalAdvance(SATURATED_NAME)
-        below = others + name + lines > width and (self.height() >= LOW or width < TINY)
+        below = others + name + lines > width and (self.height() >= LEAST_HEIGHT or width < TINY)
         (self.second if below else self.first).addWidget(self.lines, 1)
         room = width - 2 * MARGIN_PX if below else width - others
         named = others + name <= width if below else name + self.overlay.width_within(room) <= room

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QComboBox,
     QHBoxLayout,
@@ -29,6 +28,7 @@ from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.folders import ask_results_folder
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
+from studio.qt.core.open_file import open_file
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.core.step_bar import StepBar
@@ -211,7 +211,7 @@ class MotionPanel(QWidget):
 
     def _open_report(self) -> None:
         if self.report is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.report)))
+            open_file(self.session, self.report)
 
     def _follow_step(self) -> None:
         scene, step = self.session.project.scene, self.session.step

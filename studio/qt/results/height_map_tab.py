@@ -47,7 +47,6 @@ BAR_TIP = "Drag an end to another value; a double click brings back the percenti
 BAR_PX = 136
 """Beside the picture, for its colour bar."""
 LEAST_PX, TOLD_PX = 300, 240
-FULL_SHARE = 100.0
 
 
 class HeightMapTab(QWidget):
@@ -61,7 +60,7 @@ class HeightMapTab(QWidget):
         """What is told of the profile."""
         self._scan: ScanResults | None = None
         """Of which the map is, or will be."""
-        self.scale = ColourScale(about_zero=False, share=FULL_SHARE)
+        self.scale = ColourScale(about_zero=False)
         self.pitch = QDoubleSpinBox(decimals=4, minimum=0.0, maximum=1000.0, singleStep=0.05)
         self.pitch.setSuffix(" mm")
         self.pitch.setSpecialValueText("as many cells as points")
@@ -169,6 +168,8 @@ class HeightMapTab(QWidget):
         share = f"{np.isfinite(made.heights).mean():.1%} with a height"
         texts = [size + share]
         if np.isfinite(made.heights).any():
+            low, high = 1e3 * np.nanmin(made.heights), 1e3 * np.nanmax(made.heights)
+            texts.append(f"Heights from {low:.4g} to {high:.4g} mm; of few points beyond the rest colours say no more")
             texts.append(sigma_sentence(sigma_record(made, encoded(made.heights)[1])).replace(" um", " µm"))
         self.told.setText("\n".join(texts))
 

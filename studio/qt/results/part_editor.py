@@ -17,7 +17,9 @@ from studio.qt.core.session import Session
 from studio.qt.forms.fields import TextField, reason
 from studio.qt.forms.number_field import NumberField
 
-FIELDS = ("name", "nominal", "lower", "upper")
+LIMITS = ("lower", "upper")
+FIELDS = ("name", "nominal", *LIMITS)
+NOMINAL_FIRST = "Give the nominal first: what is allowed is a deviation from it"
 
 
 class PartEditor(QWidget):
@@ -52,6 +54,9 @@ class PartEditor(QWidget):
             self._make(gauge)
         for name, field in self.fields.items():
             field.show_value(getattr(gauge, name))
+            if name in LIMITS:
+                field.setEnabled(gauge.nominal is not None)
+                field.setToolTip(field.spec.help if field.isEnabled() else NOMINAL_FIRST)
 
     def _make(self, gauge: Gauge) -> None:
         for i in range(self._grid.count() - 1, -1, -1):
@@ -91,7 +96,7 @@ class PartEditor(QWidget):
             self._set(name, value)
         except InputError as error:
             if not field.hasFocus():
-                self.session.message.emit("warning", f"{reason(error)} The value is as it was")
+                self.session.message.emit("warning", f"{reason(error)}. The value is as it was")
             field.reject()
             self._tell(reason(error))
             return

@@ -33,6 +33,7 @@ from studio.qt.results.results_profile import ProfilePlot
 from studio.scan.gauging import kept_readings, profiles, read_each
 from studio.scan.remarks import best
 from studio.scan.scan_folder import measured_project
+from studio.scan.sheet_lean import lean_text
 
 HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
 NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
@@ -243,6 +244,8 @@ class PartTab(QWidget):
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
         elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].reason:
             text = self.readings[self.chosen].reason.capitalize()
+        elif self.readings and (render := self.session.shown) is not None:
+            text = lean_text(render.project.scene, self.laser, render.frame.step)
         self.told.setText(text)
         self.told.setVisible(bool(text))
 

@@ -33,6 +33,7 @@ from studio.qt.core import theme
 from studio.qt.core.icons import dot
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
+from studio.qt.results.heads import heads
 from studio.qt.results.measures_table import MeasuresTable
 from studio.qt.results.part_tab import PartTab
 from studio.qt.results.region_tab import RegionTab
@@ -44,7 +45,7 @@ from studio.qt.results.results_steps import StepsPlot
 from studio.qt.results.scan_bar import ScanBar
 from studio.scan.redevelop import is_developed_otherwise
 from studio.scan.region import Box, Region, scan_errors
-from studio.scan.remarks import frame_remarks, scale_head, scale_notes
+from studio.scan.remarks import frame_remarks, scale_notes
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, error_values, measured_series, table, true_series
 from studio.scan.scan_results import COLUMNS, ScanResults
 from studio.scan.stages import Measurement
@@ -120,7 +121,9 @@ class ResultsPanel(QWidget):
         self.scan_bar.scope_changed.connect(self.refresh)
         self.scan_steps.told.connect(self._tell_head)
         session.renders_changed.connect(self._another_render)
+        session.project_changed.connect(self._tell_head)
         session.step_changed.connect(lambda: self.by_step.mark(session.step))
+        session.step_changed.connect(self._tell_head)
         session.measured.connect(self.refresh)
         session.hover_changed.connect(self._mark)
         theme.notice.changed.connect(self._repaint)
@@ -226,12 +229,7 @@ class ResultsPanel(QWidget):
             notice.show_texts(remarks)
 
     def _tell_head(self) -> None:
-        """Above all figures: why they are not the scanner's, or not of the step that was asked for."""
-        render = self.session.shown
-        told = [] if render is None else [scale_head(render.scanner_scale)]
-        if self.scan_steps.problem:
-            told.insert(0, f"Step {self.session.step + 1} cannot be shown: {self.scan_steps.problem}")
-        told = [text for text in told if text]
+        told = heads(self.session, self.scan_steps.problem)
         self.head_text.setText("   ".join(told))
         self.head_text.setToolTip("".join(f"<p>{escape(text)}</p>" for text in told))
         self.head.setVisible(bool(told))

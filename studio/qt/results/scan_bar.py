@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QWidget
 
+from studio.qt.core.open_file import open_file
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.core.step_bar import StepBar
@@ -66,4 +66,4 @@ class ScanBar(QWidget):
 
     def _open_report(self) -> None:
         if self.scan is not None and self.scan.report is not None:
-            QDesktopServices.openUrl(QUrl.fromLocalFile(str(self.scan.report)))
+            open_file(self.session, self.scan.report)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from render.world.world import build_world
 from studio.project.project import Project
 from studio.project.templates import template_folder
 from studio.scan.remarks import best, frame_remarks, frame_result, scale_head, scale_notes
+from studio.scan.speckle_remark import speckle_remark
 from studio.scan.stages import Clock, develop_step, measure_step, render_step, scaled
 
 
@@ -43,3 +46,22 @@ def test_the_remarks_are_those_of_the_report() -> None:
 def test_without_a_measurement_there_is_nothing_to_remark() -> None:
     with pytest.raises(InputError, match="nothing is measured"):
         best({}, scaled(Project.load(template_folder("plane") / "project.json"), 0.1))
+
+
+def test_speckle_that_the_sensor_leaves_out_is_told_with_its_size() -> None:
+    folder = template_folder("plane")
+    project = Project.load(folder / "project.json")
+    direct = project.render.model_copy(update={"ambient_samples": 1, "transport": "direct", "truth_images": False})
+    project = project.model_copy(update={"render": direct})
+    world, clock = build_world(project.scene, folder, 0), Clock(lambda *_: None, lambda: False)
+    frame = render_step(project, world, 0, clock)
+    scatter, told = {}, {}
+    for how in ("off", "polarised"):
+        sensor = project.sensor.model_copy(update={"speckle": how})
+        made = project.model_copy(update={"sensor": sensor})
+        (one,) = measure_step(made, frame, world, develop_step(made, frame, clock, None), clock, None, "likelihood")
+        scatter[how], told[how] = one.errors.depth_z.robust_sigma, speckle_remark(made, [one])
+    assert told["polarised"] == ""
+    foretold = float(re.search(r"by about ([\d.]+)", told["off"])[1]) * 1e-6
+    # 3 standard errors of the robust sigma of 2,000 rows, of which two or three at a time share grains
+    assert foretold == pytest.approx(scatter["polarised"], rel=0.1) and foretold > 3.0 * scatter["off"]

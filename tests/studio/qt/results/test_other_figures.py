@@ -19,6 +19,7 @@ from studio.qt.image.camera_view import CameraView
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.render.history import History
 from studio.qt.render.render_panel import RenderPanel
+from studio.qt.results.heads import CHANGED
 from studio.qt.results.readout_panel import ReadoutPanel
 from studio.qt.results.results_panel import ResultsPanel
 from studio.scan.stages import scaled
@@ -158,3 +159,27 @@ def test_results_explain_what_lies_within_two_sigma(qtbot: QtBot) -> None:
     assert ("predicted sigma" in said) == low
     panel.close()
     develop.close()
+
+
+@pytest.fixture
+def results(qtbot: QtBot) -> ResultsPanel:
+    made = ResultsPanel(small_session(rendered=True))
+    qtbot.addWidget(made)
+    return made
+
+
+def test_figures_of_a_scene_that_has_changed_say_so(results: ResultsPanel) -> None:
+    panel, session = results, results.session
+    assert not panel.head_text.text().startswith(CHANGED)
+    session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5)
+    assert CHANGED in panel.head_text.text() and panel.head.isVisibleTo(panel)
+    session.document.undo()
+    assert CHANGED not in panel.head_text.text()
+
+
+def test_a_cell_of_a_study_says_whose_it_is(results: ResultsPanel) -> None:
+    panel = results
+    cell = replace(another_render(), cell="key", name="Sweep 1: 0.04, repeat 1")
+    panel.session.add_render(cell)
+    assert "Cell of a study: Sweep 1: 0.04, repeat 1" in panel.head_text.text()
+    assert "Render workspace" in panel.head_text.text()

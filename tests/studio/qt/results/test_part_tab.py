@@ -138,21 +138,23 @@ def test_a_moved_edge_is_one_step_of_undo_and_reads_the_measure_anew(panel: Resu
     assert session.project.measures == (gauge,) and part.readings[0].points == before
 
 
-def test_a_tolerance_without_its_nominal_is_refused_beside_the_field(panel: ResultsPanel, qtbot: QtBot) -> None:
+def test_a_tolerance_needs_its_nominal(panel: ResultsPanel, qtbot: QtBot) -> None:
     gauge = with_a_step(panel.session)
     panel.figures.setCurrentIndex(PART)
     panel.part.table.selectRow(0)
     editor = panel.part.editor
-    for name, text in (("lower", "-0.1"), ("nominal", "0"), ("lower", "-0.1"), ("name", "ground")):
+    assert not editor.fields["lower"].isEnabled() and "nominal first" in editor.fields["lower"].toolTip()
+    assert panel.session.project.measures == (gauge,)
+    for name, text in (("nominal", "0"), ("lower", "-0.1"), ("nominal", ""), ("name", "ground")):
         field = editor.fields[name]
         field.setFocus()
         field.selectAll()
-        qtbot.keyClicks(field, text)
-        refused = name == "lower" and panel.session.project.measures[0].nominal is None
+        qtbot.keyClicks(field, text) if text else qtbot.keyClick(field, Qt.Key.Key_Delete)
         qtbot.keyClick(field, Qt.Key.Key_Return)
+        refused = text == ""  # the lower one is a deviation from it
         assert editor.problem.isVisible() == refused
         if refused:
-            assert "nominal" in editor.problem.text() and panel.session.project.measures == (gauge,)
+            assert "nominal" in editor.problem.text() and panel.session.project.measures[0].nominal == 0.0
             qtbot.keyClick(field, Qt.Key.Key_Escape)
     changed = panel.session.project.measures[0]
     assert (changed.name, changed.nominal, changed.lower) == ("ground", 0.0, pytest.approx(-1e-4))

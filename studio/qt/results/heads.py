@@ -1,0 +1,21 @@
+"""What stands above all figures of a render: why they are not the scanner's, or not of the scene as it is now."""
+
+from __future__ import annotations
+
+from studio.qt.core.session import Session
+from studio.scan.remarks import scale_head
+
+CHANGED = "The scene has changed since: these are the figures of the render as it was."
+
+
+def heads(session: Session, step_problem: str) -> list[str]:
+    """Nothing where they are what they seem. step_problem: why the step that is looked at cannot be shown."""
+    render = session.shown
+    told = [f"Step {session.step + 1} cannot be shown: {step_problem}"] if step_problem else []
+    if render is None:
+        return told
+    if render.cell:
+        told.append(f"Cell of a study: {render.name}. Your own renders are in the list of the Render workspace.")
+    elif render.is_stale(session.project) or (render.scan is None and render.frame.step != session.step):
+        told.append(CHANGED)
+    return [*told, *filter(None, [scale_head(render.scanner_scale)])]
