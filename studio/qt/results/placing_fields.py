@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 from PySide6.QtCore import QObject, Qt
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QToolTip, QWidget
 
 from render.base.arrays import Float
 from render.base.errors import InputError
@@ -45,6 +45,9 @@ WIDTH = 88
 class PlacingField(NumberField):
     """A read-out that can be set."""
 
+    why = ""
+    """What was typed last was refused for."""
+
     def mark(self, level: str) -> None:
         """In the colour of what is out of range."""
         colours = theme.colours()
@@ -71,6 +74,8 @@ class PlacingFields(QObject):
             field.setAlignment(Qt.AlignmentFlag.AlignRight)
             field.setFixedWidth(WIDTH)
             field.entered.connect(partial(self.set, key))
+            field.refused.connect(partial(self._tell_why, field))
+            field.given_up.connect(partial(self._tell_given_up, key))
             field.drag_began.connect(self._begin)
             field.dragged.connect(partial(self._drag, key))
             field.drag_ended.connect(self._end)
@@ -89,6 +94,15 @@ class PlacingFields(QObject):
     def set(self, key: str, value: float) -> None:
         """Move the laser, or the rig, so that the read-out becomes a value; one step to undo."""
         self._move(key, value, (self.session.project, self._point, self.values), "")
+
+    def _tell_why(self, field: PlacingField, why: str) -> None:
+        """Beside the field, as its row has no room for it."""
+        field.why = why or field.why
+        QToolTip.showText(field.mapToGlobal(field.rect().bottomLeft()), why, field)
+
+    def _tell_given_up(self, key: str) -> None:
+        told = f"{SPECS[key].label}: {self.fields[key].why}. The value is as it was"
+        self.session.message.emit("warning", told)
 
     def _begin(self) -> None:
         self._start = (self.session.project, self._point, dict(self.values))
@@ -119,6 +133,9 @@ class PlacingFields(QObject):
             return
         if made is not None:
             self.session.document.apply(f"set the {LABELS[key]}", made, merge)
+            if found is None and not merge:
+                why = f"at this {LABELS[key]} the camera sees nothing that the laser lights; Ctrl+Z takes it back"
+                self.session.message.emit("warning", why)
 
     def _moved(self, key: str, value: float, start: Start) -> Project:
         project, point, before = start

@@ -57,3 +57,27 @@ def test_a_drag_is_one_step_to_undo_and_escape_gives_it_up(qtbot: QtBot) -> None
         assert (session.project == before) is not keep
     session.document.undo()
     assert session.project == before
+
+
+def test_a_number_that_cannot_be_is_dropped_and_said_why(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    field, session = panel.placing.fields["standoff"], panel._session
+    before, shown = session.project, field.text()
+    field.setText("0")
+    field.textEdited.emit("0")
+    assert field.invalid
+    with qtbot.waitSignal(session.message) as told:
+        field.leave()
+    assert told.args[0] == "warning" and "at least 1 mm. The value is as it was" in told.args[1]
+    assert session.project == before and field.text() == shown and not field.invalid
+
+
+def test_a_rig_that_sees_its_line_no_longer_is_told(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    field, session = panel.placing.fields["standoff"], panel._session
+    field.setText("100 m")
+    field.pending = True
+    with qtbot.waitSignal(session.message) as told:
+        field.enter()
+    assert told.args[0] == "warning" and "sees nothing that the laser lights" in told.args[1]
+    assert session.document.undo_label == "set the stand-off"
