@@ -52,9 +52,7 @@ class Parameter(Model):
             found = "both values and a range" if ranged else "neither values nor a range"
             raise ValueError(f"it has {found}; allowed: values, or low and high")
         if ranged and self.spacing == "logarithmic" and not (self.low > 0 and self.high > 0):  # type: ignore[operator]
-            raise ValueError(
-                "a logarithmic range reaches 0; allowed: low and high above 0, or a plain range"
-            )
+            raise ValueError("a logarithmic range reaches 0; allowed: low and high above 0, or a plain range")
         if ranged and self.low == self.high:
             raise ValueError("the range is empty; allowed: low and high that differ")
         if len({json.dumps(value) for value in self.values}) < len(self.values):

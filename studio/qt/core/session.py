@@ -175,6 +175,7 @@ class Session(QObject):
         self.selection: FieldPath = ()
         """The item that panels show, and about which several are turned."""
         self._others: tuple[FieldPath, ...] = ()
+        self._judged: tuple[Render, Project, bool] | None = None
         """Items that are selected beside it."""
         self.hovered: int | None = None
         self.range: tuple[float, float] | None = None
@@ -233,6 +234,16 @@ class Session(QObject):
         self.hover_changed.emit()
         self.step_changed.emit()
         self.renders_changed.emit()
+
+    @property
+    def stale(self) -> bool:
+        """The scene has changed since the shown render, in a way that developing cannot follow."""
+        shown, project, step = self.shown, self.project, self.step
+        if shown is None or shown.cell:
+            return False
+        if self._judged is None or self._judged[0] is not shown or self._judged[1] is not project:
+            self._judged = shown, project, shown.is_stale(project)
+        return self._judged[2] or shown.frame.step != step
 
     def select(self, path: FieldPath) -> None:
         """Select an item of the scene by its path: ("scene", "objects", 0), ("scene", "rig", "camera"), ()."""

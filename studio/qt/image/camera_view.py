@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
 
 from render.base.threads import Cancel
 from render.output.tone_mapping import Picture, pyramid
-from studio.project.project import Project
 from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
@@ -43,8 +42,6 @@ NARROW, TINY, LEAST_CHOICE = 600, 480, 124
 MARGIN_PX, SPACE_PX = 6, 8
 LEAST_HEIGHT = 260
 """px, from which names of lines may have a row of their own."""
-NAMES_PX = 10_000
-"""Room for the names of all lines."""
 SATURATED_NAME = "Saturated"
 LIVE = "Live estimate"
 
@@ -75,7 +72,6 @@ class CameraView(QWidget):
         self.lines = QWidget()
         self.render_button = QPushButton("Render")
         self.is_live = True
-        self._judged: tuple[Render, Project, int, bool] | None = None
         self._ground = ""
         self._chosen = 0
         self._last_shown: Render | None = None
@@ -103,19 +99,6 @@ class CameraView(QWidget):
             self._colour()
         super().changeEvent(event)
 
-    @property
-    def stale(self) -> bool:
-        """The scene has changed since the shown render, in a way that developing cannot follow."""
-        shown, project, step = self.session.shown, self.session.project, self.session.step
-        if shown is None:
-            return False
-        before = self._judged
-        if before is None or before[0] is not shown or before[1] is not project or before[2] != step:
-            changed = not shown.cell and (shown.frame.step != step or shown.is_stale(project))
-            self._judged = (shown, project, step, changed)
-            return changed
-        return before[3]
-
     def refresh(self) -> None:
         """Draw what is chosen."""
         self._draw_live() if self.is_live else self._draw_render()
@@ -128,13 +111,12 @@ class CameraView(QWidget):
         for widget in (self.choice, self.bright, self.saturated):
             self.bar.addWidget(widget)
             self.bar.addSpacing(SPACE_PX)
-        lines = self.lines
-        lines.setLayout(self.overlay.bar)
+        self.lines.setLayout(self.overlay.bar)
         self.overlay.bar.setContentsMargins(0, 0, 0, 0)
         self.overlay.bar.addStretch(1)
         # many methods must not make the panel, and so the window, wider
-        lines.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.first.addWidget(lines, 1)
+        self.lines.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.first.addWidget(self.lines, 1)
         self.bar.addLayout(self.first, 1)
         fit = "Fit", "The whole image (F)", self.view.fit
         one_to_one = "1:1", "One screen pixel a pixel", self.view.one_to_one
@@ -190,7 +172,7 @@ class CameraView(QWidget):
 
     def _colour_badge(self) -> None:
         colours = theme.colours()
-        ground = theme.mixed(colours.warning, colours.window, 0.3) if self.stale else colours.raised
+        ground = theme.mixed(colours.warning, colours.window, 0.3) if self.session.stale else colours.raised
         if ground != self._ground:  # a style sheet paints everything anew
             self._ground = ground
             self.badge.setStyleSheet(f"QFrame, QLabel {{ background: {ground}; }}")
@@ -202,14 +184,14 @@ class CameraView(QWidget):
         new = shown is not self._last_shown
         self._last_shown = shown
         if new:
-            self.is_live = shown is None or self.stale
+            self.is_live = shown is None or self.session.stale
             self._read_out(None)
         self._fill_choice()
         self._profile_of_view()
         self.refresh()
 
     def _project_changed(self) -> None:
-        if self.session.shown is not None and self.stale and not self.is_live:
+        if self.session.shown is not None and self.session.stale and not self.is_live:
             self.is_live = True
             self._fill_choice()
         self._show_badge()
@@ -251,7 +233,7 @@ class CameraView(QWidget):
             text = "Preparing the live estimate; the very first time this takes half a minute."
         elif shown is None:
             text = "Live estimate: one ray a pixel, no noise. Render for the real image."
-        elif self.stale:
+        elif self.session.stale:
             text = (
                 "Live estimate: the scene has changed since the render." if self.is_live else "The scene has changed."
             )
@@ -265,7 +247,7 @@ class CameraView(QWidget):
             text = "Live estimate, but not of the scene as it is set: the scene tree marks what cannot be."
         self._colour_badge()
         self.badge_text.setText(text)
-        self.render_button.setVisible(shown is None or self.stale)
+        self.render_button.setVisible(shown is None or self.session.stale)
         self.badge.setVisible(bool(text))
 
     # the live estimate
@@ -327,7 +309,7 @@ class CameraView(QWidget):
 
     def _name_boxes(self) -> None:
         """Lines' boxes have their names where there is room for them: beside the others, else in a row of their own."""
-        width, lines = self.width(), self.overlay.width_within(NAMES_PX)
+        width, lines = self.width(), self.overlay.width_named()
         self.choice.setMaximumWidth(LEAST_CHOICE if width < NARROW else self.choice.sizeHint().width())
         for button in self.zooms:
             button.setVisible(width >= TINY)

@@ -76,12 +76,16 @@ class LineOverlay:
         self._switch()
         self._zoomed()
 
+    def width_named(self) -> int:
+        """px that the boxes take with their names."""
+        metrics = self.truth_box.fontMetrics()
+        shown = [box for box in (self.truth_box, *self.method_boxes.values()) if not box.isHidden()]
+        return sum(BOX_PX + metrics.horizontalAdvance(box.property("name")) for box in shown)
+
     def width_within(self, width: int) -> int:
         """px that the boxes take: with their names where there is room for all, else with their colours alone."""
-        metrics = self.truth_box.fontMetrics()
-        names = [box.property("name") for box in (self.truth_box, *self.method_boxes.values()) if not box.isHidden()]
-        named = sum(BOX_PX + metrics.horizontalAdvance(name) for name in names)
-        return named if named <= width else BOX_PX * len(names)
+        count = sum(not box.isHidden() for box in (self.truth_box, *self.method_boxes.values()))
+        return self.width_named() if self.width_named() <= width else BOX_PX * count
 
     def show_names_within(self, width: int) -> None:
         boxes = (self.truth_box, *self.method_boxes.values())

@@ -16,6 +16,6 @@ def heads(session: Session, step_problem: str) -> list[str]:
         return told
     if render.cell:
         told.append(f"Cell of a study: {render.name}. Your own renders are in the list of the Render workspace.")
-    elif render.is_stale(session.project) or (render.scan is None and render.frame.step != session.step):
+    elif session.stale and (render.scan is None or render.frame.step == session.step):
         told.append(CHANGED)
     return [*told, *filter(None, [scale_head(render.scanner_scale)])]

@@ -171,7 +171,7 @@ class TestOpened:
         render = shown(window, qtbot, 0)
         assert window.session.document.path is None and not window.files.unsaved
         assert "at 0.5 x" in window.session.project.name
-        assert render.scanner_scale == SCALE and not window.panels["camera"].stale  # type: ignore[attr-defined]
+        assert render.scanner_scale == SCALE and not window.session.stale
         window.files.count_as_saved(window.session.project)
 
     def test_a_step_that_is_damaged_is_named_and_the_others_are_shown(

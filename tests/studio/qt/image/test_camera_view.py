@@ -113,17 +113,17 @@ def test_a_render_takes_the_place_of_the_estimate(qtbot, unrendered):
 def test_a_changed_scene_makes_the_render_stale_and_goes_live(qtbot, made):
     session = made.session
     session.set(("scene", "objects", 0, "scale"), 1.01)
-    assert made.stale and made.is_live and made.badge.isVisible() and made.render_button.isVisible()
+    assert made.session.stale and made.is_live and made.badge.isVisible() and made.render_button.isVisible()
     assert "changed" in made.badge_text.text()
     choose(made, "Image")
     assert not made.is_live and made.badge.isVisible()
     session.document.undo()
-    assert not made.stale and not made.badge.isVisible()
+    assert not made.session.stale and not made.badge.isVisible()
 
 
 def test_exposure_does_not_make_it_stale(qtbot, made):
     made.session.set(("sensor", "exposure_time"), 0.1)
-    assert not made.stale and not made.is_live
+    assert not made.session.stale and not made.is_live
 
 
 def test_each_light_group_is_seen_on_its_own(qtbot, made):
