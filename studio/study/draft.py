@@ -27,8 +27,9 @@ ELSEWHERE = ("extraction.method", "seed")
 REPEATS, IMAGE_SCALE, COUNT = 4, 0.25, 5
 DERIVED_BY = [one.assign for each in DERIVED.values() for one in each]
 """Of fields that are worked out from others, and stand in no file."""
+ROTATION_HELP = "Turned about one axis alone, this is the inspector's angle; about several, the axis times the angle."
 REACH = 0.01
-"""m, to either side of a position, and of any other quantity that is 0."""
+"""m or rad, to either side of a position, and of any other quantity that is 0."""
 
 
 def new_draft(base: str) -> Data:
@@ -121,10 +122,23 @@ def varying(path: FieldPath, spec: FieldSpec) -> list[tuple[FieldPath, FieldSpec
     if spec.kind in VALUES:
         return [(path, spec)]
     if spec.kind == "pose":
-        length = replace(spec, kind="number", unit=Unit.of("m"), default=0.0, help="")
+        parts = (("translation", "Position", "m", ""), ("rotation", "Rotation vector", "rad", ROTATION_HELP))
         return [
-            ((*path, "translation", i), replace(length, name=str(i), label=f"Position {axis}", value=value))
-            for i, (axis, value) in enumerate(zip(AXES, spec.value.translation, strict=True))
+            (
+                (*path, name, i),
+                replace(
+                    spec,
+                    kind="number",
+                    unit=Unit.of(unit),
+                    default=0.0,
+                    help=help,
+                    name=str(i),
+                    label=f"{label} {axis}",
+                    value=value,
+                ),
+            )
+            for name, label, unit, help in parts
+            for i, (axis, value) in enumerate(zip(AXES, getattr(spec.value, name), strict=True))
         ]
     if spec.kind == "numbers" and spec.length is not None:
         return [

@@ -52,7 +52,7 @@ from studio.scan.stages import Measurement
 
 NOTHING = (
     "Nothing is measured yet. Render the frame (F5), run a scan, or open the results of one: "
-    "line, points and errors appear here."
+    "line, points and errors appear here, those of a scan that runs when it has ended."
 )
 BY_STEP_ONLY = "The scan's files hold this error in sum only; choose This step"
 AS_SCANNED = "All steps are as they were scanned; what was changed since in exposure or extraction is in This step."

@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from studio.project.project import Project
+from studio.project.templates import template_folder
 from studio.study.answers import Answer, answers
 from studio.study.cells import next_cells
 from studio.study.charts import chart, places
+from studio.study.draft import fields_of, path_text, spec_of
 from studio.study.labels import as_read, interval_text
 from studio.study.page import sentences, table, write_page
 from studio.study.study import Study
@@ -78,3 +81,13 @@ def test_an_interval_of_a_single_repeat_is_none() -> None:
     assert interval_text(float("nan"), float("nan")) == "-"
     assert interval_text(0.0, float("inf")) == "0 to -"
     assert interval_text(-1.23456, 2.0, 3) == "-1.23 to 2"
+
+
+def test_a_pose_is_varied_by_its_position_and_its_turn() -> None:
+    project = Project.load(template_folder("weld_seam") / "project.json")
+    laser = fields_of(project, ("scene", "rig", "lasers", 0))
+    labels = {path_text(path): spec.label for path, spec in laser if "T_rig_laser" in path}
+    turn = "scene.rig.lasers[0].T_rig_laser.rotation[1]"
+    assert len(labels) == 6 and labels[turn] == "Rotation vector y"
+    spec = spec_of(project, turn)
+    assert spec is not None and spec.unit.with_unit(spec.value) == "-13 deg"
