@@ -28,6 +28,7 @@ NOTHING = (
     "Nothing is measured yet. Choose a field to vary and run the study: charts fill while it runs, "
     "and a click on a point opens its frame, line and errors."
 )
+OPENS = "A click on a point, or two on its row, open its frame, line and errors in Measure."
 ROW_PX = 22
 
 
@@ -85,6 +86,7 @@ class ChartsPanel(QWidget):
     def open(self, spot: int) -> None:
         """Look at the cell behind a point in Measure."""
         if self.work.found is not None and self.answer is not None:
+            self.table.selectRow(spot)
             self.opener.open(self.work.found, self.work.chosen, spot, self.runner)
 
     def refresh(self) -> None:
@@ -155,7 +157,7 @@ class ChartsPanel(QWidget):
         answer = self.answer
         if answer is None or spot is None or spot >= len(answer.spots):
             self.chart.mark(None)
-            self.reading.setText("A click on a point opens its frame, line and errors in Measure.")
+            self.reading.setText(OPENS)
             return
         self.chart.mark(spot)
         pairs = zip(self._header, self._texts[spot], strict=True)
