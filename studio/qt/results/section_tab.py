@@ -95,6 +95,8 @@ class SectionTab(QWidget):
         for signal in (session.renders_changed, session.measured):
             signal.connect(self.refresh)
         self._another_normal()
+        self._untouched = True
+        """The plane is where it stood at first."""
         self._repaint()
         self.refresh()
 
@@ -143,6 +145,17 @@ class SectionTab(QWidget):
         self.form.setRowVisible(self.normals, self.normal.currentData() is None)
         self._moved()
 
+    def along_most(self) -> None:
+        """Upright through the middle of the points, near to most of them: of a single frame along its line."""
+        if self._read is None:
+            return
+        near = 0.5e-3 * self.thickness.value()
+        points = np.column_stack([self._read[0][name] for name in "xyz"])
+        middle = np.median(points, axis=0)
+        beside = np.sum(np.abs(points[:, :2] - middle[:2]) <= near, axis=0)
+        x, y, z = middle.tolist()
+        self.take(Plane((x, y, z), list(NORMALS.values())[int(np.argmax(beside))]))
+
     def to_middle(self) -> None:
         """Of the points, by their medians."""
         if self._read is None:
@@ -174,7 +187,9 @@ class SectionTab(QWidget):
             first = self._read is None
             self.section, self._read = found
             self._show()
-            if first:
+            if first and self._untouched:
+                self.along_most()
+            elif first:
                 self.to_middle()
 
         self.runner.run(LANE, "section", work, then)
@@ -188,6 +203,7 @@ class SectionTab(QWidget):
 
     def _moved(self) -> None:
         """What is cut follows soon, while a drag goes on too."""
+        self._untouched = False
         self._place()
         if not self._rest.isActive():
             self._rest.start()

@@ -17,6 +17,7 @@ from studio.project.project import Project
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
+from studio.qt.results import section_tab
 from studio.qt.results.nominal_panel import NominalPanel
 from studio.qt.viewport.error_cloud import ErrorCloud
 from studio.qt.viewport.view3d import View3D
@@ -163,3 +164,19 @@ def test_a_low_panel_has_the_section_beside_its_fields(panel: NominalPanel, qtbo
         assert (tab.view.x() > tab.thickness.geometry().right()) == beside
         scrolled = tab.height() > tab.parentWidget().height()
         assert not scrolled or size == (300, 250)
+
+
+@pytest.mark.parametrize(("turned", "across"), [(False, 0), (True, 1)])
+def test_a_section_begins_along_the_line(
+    panel: NominalPanel, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, turned: bool, across: int
+) -> None:
+    """Of a single frame the other plane meets the line once."""
+    along, beside = np.linspace(-0.1, 0.1, 500), np.full(500, 0.02)
+    names = ("y", "x") if not turned else ("x", "y")
+    points = {**dict(zip(names, (along, beside), strict=True)), "z": np.zeros(500)}
+    points |= {"error_surface": np.zeros(500), "row": np.arange(500), "laser": np.zeros(500, int)}
+    scene, root, _ = section_tab.shown_points(panel.section.session)
+    monkeypatch.setattr(section_tab, "shown_points", lambda _: (scene, root, lambda: points))
+    panel.show_tab(panel.section)
+    qtbot.waitUntil(lambda: panel.section.section is not None)
+    assert panel.section.normal.currentIndex() == across
