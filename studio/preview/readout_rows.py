@@ -114,7 +114,8 @@ def _ranged(
     if values is None:
         return Row(key, label, NOTHING, "", "", help)
     low, high = text(values.low), text(values.high)
-    note = f"{low} to {high}" if low != high else ""
+    length = unit if unit == " mm" else ""  # in inches the value stands beside these
+    note = f"{low} to {high}{length}" if low != high else ""
     return Row(key, label, f"{text(values.middle)}{unit}", note, level(values), help)
 
 

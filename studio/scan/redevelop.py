@@ -14,6 +14,7 @@ from render.base.threads import Cancel
 from render.camera.camera import Lens
 from render.frame import Frame
 from render.scene.scene import Scene
+from render.scene.shape import MeshFile
 from render.sensor.develop import Image, develop
 from render.world.world import World
 from studio.project.project import Project
@@ -53,7 +54,19 @@ def is_stale(rendered: Project, now: Project) -> bool:
         return True
     # a laser that was off left no light to scale
     lit = any(a.power == 0.0 < b.power for a, b in zip(before.lasers, scene.lasers, strict=True))
-    return lit or light_path(before) != light_path(scene)
+    return lit or light_path(_signed_alike(before, scene)) != light_path(_signed_alike(scene, before))
+
+
+def _signed_alike(scene: Scene, other: Scene) -> Scene:
+    """Without the digests of mesh files that the other does not have: saving writes them, and nothing is another."""
+    if len(scene.objects) != len(other.objects):
+        return scene
+    objects = []
+    for item, its in zip(scene.objects, other.objects, strict=True):
+        if isinstance(item.shape, MeshFile) and isinstance(its.shape, MeshFile) and its.shape.sha256 is None:
+            item = item.model_copy(update={"shape": item.shape.model_copy(update={"sha256": None})})
+        objects.append(item)
+    return scene.model_copy(update={"objects": tuple(objects)})
 
 
 def light_path(scene: Scene) -> Scene:

@@ -19,6 +19,7 @@ from studio.scan.stages import Measurement
 
 __all__ = ["best", "frame_remarks", "frame_result", "result_remarks", "scale_head", "scale_name", "scale_notes"]
 
+OF_ALL_LASERS = "What follows is of all lasers together; charts and table are of the one that is chosen."
 Measurements = Mapping[str, Sequence[Measurement]]
 """By method: one for each laser."""
 
@@ -37,7 +38,9 @@ def frame_remarks(project: Project, frame: Frame, measurements: Measurements) ->
     """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be."""
     with closing(record_of(project.scene, [frame_result(project, frame, measurements)])) as record:
         speckle = speckle_remark(project, best(measurements, project))
-        return [*frame.warnings, *result_remarks(record), *filter(None, [speckle])]
+        said = [*result_remarks(record), *filter(None, [speckle])]
+        of_all = [OF_ALL_LASERS] if said and len(project.scene.lasers) > 1 else []
+        return [*frame.warnings, *of_all, *said]
 
 
 def result_remarks(record: ScanRecord) -> list[str]:

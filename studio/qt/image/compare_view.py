@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QSize, Qt
-from PySide6.QtGui import QCloseEvent, QImage, QPixmap
+from PySide6.QtGui import QCloseEvent, QImage, QPixmap, QShortcut
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QVBoxLayout, QWidget
 
 from analysis.report.colour import DIVERGING
@@ -51,6 +51,7 @@ class CompareView(QWidget):
         self.left, self.right, self.told = QLabel(), QLabel(), QLabel()
         self.told.setObjectName("muted")
         self.scale = QLabel()
+        QShortcut(Qt.Key.Key_Escape, self, self.close)
         self._lay_out()
         self.wipe.sigPositionChanged.connect(lambda line: self.over.set_clip(float(line.value())))
         self.mode.currentTextChanged.connect(lambda text: self._show_mode())

@@ -105,8 +105,15 @@ class RowProfile(QWidget):
         session.hover_changed.connect(self.refresh)
         for signal in (session.developed, session.measured, session.renders_changed):
             signal.connect(self.refresh)
+        session.project_changed.connect(self._follow_project)
+        self._as_it_was = False
+        """The scene has changed since what is shown."""
         self._colour()
         self.refresh()
+
+    def _follow_project(self) -> None:
+        if self.session.stale != self._as_it_was:
+            self.refresh()
 
     def show_laser(self, laser: int) -> None:
         """Whose image it is."""
@@ -159,7 +166,9 @@ class RowProfile(QWidget):
         for method, item in lines.items():
             told.append(self._show_method(method, item, index, image, true))
             places += list(item.line.u[index][item.line.valid[index]])
-        self.text.setText("   ".join(told) if told else "no line here")
+        self._as_it_was = self.session.stale
+        before = ["<i>in the render as it was:</i>"] if self._as_it_was else []
+        self.text.setText("   ".join([*before, *told]) if told else "no line here")
         if self.follow.isChecked():
             self._look_at(places, lines, index, values, image)
 

@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from analysis.line.settings import Method
+from analysis.report.colour import method_name
 from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import show_trouble, suggested
@@ -129,7 +130,9 @@ class ExportActions(QObject):
         def then(written: list[Path]) -> None:
             if writer is export.export_report:
                 render.report = written[0]
-            self._tell(written, notes)
+            method = how.project.extraction.method
+            of = f", the points by {method_name(method)}, the project's own method" if kind == "points" else ""
+            self._tell(written, of, notes)
 
         self._job = self.runner.run(LANE, f"export {path.name}", work, then)
         self.preferences.change(folder=str(path.parent))
@@ -152,8 +155,8 @@ class ExportActions(QObject):
         if job is self._job:
             self.session.message.emit("info", f"Cancelled: {job.name}. No file was written")
 
-    def _tell(self, written: list[Path], notes: tuple[str, ...]) -> None:
-        names = ", ".join(str(path) for path in written)
+    def _tell(self, written: list[Path], of: str, notes: tuple[str, ...]) -> None:
+        names = ", ".join(str(path) for path in written) + of
         self.session.message.emit("warning" if notes else "info", "\n".join([f"Wrote {names}", *notes]))
 
 

@@ -80,6 +80,12 @@ class UprightAxis(pg.AxisItem):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__("left")
 
+    def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:
+        """From 10,000 on in thousands, so that the minus sign has room."""
+        if len(values) and max(abs(float(value) * scale) for value in values) >= 1e4:
+            return [f"{float(value) * scale / 1e3:g}k" if value else "0" for value in values]
+        return list(super().tickStrings(values, scale, spacing))
+
     def resizeEvent(self, event: Any = None) -> None:
         super().resizeEvent(event)
         # the title itself knows nothing of its being turned

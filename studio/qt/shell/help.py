@@ -37,6 +37,15 @@ PAGES = {
 }
 """Page -> title, in the order of the list; panels have pages of their own key."""
 
+OF_WORKSPACE = {
+    "render": "render",
+    "measure": "results",
+    "study": "study",
+    "calibrate": "calibrate",
+    "dataset": "recipe",
+}
+"""The page of a workspace as a whole."""
+
 
 class Help(QDialog):
     """Not modal: read and do."""
@@ -87,12 +96,12 @@ class Help(QDialog):
         self.open_page(url.fileName().removesuffix(".md"))
 
 
-def panel_with_focus(panels: Iterable[tuple[str, QWidget]]) -> str:
-    """The panel that has the focus, or else the one under the mouse."""
+def panel_with_focus(panels: Iterable[tuple[str, QWidget]], workspace: str) -> str:
+    """The panel that has the focus, or else the one under the mouse, or else the workspace's own."""
     for widget in (QApplication.focusWidget(), QApplication.widgetAt(QCursor.pos())):
         while widget is not None:
             for key, panel in panels:
                 if widget is panel:
                     return key
             widget = widget.parentWidget()
-    return "start"
+    return OF_WORKSPACE.get(workspace, "start")

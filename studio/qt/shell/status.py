@@ -10,7 +10,7 @@ from PySide6.QtGui import QMouseEvent, QMoveEvent, QResizeEvent, QStatusTipEvent
 from PySide6.QtWidgets import QLabel, QProgressBar, QSizePolicy, QStatusBar, QWidget
 
 from studio.qt.core.icons import icon, icon_button
-from studio.qt.core.jobs import RENDER, JobRunner, time_left
+from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Job, State
 
@@ -100,6 +100,8 @@ class StatusBar(QStatusBar):
         if job is self.job:
             self.job = None
             self._show_work(False)
+            if self.text.text() == BUSY or self.whole.text() == BUSY:
+                self._say("", "message")
 
     def _show_work(self, visible: bool) -> None:
         for widget in (self.work, self.bar, self.left, self.pause, self.cancel):

@@ -268,7 +268,7 @@ class MainWindow(QMainWindow):
             "scan": self._scan,
             "frame_points": lambda: self.cloud.frame(),
             "log": lambda: self.show_panel("log"),
-            "help": lambda: self.help.open_page(panel_with_focus(self.panels)),
+            "help": lambda: self.help.open_page(panel_with_focus(self.panels, self.workspace)),
             "search": lambda: CommandSearch(self).open(),
             "shortcuts": lambda: CheatSheet(self).open(),
             "tour": self.start_tour,

@@ -9,6 +9,8 @@ import pytest
 
 from render.frame import Frame
 from render.render import render_world
+from render.scene.scene import SceneObject
+from render.scene.shape import MeshFile
 from render.world.world import World, build_world
 from studio.project.calibration import Calibration
 from studio.project.document import replaced
@@ -141,3 +143,15 @@ def test_every_method_measures_every_laser(project, rendered):
     )
     assert [m.line.method for m in (found["likelihood"][0], found["gaussian"][0])] == ["likelihood", "gaussian"]
     assert found["likelihood"][0].errors.completeness > 0.9
+
+
+def test_saving_which_signs_mesh_files_makes_no_render_stale_and_another_file_does():
+    ball = Project.load(template_folder("sphere") / "project.json")
+
+    def signed(digest: str | None) -> Project:
+        part = SceneObject(name="part", shape=MeshFile(path="part.stl", sha256=digest))
+        return replaced(ball, ("scene", "objects"), (*ball.scene.objects, part))
+
+    unsigned, one, other = signed(None), signed("a" * 64), signed("b" * 64)
+    assert not is_stale(unsigned, one) and not is_stale(one, unsigned)
+    assert is_stale(one, other)

@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtCore import QPointF
 from pytestqt.qtbot import QtBot
 
+from render.checkpoint import RenderState
 from studio.preview.readout_rows import Row
 from studio.project.document import Document
 from studio.project.project import Project
@@ -19,7 +20,7 @@ from studio.qt.image.camera_view import CameraView
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.render.history import History
 from studio.qt.render.render_panel import RenderPanel
-from studio.qt.results.heads import CHANGED
+from studio.qt.results.heads import CHANGED, STOPPED
 from studio.qt.results.readout_panel import ReadoutPanel
 from studio.qt.results.results_panel import ResultsPanel
 from studio.scan.stages import scaled
@@ -183,3 +184,20 @@ def test_a_cell_of_a_study_says_whose_it_is(results: ResultsPanel) -> None:
     panel.session.add_render(cell)
     assert "Cell of a study: Sweep 1: 0.04, repeat 1" in panel.head_text.text()
     assert "Render workspace" in panel.head_text.text()
+
+
+def test_a_render_that_was_stopped_says_that_light_is_missing(results: ResultsPanel) -> None:
+    stopped = replace(another_render(), final=False, state=RenderState({}))
+    results.session.add_render(stopped)
+    assert STOPPED in results.head_text.text()
+    results.session.add_render(replace(stopped, final=False, state=None, number=3))
+    assert STOPPED not in results.head_text.text(), "more is to come by itself"
+
+
+def test_the_profile_of_a_render_says_that_the_scene_has_changed(camera: CameraView) -> None:
+    session = camera.session
+    assert "as it was" not in camera.profile.text.text()
+    session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5)
+    assert "in the render as it was" in camera.profile.text.text()
+    session.document.undo()
+    assert "as it was" not in camera.profile.text.text()

@@ -38,3 +38,9 @@ def test_points_beyond_the_axis_are_crosses_at_its_ends(plots: RowPlots) -> None
 def test_the_ring_of_such_a_row_is_about_its_cross(plots: RowPlots) -> None:
     plots.mark(100)
     assert plots.rings[-1].getData()[1].tolist() == [-plots.limit]
+
+
+def test_large_errors_have_room_for_their_sign(plots: RowPlots) -> None:
+    axis = plots.error.getAxis("left")
+    assert axis.tickStrings([-200_000.0, 0.0, 200_000.0], 1.0, 200_000.0) == ["-200k", "0", "200k"]
+    assert axis.tickStrings([-50.0, 0.0, 50.0], 1.0, 50.0) == ["-50", "0", "50"]
