@@ -42,7 +42,7 @@ def parameter_rows(result: Calibrated) -> list[tuple[str, str, str]]:
     at = estimate.camera_count
     if result.adjusted.solution.free[at]:
         rows.append(
-            ("board warp um", f"{warp[0]:.0f} {warp[1]:.0f}", f"{1e6 * sigma[at]:.2g} {1e6 * sigma[at + 1]:.2g}")
+            ("board warp um", f"{round(warp[0])} {round(warp[1])}", f"{1e6 * sigma[at]:.2g} {1e6 * sigma[at + 1]:.2g}")
         )
     return rows
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QMargins, QObject, QSize, Qt
+from PySide6.QtCore import QEvent, QMargins, QObject, QSize, Qt, QTimer
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -108,6 +108,19 @@ class Scrolled(QScrollArea):
 
     def _widen(self) -> None:
         self.setMinimumWidth(self.panel.minimumSizeHint().width() + self.verticalScrollBar().sizeHint().width())
+
+
+def bring_into_view(widget: QWidget) -> None:
+    """Scroll to it, as soon as it stands where it will, if it is in something that scrolls."""
+
+    def scroll() -> None:
+        area = widget.parentWidget()
+        while area is not None and not isinstance(area, QScrollArea):
+            area = area.parentWidget()
+        if area is not None:
+            area.ensureWidgetVisible(widget)
+
+    QTimer.singleShot(0, widget, scroll)
 
 
 def spring() -> QWidget:

@@ -28,7 +28,7 @@ from studio.editing.forms import choice_label
 from studio.project.project import Project
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner, time_left
 from studio.qt.core.session import Render, Session
-from studio.qt.core.widgets import text_button, thin_bar
+from studio.qt.core.widgets import bring_into_view, text_button, thin_bar
 from studio.qt.render.history import History
 from studio.qt.render.render_job import can_go_on, render_frames
 from studio.qt.render.render_texts import error_text, plan_text
@@ -165,6 +165,7 @@ class RenderPanel(QWidget):
 
         self._job = self.runner.run(RENDER, "render", work)
         self._show_state()
+        bring_into_view(self.pause_button)
         self._tell_render()
 
     def pause(self) -> None:
