@@ -317,9 +317,11 @@ class CameraView(QWidget):
         spaces = (len(shown) + 4) * max(self.bar.spacing(), 0) + 2 * SPACE_PX + 2 * MARGIN_PX
         others = sum(min(box.sizeHint().width(), box.maximumWidth()) for box in shown) + spaces + BOX_PX
         name = self.saturated.fontMetrics().horizontalAdvance(SATURATED_NAME)
-        below = others + name + lines > width and (self.height() >= LEAST_HEIGHT or width < TINY)
+        row = width - 2 * MARGIN_PX
+        helps = self.height() >= LEAST_HEIGHT and lines <= row
+        below = others + name + lines > width and (helps or width < TINY)
         (self.second if below else self.first).addWidget(self.lines, 1)
-        room = width - 2 * MARGIN_PX if below else width - others
+        room = row if below else width - others
         named = others + name <= width if below else name + self.overlay.width_within(room) <= room
         self.saturated.setText(SATURATED_NAME if named else "")
         self.overlay.show_names_within(room - (name if named and not below else 0))

@@ -213,6 +213,7 @@ def test_boxes_have_their_names_as_far_as_there_is_room(qtbot, made):
         ((1400, 700), (True, True), False),
         ((700, 700), (True, True), True),
         ((700, 220), (False, True), False),
+        ((500, 700), (False, False), False),
         ((400, 700), (False, True), True),
         ((1400, 700), (True, True), False),
     ):
