@@ -319,7 +319,8 @@ class CameraView(QWidget):
         name = self.saturated.fontMetrics().horizontalAdvance(SATURATED_NAME)
         row = width - 2 * MARGIN_PX
         helps = self.height() >= LEAST_HEIGHT and lines <= row
-        below = others + name + lines > width and (helps or width < TINY)
+        least = others + self.overlay.width_within(0)
+        below = others + name + lines > width and (helps or least > width)
         (self.second if below else self.first).addWidget(self.lines, 1)
         room = row if below else width - others
         named = others + name <= width if below else name + self.overlay.width_within(room) <= room
