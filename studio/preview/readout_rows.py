@@ -64,7 +64,7 @@ def rows(r: Readouts) -> tuple[Row, ...]:
             "Depth per pixel",
             r.depth_per_px,
             " µm",
-            _micrometres,
+            micrometres,
             "Change of depth when the line moves by one pixel. A method that finds the line to 0.1 px "
             "resolves a tenth of it." + _working_depth(r),
         ),
@@ -73,7 +73,7 @@ def rows(r: Readouts) -> tuple[Row, ...]:
             "Along the line",
             r.along_per_px,
             " µm/px",
-            _micrometres,
+            micrometres,
             "Length in the sheet from one scan line to the next: how finely a profile is sampled.",
         ),
         _ranged(
@@ -147,7 +147,7 @@ def _working_level(r: Readouts) -> tuple[Level, str]:
 def _working_depth(r: Readouts) -> str:
     if r.working_depth_per_px is None:
         return ""
-    near, far = (_micrometres(value) for value in r.working_depth_per_px)
+    near, far = (micrometres(value) for value in r.working_depth_per_px)
     return f" Over the working range: {near} to {far} µm (as far as ten times the nearest depth)."
 
 
@@ -197,9 +197,9 @@ def _sigma(r: Readouts) -> Row:
     )
     if r.photon_sigma is None or r.speckle_sigma is None or r.speckled_sigma is None:
         return Row("sigma", "Depth noise, sigma", NOTHING, "", "", help)
-    photon, speckle = _micrometres(r.photon_sigma), _micrometres(r.speckle_sigma)
+    photon, speckle = micrometres(r.photon_sigma), micrometres(r.speckle_sigma)
     if not r.speckled:
-        both = _micrometres(r.speckled_sigma)
+        both = micrometres(r.speckled_sigma)
         help += (
             f" The sensor's is off: images have none, where a laser on a rough surface would make it {both} µm. "
             "Switch it on in the sensor, under Laser speckle, for what a real scanner meets."
@@ -207,10 +207,10 @@ def _sigma(r: Readouts) -> Row:
         return Row("sigma", "Depth noise, sigma", f"{photon} µm", f"with speckle {both}", "", help)
     help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
     note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
-    return Row("sigma", "Depth noise, sigma", f"{_micrometres(r.speckled_sigma)} µm", note, "", help)
+    return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", note, "", help)
 
 
-def _micrometres(value: float) -> str:
+def micrometres(value: float) -> str:
     return _digits(1e6 * value)
 
 

@@ -17,7 +17,7 @@ from studio.editing.units import Unit
 from studio.preview.estimates import SHARP_PX
 from studio.preview.inspection import NARROW_PX, WIDE_PX
 from studio.preview.preview import Look
-from studio.preview.readout_rows import Row, rows
+from studio.preview.readout_rows import Row, micrometres, rows
 from studio.preview.readouts import Readouts, readouts
 from studio.project.document import FieldPath, replaced
 from studio.project.project import Project
@@ -68,7 +68,8 @@ def remedies(look: Look, laser: int, look_at: Callable[[Project], Look]) -> tupl
                 if _differ(now.depth_sigma, then.depth_sigma):
                     gain += f", depth noise {before['sigma'].value} → {after['sigma'].value}"
                 if not now.speckled and _differ(now.speckled_sigma, then.speckled_sigma):
-                    gain += f", {before['sigma'].note} → {after['sigma'].note.removeprefix('with speckle ')} µm"
+                    speckled = (micrometres(one.speckled_sigma or 0.0) for one in (now, then))
+                    gain += f", with speckle {' → '.join(speckled)} µm"
                 found.append(Remedy(row.key, label, gain, project))
                 break
     return tuple(found)

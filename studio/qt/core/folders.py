@@ -47,14 +47,14 @@ class ResultsFolder(QFileDialog):
         super().accept()
 
 
-def folder_name(name: str) -> str:
+def readable_folder(name: str) -> str:
     """A name of any characters as one that every system takes, still to be read."""
     return re.sub(r"[\\/:*?\"<>|\x00-\x1f]+", "-", name).strip(". ")[:LONGEST] or "results"
 
 
 def ask_results_folder(parent: QWidget, title: str, place: Path, name: str) -> Path | None:
     """None: the person thought better of it. place, name: where a new one is suggested, and what it could be called."""
-    dialog = ResultsFolder(parent, title, place / folder_name(name))
+    dialog = ResultsFolder(parent, title, place / readable_folder(name))
     chosen = dialog.selectedFiles()[0] if dialog.exec() else ""
     dialog.deleteLater()
     return Path(chosen) if chosen else None

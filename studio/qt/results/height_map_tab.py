@@ -169,7 +169,7 @@ class HeightMapTab(QWidget):
         texts = [size + share]
         if np.isfinite(made.heights).any():
             low, high = 1e3 * np.nanmin(made.heights), 1e3 * np.nanmax(made.heights)
-            texts.append(f"Heights from {low:.4g} to {high:.4g} mm; of few points beyond the rest colours say no more")
+            texts.append(f"Heights from {low:.4g} to {high:.4g} mm")
             texts.append(sigma_sentence(sigma_record(made, encoded(made.heights)[1])).replace(" um", " µm"))
         self.told.setText("\n".join(texts))
 

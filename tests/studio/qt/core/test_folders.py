@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QDialogButtonBox, QLineEdit, QMessageBox
 from pytestqt.qtbot import QtBot
 
-from studio.qt.core.folders import ResultsFolder, folder_name
+from studio.qt.core.folders import ResultsFolder, readable_folder
 
 
 def choice(qtbot: QtBot, suggested: Path) -> ResultsFolder:
@@ -69,4 +69,4 @@ def test_what_cannot_be_made_is_told_and_leaves_the_question_open(
     [("Weld seam scan", "Weld seam scan"), ("a/b: c?", "a-b- c-"), ("..", "results"), ("x" * 200, "x" * 80)],
 )
 def test_a_name_that_no_folder_may_have_is_mended(name: str, made: str) -> None:
-    assert folder_name(name) == made
+    assert readable_folder(name) == made
