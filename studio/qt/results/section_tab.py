@@ -121,7 +121,7 @@ class SectionTab(QWidget):
 
     def showEvent(self, event: object) -> None:
         super().showEvent(event)  # type: ignore[arg-type]
-        if self.section is None:
+        if self.section is None or self.section.plane != self.plane:
             self._rest.start()
         self._place()
 
@@ -202,10 +202,10 @@ class SectionTab(QWidget):
         self.session.message.emit("info", f"Wrote {path}")
 
     def _moved(self) -> None:
-        """What is cut follows soon, while a drag goes on too."""
+        """What is cut follows soon, while a drag goes on too; out of sight, once it is looked at."""
         self._untouched = False
         self._place()
-        if not self._rest.isActive():
+        if self.isVisible() and not self._rest.isActive():
             self._rest.start()
 
     def _follow(self) -> None:

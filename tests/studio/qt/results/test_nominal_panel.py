@@ -175,6 +175,8 @@ def test_a_section_begins_along_the_line(
     names = ("y", "x") if not turned else ("x", "y")
     points = {**dict(zip(names, (along, beside), strict=True)), "z": np.zeros(500)}
     points |= {"error_surface": np.zeros(500), "row": np.arange(500), "laser": np.zeros(500, int)}
+    qtbot.wait(3 * section_tab.REST_MS)
+    assert panel.section._read is None, "nothing is cut before somebody looks"
     scene, root, _ = section_tab.shown_points(panel.section.session)
     monkeypatch.setattr(section_tab, "shown_points", lambda _: (scene, root, lambda: points))
     panel.show_tab(panel.section)
