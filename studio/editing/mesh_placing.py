@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
 
 from render.base.arrays import Float
-from render.base.pose import Pose
+from render.base.pose import Pose, transform_points
 from render.scene.scene import Scene, SceneObject
 from render.scene.shape import MeshFile
 from studio.editing.placement import field_of_view, target, vector
@@ -61,6 +62,26 @@ def fitted(item: SceneObject, vertices: Float, scene: Scene) -> SceneObject:
     scale = float(f"{item.scale * FILLED * field_of_view(scene) / float((high - low).max()):.3g}")
     middle = matrix[:3, :3] @ (low + high) / 2.0 * (scale / item.scale)
     return _moved(item.model_copy(update={"scale": scale}), target(scene) - middle)
+
+
+def meeting(boxes: Sequence[tuple[Float, Float]], index: int) -> list[int]:
+    """Which boxes share space with one of them. boxes: (2, 3) m lowest and highest corner, and (4, 4) to the world.
+
+    Each turned box counts as the one along the world's axes around it; what only touches does not count.
+    """
+    around = [_around(box, to_world) for box, to_world in boxes]
+    low, high = around[index]
+    slack = 1e-6
+    return [
+        k
+        for k, (other_low, other_high) in enumerate(around)
+        if k != index and np.all((low < other_high - slack) & (other_low < high - slack))
+    ]
+
+
+def _around(box: Float, to_world: Float) -> tuple[Float, Float]:
+    corners = transform_points(to_world, np.array(np.meshgrid(*box.T, indexing="ij")).reshape(3, -1).T)
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _moved(item: SceneObject, place: Float, rotation: tuple[float, float, float] | None = None) -> SceneObject:

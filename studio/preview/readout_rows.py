@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from studio.editing.units import Unit
 from studio.preview.estimates import SHARP_PX
 from studio.preview.inspection import DIM_ELECTRONS, NARROW_PX, WIDE_PX
 from studio.preview.readouts import Range, Readouts
@@ -35,7 +36,7 @@ def rows(r: Readouts) -> tuple[Row, ...]:
         Row(
             "baseline",
             "Baseline",
-            f"{_digits(1e3 * r.baseline)} mm",
+            _lengths(r.baseline),
             "",
             "",
             "Distance between the camera's centre and the laser. More baseline: finer depth, more occlusion.",
@@ -54,8 +55,8 @@ def rows(r: Readouts) -> tuple[Row, ...]:
             "standoff",
             "Stand-off",
             r.distance,
-            " mm",
-            lambda value: _digits(1e3 * value),
+            f" {Unit.of('m').shown}",
+            _length,
             "Depth of the lit line, from the camera along its axis.",
         ),
         Row("working", "Working range", _working(r), "", *_working_level(r)),
@@ -114,8 +115,7 @@ def _ranged(
     if values is None:
         return Row(key, label, NOTHING, "", "", help)
     low, high = text(values.low), text(values.high)
-    length = unit if unit == " mm" else ""  # in inches the value stands beside these
-    note = f"{low} to {high}{length}" if low != high else ""
+    note = f"{low} to {high}" if low != high else ""
     return Row(key, label, f"{text(values.middle)}{unit}", note, level(values), help)
 
 
@@ -131,8 +131,7 @@ def _outside(least: float, low: float, high: float, most: float) -> Callable[[Ra
 def _working(r: Readouts) -> str:
     if r.working_nearest is None:
         return "none"
-    far = "∞" if r.working_farthest is None else _digits(1e3 * r.working_farthest)
-    return f"{_digits(1e3 * r.working_nearest)} to {far} mm"
+    return _lengths(r.working_nearest, math.inf if r.working_farthest is None else r.working_farthest)
 
 
 def _working_level(r: Readouts) -> tuple[Level, str]:
@@ -140,7 +139,7 @@ def _working_level(r: Readouts) -> tuple[Level, str]:
     if r.working_nearest is None:
         return "error", f"{help} The camera never sees the middle of this sheet: turn one towards the other."
     if r.distance is not None:
-        help += f" The line lies at {_digits(1e3 * r.distance.low)} to {_digits(1e3 * r.distance.high)} mm."
+        help += f" The line lies at {_lengths(r.distance.low, r.distance.high)}."
     return "", help
 
 
@@ -175,14 +174,13 @@ def _saturation(r: Readouts) -> Row:
 
 
 def _focus(r: Readouts) -> Row:
-    far = "∞" if math.isinf(r.sharp_farthest) else _digits(1e3 * r.sharp_farthest)
     help = (
         f"Diameter of the blur disc along the line. At most {SHARP_PX:g} px, which counts as sharp, on the axis from "
-        f"{_digits(1e3 * r.sharp_nearest)} to {far} mm. Set the focus distance to that of the line, or close the "
+        f"{_lengths(r.sharp_nearest, r.sharp_farthest)}. Set the focus distance to that of the line, or close the "
         "aperture; a tilted sensor (tauX, tauY of the distortion) tilts the plane in focus. Images show it where the "
         "camera's lens is rendered as a thin lens, or the sensor's defocus is switched on."
     )
-    note = f"sharp {_digits(1e3 * r.sharp_nearest)} to {far}"
+    note = f"sharp {_length(r.sharp_nearest)} to {_length(r.sharp_farthest)}"
     if r.blur_px is None:
         return Row("blur", "Defocus blur", NOTHING, note, "", help)
     worst = r.blur_px.high
@@ -208,6 +206,15 @@ def _sigma(r: Readouts) -> Row:
     help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
     note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
     return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", note, "", help)
+
+
+def _length(value: float) -> str:
+    """In the unit that lengths are shown in."""
+    return _digits(Unit.of("m").factor * value)
+
+
+def _lengths(*values: float) -> str:
+    return f"{' to '.join(_length(value) for value in values)} {Unit.of('m').shown}"
 
 
 def micrometres(value: float) -> str:

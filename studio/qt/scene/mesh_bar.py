@@ -79,7 +79,9 @@ class MeshBar(QWidget):
             self.told.setText("Hidden." if not item.visible else "Not read yet.")
         else:
             sides = vertices.max(axis=0) - vertices.min(axis=0)
-            self.told.setText(" x ".join(f"{1e3 * side:.4g}" for side in sides) + " mm along x, y, z of the file")
+            size = " x ".join(f"{1e3 * side:.4g}" for side in sides) + " mm along x, y, z of the file"
+            inside = self._met(item)
+            self.told.setText(f"{size}. May stand in {inside}: their boxes overlap." if inside else size)
 
     def _turn_up(self, axis: mesh_placing.UpAxis) -> None:
         def turned(item: SceneObject, vertices: Float) -> SceneObject:
@@ -102,6 +104,15 @@ class MeshBar(QWidget):
             session.message.emit("error", str(error))
         else:
             session.document.apply(f"{label}: {item.name}", project)
+
+    def _met(self, item: SceneObject) -> str:
+        """Names of what it may stand in."""
+        look = live(self.session).look
+        visible = [look.scene.visible_objects[one.index] for one in look.placed]
+        index = next(i for i, one in enumerate(visible) if one is item)
+        boxes = [(one.body.bounds, one.T_world_object) for one in look.placed]
+        names = [visible[k].name for k in mesh_placing.meeting(boxes, index)]
+        return ", ".join(names[:2]) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
 
     def _vertices(self, item: SceneObject) -> Float | None:
         """(n, 3) m in the object's frame, as they are drawn; None: they are not, or not as the item is now."""

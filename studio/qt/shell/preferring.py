@@ -92,7 +92,9 @@ class PreferencesDialog(QDialog):
         form = QFormLayout()
         form.setLabelAlignment(Qt.AlignmentFlag.AlignRight)
         form.addRow("Lengths in", self.length)
-        note = QLabel("From the next start; what is typed may have any unit.")
+        note = QLabel(
+            "Of fields and design, from the next start; results stay in mm and µm.\nWhat is typed may have any unit."
+        )
         note.setObjectName("muted")
         form.addRow("", note)
         form.addRow("Threads", self.threads)

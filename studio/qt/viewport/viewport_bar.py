@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidgetAction,
 )
 
+from studio.editing.units import Unit
 from studio.project.document import FieldPath
 from studio.qt.core.widgets import ElidedLabel
 from studio.qt.forms.fields import tool_button
@@ -88,7 +89,7 @@ class ViewportBar(QWidget):
 
     def tell_spacing(self, metres: float) -> None:
         """Of the ground grid."""
-        self._spacing = f"grid {1e3 * metres:g} mm" if metres else ""
+        self._spacing = f"grid {Unit.of('m').with_unit(metres)}" if metres else ""
         self._tell_right()
 
     def tell_through(self, path: FieldPath) -> None:

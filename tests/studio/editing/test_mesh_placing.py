@@ -10,7 +10,17 @@ from render.base.pose import Pose, transform_points
 from render.material.conductor import Conductor
 from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile
-from studio.editing.mesh_placing import FILLED, UP_AXES, UpAxis, fitted, on_ground, up_axis, with_axis_up, with_mesh
+from studio.editing.mesh_placing import (
+    FILLED,
+    UP_AXES,
+    UpAxis,
+    fitted,
+    meeting,
+    on_ground,
+    up_axis,
+    with_axis_up,
+    with_mesh,
+)
 from studio.editing.placement import field_of_view, target
 from studio.project.mesh_import import ImportedMesh
 from studio.project.project import Project
@@ -66,3 +76,16 @@ def test_another_file_takes_the_place_of_the_mesh_alone() -> None:
     other = with_mesh(item, ImportedMesh("meshes/new.ply", "in", ((0, 0, 0), (1, 1, 1)), 12))
     assert (other.shape.path, other.shape.unit) == ("meshes/new.ply", "in")
     assert other.model_copy(update={"shape": item.shape}) == item
+
+
+def test_boxes_that_share_space_are_told_and_what_touches_is_not() -> None:
+    cube = np.array([[-0.01, -0.01, -0.01], [0.01, 0.01, 0.01]])
+    floor = np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 0.0]])
+
+    def at(height: float, turn: float = 0.0) -> tuple[Float, Float]:
+        return cube, Pose(translation=(0.0, 0.0, height), rotation=(turn, 0.0, 0.0)).matrix
+
+    boxes = [(floor, np.eye(4)), at(0.01), at(0.0), at(0.029)]
+    assert meeting(boxes, 1) == [2, 3]
+    assert meeting(boxes, 2) == [0, 1]
+    assert meeting([*boxes[:1], at(0.01, 0.3)], 1) == [0]

@@ -10,6 +10,7 @@ import pytest
 
 from render.base.pose import Pose
 from render.camera.camera import Camera
+from studio.editing import units
 from studio.preview.estimates import blur_px, centre_bound_px, depth_of_field, read_variance
 from studio.preview.inspection import inspect
 from studio.preview.preview import Preview
@@ -166,3 +167,16 @@ def test_rows_warn_where_a_value_leaves_its_sensible_range() -> None:
     assert row(far, "plane", "blur").level == "error"
     away = replaced(project, (*LASER, "T_rig_laser"), Pose(translation=(0.2, 0, 0), rotation=(0, 0.9, 0)))
     assert row(away, "plane", "working").level == "error"
+
+
+def test_distances_are_in_the_unit_that_fields_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = read(sample("plane"), "plane")
+    told = {row.key: row for row in rows(made)}
+    monkeypatch.setitem(units.SHOWN, "m", "in")
+    inches = {row.key: row for row in rows(made)}
+    for key in ("baseline", "standoff"):
+        (value, unit), (other, inch) = told[key].value.split(), inches[key].value.split()
+        assert (unit, inch) == ("mm", "in")
+        assert float(value) == pytest.approx(25.4 * float(other), rel=0.01)
+    assert inches["working"].value.endswith(" in")
+    assert inches["depth"] == told["depth"]

@@ -101,11 +101,14 @@ class TestKinds:
         bar = inspector.mesh_bar
         qtbot.waitUntil(lambda: bar.ground.isEnabled())
         assert bar.told.text().startswith("100 x 50 x 20 mm")
+        floor = session.project.scene.objects[0].name
+        assert f"May stand in {floor}: their boxes overlap" in bar.told.text()
         bar.axes["-x"].trigger()
         qtbot.waitUntil(lambda: bar.ground.isEnabled() and bar.up.text().startswith("-x"))
         qtbot.mouseClick(bar.ground, Qt.MouseButton.LeftButton)
         placed = session.project.scene.objects[1]
         assert placed.T_world_object.translation[2] == pytest.approx(0.05, abs=1e-9)
+        qtbot.waitUntil(lambda: "May stand in" not in bar.told.text())
         trimesh.creation.icosphere(1, 10.0).export(outside.with_name("ball.stl"))
         monkeypatch.setattr(mesh_importer, "choose_file", lambda *_: outside.with_name("ball.stl"))
         qtbot.mouseClick(bar.replace, Qt.MouseButton.LeftButton)
