@@ -72,13 +72,15 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
     area = 0.5 * float(np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])[is_surface].sum())
     if pitch is None:
         pitch = float(f"{max(math.sqrt(area / len(xy)), 1e-9):.3g}")
-    extent = mesh.points.max(axis=0)
-    columns, rows = (int(min(length / pitch, 1e9)) + 1 for length in extent)
+    # a stray point far from the others is of no triangle that counts: the map ends where surface does
+    left, bottom = corners[is_surface].min(axis=(0, 1))
+    right, top = corners[is_surface].max(axis=(0, 1))
+    columns, rows = (int(min(length / pitch, 1e9)) + 1 for length in (right - left, top - bottom))
     if columns * rows > MOST_CELLS:
         found, allowed = f"{columns} x {rows} cells of {pitch:g} m", f"at most {MOST_CELLS} cells"
         raise InputError("the height map would be too large", found=found, allowed=allowed, cure="give a larger pitch")
     heights, sigma, covariance = (np.full(rows * columns, np.nan) for _ in range(3))
-    grid = _Grid(cloud, pitch, columns, float(extent[1]), mesh, is_surface)
+    grid = _Grid(cloud, pitch, columns, float(left), float(top), mesh, is_surface)
     for start in range(0, rows * columns, CHUNK):
         cells = np.arange(start, min(start + CHUNK, rows * columns))
         here, beside = grid.weights(cells), grid.weights(cells + 1)
@@ -89,8 +91,8 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
     together = covariance[:-1] / (sigma[:-1] * sigma[1:])
     return HeightMap(
         heights.reshape(rows, columns),
-        float(origin[0]),
-        float(origin[1] + extent[1]),
+        float(origin[0] + left),
+        float(origin[1] + top),
         pitch,
         len(xy),
         _median(cloud["sigma_random"]),
@@ -139,11 +141,13 @@ def along(made: HeightMap, start: tuple[float, float], end: tuple[float, float])
 
 @dataclass(frozen=True)
 class _Grid:
-    """Cells row by row over a triangulation whose origin is its lowest x and y."""
+    """Cells row by row over a triangulation."""
 
     cloud: Cloud
     pitch: float
     columns: int
+    left: float
+    """x of the first column, from the triangulation's origin."""
     top: float
     """y of the first row."""
     mesh: Delaunay
@@ -152,7 +156,7 @@ class _Grid:
 
     def weights(self, cells: NDArray[np.intp]) -> Means:
         row, column = np.divmod(cells, self.columns)
-        place = np.column_stack([column * self.pitch, self.top - row * self.pitch])
+        place = np.column_stack([self.left + column * self.pitch, self.top - row * self.pitch])
         # a hair of tolerance, so that the cells on the hull are of its triangles
         found = self.mesh.find_simplex(place, tol=1e-9)
         transform = self.mesh.transform[found]

@@ -96,3 +96,13 @@ def test_what_makes_no_height_map_is_refused(kept: slice, pitch: float | None, w
     cloud = {name: column[kept] for name, column in scan().items()}
     with pytest.raises(InputError, match=words):
         height_map(cloud, pitch)
+
+
+def test_a_stray_point_does_not_widen_the_map() -> None:
+    clean, cloud = height_map(scan(), 4e-4), scan()
+    stray = {name: np.append(column, column[0]) for name, column in cloud.items()}
+    stray["x"][-1], stray["y"][-1] = 0.08, -0.05
+    made = height_map(stray, 4e-4)
+    assert made.heights.shape == clean.heights.shape
+    assert (made.x, made.y) == pytest.approx((clean.x, clean.y), abs=1e-12)
+    assert np.allclose(made.heights, clean.heights, atol=1e-12, equal_nan=True)

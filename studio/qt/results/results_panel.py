@@ -54,8 +54,8 @@ NOTHING = (
     "Nothing is measured yet. Render the frame (F5), run a scan, or open the results of one: "
     "line, points and errors appear here, those of a scan that runs when it has ended."
 )
-BY_STEP_ONLY = "The scan's files hold this error in sum only; choose This step"
-AS_SCANNED = "All steps are as they were scanned; what was changed since in exposure or extraction is in This step."
+BY_STEP_ONLY = "The scan's files hold this error in sum only; choose Figures of this step"
+AS_SCANNED = "All steps are as they were scanned; what changed since in exposure or extraction is in this step's."
 STEPS, NOTICE = 2, 3
 """Tabs of the plots."""
 PART, REGION = 1, 2

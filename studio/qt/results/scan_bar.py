@@ -25,9 +25,9 @@ class ScanBar(QWidget):
         self.steps.setMinimumWidth(260)
         self.told = QLabel()
         self.scope = QComboBox()
-        self.scope.addItems(["All steps", "This step"])
+        self.scope.addItems(["Figures of all steps", "Figures of this step"])
         self.scope.setToolTip("What the measures, the histogram and the points in the 3D view are of")
-        self.scope.currentIndexChanged.connect(lambda index: self.scope_changed.emit(index == 0))
+        self.scope.currentIndexChanged.connect(self._rescope)
         self.report = QToolButton()
         self.report.setText("Report")
         self.report.clicked.connect(self._open_report)
@@ -62,7 +62,12 @@ class ScanBar(QWidget):
     def _tell(self) -> None:
         if self.scan is not None:
             step = min(self.session.step, self.scan.count - 1)
-            self.told.setText(f"step {step + 1} of {self.scan.count}")
+            charts = "charts: " if self.whole is not None else ""
+            self.told.setText(f"{charts}step {step + 1} of {self.scan.count}")
+
+    def _rescope(self, index: int) -> None:
+        self._tell()
+        self.scope_changed.emit(index == 0)
 
     def _open_report(self) -> None:
         if self.scan is not None and self.scan.report is not None:
