@@ -25,6 +25,8 @@ POLITENESS = 5
 """Added to the niceness of a job's threads, so that the window's thread is served first."""
 EARLIEST_ESTIMATE = 0.5
 """Seconds of work before the time left is told."""
+SMALL_SHARE, LONG_WORK = 0.05, 20.0
+"""Of the work, by which alone nobody can judge the rest, and seconds from which a poor estimate is better than none."""
 
 
 class State(StrEnum):
@@ -101,7 +103,8 @@ class Job(Generic[Result]):
     @property
     def seconds_left(self) -> float | None:
         """Estimated from the progress; None while that says too little."""
-        if self.ended or self.done < 0.01 or self.seconds < EARLIEST_ESTIMATE:
+        enough = 0.01 if self.seconds >= LONG_WORK else SMALL_SHARE
+        if self.ended or self.done < enough or self.seconds < EARLIEST_ESTIMATE:
             return None
         # time that passes since the work told how far it is makes what is left less, not more
         left = self._told / self.done - self.seconds
