@@ -93,8 +93,8 @@ class SeenGrid:
     """(n,) another object is seen beside the point."""
 
 
-def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> CoarseImage:
-    """Sampled until the error is at most COARSE_ERROR, or `most` samples are spent. Raises Cancelled.
+def coarse_image(paths: CameraPaths, height: int, most: int, run: Run, target: float = COARSE_ERROR) -> CoarseImage:
+    """Sampled until the error is at most `target`, or `most` samples are spent. Raises Cancelled.
 
     The image depends on the scene and the seed alone.
     """
@@ -114,7 +114,7 @@ def coarse_image(paths: CameraPaths, height: int, most: int, run: Run) -> Coarse
         error, noise = _errors(film, paths, height, seen, held, run.threads)
         noisy = 2.0 * noise**2 > error**2 or block == 1
         needed = 2 * count * len(grid) if noisy else 3 * 2 * FIRST_SAMPLES * len(grid)
-        if error <= COARSE_ERROR or film.total + max(needed, _least(error / COARSE_ERROR, needed, noisy)) > most:
+        if error <= target or film.total + max(needed, _least(error / target, needed, noisy)) > most:
             break
         count, block = (2 * count, block) if noisy else (count, block // 2)
     radiance, known = _image(film, paths, height, seen, run.between(0.5, 1.0))

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from render.ambient.integrator import AmbientImage, ambient_images
-from render.ambient.measured_light import measured_images, seen_from
+from render.ambient.integrator import AmbientImage
+from render.ambient.measured_light import image_light, measured_images, seen_from
 from render.ambient.transport_plan import (
     DARK,
     EFFECT,
@@ -96,7 +96,7 @@ class AmbientLight(LightGroup[AmbientPlan]):
             if kept is not None:
                 yield kept
                 return
-            for image in ambient_images(placed, target=target, **how, run=part):
+            for image in image_light(placed, target=target, **how, run=part):
                 yield image
             run.leave(self.field, placed.world, made_of, image)
 

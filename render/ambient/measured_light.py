@@ -1,4 +1,5 @@
-"""Ambient light for an image that is measured: as well as each scan line needs it where a line is, coarse elsewhere."""
+"""Ambient light for what is measured: as well as each scan line needs it where a line is, coarse elsewhere; and for an
+image that may be off by a twentieth, coarse everywhere."""
 
 from __future__ import annotations
 
@@ -8,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from render.ambient.coarse_image import TILE, CoarseImage, coarse_image
+from render.ambient.coarse_image import COARSE_ERROR, TILE, CoarseImage, coarse_image
 from render.ambient.integrator import AmbientImage, ambient_images
-from render.ambient.line_samples import PILOT, Band, band_of, sample_band
+from render.ambient.line_samples import PILOT, band_of, sample_band
 from render.ambient.path_state import CLAMPED, INVALID
 from render.ambient.path_tracer import CameraPaths, camera_paths
 from render.ambient.pixel_samples import PixelSamples
 from render.ambient.taught_image import CHECK_SEED, CoarseLesson, taken_over
-from render.base.arrays import Float, Float32
+from render.base.arrays import Float, Float32, Int
 from render.base.threads import map_chunks
 from render.importance import Importance, known_below
 from render.run import Run
@@ -59,11 +60,44 @@ def measured_images(
     coarse = _coarse(placed, paths, (most, surfaces, clamp, run.seed), budget, run.between(0.0, 0.5))
     band = band_of(importance, coarse, run.threads)
     film = PixelSamples(band.pixels)
-    yield _image(coarse, film, band, None)
+    yield _image(coarse, film, None)
     deviations = np.zeros(0)
     if len(band.pixels):
         deviations = sample_band(film, paths, band, budget - coarse.samples, run.between(0.5, 1.0))
-    yield _image(coarse, film, band, deviations)
+    yield _image(coarse, film, deviations, band.pixels)
+
+
+def image_light(
+    placed: PlacedScene,
+    *,
+    target: float,
+    most: int = 16,
+    surfaces: int | None = 1,
+    clamp: float | None = None,
+    run: Run = Run(),
+) -> Iterator[AmbientImage]:
+    """As `ambient_images`; where the target is no finer than COARSE_ERROR, the coarse image alone, if it reaches it.
+
+    Raises Cancelled.
+    """
+    camera, part = placed.camera, run
+    if target >= COARSE_ERROR and most >= LEAST_SAMPLES:
+        view = camera.view(placed.T_world_camera)
+        paths = camera_paths(placed.world, placed.scene, view, surfaces=surfaces, clamp=clamp, seed=run.seed)
+        allowed = _share(most) * most * camera.width * camera.height
+        coarse = coarse_image(paths, camera.height, int(allowed), run.between(0.0, 0.2), target)
+        if coarse.error <= target:
+            image = _image(coarse, PixelSamples(np.zeros(0, np.int32)), None)
+            yield replace(image, error=coarse.error, coarse_error=None)
+            run.progress(1.0)
+            return
+        part = run.between(0.2, 1.0)
+    yield from ambient_images(placed, target=target, most=most, surfaces=surfaces, clamp=clamp, run=part)
+
+
+def _share(most: int) -> float:
+    """Of the samples that are allowed, for the coarse image."""
+    return min(COARSE_SAMPLES / most, COARSE_SHARE)
 
 
 def _coarse(placed: PlacedScene, paths: CameraPaths, settings: tuple[Any, ...], budget: int, run: Run) -> CoarseImage:
@@ -79,8 +113,7 @@ def _coarse(placed: PlacedScene, paths: CameraPaths, settings: tuple[Any, ...], 
     if lesson is not None:
         found = taken_over(lesson, placed, replace(paths, seed=run.shifted(CHECK_SEED).seed), run)
     if found is None:
-        share = min(COARSE_SAMPLES / settings[0], COARSE_SHARE)
-        found = coarse_image(paths, placed.camera.height, int(share * budget), run)
+        found = coarse_image(paths, placed.camera.height, int(_share(settings[0]) * budget), run)
     run.leave(COARSE, world, made_of, found)
     run.teach(COARSE, CoarseLesson(found, placed, made_of))
     return found
@@ -103,14 +136,14 @@ def seen_from(placed: PlacedScene, *settings: object) -> tuple[object, ...]:
     return scene.camera, placed.T_world_camera.tobytes(), scene.lights, scene.environment, *settings
 
 
-def _image(coarse: CoarseImage, film: PixelSamples, band: Band, deviations: Float | None) -> AmbientImage:
-    """The coarse image with the band in it, once that has been sampled to some deviations of the lines."""
+def _image(coarse: CoarseImage, film: PixelSamples, deviations: Float | None, band: Int | None = None) -> AmbientImage:
+    """The coarse image, with the pixels of the band in it once they are sampled to some deviations of the lines."""
     radiance, error, total = coarse.radiance, float("nan"), coarse.samples + film.total
     lines: int | None = None
     unknown: int | None = None
-    if deviations is not None:
+    if deviations is not None and band is not None:
         radiance = _copied(radiance)
-        radiance.reshape(-1, 3)[band.pixels] = film.means().mean(axis=1)
+        radiance.reshape(-1, 3)[band] = film.means().mean(axis=1)
         error, lines, unknown = known_below(deviations), len(deviations), int(np.sum(deviations > 1.0))
     return AmbientImage(
         radiance,

@@ -69,7 +69,8 @@ class RenderSettings(Model):
     ambient_error: float = quantity(
         0.01,
         label="Ambient error",
-        help="Target relative RMS error of the ambient light, without a goal.",
+        help="Target relative RMS error of the ambient light, without a goal. From 5 % on few pixels are sampled, and "
+        "the others interpolated, where that reaches it.",
         gt=1e-4,
         le=1,
     )
