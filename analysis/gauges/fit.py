@@ -24,6 +24,11 @@ Curve = Callable[[Float, Float], tuple[Float, Float, Float]]
 ITERATIONS = 30
 ROUNDS = 4
 OUTLIER_SIGMAS = 5.0
+DRAWN_SIGMAS = 3.0
+"""A usual miss from which far points may have drawn the curve to them: they have if most lie so much nearer another."""
+DRAWN, DRAWN_SEED = 50, 11
+"""Curves that are drawn by chance then: with a third of the points false, 15 of them have no false one in three."""
+MEDIAN_TO_SIGMA = 1.4826
 GRAZING = 1e-3
 """Sine of the angle between curve and d below which a point slides along the curve and tells nothing of it."""
 FOOT_STEPS = 3
@@ -66,7 +71,10 @@ class Fit:
 
 
 def frame_of(position: Float) -> Frame:
-    """Axes by the greatest spread of (m, 2) points; along goes to the right, or up."""
+    """Axes by the greatest spread of (m, 2) points, but for those far above or below most; along goes right, or up."""
+    height = position[:, 1] - np.median(position[:, 1])
+    most = position[np.abs(height) <= OUTLIER_SIGMAS * robust_sigma(height)]
+    position = most if np.ptp(most[:, 0]) > 0.5 * np.ptp(position[:, 0]) else position
     centre = position.mean(axis=0)
     along = np.linalg.svd(position - centre, full_matrices=False)[2][0]
     along = along if (along[0], along[1]) > (0.0, 0.0) else -along
@@ -136,16 +144,13 @@ def fit(
         part = profile.taken(here)
         local, direction = frame.local(part.position), part.random @ frame.axes.T
         curve, whitening = curve_of(here), _weighted(part.whitening(), weight[here])
-        theta = start(local)
-        for _ in range(ITERATIONS):
-            e, by_theta, _ = _misses(curve, local, direction, theta)
-            change = np.linalg.lstsq(_white(whitening, by_theta), -_white(whitening, e), rcond=None)[0]
-            theta = theta + change
-            if np.all(np.abs(change) <= 1e-9 * np.abs(theta) + 1e-12):
-                break
+        theta = _solved(curve, local, direction, whitening, start(local), ITERATIONS)
         e, by_theta, by_point = _misses(curve, local, direction, theta)
-        white = _white(whitening, e)
-        wrong = np.abs(e) > OUTLIER_SIGMAS * max(1.0, robust_sigma(e))
+        white, usual = _white(whitening, e), max(1.0, robust_sigma(e))
+        wrong = np.abs(e) > OUTLIER_SIGMAS * usual
+        if round_left == ROUNDS - 1 and usual > DRAWN_SIGMAS:
+            found, of_most = _of_most_points(curve_of, start, here, local, direction, len(theta))
+            wrong = found if of_most < usual / DRAWN_SIGMAS else wrong
         if round_left == 0 or not wrong.any() or len(e) - np.count_nonzero(wrong) <= len(theta):
             break
         here = here.copy()
@@ -155,6 +160,50 @@ def fit(
     gradient[:, here] = -(_gain(whitening, solved)[:, :, None] * by_point) @ frame.axes
     ratio = birge(white, float(weight[here].sum()) - len(theta))
     return Fit(theta, np.linalg.norm(solved, axis=1), gradient, here, frame, ratio)
+
+
+def _solved(
+    curve: Curve, local: Float, direction: Float, whitening: tuple[Float, Float], theta: Float, most: int
+) -> Float:
+    """Parameters of the least weighted misses, by at most so many steps of Gauss and Newton from some first ones."""
+    for _ in range(most):
+        e, by_theta, _ = _misses(curve, local, direction, theta)
+        change = np.linalg.lstsq(_white(whitening, by_theta), -_white(whitening, e), rcond=None)[0]
+        theta = theta + change
+        if np.all(np.abs(change) <= 1e-9 * np.abs(theta) + 1e-12):
+            break
+    return theta
+
+
+def _of_most_points(
+    curve_of: Callable[[NDArray[np.bool_]], Curve],
+    start: Callable[[Float], Float],
+    here: NDArray[np.bool_],
+    local: Float,
+    direction: Float,
+    parameters: int,
+) -> tuple[NDArray[np.bool_], float]:
+    """(n,) the points off a curve that most of them are near, and how near these are, in sigmas.
+
+    Of curves through as few points as it takes, drawn by chance, the one of the least median miss (Rousseeuw, J. Am.
+    Stat. Assoc. 79, 1984): no far points draw it to them, as long as they are fewer than half.
+    """
+    random, curve, used = np.random.default_rng(DRAWN_SEED), curve_of(here), np.flatnonzero(here)
+    best, least = np.zeros(len(local)), math.inf
+    for _ in range(DRAWN):
+        some = np.sort(random.choice(len(local), parameters, replace=False))
+        of_some = np.zeros_like(here)
+        of_some[used[some]] = True
+        even = np.ones(parameters), np.zeros(parameters)
+        with np.errstate(all="ignore"):  # points that are no curve's
+            own = curve_of(of_some)
+            theta = _solved(own, local[some], direction[some], even, start(local[some]), FOOT_STEPS)
+            e = _misses(curve, local, direction, theta)[0]
+        middle = float(np.median(np.abs(e)))
+        if middle < least:
+            best, least = e, middle
+    usual = max(1.0, MEDIAN_TO_SIGMA * least)
+    return np.abs(best) > OUTLIER_SIGMAS * usual, usual
 
 
 def birge(white: Float, free: float) -> float:

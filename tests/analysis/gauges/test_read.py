@@ -97,6 +97,20 @@ def test_a_false_point_far_off_draws_nothing_to_it(kind: str, place: int) -> Non
     assert reading.sigma < 1.5 * read(gauge(kind), 0, profile(height), None).sigma
 
 
+@pytest.mark.parametrize("kind", ["radius", "straightness", "angle", "step", "gap"])
+def test_several_false_points_side_by_side_draw_nothing_to_them(kind: str) -> None:
+    """Each has others beside it, so that none stands alone: a sphere of 49 mm was read as 477 mm."""
+    height, exact = shape(kind)
+    points = profile(height, noise=noises(1, 1.0, seed=6)[0])
+    ends = np.flatnonzero(points.weight(*REGION[kind][0]) > 0.0)
+    points.position[ends[-4:], 1] += np.array([0.45, 0.44, 0.6, 0.61])
+    points.position[ends[:3], 1] += np.array([0.1, 0.12, 0.09])
+    reading = read(gauge(kind), 0, points, None)
+    assert abs(reading.value - exact) < 4.0 * reading.sigma
+    true = ~np.isin(np.arange(len(height)), np.append(ends[-4:], ends[:3]))
+    assert reading.sigma < 1.5 * read(gauge(kind), 0, points.taken(true), None).sigma
+
+
 def test_residuals_beyond_the_noise_widen_sigma() -> None:
     height, _ = shape("step")
     wavy = height + 1e-4 * np.sin(ACROSS / 7e-4)
