@@ -11,7 +11,7 @@ from html import escape
 
 import numpy as np
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -102,9 +102,6 @@ class ResultsPanel(QWidget):
         self.head_text.setMinimumWidth(1)  # a narrow panel may cut it off: it is among the remarks as well
         self.notices = Remarks(), Remarks()
         """What a reader should notice: below the measures, and in a tab where there is no room below them."""
-        self.give_up = QShortcut(QKeySequence(Qt.Key.Key_Escape), self, self.part.cancel)
-        self.give_up.setContext(Qt.ShortcutContext.WindowShortcut)
-        self.give_up.setEnabled(False)
         self._lay_out()
         self.laser.currentIndexChanged.connect(self.refresh)
         self.error.currentIndexChanged.connect(self.refresh)
@@ -116,7 +113,7 @@ class ResultsPanel(QWidget):
             ranged.connect(lambda low, high: self.choose(Region("scan lines", low, high)))
         self.profile.ranged.connect(lambda low, high: self.choose(Region("fan", 1e-3 * low, 1e-3 * high)))
         self.region.changed.connect(self._show_region)
-        self.part.placing_changed.connect(self._follow_placing)
+        self.part.placing_changed.connect(lambda: self.figures.setCurrentIndex(PART))
         self.by_step.chosen.connect(session.look_at_step)
         self.scan_bar.scope_changed.connect(self.refresh)
         self.scan_steps.told.connect(self._tell_head)
@@ -281,9 +278,11 @@ class ResultsPanel(QWidget):
         self.pinned = None if scan_line == self.pinned else scan_line
         self.session.hover(scan_line)
 
-    def _follow_placing(self) -> None:
-        self.give_up.setEnabled(self.part.placing is not None)
-        self.figures.setCurrentIndex(PART)
+    def give_up(self) -> bool:
+        """Escape: no measure is added after all; False: none was being added."""
+        adding = self.part.placing is not None
+        self.part.cancel()
+        return adding
 
     def choose(self, region: Region | Box) -> None:
         """A range was dragged: of the measure that is being added, else to be told of."""

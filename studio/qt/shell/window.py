@@ -32,6 +32,7 @@ from studio.qt.scene import scene_actions
 from studio.qt.scene.mesh_bar import replace_mesh
 from studio.qt.scene.mesh_importer import choose_meshes, import_meshes
 from studio.qt.shell.command_search import CommandSearch
+from studio.qt.shell.escape import escape
 from studio.qt.shell.file_actions import FileActions
 from studio.qt.shell.help import Help, panel_with_focus
 from studio.qt.shell.memory import return_what_is_free
@@ -292,7 +293,7 @@ class MainWindow(QMainWindow):
         }
         for key, fill in filled.items():
             menus[key].aboutToShow.connect(lambda menu=menus[key], fill=fill: (menu.clear(), fill(menu)))
-        QShortcut(Qt.Key.Key_Escape, self).activated.connect(self._escape)
+        QShortcut(Qt.Key.Key_Escape, self).activated.connect(lambda: escape(self))
         self.status.log_asked.connect(lambda: self.show_panel("log"))
         self.calibrating.began.connect(lambda: self.switch_to("calibrate"))
         files.results_opened.connect(lambda: self.switch_to("measure"))
@@ -305,14 +306,6 @@ class MainWindow(QMainWindow):
         session.vary_asked.connect(self._vary)
         runner.failed.connect(self._tell_failure)
         self._tell_selection()
-
-    def _escape(self) -> None:
-        if self.tour is not None:
-            self.tour.end()
-        elif self.status.job is not None:
-            # it leaves fields, menus and drags: once too often must not cost an hour of work
-            keys = self.commands["cancel"].shortcut().toString()
-            self.session.message.emit("info", f"Esc does not stop the {self.status.job.name}; {keys} does")
 
     def _rename(self) -> None:
         self.show_panel("scene")

@@ -62,3 +62,19 @@ def test_a_render_leaves_the_panels_where_they_are(
         qtbot.keyClick(window, Qt.Key.Key_F5)
         assert {key for key, dock in window.docks.items() if dock.isVisible()} == shown
     assert started == ["render"] * 2
+
+
+def test_escape_gives_up_the_measure_that_is_being_added(window: MainWindow, qtbot: QtBot) -> None:
+    window.switch_to("measure")
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    results: Any = window.panels["results"]
+    part = results.part
+    part.start("angle")
+    part.place(-0.01, -0.005)
+    for focus in (results.profile, results.rows, window):
+        focus.setFocus()
+        qtbot.keyClick(window.focusWidget() or window, Qt.Key.Key_Escape)
+        assert part.placing is None and not any(span.isVisible() for span in part.drawing.spans)
+        part.start("angle")
+    assert not window.session.project.measures
