@@ -11,6 +11,8 @@ from analysis.report.units import micrometres, percent
 from studio.runtime.streams import print_json
 from studio.scan.deviation import Question, compared, write_deviation
 
+ANOTHER_SIZE = 2.0
+"""Times as large or as small as the part: a nominal of the same part is not, in its own unit."""
 MARKS = {"pass": "PASS", "fail": "FAIL", "undecided": "UNDECIDED"}
 
 
@@ -51,6 +53,10 @@ def details(record: dict[str, Any]) -> list[str]:
     """How it was aligned, and what the tolerance says."""
     size = f"Mean {micrometres(record['mean'])}, rms {micrometres(record['rms'])}"
     told = [f"{size}, {micrometres(record['least'])} to {micrometres(record['largest'])}"]
+    times, unit = record["nominal_over_part"], record["nominal_unit"]
+    if not 1.0 / ANOTHER_SIZE < times < ANOTHER_SIZE:
+        doubt = f": is its unit another than {unit}?" if unit else ""
+        told.insert(0, f"The nominal is {times:.3g} times as large as the part{doubt}")
     if record["share_false"]:
         rest = micrometres(record["rms_without_false"])
         false = f"{percent(record['share_false'], 2)} of the points are false, 6 robust sigma from the median"

@@ -91,6 +91,10 @@ class Compared:
     """(3,) from the part to the camera, on the whole."""
     left_out: int
     """Points of other objects."""
+    nominal_unit: Unit | None = None
+    """That its file was read in; None: the part as it was scanned, or a file that tells it."""
+    nominal_over_part: float = 1.0
+    """Diagonals of their boxes."""
 
     @property
     def record(self) -> dict[str, Any]:
@@ -108,6 +112,8 @@ class Compared:
             "format_version": VERSION,
             "part": self.question.part,
             "nominal": "as scanned" if self.question.cad is None else self.question.cad.name,
+            "nominal_unit": self.nominal_unit,
+            "nominal_over_part": self.nominal_over_part,
             "alignment": self.question.alignment,
             "motion": aligned.motion.tolist(),
             "shift": shift.tolist(),
@@ -151,7 +157,15 @@ def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) ->
         raise InputError("the tolerance is empty", found=question.upper, allowed=f"above {question.lower}")
     points = np.column_stack([cloud[name] for name in "xyz"])
     sigma = np.hypot(cloud["sigma_random"], np.nan_to_num(cloud["sigma_systematic"]))
-    vertices, triangles, here = _nominal(root, scene, points, question, float(np.nanmedian(sigma)))
+    vertices, triangles, here, part = _scanned(root, scene, points, question)
+    size, unit = _diagonal(vertices, triangles), None
+    if question.cad is not None and part is not None:
+        own = part.shape.unit if isinstance(part.shape, MeshFile) else "mm"
+        unit = None if is_step(question.cad) else question.cad_unit or own
+        vertices, triangles = _read(question.cad, unit, scene, part, float(np.nanmedian(sigma)))
+    if len(triangles) == 0:
+        raise InputError("there is no nominal surface", where=str(question.cad or root))
+    over_part = _diagonal(vertices, triangles) / size if size > 0.0 else 1.0
     if not here.any():
         raise InputError(
             "no point is of the part", where=question.part or "all objects", cure="name another with --part"
@@ -169,7 +183,7 @@ def compare_cloud(scene: Scene, root: Path, cloud: Cloud, question: Question) ->
         judged = verdicts(made.value, sigma, lower, math.inf if question.upper is None else question.upper)
     columns = {name: cloud[name][here] for name in ("laser", "step", "row")}
     towards = (eyes - points).mean(axis=0)
-    return Compared(made, sigma, judged, columns, question, towards, int(np.count_nonzero(~here)))
+    return Compared(made, sigma, judged, columns, question, towards, int(np.count_nonzero(~here)), unit, over_part)
 
 
 def write_deviation(what: Compared, path: Path, reads: Sequence[Path] = ()) -> list[Path]:
@@ -204,46 +218,46 @@ def map_of(what: Compared) -> DeviationMap:
     return DeviationMap(what.found.points, what.found.value, what.towards, asked.lower, asked.upper)
 
 
-def _nominal(
-    root: Path, scene: Scene, points: Float, question: Question, sigma: float
-) -> tuple[Float, Int, NDArray[np.bool_]]:
-    """Vertices and triangles in the world at step 0, and which points are of them."""
+def _scanned(
+    root: Path, scene: Scene, points: Float, question: Question
+) -> tuple[Float, Int, NDArray[np.bool_], SceneObject | None]:
+    """Vertices and triangles of the part in the world at step 0, which points are of it, and the part itself."""
     world = build_world(scene, root)
     objects = scene.visible_objects
     names = [item.name for item in objects]
     if question.part is None and (question.cad is None or len(objects) == 1):
-        vertices, triangles, here = world.vertices, world.triangles, np.ones(len(points), dtype=np.bool_)
-        part = objects[0] if objects else None
-    else:
-        if question.part not in names:
-            raise InputError("which part is meant?", found=str(question.part), allowed=", ".join(names), cure="--part")
-        index = names.index(question.part)
-        part = objects[index]
-        of = nearest_triangle(points, world.vertices, world.triangles)
-        here = world.object_id[of] == index
-        vertices, triangles = world.vertices, world.triangles[world.object_id == index]
-    if question.cad is not None and part is not None:
-        vertices, triangles = _read(question, scene, part, sigma)
-    if len(triangles) == 0:
-        raise InputError("there is no nominal surface", where=str(question.cad or root))
-    return vertices, np.ascontiguousarray(triangles, dtype=np.int64), here
+        every = np.ones(len(points), dtype=np.bool_)
+        return world.vertices, _whole(world.triangles), every, objects[0] if objects else None
+    if question.part not in names:
+        raise InputError("which part is meant?", found=str(question.part), allowed=", ".join(names), cure="--part")
+    index = names.index(question.part)
+    of = nearest_triangle(points, world.vertices, world.triangles)
+    own = world.triangles[world.object_id == index]
+    return world.vertices, _whole(own), world.object_id[of] == index, objects[index]
 
 
-def _read(question: Question, scene: Scene, part: SceneObject, sigma: float) -> tuple[Float, Int]:
-    """The nominal's file where the part stands."""
-    assert question.cad is not None
+def _diagonal(vertices: Float, triangles: Int) -> float:
+    """Of the box about what has triangles, m."""
+    return float(np.linalg.norm(np.ptp(vertices[np.unique(triangles)], axis=0))) if len(triangles) else 0.0
+
+
+def _whole(triangles: Int) -> Int:
+    return np.ascontiguousarray(triangles, dtype=np.int64)
+
+
+def _read(cad: Path, unit: Unit | None, scene: Scene, part: SceneObject, sigma: float) -> tuple[Float, Int]:
+    """The nominal's file where the part stands; unit: None where the file tells it."""
     matrix = scene.T_world_object(part, 0)
-    if is_step(question.cad):
-        parts = read_step(question.cad, 0.1 * sigma if math.isfinite(sigma) else CHORD)
+    if unit is None:
+        parts = read_step(cad, 0.1 * sigma if math.isfinite(sigma) else CHORD)
         first = np.cumsum([0, *(len(one.vertices) for one in parts)])[:-1]
         local = part.scale * np.concatenate([one.vertices for one in parts])
         triangles = np.concatenate([one.triangles + k for one, k in zip(parts, first, strict=True)])
-        return transform_points(matrix, local), triangles
-    own = part.shape.unit if isinstance(part.shape, MeshFile) else "mm"
-    shape = MeshFile(path=question.cad.name, unit=question.cad_unit or own)
+        return transform_points(matrix, local), _whole(triangles)
+    shape = MeshFile(path=cad.name, unit=unit)
     # of another material: images of the scanned part's would be looked for beside the nominal
-    mesh = load_mesh(SceneObject(name="nominal", shape=shape, scale=part.scale), question.cad.absolute().parent)
-    return transform_points(matrix, mesh.vertices), mesh.triangles
+    mesh = load_mesh(SceneObject(name="nominal", shape=shape, scale=part.scale), cad.absolute().parent)
+    return transform_points(matrix, mesh.vertices), _whole(mesh.triangles)
 
 
 def _eyes(scene: Scene, step: NDArray[np.int32]) -> Float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from PySide6.QtCore import QSize, Qt
@@ -23,7 +24,9 @@ from PySide6.QtWidgets import (
 from analysis.deviation import Alignment
 from analysis.report.deviation_figure import draw
 from render.base.errors import InputError
+from render.scene.shape import Unit
 from studio.commands.deviation import details, sentence
+from studio.project.step_file import is_step
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, ShownDeviation
@@ -57,6 +60,11 @@ class DeviationTab(QWidget):
         self.part = QComboBox()
         self.nominal = ElidedLabel(Qt.TextElideMode.ElideLeft)
         self.choose = text_button("File…", "A CAD file in the part's place: STEP, STL, PLY, OBJ, GLB")
+        self.unit = QComboBox()
+        self.unit.addItem("unit of the part", None)
+        for unit in get_args(Unit):
+            self.unit.addItem("µm" if unit == "um" else unit, unit)
+        self.unit.setToolTip("That the nominal's file is in, which a mesh does not say")
         self.as_scanned = text_button("As scanned", "The part of the scene itself is the nominal")
         self.alignment = QComboBox()
         for key, name in ALIGNMENTS.items():
@@ -105,6 +113,7 @@ class DeviationTab(QWidget):
         self.cad = file
         self.nominal.setText("the part as it was scanned" if file is None else str(file))
         self.as_scanned.setEnabled(file is not None)
+        self.unit.setVisible(file is not None and not is_step(file))
 
     def question(self) -> Question:
         """What is asked. InputError: the spots are no places."""
@@ -114,6 +123,7 @@ class DeviationTab(QWidget):
         return Question(
             part=None if part in ("", ALL) else part,
             cad=self.cad,
+            cad_unit=self.unit.currentData(),
             alignment=alignment,
             datums=_places(self.spots.text()) if alignment == "3-2-1" else (),
             lower=lower,
@@ -218,6 +228,7 @@ class DeviationTab(QWidget):
         self.form = QFormLayout()
         files = QHBoxLayout()
         files.addWidget(self.choose)
+        files.addWidget(self.unit)
         files.addWidget(self.as_scanned)
         files.addStretch(1)
         limits = QHBoxLayout()

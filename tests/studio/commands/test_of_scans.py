@@ -80,6 +80,11 @@ def test_a_nominal_that_is_lower_shifts_every_deviation_until_it_is_fitted(scan:
     one = told("deviation", scan, "--part", part.name, "--align", "best-fit", "--out", tmp_path / "c.csv")
     two = told("deviation", scan, *arguments, "--align", "best-fit", "--out", tmp_path / "d.csv")
     assert two["shift"][2] - one["shift"][2] == pytest.approx(-5e-4, abs=5e-5)
+    assert measured["nominal_unit"] == "mm" and measured["nominal_over_part"] == pytest.approx(1.0, abs=1e-5)
+    inches = ("--part", part.name, "--cad", tmp_path / "nominal.stl", "--unit", "in", "--out", tmp_path / "e.csv")
+    assert told("deviation", scan, *inches)["nominal_over_part"] == pytest.approx(25.4, rel=1e-5)
+    warned = "The nominal is 25.4 times as large as the part: is its unit another than in?"
+    assert warned in call("deviation", scan, *inches).output
 
 
 def polylines(path: Path) -> list[np.ndarray]:

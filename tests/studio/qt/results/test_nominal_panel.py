@@ -71,6 +71,18 @@ def test_the_figures_are_those_of_the_command(
         assert len(list(csv.DictReader(file))) == expected.record["points"]
 
 
+def test_a_mesh_is_read_in_the_unit_that_is_chosen(panel: NominalPanel, tmp_path: Path) -> None:
+    tab = panel.deviation
+    panel.show_tab(tab)
+    assert not tab.unit.isVisible() and tab.question().cad_unit is None
+    tab.take_nominal(tmp_path / "part.stl")
+    assert tab.unit.isVisible() and tab.question().cad_unit is None
+    tab.unit.setCurrentIndex(tab.unit.findData("mm"))
+    assert tab.question().cad_unit == "mm"
+    tab.take_nominal(tmp_path / "part.step")
+    assert not tab.unit.isVisible()
+
+
 def test_spots_that_are_no_places_are_told(panel: NominalPanel) -> None:
     tab = panel.deviation
     assert not tab.spots.isVisible()
