@@ -106,7 +106,9 @@ class Gauge(Model):
         if self.nominal is None and (self.lower is not None or self.upper is not None):
             raise ValueError("lower and upper are deviations from nominal, which is missing; give it, or none of them")
         if self.lower is not None and self.upper is not None and self.lower > self.upper:
-            raise ValueError(f"lower is {self.lower} and upper {self.upper}; allowed: lower is not above upper")
+            factor, unit = {"m": (1e3, "mm"), "rad": (180.0 / math.pi, "deg"), "m2": (1e6, "mm²")}[self.unit]
+            found = f"lower is {factor * self.lower:.6g} {unit} and upper {factor * self.upper:.6g} {unit}"
+            raise ValueError(f"{found}; allowed: lower is not above upper")
         return self
 
     @property

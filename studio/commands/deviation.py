@@ -55,7 +55,7 @@ def details(record: dict[str, Any]) -> list[str]:
     told = [f"{size}, {micrometres(record['least'])} to {micrometres(record['largest'])}"]
     times, unit = record["nominal_over_part"], record["nominal_unit"]
     if not 1.0 / ANOTHER_SIZE < times < ANOTHER_SIZE:
-        doubt = f": is its unit another than {unit}?" if unit else ""
+        doubt = f"; it was read in {unit}, and may be in another unit" if unit else ""
         told.insert(0, f"The nominal is {times:.3g} times as large as the part{doubt}")
     if record["share_false"]:
         rest = micrometres(record["rms_without_false"])

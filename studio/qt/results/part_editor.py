@@ -54,9 +54,12 @@ class PartEditor(QWidget):
             self._make(gauge)
         for name, field in self.fields.items():
             field.show_value(getattr(gauge, name))
-            if name in LIMITS:
-                field.setEnabled(gauge.nominal is not None)
-                field.setToolTip(field.spec.help if field.isEnabled() else NOMINAL_FIRST)
+        self._allow_limits(gauge.nominal is not None)
+
+    def _allow_limits(self, allowed: bool) -> None:
+        for name in LIMITS:
+            self.fields[name].setEnabled(allowed)
+            self.fields[name].setToolTip(self.fields[name].spec.help if allowed else NOMINAL_FIRST)
 
     def _make(self, gauge: Gauge) -> None:
         for i in range(self._grid.count() - 1, -1, -1):
@@ -86,6 +89,9 @@ class PartEditor(QWidget):
             field.setAccessibleName(spec.label)
             field.entered.connect(partial(self._enter, name))
             field.refused.connect(self._tell)
+            if name == "nominal":
+                # while it is typed, so that Tab goes on to them
+                field.textEdited.connect(lambda text: self._allow_limits(bool(text.strip())))
             self._grid.addWidget(label, 0, column)
             self._grid.addWidget(field, 1, column)
             self.fields[name] = field

@@ -37,7 +37,7 @@ def test_a_sigma_as_wide_as_the_tolerance_never_passes() -> None:
         ({"regions": ((0.0, 0.1),)}, "1 of them; allowed for step: 2"),
         ({"regions": ((0.0, 0.1), (0.3, 0.2))}, r"regions\[1\] goes from 0.3 m to 0.2 m"),
         ({"lower": -0.1}, "nominal, which is missing"),
-        ({"nominal": 1.0, "lower": 0.2, "upper": 0.1}, "lower is 0.2 and upper 0.1"),
+        ({"nominal": 1.0, "lower": 0.2, "upper": 0.1}, "lower is 200 mm and upper 100 mm"),
         ({"nominal": math.nan}, "finite number"),
         ({"kind": "volume"}, "kind"),
     ],

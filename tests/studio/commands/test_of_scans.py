@@ -83,7 +83,7 @@ def test_a_nominal_that_is_lower_shifts_every_deviation_until_it_is_fitted(scan:
     assert measured["nominal_unit"] == "mm" and measured["nominal_over_part"] == pytest.approx(1.0, abs=1e-5)
     inches = ("--part", part.name, "--cad", tmp_path / "nominal.stl", "--unit", "in", "--out", tmp_path / "e.csv")
     assert told("deviation", scan, *inches)["nominal_over_part"] == pytest.approx(25.4, rel=1e-5)
-    warned = "The nominal is 25.4 times as large as the part: is its unit another than in?"
+    warned = "The nominal is 25.4 times as large as the part; it was read in in, and may be in another"
     assert warned in call("deviation", scan, *inches).output
 
 

@@ -160,6 +160,23 @@ def test_a_tolerance_needs_its_nominal(panel: ResultsPanel, qtbot: QtBot) -> Non
     assert (changed.name, changed.nominal, changed.lower) == ("ground", 0.0, pytest.approx(-1e-4))
 
 
+def test_tab_goes_from_the_nominal_on_to_its_tolerances(panel: ResultsPanel, qtbot: QtBot) -> None:
+    with_a_step(panel.session)
+    panel.figures.setCurrentIndex(PART)
+    panel.part.table.selectRow(0)
+    fields = panel.part.editor.fields
+    panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)
+    fields["nominal"].setFocus()
+    for text in ("4", "-0.01", "0.02"):
+        focused = panel.focusWidget()
+        focused.selectAll()
+        qtbot.keyClicks(focused, text)
+        qtbot.keyClick(focused, Qt.Key.Key_Tab)
+    made = panel.session.project.measures[0]
+    assert (made.nominal, made.lower, made.upper) == pytest.approx((0.004, -1e-5, 2e-5))
+
+
 def test_a_drag_over_rows_tells_of_their_errors_and_writes_their_points(
     panel: ResultsPanel, qtbot: QtBot, tmp_path: Path
 ) -> None:
