@@ -23,11 +23,11 @@ from studio.project.date_and_time import now
 from studio.project.input_files import input_files, input_hashes
 from studio.project.project import Project
 from studio.scan.cautions import Cautions
+from studio.scan.image_lacks import image_lacks
 from studio.scan.own_files import check_not_read, check_replaceable
 from studio.scan.remarks import Measurements, best, frame_result
 from studio.scan.results import report_input
 from studio.scan.run_record import run_text
-from studio.scan.speckle_remark import speckle_remark
 from studio.scan.summary import summarise
 
 
@@ -70,8 +70,8 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     cautions.look(what.frame, what.frame.warnings)
     result = frame_result(what.project, what.frame, what.measurements, what.images)
     with closing(record_of(what.project.scene, [result])) as record:
-        speckle = speckle_remark(what.project, best(what.measurements, what.project))
-        notes = [*cautions.notes(summarise(record)), *filter(None, [speckle])]
+        lacks = image_lacks(what.project, best(what.measurements, what.project))
+        notes = [*cautions.notes(summarise(record)), *lacks.values()]
         data = report_input(
             what.project.in_folder(what.root),
             first,

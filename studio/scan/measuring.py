@@ -21,10 +21,10 @@ from render.world.world import World
 from studio.project.date_and_time import now
 from studio.project.project import Project
 from studio.scan.gauging import write_measures
+from studio.scan.image_lacks import image_lacks
 from studio.scan.remarks import result_remarks
 from studio.scan.results import compared_methods, measure_frame, report_input
 from studio.scan.spacetime_window import Passing, Sweep, Taken
-from studio.scan.speckle_remark import speckle_remark
 from studio.scan.stages import Clock
 
 IMAGES_KEPT = 16
@@ -61,8 +61,8 @@ class Measuring:
         self._compared: tuple[Method, ...] | None = None
         self._shown = set(np.linspace(0, count - 1, min(count, IMAGES_KEPT)).astype(int).tolist())
         self._compare_all = compare_all
-        self.speckle = ""
-        """What it would do, by the first frame with a line."""
+        self.lacks: dict[str, str] = {}
+        """As of `image_lacks`, by the first frames that tell."""
         self._last = count - 1 if report else None
         self._drawing: Drawing | None = None
 
@@ -93,9 +93,8 @@ class Measuring:
             )
             if self._compared is None:
                 self._compared = compared_methods(result)
-            self.speckle = self.speckle or speckle_remark(
-                self._project, [laser.extractions[0] for laser in result.lasers]
-            )
+            chosen = [laser.extractions[0] for laser in result.lasers]
+            self.lacks = image_lacks(self._project, chosen, self.lacks)
             for i, laser in enumerate(result.lasers):
                 best = laser.extractions[0]
                 self._points.add(cloud(best.points, best.errors, i, result.step, self._project.scene))
@@ -120,7 +119,7 @@ class Measuring:
     def remarks(self) -> list[str]:
         """What the results say beyond themselves, and images that the chooser did not judge."""
         unlike = [note for note in self.notes() if UNLIKE in note]
-        return [*result_remarks(self.record), *unlike, *filter(None, [self.speckle])]
+        return [*result_remarks(self.record), *unlike, *self.lacks.values()]
 
     def write_points(self, out: Path) -> list[Path]:
         """points.ply and points.csv of all frames and lasers, by the project's method, at the first step's pose.
@@ -154,7 +153,7 @@ class Measuring:
             world,
             self.record,
             self._clock.seconds,
-            notes=[*notes, *filter(None, [self.speckle]), *self.notes()],
+            notes=[*notes, *self.lacks.values(), *self.notes()],
             created=created or now(),
             image_scale=image_scale,
             run=run,

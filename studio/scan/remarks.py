@@ -14,7 +14,7 @@ from render.frame import Frame
 from render.sensor.develop import Image
 from studio.project.project import Project
 from studio.scan.gauging import patches, readings
-from studio.scan.speckle_remark import speckle_remark
+from studio.scan.image_lacks import image_lacks
 from studio.scan.stages import Measurement
 
 __all__ = ["best", "frame_remarks", "frame_result", "result_remarks", "scale_head", "scale_name", "scale_notes"]
@@ -37,8 +37,8 @@ def scale_notes(image_scale: float) -> tuple[str, ...]:
 def frame_remarks(project: Project, frame: Frame, measurements: Measurements) -> list[str]:
     """What was odd about a frame, and what its errors say beyond themselves; nothing where all is as it should be."""
     with closing(record_of(project.scene, [frame_result(project, frame, measurements)])) as record:
-        speckle = speckle_remark(project, best(measurements, project))
-        said = [*result_remarks(record), *filter(None, [speckle])]
+        lacks = image_lacks(project, best(measurements, project))
+        said = [*result_remarks(record), *lacks.values()]
         of_all = [OF_ALL_LASERS] if said and len(project.scene.lasers) > 1 else []
         return [*frame.warnings, *of_all, *said]
 

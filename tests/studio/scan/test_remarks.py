@@ -12,8 +12,10 @@ from analysis.report.summary import remarks
 from analysis.report.total import total
 from render.base.errors import InputError
 from render.world.world import build_world
+from studio.project.document import replaced
 from studio.project.project import Project
 from studio.project.templates import template_folder
+from studio.scan.image_lacks import image_lacks
 from studio.scan.remarks import best, frame_remarks, frame_result, scale_head, scale_notes
 from studio.scan.speckle_remark import speckle_remark
 from studio.scan.stages import Clock, develop_step, measure_step, render_step, scaled
@@ -65,3 +67,25 @@ def test_speckle_that_the_sensor_leaves_out_is_told_with_its_size() -> None:
     foretold = float(re.search(r"by about ([\d.]+)", told["off"])[1]) * 1e-6
     # 3 standard errors of the robust sigma of 2,000 rows, of which two or three at a time share grains
     assert foretold == pytest.approx(scatter["polarised"], rel=0.1) and foretold > 3.0 * scatter["off"]
+
+
+def test_blur_that_the_image_leaves_out_is_told_with_its_size() -> None:
+    """A disc of diameter D has a sigma of D / 4 across the line."""
+    folder = template_folder("plane")
+    project = Project.load(folder / "project.json")
+    direct = project.render.model_copy(update={"ambient_samples": 1, "transport": "direct", "truth_images": True})
+    project = project.model_copy(update={"render": direct})
+    lens = ("scene", "rig", "camera", "lens", "focus_distance")
+    world, clock = build_world(project.scene, folder, 0), Clock(lambda *_: None, lambda: False)
+    width, told = {}, {}
+    for focus, defocus in ((0.8663, False), (0.5, False), (0.5, True)):
+        made = replaced(project, lens, focus)
+        made = made.model_copy(update={"sensor": made.sensor.model_copy(update={"defocus": defocus})})
+        frame = render_step(made, world, 0, clock)
+        (one,) = measure_step(made, frame, world, develop_step(made, frame, clock, None), clock, None, "likelihood")
+        width[focus, defocus] = float(np.nanmedian(one.line.width))
+        told[focus, defocus] = image_lacks(made, [one], {"speckle": "known"})
+    assert told[0.8663, False] == told[0.5, True] == {"speckle": "known"}
+    foretold = float(re.search(r"blurred by ([\d.]+) px", told[0.5, False]["defocus"])[1])
+    blur = np.sqrt(width[0.5, True] ** 2 - width[0.5, False] ** 2)
+    assert foretold == pytest.approx(4.0 * blur, rel=0.1) and foretold > 4.0
