@@ -336,9 +336,8 @@ class MainWindow(QMainWindow):
         # lays it out again after another state has freed the docks' places in it
         self.switch_to(values.workspace)
         geometry = unsealed(values.geometry)
-        if geometry is not None:
-            self.restoreGeometry(geometry)
-        else:
+        # of a screen that was much larger, or smaller, Qt restores nothing
+        if geometry is None or not self.restoreGeometry(geometry):
             self._fit_screen()
 
     def _fit_screen(self) -> None:

@@ -27,6 +27,7 @@ from studio.runtime.jobs import Progress
 from studio.study.draft import Data, by_names, finished, new_draft, path_text, suggested, varies_nothing
 from studio.study.estimate import Costs, Estimate, costs, estimate
 from studio.study.folder_run import Found, in_window, opened, run_into
+from studio.study.kept_draft import keep_draft, kept_draft
 from studio.study.study import Study, base_project
 
 REST_MS = 250
@@ -62,7 +63,7 @@ class StudyWork(LongWork):
         """Someone looks at the estimate."""
         self.loaded: dict[str, Project] = {}
         """Base projects of a study that came from a file; empty: it is of the open project."""
-        self.draft: Data = new_draft(self.base_name)
+        self.draft: Data = self._begun()
         self.chosen = 0
         """The sweep that is edited and whose chart is shown."""
         self.found: Found | None = None
@@ -120,6 +121,7 @@ class StudyWork(LongWork):
         if draft != self.draft:
             self.draft = draft
             self.chosen = min(self.chosen, len(draft["sweeps"]) - 1)
+            self._keep()
             self.draft_changed.emit()
             self._rest.start()
 
@@ -159,6 +161,7 @@ class StudyWork(LongWork):
     def start_anew(self) -> None:
         """An empty study of the open project."""
         self._take({}, new_draft(self.base_name))
+        self._keep()
 
     def load(self, path: Path | str) -> None:
         """A study's file, or a ready-made one by its name, with its own base projects."""
@@ -268,6 +271,7 @@ class StudyWork(LongWork):
             self._read(folder, as_it_is=True)
 
     def close(self) -> None:
+        self._keep()  # the project may have become a file since the last change
         self._rest.stop()
         self.unseen.close()
 
@@ -346,7 +350,17 @@ class StudyWork(LongWork):
         if self.running or self.found is not None:
             self.loaded = dict(self.found.bases) if self.found is not None else self._run_bases
         else:
-            self.start_anew()
+            self._take({}, self._begun())
+
+    def _begun(self) -> Data:
+        """The study of the open project as it was left, else an empty one."""
+        path = self.session.document.path
+        return (kept_draft(path, self.base_name) if path is not None else None) or new_draft(self.base_name)
+
+    def _keep(self) -> None:
+        path = self.session.document.path
+        if path is not None and not self.loaded:
+            keep_draft(path, self.draft)
 
     def _base_from(self, folder: Path, study: Study) -> str:
         """How a study's file in a folder calls its base. InputError: no path leads there."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QByteArray, QSize, Qt
 from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -30,7 +30,8 @@ from studio.qt.core.session import Render, one_of
 from studio.qt.core.widgets import ElidedLabel
 from studio.qt.shell.shortcuts import CheatSheet
 from studio.qt.shell.window import MainWindow
-from studio.qt.shell.workspaces import WORKSPACES
+from studio.qt.shell.workspaces import WORKSPACES, sealed
+from studio.runtime.preferences import PreferencesFile
 from tests.studio.qt.conftest import new_window
 from tests.studio.qt.small_session import FOLDER, small_project, small_render
 
@@ -218,10 +219,14 @@ def test_the_cheat_sheet_fits_its_screen(
     assert screen[0] < 1280 or sheet.size() == page
 
 
+@pytest.mark.parametrize("kept", [False, True])
 @pytest.mark.parametrize(("screen", "maximized"), [(QSize(1366, 768), True), (QSize(1920, 1200), False)])
-def test_the_first_window_fits_its_screen(
-    screen: QSize, maximized: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_window_fits_its_screen_where_nothing_of_an_earlier_one_is_restored(
+    screen: QSize, maximized: bool, kept: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """kept: of a screen so different that Qt refuses it."""
+    if kept:
+        PreferencesFile(tmp_path / "config").change(geometry=sealed(QByteArray(b"of another screen")))
     monkeypatch.setattr(MainWindow, "screen", lambda _: SimpleNamespace(availableSize=lambda: screen))
     made = new_window(tmp_path, "plane")
     assert made.isMaximized() == maximized

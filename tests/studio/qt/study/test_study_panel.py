@@ -295,3 +295,18 @@ def test_the_rings_stand_where_the_figure_has_its_marks(desk: Desk) -> None:
         answer = Answer(sweep, spots, None, ())
         drawn = [line.get_xydata() for line in chart(answer, {}).axes[0].lines if len(line.get_xydata()) == 2]
         assert any(np.allclose(np.sort(marks, axis=0), np.sort(places(answer), axis=0)) for marks in drawn)
+
+
+def test_a_study_that_was_not_run_is_there_when_the_project_is_opened_again(desk: Desk, tmp_path: Path) -> None:
+    desk.small([1.0, 2.0])
+    left = desk.work.draft
+    desk.session.replace_document(Document(Project.load(template_folder("sphere"))))
+    assert not desk.work.sweep["vary"]
+    file = tmp_path / "plane.json"
+    desk.session.replace_document(Document(Project.load(file), file))
+    assert desk.work.draft == left
+    again = Session(Document(Project.load(file), file))
+    work = one_of(StudyWork, again)
+    assert work.draft == left
+    work.close()
+    live(again).close()
