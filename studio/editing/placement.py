@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 USUAL_DISTANCE = 0.5
 NEAR, FAR = 0.02, 50.0
+STAGE_STEP = 0.001
+"""m between two frames of a new stage."""
 FREE = 0.02
 """m; lasers nearer to each other than this stand in each other's way."""
 
@@ -45,6 +47,17 @@ def field_of_view(scene: Scene) -> float:
     """The smaller side of what the camera sees at the working distance, m."""
     camera = scene.camera
     return working_distance(scene) * min(camera.width / camera.fx, camera.height / camera.fy)
+
+
+def across_the_line(scene: Scene) -> Vector3:
+    """A step (m) of a stage, along the level axis of the world that most crosses the first laser's sheet.
+
+    A stage that runs along the line scans the same profile again and again.
+    """
+    if not scene.lasers:
+        return STAGE_STEP, 0.0, 0.0
+    x, y = np.abs(scene.T_world_laser(0)[:2, 0])
+    return (STAGE_STEP, 0.0, 0.0) if x > y else (0.0, STAGE_STEP, 0.0)
 
 
 def object_pose(scene: Scene, flat: bool = False) -> Pose:

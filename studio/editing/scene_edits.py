@@ -19,6 +19,7 @@ from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile, Parametric, Plane
 from studio.editing.placement import (
     Array,
+    across_the_line,
     field_of_view,
     light_pose,
     new_laser,
@@ -203,6 +204,8 @@ def set_motion(project: Project, kind: type[BaseModel]) -> Result:
 
     assert kind in (NoMotion, LinearStage, Turntable, PoseList)
     motion = start_value(Alternative("", "", kind), project.scene.motion)
+    if isinstance(motion, LinearStage) and not isinstance(project.scene.motion, LinearStage):
+        motion = motion.model_copy(update={"step": across_the_line(project.scene)})
     return replaced(project, ("scene", "motion"), motion), ("scene", "motion")
 
 

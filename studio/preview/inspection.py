@@ -316,10 +316,10 @@ def _warnings(project: Project, views: tuple[LaserView, ...], laser_power: Seque
         if view.ambient_saturated is not None and view.ambient_saturated > 0.01:
             found.append(
                 f"{view.name}: the ambient light alone saturates {view.ambient_saturated:.0%} of the line; shorten "
-                "sensor.exposure_time, add a band-pass filter, or darken the lamps"
+                "the exposure time, add a band-pass filter, or darken the lamps"
             )
         if view.saturated is not None and view.saturated > 0.01:
-            found.append(f"{view.name}: {view.saturated:.0%} of the line saturates; shorten sensor.exposure_time")
+            found.append(f"{view.name}: {view.saturated:.0%} of the line saturates; shorten the exposure time")
         if view.light_electrons is not None and view.light_electrons < DIM_ELECTRONS:
             power = project.scene.lasers[i].power if laser_power is None else laser_power[i]
             found.append(f"{view.name}: {_why_dim(project, i, power, view.light_electrons)}")

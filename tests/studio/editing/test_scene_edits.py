@@ -178,6 +178,15 @@ class TestLists:
             assert made.scene.motion.moves == moves
         assert scene_edits.set_motion(project, NoMotion)[0].scene.frame_count == 1
 
+    @pytest.mark.parametrize("template", ["sphere", "v_groove", "step_block", "weld_seam"])
+    def test_a_new_stage_moves_across_the_line(self, template: str) -> None:
+        still = scene_edits.set_motion(Project.load(template_folder(template) / "project.json"), NoMotion)[0]
+        made, path = scene_edits.set_motion(still, LinearStage)
+        step, normal = np.array(made.scene.motion.step), made.scene.T_world_laser(0)[:3, 0]  # type: ignore[union-attr]
+        assert abs(step @ normal) > 0.6 * np.linalg.norm(step) == pytest.approx(0.6e-3)
+        slower = replaced(made, (*path, "step"), (0.0, 0.0, 0.0005))
+        assert scene_edits.set_motion(slower, LinearStage)[0] == slower
+
 
 class TestMeshImport:
     def mesh(self, file: Path, size: tuple[float, float, float] = (0.1, 0.2, 0.05)) -> Path:
