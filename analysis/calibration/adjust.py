@@ -26,6 +26,8 @@ ROUNDING = 1e-9
 """Of chi-square: what a step may add by rounding alone."""
 SINGULAR = 1e-13
 """Smallest eigenvalue of the scaled normal matrix at which its parameters count as determined."""
+OPEN_POSE, LEAST_POSE = 1e-12, 1e-9
+"""Added to the scaled information on a pose, and least of it that is scaled: so little that no known pose feels it."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,11 @@ def view_information(seen: Observations, estimate: Estimate, start: Float | None
     normal, at_corners, at_lasers, _ = _normal(seen, estimate, everything, None, start)
     assert len(normal.pose) == seen.count
     own = np.stack([a.T @ a + b.T @ b for a, b in _by_view(seen, at_corners, at_lasers, "by_shared")])
-    return own - normal.mixed.transpose(0, 2, 1) @ np.linalg.solve(normal.pose + 1e-9 * np.eye(6), normal.mixed)
+    # a view that leaves its pose open in some direction says nothing by way of it; turns and shifts have other sizes
+    size = np.sqrt(np.maximum(np.diagonal(normal.pose, axis1=1, axis2=2), LEAST_POSE))[:, :, None]
+    pose = normal.pose / (size * size.transpose(0, 2, 1)) + OPEN_POSE * np.eye(6)
+    mixed = normal.mixed / size
+    return own - mixed.transpose(0, 2, 1) @ np.linalg.solve(pose, mixed)
 
 
 def leverage(seen: Observations, solution: Solution, first: Index, second: Index) -> Float:

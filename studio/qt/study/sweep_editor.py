@@ -41,6 +41,7 @@ SAMPLINGS = [
     ("Quasi-random", "sobol", "Spread evenly over the ranges (Sobol)"),
     ("Search the limit", "bisection", "Where the limit is crossed, from the first end, where it holds, to the other"),
     ("Search a boundary", "boundary", "Where the limit is crossed in a map: along the second field, over the first"),
+    ("Each effect", "effects", "What makes the depth error: every effect switched off, and switched on alone"),
 ]
 CHARTS = [
     ("Over the first field", "sweep", "A line for each method and each combination of the other fields"),
@@ -48,6 +49,7 @@ CHARTS = [
     ("Map of two fields", "map", "Of the first method, with the limit as a line"),
     ("The line itself", "profile", "Positions, depths and their errors along the line, of the first repeat"),
     ("Images", "pictures", "Side by side, of the first repeat and method"),
+    ("Error budget", "budget", "What each effect makes of bias and spread"),
 ]
 TOLERANCE, SAMPLES = 0.05, 16
 
@@ -139,7 +141,8 @@ class SweepEditor(QWidget):
             self._show_parameters()
 
     def _show_parameters(self) -> None:
-        work, vary = self.work, self.work.sweep["vary"]
+        work, effects = self.work, self.work.sweep.get("sampling") == "effects"
+        vary = [] if effects else work.sweep["vary"]
         structure = work.chosen, [(one["field"], kind_of(one)) for one in vary], id(work.loaded)
         if structure != self._structure:
             self._structure = structure
@@ -156,7 +159,8 @@ class SweepEditor(QWidget):
         for row, parameter in zip(self.rows, vary, strict=True):
             row.refresh(parameter)
             row.allow_count(work.sweep.get("sampling", "grid") in ("grid", "boundary"))
-        self.hint.setVisible(not vary)
+        self.hint.setVisible(not vary and not effects)
+        self.add.setVisible(not effects)
 
     def _remove(self, number: int) -> None:
         vary = self.work.sweep["vary"]
@@ -198,6 +202,11 @@ class SweepEditor(QWidget):
         values: dict[str, Any] = {"sampling": sampling}
         values["samples"] = self.work.sweep.get("samples", SAMPLES) if sampling == "sobol" else None
         values["tolerance"] = self.work.sweep.get("tolerance", TOLERANCE) if sampling == "bisection" else None
+        if "effects" in (
+            sampling,
+            self.work.sweep.get("sampling"),
+        ):  # no fields, with a chart of their own
+            values |= {"vary": [], "chart": "budget" if sampling == "effects" else "sweep"}
         if sampling == "boundary":
             values["chart"] = "map"
         if sampling in ("bisection", "boundary") and "limit" not in self.work.sweep:

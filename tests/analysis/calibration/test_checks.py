@@ -241,6 +241,16 @@ def test_information_of_views_adds_up_to_that_of_all() -> None:
     np.testing.assert_allclose(view_information(seen, there).sum(axis=0), whole, atol=1e-6 * np.abs(whole).max())
 
 
+def test_views_that_leave_their_poses_open_tell_nothing_and_are_no_fault() -> None:
+    """A place for the next board may have a single corner in the image: no calibration must end there."""
+    there = truth(1, 24, lasers=1)
+    seen = gather(views_of(there), EXTENT)
+    alone = np.isin(np.arange(len(seen.view)), np.searchsorted(seen.view, np.arange(seen.count)) + 3)
+    single = replace(seen, whitening=8.0 * seen.whitening * alone[:, None, None], laser_weight=0.0 * seen.laser_weight)
+    told, whole = view_information(single, there), view_information(seen, there)
+    assert np.abs(told).max() < 1e-3 * np.abs(whole).max()
+
+
 def test_the_whole_way_tells_what_to_photograph_where_nothing_can_be_found() -> None:
     there = truth(12, 20, tilt=(0.0, 0.5), depth=(0.85, 0.851), lasers=1)
     views = noisy(views_of(there, laser_step=64), np.random.default_rng(13))

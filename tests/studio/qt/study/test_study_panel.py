@@ -27,6 +27,7 @@ from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
 from studio.study.draft import VALUES
 from studio.study.store import FILE
+from studio.study.study import ready_made
 
 NOISE = ("sensor", "read_noise")
 POWER = ("scene", "rig", "lasers", 0, "power")
@@ -144,6 +145,30 @@ class TestDraft:
         desk.work.change_sweep(sampling="bisection")
         desk.work.look_ahead()
         assert desk.panel.problem.text().startswith("Sweep 1: bisection takes ranges")
+
+    @pytest.mark.parametrize("name", ready_made())
+    def test_every_ready_made_study_is_shown_as_it_is(self, desk: Desk, qtbot: QtBot, name: str) -> None:
+        """With the one before it still there: a form that stops half way shows some of both."""
+        desk.small([1.0, 2.0])
+        desk.work.load(name)
+        editor = desk.panel.editor
+        for number, sweep in enumerate(desk.work.study().sweeps):
+            desk.work.choose_sweep(number)
+            shown = [field.values[field.currentIndex()] for field in (editor.sampling, editor.chart, editor.measure)]
+            assert shown == [sweep.sampling, sweep.chart, sweep.measure]
+            assert len(editor.rows) == (0 if sweep.sampling == "effects" else len(sweep.vary))
+        qtbot.waitUntil(lambda: desk.work.estimate is not None or desk.work.problem != "")
+        assert desk.work.problem == "" == desk.work.failure
+
+    def test_effects_are_chosen_and_left_again(self, desk: Desk) -> None:
+        desk.small([1.0, 2.0])
+        editor = desk.panel.editor
+        desk.work.change(lambda draft: draft.update(repeats=3))
+        editor.sampling.entered.emit("effects")
+        (sweep,) = desk.work.study().sweeps
+        assert (sweep.sampling, sweep.chart) == ("effects", "budget") and not editor.add.isVisible()
+        editor.sampling.entered.emit("grid")
+        assert desk.work.sweep["vary"] == [] and desk.work.sweep["chart"] == "sweep" and editor.add.isVisible()
 
     def test_a_ready_made_study_comes_with_its_own_base(self, qtbot: QtBot, desk: Desk) -> None:
         desk.work.load("quick")
