@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from PySide6.QtWidgets import QApplication
 
+from studio.project.input_files import input_files
+from studio.project.templates import FOLDER
 from studio.qt.core.session import Render, Session
 
 
-def copy_as_python(session: Session, render: Render | None) -> None:
-    """render: None where nothing is rendered yet; the lines render the project as it is then."""
+def copy_shown(session: Session) -> None:
+    """The render that is shown, or the project as it is now where the scene has changed since."""
+    shown = session.shown
+    if shown is not None and not shown.cell and shown.is_stale(session.project):
+        copy_as_python(session, None, ": the project as it is now, which has changed since the render")
+    else:
+        copy_as_python(session, shown)
+
+
+def copy_as_python(session: Session, render: Render | None, said: str = "") -> None:
+    """render: None where nothing is rendered yet; the lines render the project as it is then. said: after the count."""
     from studio.notebook.python_lines import Work, python_lines, scan_lines
 
     document = session.document
@@ -31,4 +44,14 @@ def copy_as_python(session: Session, render: Render | None) -> None:
             )
         text = python_lines(work)
     QApplication.clipboard().setText(text)
-    session.message.emit("info", f"Copied {len(text.splitlines())} lines of Python")
+    told = f"Copied {len(text.splitlines())} lines of Python{said}"
+    if document.path is None and input_files(session.project.scene, document.root) and not _is_template(document.root):
+        session.message.emit(
+            "warning", f"{told}. Its meshes and textures go with the window until it is saved: save it, then copy again"
+        )
+        return
+    session.message.emit("info", told)
+
+
+def _is_template(root: Path) -> bool:
+    return root.parent == FOLDER

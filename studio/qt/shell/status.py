@@ -54,7 +54,8 @@ class StatusBar(QStatusBar):
         self.whole.clicked.connect(self.whole.hide)
         self.plan = QLabel()
         self.plan.setObjectName("muted")
-        for widget in (self.work, self.bar, self.left, self.pause, self.cancel):
+        # the buttons first: texts that come and go beside them must not move them from under the mouse
+        for widget in (self.pause, self.cancel, self.bar, self.work, self.left):
             self.addWidget(widget)
         self.addWidget(self.text, 1)
         self.addPermanentWidget(self.plan)

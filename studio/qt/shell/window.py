@@ -25,7 +25,7 @@ from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import Scrolled, room_for_a_window
 from studio.qt.forms.fields import leave_typing
-from studio.qt.render.python_copy import copy_as_python
+from studio.qt.render.python_copy import copy_shown
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
 from studio.qt.scene import scene_actions
@@ -255,7 +255,7 @@ class MainWindow(QMainWindow):
             "delete": lambda: scene_actions.remove(session),
             "rename": self._rename,
             "hide": lambda: scene_actions.toggle_visible(session),
-            "copy_python": lambda: copy_as_python(session, session.shown),
+            "copy_python": lambda: copy_shown(session),
             "deselect": lambda: session.select(()),
             "import_mesh": lambda: choose_meshes(session, self),
             "replace_mesh": lambda: replace_mesh(session, self),

@@ -8,7 +8,9 @@ from PySide6.QtGui import QStatusTipEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from render.base.threads import Cancel
 from studio.qt.shell.window import MainWindow
+from studio.runtime.jobs import Progress
 
 
 def show_tip(window: MainWindow, text: str) -> None:
@@ -40,3 +42,24 @@ def test_what_is_said_after_a_tip_is_read_and_no_tip_hides_a_warning(window: Mai
     window.session.message.emit("info", "Saved.")
     show_tip(window, "Pause")
     assert window.status.text.text() == "Pause"
+
+
+def test_the_buttons_stay_where_they_are_while_texts_come_and_go(window: MainWindow, qtbot: QtBot) -> None:
+    """Who aimed at Cancel hit Pause."""
+    status, go, done = window.status, Event(), Event()
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        progress("plan", 0.0)
+        go.wait(60)
+        progress("reflected light of the laser, frame 3 of 8", 0.6)
+        done.wait(60)
+
+    window.runner.run("render", "render", work)
+    qtbot.waitUntil(status.cancel.isVisible)
+    before = status.pause.pos(), status.cancel.pos()
+    go.set()
+    qtbot.waitUntil(lambda: "frame 3" in status.work.text() and status.left.text() != "")
+    qtbot.wait(20)
+    assert (status.pause.pos(), status.cancel.pos()) == before
+    done.set()
+    qtbot.waitUntil(lambda: not status.bar.isVisible())
