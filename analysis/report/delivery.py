@@ -24,16 +24,22 @@ class Delivery(Model):
         "", label="Logo", help="An image in the project's folder, PNG or JPEG: its path from there.", max_length=1000
     )
     lower: float | None = quantity(
-        None, unit="m", label="Surface from", help="Tolerance of the surface's deviation.", ge=-1.0, le=1.0
+        None,
+        unit="m",
+        label="Surface from",
+        help="Tolerance of the surface's deviation, as of too little material: below 0 for most parts.",
+        ge=-1.0,
+        le=1.0,
     )
-    upper: float | None = quantity(None, unit="m", label="Surface to", help="Its upper limit.", ge=-1.0, le=1.0)
+    upper: float | None = quantity(
+        None, unit="m", label="Surface to", help="Its upper limit; empty: there is none.", ge=-1.0, le=1.0
+    )
 
     @model_validator(mode="after")
     def _tolerance_is_one(self) -> Self:
-        if (self.lower is None) != (self.upper is None):
-            raise ValueError("a tolerance of the surface has two limits; give lower and upper, or none of them")
         if self.lower is not None and self.upper is not None and not self.upper > self.lower:
-            raise ValueError(f"lower is {self.lower} and upper {self.upper}; allowed: upper is above lower")
+            found = f"lower is {1e3 * self.lower:.6g} mm and upper {1e3 * self.upper:.6g} mm"
+            raise ValueError(f"{found}; allowed: upper is above lower")
         return self
 
     @property
@@ -43,5 +49,5 @@ class Delivery(Model):
 
     @property
     def has_tolerance(self) -> bool:
-        """Of the surface."""
-        return self.lower is not None and self.upper is not None
+        """Of the surface, with one limit or two."""
+        return self.lower is not None or self.upper is not None

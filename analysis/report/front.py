@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -78,11 +79,14 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         ("Mean deviation", micrometres(float(value.mean()), 2)),
         ("95 % of the points deviate less than", micrometres(float(np.percentile(np.abs(value), 95.0)))),
     ]
-    if told.lower is None or told.upper is None:
+    if not told.has_tolerance:
         return {"verdict": "", "mark": "", "rows": table}
-    judged = verdicts(value, _sigma(rows), told.lower, told.upper)
+    lower = -math.inf if told.lower is None else told.lower
+    upper = math.inf if told.upper is None else told.upper
+    judged = verdicts(value, _sigma(rows), lower, upper)
     shares = {key: float(np.mean(judged == key)) for key in (WITHIN, UNDECIDED, ABOVE, BELOW)}
-    limits = f"{1e6 * told.lower:+.4g} / {1e6 * told.upper:+.4g}\u00a0µm"
+    ends = ["none" if limit is None else f"{1e6 * limit:+.4g}" for limit in (told.lower, told.upper)]
+    limits = f"{' / '.join(ends)}\u00a0µm"
     table += [
         ("Tolerance", limits),
         ("Proved within", percent(shares[WITHIN], 2)),

@@ -6,7 +6,7 @@ import re
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QLineEdit, QWidget
+from PySide6.QtWidgets import QDialogButtonBox, QFileDialog, QLineEdit, QMessageBox, QWidget
 
 from studio.qt.core.dialogs import show_trouble
 from studio.runtime.error_messages import trouble
@@ -58,3 +58,27 @@ def ask_results_folder(parent: QWidget, title: str, place: Path, name: str) -> P
     chosen = dialog.selectedFiles()[0] if dialog.exec() else ""
     dialog.deleteLater()
     return Path(chosen) if chosen else None
+
+
+def unused_name(place: Path, name: str) -> str:
+    """The name itself, or with the next number under which there is nothing yet."""
+    name, number = readable_folder(name), 2
+    unused = name
+    while (place / unused).exists():
+        unused, number = f"{name} {number}", number + 1
+    return unused
+
+
+def may_replace_scan(parent: QWidget | None, folder: Path) -> bool:
+    """What a folder holds of an earlier scan goes when another one begins there: the person is asked first."""
+    box = QMessageBox(
+        QMessageBox.Icon.Warning, "Replace the scan", f"Replace the scan in “{folder.name}”?", parent=parent
+    )
+    box.setObjectName("replace")
+    box.setInformativeText(
+        f"Its frames, points and report are deleted as soon as the new one begins, and cannot be had back:\n{folder}"
+    )
+    replace = box.addButton("Replace", QMessageBox.ButtonRole.DestructiveRole)
+    box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
+    box.exec()
+    return box.clickedButton() is replace

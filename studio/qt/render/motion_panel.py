@@ -26,7 +26,7 @@ from render.scene.motion import LinearStage, NoMotion, Turntable
 from studio.editing.scene_edits import set_motion
 from studio.project.document import Document
 from studio.project.project import Project
-from studio.qt.core.folders import ask_results_folder
+from studio.qt.core.folders import ask_results_folder, may_replace_scan, unused_name
 from studio.qt.core.jobs import BUSY, RENDER, JobRunner
 from studio.qt.core.open_file import open_file
 from studio.qt.core.scan_steps import scan_steps
@@ -36,7 +36,7 @@ from studio.runtime.console import FRAMES, frame_of
 from studio.runtime.jobs import Job, Progress
 from studio.scan.options import Listener, ScanOptions
 from studio.scan.scan_folder import open_folder
-from studio.scan.scan_results import is_unfinished
+from studio.scan.scan_results import holds_scan, is_unfinished
 from studio.scan.stages import scaled
 
 if TYPE_CHECKING:
@@ -114,8 +114,12 @@ class MotionPanel(QWidget):
         """Ask for the folder of the results, then run the scan."""
         start = self.session.document.path
         place = start.parent if start is not None else Path.home()
-        chosen = ask_results_folder(self, "Folder for the scan's results", place, f"{self.session.project.name} scan")
-        if chosen is not None:
+        name = unused_name(place, f"{self.session.project.name} scan")
+        chosen = ask_results_folder(self, "Folder for the scan's results", place, name)
+        if chosen is None:
+            return
+        goes_on = is_unfinished(chosen, scaled(self.session.project, SCALES[self.scale.currentText()]))
+        if goes_on or holds_scan(chosen) is None or may_replace_scan(self, chosen):
             self.run_into(chosen)
 
     def run_into(self, folder: Path, report: bool = True) -> Job[ScanResult] | None:

@@ -56,9 +56,15 @@ def test_the_pages_hold_what_was_said_once_and_as_text() -> None:
 
 @pytest.mark.parametrize(
     ("limits", "verdict"),
-    [((-0.2, 0.2), "pass"), ((-1e-3, 1e-3), "undecided"), ((0.2, 0.4), "fail")],
+    [
+        ((-0.2, 0.2), "pass"),
+        ((-1e-3, 1e-3), "undecided"),
+        ((0.2, 0.4), "fail"),
+        ((-0.2, None), "pass"),
+        ((None, -0.2), "fail"),
+    ],
 )
-def test_the_surface_s_tolerance_decides(limits: tuple[float, float], verdict: str) -> None:
+def test_the_surface_s_tolerance_decides(limits: tuple[float | None, float | None], verdict: str) -> None:
     """By two sigma, millimetres here: within 200 mm all points are proved, of 1 mm none is, nor out of it."""
     found = told(handed(lower=limits[0], upper=limits[1]))
     assert found["verdict"] == verdict
@@ -77,10 +83,11 @@ def test_the_worst_measure_decides() -> None:
         assert told(replace(report, measures=rows))["verdict"] == expected
 
 
-def test_a_tolerance_has_two_limits_in_order() -> None:
-    for fields in ({"lower": 0.0}, {"lower": 1e-3, "upper": -1e-3}):
-        with pytest.raises(ValidationError):
-            Delivery(**fields)
+def test_a_tolerance_has_its_limits_in_order_and_one_alone_is_one() -> None:
+    with pytest.raises(ValidationError, match="lower is 1 mm and upper -1 mm"):
+        Delivery(lower=1e-3, upper=-1e-3)
+    page = render_page(handed(customer="Ada", lower=-1e-3))
+    assert "-1000 / none" in page
 
 
 def test_a_scan_without_points_is_told_of_as_well() -> None:

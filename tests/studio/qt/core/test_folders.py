@@ -9,7 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QDialogButtonBox, QLineEdit, QMessageBox
 from pytestqt.qtbot import QtBot
 
-from studio.qt.core.folders import ResultsFolder, readable_folder
+from studio.qt.core.folders import ResultsFolder, may_replace_scan, readable_folder, unused_name
+from tests.studio.qt.shell.window_hands import answer
 
 
 def choice(qtbot: QtBot, suggested: Path) -> ResultsFolder:
@@ -70,3 +71,18 @@ def test_what_cannot_be_made_is_told_and_leaves_the_question_open(
 )
 def test_a_name_that_no_folder_may_have_is_mended(name: str, made: str) -> None:
     assert readable_folder(name) == made
+
+
+def test_a_suggested_name_is_of_nothing_that_is_there(tmp_path: Path) -> None:
+    assert unused_name(tmp_path, "a/b scan") == "a-b scan"
+    (tmp_path / "a-b scan").mkdir()
+    (tmp_path / "a-b scan 2").write_text("")
+    assert unused_name(tmp_path, "a/b scan") == "a-b scan 3"
+
+
+@pytest.mark.parametrize(("button", "expected"), [("Replace", True), ("Cancel", False)])
+def test_an_earlier_scan_is_replaced_only_if_one_says_so(
+    qtbot: QtBot, tmp_path: Path, button: str, expected: bool
+) -> None:
+    answer(qtbot, "replace", button)
+    assert may_replace_scan(None, tmp_path) is expected

@@ -17,6 +17,7 @@ from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.jobs import RENDER
 from studio.qt.core.session import Render
+from studio.qt.render import motion_panel
 from studio.qt.render.history import describe
 from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.results.results_panel import ResultsPanel
@@ -332,3 +333,21 @@ class TestRun:
             qtbot.waitUntil(lambda: window.runner.job(RENDER) is None)
         assert window.session.renders == [] and len(window.cloud.points) == 0
         assert moving.open.isHidden() and moving.go_on.isHidden()
+
+    def test_a_finished_scan_is_not_lost_without_a_question(
+        self,
+        moving: MotionPanel,
+        scanned: tuple[Path, Path],
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        folder = tmp_path / "scan"
+        shutil.copytree(scanned[1], folder)
+        asked: list[Path] = []
+        began: list[Path] = []
+        monkeypatch.setattr(motion_panel, "may_replace_scan", lambda _, where: asked.append(where))
+        monkeypatch.setattr(moving, "run_into", began.append)
+        for chosen in (folder, tmp_path / "new"):
+            monkeypatch.setattr(motion_panel, "ask_results_folder", lambda *_, chosen=chosen: chosen)
+            moving.ask_and_run()
+        assert asked == [folder] and began == [tmp_path / "new"]
