@@ -50,6 +50,8 @@ class Exported:
     """A run of the project's first step, as it is now, gives the same images."""
     finished: bool = True
     """The frame's light was neither stopped nor ended by the clock."""
+    part_of: str = ""
+    """What a report says of the whole that this is a part of."""
 
 
 Writer = Callable[[Path, Exported], list[Path]]
@@ -71,7 +73,7 @@ def export_report(path: Path, what: Exported) -> list[Path]:
     result = frame_result(what.project, what.frame, what.measurements, what.images)
     with closing(record_of(what.project.scene, [result])) as record:
         lacks = image_lacks(what.project, best(what.measurements, what.project))
-        notes = [*cautions.notes(summarise(record)), *lacks.values()]
+        notes = [*filter(None, [what.part_of]), *cautions.notes(summarise(record)), *lacks.values()]
         data = report_input(
             what.project.in_folder(what.root),
             first,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from PySide6.QtCore import QObject
 from PySide6.QtWidgets import QFileDialog, QWidget
@@ -25,6 +26,8 @@ from studio.scan.height_map import export_height_map
 from studio.scan.own_files import check_replaceable
 from studio.scan.redevelop import Development, develop_again, development, measure_again
 from studio.scan.remarks import scale_notes
+from studio.scan.scan_results import ScanResults
+from studio.scan.stages import Clock
 
 if TYPE_CHECKING:
     from studio.scan.export import Exported
@@ -45,6 +48,8 @@ KINDS = {
 }
 """Command -> filter of the file dialog, suffix, what it is."""
 LANE = "export"
+WHOLE = ("report", "points")
+"""What is of all steps of a scan while the figures on the screen are."""
 
 
 class ExportActions(QObject):
@@ -62,8 +67,14 @@ class ExportActions(QObject):
         for signal in (session.renders_changed, session.measured, session.developed):
             signal.connect(self.refresh)
         self._job: Job[list[Path]] | None = None
+        self.whole: Callable[[], ScanResults | None] = lambda: None
+        """The scan of whose steps together the figures on the screen are."""
         runner.cancelled.connect(self._tell_cancelled)
         self.refresh()
+
+    def follow(self, results: Any) -> None:
+        """The panel that says whether figures are of a step or of all."""
+        self.whole = lambda: results.scan_bar.whole
 
     def refresh(self) -> None:
         """Offer what can be had."""
@@ -79,7 +90,8 @@ class ExportActions(QObject):
         size = f" at {render.scanner_scale:.3g} x" if render is not None and render.scanner_scale != 1.0 else ""
         name = f"{self.session.project.name.replace('/', '-')}{size}{suffix}"
         start = suggested(self.preferences.values.folder, name)
-        chosen, _ = QFileDialog.getSaveFileName(self.window, "Export", start, name_filter)
+        title = f"Export {self._of_what(key)}".strip()
+        chosen, _ = QFileDialog.getSaveFileName(self.window, title, start, name_filter)
         if chosen:
             path = Path(chosen)
             self.write(key, path if path.suffix.lower() == suffix else path.with_name(path.name + suffix))
@@ -94,6 +106,8 @@ class ExportActions(QObject):
         now = render.developed_by(self.session.project)
         how = development(render.project, now, render.image_scale)
         kind, current, noise = KINDS[key][2], render.is_measured(how), render.noise
+        whole = self.whole() if kind in WHOLE else None
+        of = self._of_what(key)
         shown = export.Exported(
             how.powered,
             render.project,
@@ -105,6 +119,7 @@ class ExportActions(QObject):
             render.scanner_scale,
             repeatable=render.repeatable(now),
             finished=render.final and not render.frame.unfinished,
+            part_of=f"This is {of} in {render.scan.found.folder.name} alone." if render.scan is not None else "",
         )
         writers: dict[str, export.Writer] = {
             "report": export.export_report,
@@ -118,9 +133,18 @@ class ExportActions(QObject):
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
             progress(path.name, 0.0)  # how far it is, nobody knows
-            what = (
-                shown if current or kind in ("frame", "height map", "film") else _measured(shown, how, noise, cancelled)
-            )
+            nonlocal writer
+            if whole is not None:
+                from studio.scan import whole_scan
+
+                clock = Clock(progress, cancelled)
+                of_all = {
+                    "points": partial(whole_scan.export_scan_points, whole),
+                    "report": partial(whole_scan.export_scan_report, whole, how.powered, clock),
+                }
+                writer = of_all[kind]
+            as_shown = whole is not None or current or kind in ("frame", "height map", "film")
+            what = shown if as_shown else _measured(shown, how, noise, cancelled)
             if kind == "height map":  # nobody was asked about the file beside the picture
                 check_replaceable([path.with_suffix(".json")])
             return export.export_unless(cancelled, writer, path, what)
@@ -131,11 +155,21 @@ class ExportActions(QObject):
             if writer is export.export_report:
                 render.report = written[0]
             method = how.project.extraction.method
-            of = f", the points by {method_name(method)}, the project's own method" if kind == "points" else ""
-            self._tell(written, of, notes)
+            said = f", the points by {method_name(method)}, the project's own method" if kind == "points" else ""
+            self._tell(written, said + (f", of {of}" if of else ""), notes)
 
         self._job = self.runner.run(LANE, f"export {path.name}", work, then)
         self.preferences.change(folder=str(path.parent))
+
+    def _of_what(self, key: str) -> str:
+        """Of a scan: "all 8 steps", or "step 3 of 8"."""
+        render, kind = self.session.shown, KINDS[key][2]
+        if render is None or render.scan is None or kind in ("film", "height map"):
+            return ""
+        count = render.scan.count
+        if kind in WHOLE and self.whole() is not None:
+            return f"all {count} steps"
+        return f"step {render.frame.step + 1} of {count}"
 
     def screenshot(self) -> None:
         """The window as it is, as a PNG."""

@@ -95,6 +95,7 @@ class MainWindow(QMainWindow):
         self.setStatusBar(self.status)
         self.files = FileActions(self, session, self.preferences, autosave)
         self.exports = ExportActions(self, session, self.runner, self.preferences, self.commands)
+        self.panels.when_made("results", self.exports.follow)
         self.measuring = MeasureActions(self, session, self.commands)
         self.calibrating = CalibrateActions(self, session, self.commands, self.panels["calibrate"])
         self.preferring = Preferring(self)

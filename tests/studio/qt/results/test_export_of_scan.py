@@ -1,0 +1,98 @@
+"""What is exported of a scan is of all its steps while the figures on the screen are, and says what it is of."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from html import unescape
+from pathlib import Path
+
+import pytest
+from PySide6.QtWidgets import QMainWindow
+from pytestqt.qtbot import QtBot
+
+from analysis.gauges.gauge import Gauge
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.qt.core.actions import Actions
+from studio.qt.core.jobs import JobRunner
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Session
+from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.results.export_actions import ExportActions
+from studio.qt.results.scan_bar import ScanBar
+from studio.runtime.preferences import PreferencesFile
+from studio.scan.scan_folder import open_folder
+from tests.studio.scan_of_steps import small_scan
+
+FLATNESS = Gauge(name="top", kind="flatness", regions=((-0.02, 0.02),))
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return small_scan(tmp_path_factory.mktemp("steps"))
+
+
+class Bench:
+    """A scan that is looked at, with its bar and the export menu."""
+
+    def __init__(self, scanned: tuple[Path, Path], folder: Path, qtbot: QtBot) -> None:
+        file, results = scanned
+        self.session = Session(Document(Project.load(file), file))
+        scan_steps(self.session).show(open_folder(results))
+        qtbot.waitUntil(lambda: self.session.shown is not None)
+        self.panel = DevelopPanel(self.session)
+        qtbot.addWidget(self.panel)
+        with qtbot.waitSignal(self.session.measured):
+            self.panel.refresh()
+        window = QMainWindow()
+        qtbot.addWidget(window)
+        self.window, self.runner, self.bar = window, JobRunner(window), ScanBar(self.session)
+        qtbot.addWidget(self.bar)
+        self.told: list[tuple[str, str]] = []
+        self.session.message.connect(lambda level, text: self.told.append((level, text)))
+        preferences = PreferencesFile(folder / "preferences.json")
+        self.exports = ExportActions(window, self.session, self.runner, preferences, Actions(window))
+        self.exports.whole = lambda: self.bar.whole
+
+    def write(self, key: str, path: Path, qtbot: QtBot) -> Path:
+        with qtbot.waitSignal(self.runner.finished):
+            self.exports.write(key, path)
+        return path
+
+    def close(self) -> None:
+        self.panel.close()
+        self.runner.close()
+        scan_steps(self.session).close()
+
+
+@pytest.fixture
+def bench(scanned: tuple[Path, Path], tmp_path: Path, qtbot: QtBot) -> Iterator[Bench]:
+    made = Bench(scanned, tmp_path, qtbot)
+    yield made
+    made.close()
+
+
+def steps_of(file: Path) -> set[str]:
+    with open(file, newline="") as text:
+        return {row["step"] for row in csv.DictReader(text)}
+
+
+def test_points_are_of_all_steps_or_of_the_one_that_is_asked_for(bench: Bench, tmp_path: Path, qtbot: QtBot) -> None:
+    assert steps_of(bench.write("export_csv", tmp_path / "all.csv", qtbot)) == {"0", "1", "2"}
+    assert bench.told[-1][1].endswith("of all 3 steps") or "of all 3 steps\n" in bench.told[-1][1]
+    bench.bar.scope.setCurrentIndex(1)
+    assert steps_of(bench.write("export_csv", tmp_path / "one.csv", qtbot)) == {"0"}
+    assert "of step 1 of 3" in bench.told[-1][1]
+
+
+def test_a_report_is_of_all_steps_with_the_measures_of_now(bench: Bench, tmp_path: Path, qtbot: QtBot) -> None:
+    """A step's verdict alone read "within tolerance" where the scan's own was not decided."""
+    bench.session.set(("measures",), (FLATNESS,))
+    before = sorted(file.name for file in bench.bar.whole.found.folder.iterdir())  # type: ignore[union-attr]
+    text = unescape(bench.write("export_html", tmp_path / "all.html", qtbot).read_text())
+    assert "3 frames" in text and "needs 3 steps" not in text and "top" in text
+    assert before == sorted(file.name for file in bench.bar.whole.found.folder.iterdir())  # type: ignore[union-attr]
+    bench.bar.scope.setCurrentIndex(1)
+    text = unescape(bench.write("export_html", tmp_path / "one.html", qtbot).read_text())
+    assert "This is step 1 of 3 in scan alone." in text
