@@ -24,7 +24,7 @@ from studio.project.project import Project
 from studio.scan.own_files import MEASURE_COLUMNS
 from studio.scan.stages import Measurement
 
-OF_SCAN = "it is of a whole scan: run one (F6, Motion), or measure its folder again"
+OF_SCAN = "it is of a whole scan: run one (F6, Motion), or Measure > Measure the scan again"
 FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error", "error_in_sigmas")
 
 

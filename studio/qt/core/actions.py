@@ -132,6 +132,12 @@ COMMANDS: tuple[Command | str, ...] = (
     Command(
         "heights", "Measure", "Height &map…", "Alt+Z", "", "Of a scan: picture, profile along a line, 16 bit files"
     ),
+    Command(
+        "measure_scan",
+        "Measure",
+        "Measure the scan &again",
+        tip="Points, measures and report of all its steps with sensor, extraction and measures of now; no render",
+    ),
     "Measure/-",
     Command("photographs", "Measure", "Line in p&hotographs…", "", "", "Of a real scanner, beside the rendered image"),
     "Measure/-",

@@ -28,6 +28,7 @@ from studio.qt.forms.fields import leave_typing
 from studio.qt.render.python_copy import copy_shown
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
+from studio.qt.results.scan_again import ScanAgain
 from studio.qt.scene import scene_actions
 from studio.qt.scene.mesh_bar import replace_mesh
 from studio.qt.scene.mesh_importer import choose_meshes, import_meshes
@@ -97,6 +98,7 @@ class MainWindow(QMainWindow):
         self.exports = ExportActions(self, session, self.runner, self.preferences, self.commands)
         self.panels.when_made("results", self.exports.follow)
         self.measuring = MeasureActions(self, session, self.commands)
+        ScanAgain(session, self.runner, self.commands)
         self.calibrating = CalibrateActions(self, session, self.commands, self.panels["calibrate"])
         self.preferring = Preferring(self)
         self.help = Help(self)

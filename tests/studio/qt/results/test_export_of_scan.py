@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from collections.abc import Iterator
 from html import unescape
 from pathlib import Path
@@ -20,12 +21,13 @@ from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.export_actions import ExportActions
+from studio.qt.results.scan_again import KEY, ScanAgain
 from studio.qt.results.scan_bar import ScanBar
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.scan_folder import open_folder
 from tests.studio.scan_of_steps import small_scan
 
-FLATNESS = Gauge(name="top", kind="flatness", regions=((-0.02, 0.02),))
+FLATNESS = Gauge(name="top", kind="flatness", regions=((-0.1, 0.1),))
 
 
 @pytest.fixture(scope="module")
@@ -96,3 +98,24 @@ def test_a_report_is_of_all_steps_with_the_measures_of_now(bench: Bench, tmp_pat
     bench.bar.scope.setCurrentIndex(1)
     text = unescape(bench.write("export_html", tmp_path / "one.html", qtbot).read_text())
     assert "This is step 1 of 3 in scan alone." in text
+
+
+def test_a_scan_is_measured_again_with_the_measures_of_now(
+    scanned: tuple[Path, Path], tmp_path: Path, qtbot: QtBot
+) -> None:
+    """A flatness that was added after the scan is read off its frames, and nothing is rendered."""
+    file, folder = tmp_path / "project" / "steps.json", tmp_path / "scan"
+    shutil.copytree(scanned[0].parent, file.parent)
+    shutil.copytree(scanned[1], folder)
+    bench = Bench((file, folder), tmp_path, qtbot)
+    again = ScanAgain(bench.session, bench.runner, bench.exports.actions)
+    bench.session.set(("measures",), (FLATNESS,))
+    before, frames = bench.session.shown, {path: path.stat().st_mtime_ns for path in folder.glob("frame_*")}
+    assert again.actions[KEY].isEnabled()
+    again.actions[KEY].trigger()
+    qtbot.waitUntil(lambda: bench.session.shown is not before and bench.session.shown is not None)
+    assert bench.session.renders == [bench.session.shown] and bench.session.shown.scan is not None
+    (kept,) = open_folder(folder).manifest["measures"]
+    assert kept["name"] == "top" and kept["value"] is not None
+    assert {path: path.stat().st_mtime_ns for path in folder.glob("frame_*")} == frames
+    bench.close()
