@@ -13,6 +13,7 @@ Kind = Literal[
     "step",
     "width",
     "angle",
+    "opening",
     "radius",
     "v_depth",
     "peak",
@@ -29,6 +30,7 @@ REGIONS: dict[Kind, tuple[str, ...]] = {
     "step": ("lower side", "upper side"),
     "width": ("reference", "left flank", "right flank"),
     "angle": ("first line", "second line"),
+    "opening": ("left side", "right side"),
     "radius": ("arc",),
     "v_depth": ("reference", "left flank", "right flank"),
     "peak": ("reference", "peak"),
@@ -44,7 +46,8 @@ REGIONS: dict[Kind, tuple[str, ...]] = {
 TITLES: dict[Kind, str] = {
     "step": "Step height",
     "width": "Width",
-    "angle": "Angle",
+    "angle": "Angle (by which the line turns)",
+    "opening": "Opening angle (of a V or an edge)",
     "radius": "Radius",
     "v_depth": "V depth",
     "peak": "Peak height",
@@ -72,7 +75,7 @@ class Gauge(Model):
         unit="m", label="Regions", help="From and to across the fan, as the profile's plot has it.", max_length=3
     )
     nominal: float | None = quantity(
-        None, unit="m", label="Nominal", help="m; of an angle rad, of an area m².", ge=-100, le=100
+        None, unit="m", label="Nominal", help="In m; of an angle in rad, of an area in m².", ge=-100, le=100
     )
     lower: float | None = quantity(
         None,
@@ -105,10 +108,10 @@ class Gauge(Model):
                 raise ValueError(f"regions[{i}] goes from {low} m to {high} m; allowed: the second is the larger")
         if self.nominal is None and (self.lower is not None or self.upper is not None):
             raise ValueError("lower and upper are deviations from nominal, which is missing; give it, or none of them")
-        if self.lower is not None and self.upper is not None and self.lower > self.upper:
+        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
             factor, unit = {"m": (1e3, "mm"), "rad": (180.0 / math.pi, "deg"), "m2": (1e6, "mm²")}[self.unit]
             found = f"lower is {factor * self.lower:.6g} {unit} and upper {factor * self.upper:.6g} {unit}"
-            raise ValueError(f"{found}; allowed: lower is not above upper")
+            raise ValueError(f"{found}; allowed: lower is below upper, with a minus sign if it is below the nominal")
         return self
 
     @property
@@ -119,7 +122,7 @@ class Gauge(Model):
     @property
     def unit(self) -> Literal["m", "rad", "m2"]:
         """Of the value."""
-        return "rad" if self.kind == "angle" else "m2" if self.kind == "area" else "m"
+        return "rad" if self.kind in ("angle", "opening") else "m2" if self.kind == "area" else "m"
 
     def verdict(self, value: float, sigma: float) -> Verdict | None:
         """ISO 14253-1 with U = 2 sigma: proved within, proved outside, or neither; None: no tolerance, or no value."""

@@ -178,6 +178,8 @@ def _of_lines(gauge: Gauge, lines: list[tuple[Float, Float]]) -> float:
     (p, u), (q, v) = lines[:2]
     if gauge.kind == "angle":
         return math.atan2(_cross(u, v), float(u @ v))
+    if gauge.kind == "opening":
+        return math.pi - abs(math.atan2(_cross(u, v), float(u @ v)))
     if gauge.kind == "point_to_point":
         middles = [0.5 * (low + high) for low, high in gauge.regions]
         ends = [point + along * _over(x - point[0], along[0]) for x, (point, along) in zip(middles, lines, strict=True)]

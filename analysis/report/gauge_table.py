@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from analysis.gauges.gauge import TITLES
+from analysis.gauges.gauge import TITLES, Gauge
 from analysis.report.units import NONE, digits
 
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
@@ -53,6 +53,16 @@ def tolerance_text(lower: float | None, upper: float | None, unit: str) -> str:
     scale, name = scale_and_unit(unit)
     ends = [NONE if end is None else f"{scale * end:+.4g}" for end in (lower, upper)]
     return f"{' / '.join(ends)}{name}"
+
+
+def beside_nominal(gauge: Gauge) -> str:
+    """What to say of a tolerance that lets no part pass that is as large as its nominal; empty: of any other."""
+    lower, upper, nominal = gauge.lower, gauge.upper, gauge.nominal
+    if nominal is None or not ((lower or 0.0) > 0.0 or (upper or 0.0) < 0.0):
+        return ""
+    scale, name = scale_and_unit(gauge.unit)
+    ends = ["any" if end is None else f"{scale * (nominal + end):.6g}{name}" for end in (lower, upper)]
+    return f"Allowed is {ends[0]} to {ends[1]}, without the nominal itself. A limit below the nominal has a minus sign."
 
 
 def cells(row: Mapping[str, Any]) -> list[str]:

@@ -25,5 +25,5 @@ def lean_text(scene: Scene, laser: int, step: int = 0) -> str:
         return "Read in the laser's plane, which is nearly level: no height of a level part shows in it."
     return (
         f"Read in the laser's plane, which leans by {math.degrees(lean):.1f}° from the vertical: across a level part a "
-        f"height reads as {1.0 / math.cos(lean):.4g} times itself, and its truth does."
+        f"height reads as {1.0 / math.cos(lean):.4g} times itself and angles follow, and the truth does too."
     )

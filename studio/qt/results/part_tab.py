@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import MARKS, small_text, value_text
+from analysis.report.gauge_table import MARKS, beside_nominal, small_text, value_text
 from analysis.report.units import NONE
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
@@ -244,6 +244,8 @@ class PartTab(QWidget):
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
         elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].reason:
             text = self.readings[self.chosen].reason.capitalize()
+        elif 0 <= self.chosen < len(self._read) and (odd := beside_nominal(self._read[self.chosen])):
+            text = odd
         elif self.readings and (render := self.session.shown) is not None:
             text = lean_text(render.project.scene, self.laser, render.frame.step)
         self.told.setText(text)
@@ -281,5 +283,5 @@ class PartTab(QWidget):
 
 
 def _free_name(kind: Kind, taken: tuple[Gauge, ...]) -> str:
-    names = {gauge.name for gauge in taken}
-    return next(name for i in range(1, MOST_GAUGES + 2) if (name := f"{TITLES[kind]} {i}") not in names)
+    names, short = {gauge.name for gauge in taken}, TITLES[kind].split(" (")[0]
+    return next(name for i in range(1, MOST_GAUGES + 2) if (name := f"{short} {i}") not in names)

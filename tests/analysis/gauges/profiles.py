@@ -14,6 +14,7 @@ REGION = {
     "step": ((-0.015, -0.003), (0.003, 0.015)),
     "width": ((0.012, 0.02), (-0.009, -0.002), (0.002, 0.009)),
     "angle": ((-0.015, -0.003), (0.003, 0.015)),
+    "opening": ((-0.015, -0.003), (0.003, 0.015)),
     "radius": ((-0.006, 0.006),),
     "v_depth": ((0.012, 0.02), (-0.009, -0.002), (0.002, 0.009)),
     "peak": ((-0.02, -0.01), (-0.004, 0.004)),
@@ -42,6 +43,8 @@ def shape(kind: str) -> tuple[np.ndarray, float]:
             return far + 0.1 * x + 0.002 * (x > 0.0), 0.002 / np.sqrt(1.01)
         case "angle":
             return far + np.where(x > 0.0, 0.5, -0.2) * x, np.arctan(0.5) + np.arctan(0.2)
+        case "opening":
+            return far + np.abs(x), np.pi / 2.0
         case "width":
             return far + groove, 0.02
         case "area":  # the wall's middle lies 4.5 mm deep
