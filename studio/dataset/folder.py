@@ -186,6 +186,7 @@ def _card(dataset: Dataset, count: int, splits: Counter[str], reasons: Counter[s
         f"- images: {count}, of {count // dataset.per_scene} scenes; {dataset.per_scene} of each scene share its light",
         f"- split by scene: {', '.join(f'{name} {splits[name]}' for name in sorted(splits))}",
         f"- base project: {recipe.base}, image scale {recipe.image_scale:g}, seed {recipe.seed}",
+        *_scale_note(recipe.image_scale),
         f"- made by Blazer Studio {version('blazer-studio')}; recipe and base SHA-256 {dataset.digest}",
         "- line positions are exact for the meshes, at scan-line centres; sigma_floor is the Cramer-Rao bound of shot, "
         "read and quantisation noise without speckle, px",
@@ -217,3 +218,13 @@ def _copy(source: Path, target: Path, digest: str | None) -> None:
 def _write(path: Path, text: str) -> None:
     with atomic_write(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def _scale_note(image_scale: float) -> list[str]:
+    """What the numbers of a label are of, where images are smaller or larger than the scanner's."""
+    if image_scale == 1.0:
+        return []
+    return [
+        f"- `camera` and `sensor` of a label are its image's: pixels are {1.0 / image_scale:.4g} times as large, "
+        f"exposures {1.0 / image_scale**2:.4g} times as short, so that they fill as much; `drawn` has the scanner's own"
+    ]

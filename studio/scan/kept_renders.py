@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from analysis.gauges.read import Reading
 from render.base.errors import InputError
 from render.base.files import atomic_write
 from render.frame import Frame
@@ -29,6 +30,7 @@ FIGURES = {
     "Depth RMSE": "µm",
     "Depth bias": "µm",
     "Depth sigma": "µm",
+    "Depth robust sigma": "µm",
     "Off the surface, RMSE": "µm",
     "Line RMSE": "px",
     "Completeness": "%",
@@ -51,6 +53,8 @@ class Kept:
     """By the names of `FIGURES`, in their units; NaN or missing: not measured."""
     folder: Path | None = None
     """None: it is in this session alone."""
+    readings: tuple[Reading, ...] = ()
+    """Of the part's measures, as the project has them now; of a render of this session alone."""
 
 
 def figures_of(found: Sequence[Measurement]) -> dict[str, float]:
@@ -70,6 +74,7 @@ def figures_of(found: Sequence[Measurement]) -> dict[str, float]:
         "Depth RMSE": 1e6 * root([one.depth_z.rmse for one in errors]),
         "Depth bias": 1e6 * mean([one.depth_z.bias for one in errors]),
         "Depth sigma": 1e6 * root([one.depth_z.sigma for one in errors]),
+        "Depth robust sigma": 1e6 * root([one.depth_z.robust_sigma for one in errors]),
         "Off the surface, RMSE": 1e6 * root([one.surface.rmse for one in errors]),
         "Line RMSE": root([one.u.rmse for one in errors]),
         "Completeness": 100.0 * mean([one.completeness for one in errors]),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis.report.gauge_table import small_text, value_text
 from analysis.report.units import digits
 from render.base.csv_file import write_csv
 from studio.scan.kept_renders import FIGURES, Kept
@@ -38,6 +39,7 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
             continue
         cells = [_cell(value, values[0] if k else math.nan) for k, value in enumerate(values)]
         rows.append(Row(f"{name} / {unit}", tuple(cells), True))
+    rows += _measures(renders)
     labels: dict[str, str] = {}
     found: list[dict[str, tuple[str, str]]] = []
     for one in renders:
@@ -45,10 +47,26 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
         labels |= {field: change.label for field, change in differing.items()}
         found.append({field: (change.a, change.b) for field, change in differing.items()})
     for field, label in labels.items():
-        if field == "name":
+        if field == "name" or field.startswith("measures"):  # all are read by those of now
             continue
         own = next(each[field][0] for each in found if field in each)
         rows.append(Row(label, tuple(each[field][1] if field in each else own for each in found), False))
+    return rows
+
+
+def _measures(renders: Sequence[Kept]) -> list[Row]:
+    """A row for each measure of the part, with the difference from the first render's."""
+    units = {one.gauge.name: one.gauge.unit for kept in renders for one in kept.readings}
+    rows = []
+    for name, unit in units.items():
+        read = [next((one for one in kept.readings if one.gauge.name == name), None) for kept in renders]
+        values = [math.nan if one is None else one.value for one in read]
+        cells = [value_text(one.value, one.sigma, unit) if one is not None else NONE for one in read]
+        for k, value in enumerate(values[1:], 1):
+            if math.isfinite(value - values[0]):
+                sign = "+" if value > values[0] else ""
+                cells[k] += f" ({sign}{small_text(value - values[0], unit)})"
+        rows.append(Row(name, tuple(cells), True))
     return rows
 
 

@@ -23,6 +23,7 @@ from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import text_button
 from studio.runtime.error_messages import trouble
+from studio.scan.gauging import readings
 from studio.scan.kept_renders import Kept, figures_of, keep, kept_renders, open_kept
 from studio.scan.remarks import best
 from studio.study.side_by_side import side_by_side, write_table
@@ -34,7 +35,8 @@ FEWEST_PX = 190
 def as_kept(session: Session, render: Render, name: str) -> Kept:
     """A render of the session as a column of the table."""
     found = best(render.measurements, session.project) if render.measurements else []
-    return Kept(name, render.created, render.project, render.scanner_scale, figures_of(found))
+    read = readings(render.project.model_copy(update={"measures": session.project.measures}), render.frame, found)
+    return Kept(name, render.created, render.project, render.scanner_scale, figures_of(found), readings=read)
 
 
 def keep_render(session: Session, render: Render, name: str) -> Kept:

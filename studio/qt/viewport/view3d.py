@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QEnterEvent, QKeyEvent, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QApplication, QWidget
 from pyvistaqt import QtInteractor
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
@@ -175,6 +175,9 @@ class View3D(QtInteractor):  # type: ignore[misc]
         event.accept()
 
     def enterEvent(self, event: QEnterEvent) -> None:
+        # its keys are for what the mouse is over, as in Blender; a list or a tree would take G or R for a name
+        if isinstance(QApplication.focusWidget(), QAbstractItemView):
+            self.setFocus(Qt.FocusReason.MouseFocusReason)
         event.accept()
 
     def leaveEvent(self, event: Any) -> None:

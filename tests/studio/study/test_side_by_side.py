@@ -6,6 +6,8 @@ import csv
 import math
 from pathlib import Path
 
+from analysis.gauges.gauge import Gauge
+from analysis.gauges.read import Reading
 from studio.project.project import Project
 from studio.scan.kept_renders import Kept
 from studio.study.side_by_side import side_by_side, write_table
@@ -49,3 +51,17 @@ def test_renders_of_another_scale_say_so(tmp_path: Path) -> None:
     write_table(tmp_path / "t.csv", [one, small], rows)
     with open(tmp_path / "t.csv", newline="", encoding="utf-8") as file:
         assert list(csv.reader(file))[:2] == [["", "0", "small"], ["Image scale", "1", "0.25"]]
+
+
+def test_measures_of_the_part_are_read_of_every_render() -> None:
+    """Those that one render's project had and another's had not were told as settings: there, not there."""
+    gauge = Gauge(name="rise", kind="step", regions=((-0.1, 0.0), (0.0, 0.1)))
+    plain = Project.load("plane")
+    with_one = plain.model_copy(update={"measures": (gauge,)})
+    values = (0.0211664, 0.0211714)
+    renders = [
+        Kept(name, "", project, 1.0, {}, readings=(Reading(gauge, 0, value, sigma_random=4e-6),))
+        for name, project, value in zip("ab", (plain, with_one), values, strict=True)
+    ]
+    (row,) = side_by_side(renders)
+    assert row.label == "rise" and row.cells == ("21.1664\u00a0mm", "21.1714\u00a0mm (+5.00\u00a0µm)")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QEnterEvent
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from studio.qt.shell.window import MainWindow
@@ -78,3 +80,16 @@ def test_escape_gives_up_the_measure_that_is_being_added(window: MainWindow, qtb
         assert part.placing is None and not any(span.isVisible() for span in part.drawing.spans)
         part.start("angle")
     assert not window.session.project.measures
+
+
+def test_keys_are_for_the_3d_view_that_the_mouse_comes_over(window: MainWindow, power: Any, qtbot: QtBot) -> None:
+    """Not while something is typed: a tree would take G for the first letter of a name."""
+    view = cast(Any, window.panels["viewport"]).view
+    tree = window.panels["scene"]
+    enter = QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5))
+    power.setFocus()
+    QApplication.sendEvent(view, enter)
+    assert power.hasFocus()
+    tree.setFocus()
+    QApplication.sendEvent(view, enter)
+    assert view.hasFocus()
