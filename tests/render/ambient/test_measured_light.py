@@ -15,7 +15,7 @@ from render.ambient.guided_interpolation import SEEN, grid_of, interpolate, smoo
 from render.ambient.integrator import ambient_images
 from render.ambient.light_group import AmbientLight
 from render.ambient.line_samples import band_of, sample_band
-from render.ambient.measured_light import image_light, measured_images
+from render.ambient.measured_light import measured_images
 from render.ambient.path_tracer import camera_paths
 from render.ambient.pixel_samples import PixelSamples
 from render.ambient.transport_plan import LAMPS, AmbientPlan
@@ -264,19 +264,6 @@ def test_it_takes_a_fraction_of_the_rays_of_an_image_as_good():
     assert measured.coarse_error <= COARSE_ERROR >= image.error and measured.error <= 1.0
     # a ray a pixel tells what is seen there
     assert between - start < 0.3 * (world.rays.rays - between)
-
-
-def test_an_image_that_may_be_off_by_a_twentieth_is_interpolated_and_a_finer_one_sampled():
-    scene, world = box_on_a_wall(0.25)
-    placed = PlacedScene(world, scene)
-    (image,) = image_light(placed, target=COARSE_ERROR)
-    *_, reference = ambient_images(placed, target=0.0, most=512, run=Run(seed=7))
-    true = np.sqrt(np.mean((image.radiance - reference.radiance) ** 2) / np.mean(reference.radiance**2))
-    assert image.samples < 1.0 and image.lines is image.coarse_error is None
-    assert image.error <= COARSE_ERROR and true < 1.1 * COARSE_ERROR
-    *_, finer = image_light(placed, target=0.99 * COARSE_ERROR)
-    *_, sampled = ambient_images(placed, target=0.99 * COARSE_ERROR)
-    assert np.array_equal(finer.radiance, sampled.radiance)
 
 
 @pytest.mark.parametrize("axis", ["rows", "columns"])
