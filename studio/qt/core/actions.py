@@ -20,6 +20,7 @@ class Command:
     menu: str
     text: str
     shortcut: str = ""
+    """Several are parted by "; "."""
     icon: str = ""
     tip: str = ""
     checkable: bool = False
@@ -72,7 +73,7 @@ COMMANDS: tuple[Command | str, ...] = (
     "File/-",
     Command("quit", "File", "&Quit", "Ctrl+Q"),
     Command("undo", "Edit", "&Undo", "Ctrl+Z", "undo"),
-    Command("redo", "Edit", "&Redo", "Ctrl+Shift+Z", "redo"),
+    Command("redo", "Edit", "&Redo", "Ctrl+Shift+Z; Ctrl+Y", "redo"),
     "Edit/-",
     Command("duplicate", "Edit", "&Duplicate", "Ctrl+D", "", "A copy of what is selected"),
     Command("delete", "Edit", "D&elete", "Del", "", "Remove what is selected"),
@@ -211,7 +212,7 @@ class Actions:
         action.setObjectName(command.key)
         action.setCheckable(command.checkable)
         if command.shortcut:
-            action.setShortcut(QKeySequence(command.shortcut))
+            action.setShortcuts(QKeySequence.listFromString(command.shortcut))
             action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
         if command.icon:
             action.setIcon(icon(command.icon))

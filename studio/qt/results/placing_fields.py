@@ -40,6 +40,7 @@ TRIES, NEAR = 4, 1e-4
 Start = tuple[Project, Float, dict[str, float | None]]
 """Project, lit point and read-outs before anything moved."""
 WIDTH = 88
+NOTHING_LIT = "The camera sees nothing that the laser lights: aim it (T), move one of them, or undo (Ctrl+Z)"
 
 
 class PlacingField(NumberField):
@@ -87,6 +88,7 @@ class PlacingFields(QObject):
         for key, field in self.fields.items():
             value = self.values[key]
             field.setEnabled(value is not None)
+            field.setToolTip("" if value is not None else NOTHING_LIT)
             if not field.hasFocus() or not field.pending:
                 scale = field.spec.unit.factor
                 field.show_value(None if value is None else float(f"{value * scale:.{DIGITS}g}") / scale)

@@ -55,7 +55,8 @@ def page() -> str:
     groups: dict[str, list[tuple[str, str]]] = {}
     for command in COMMANDS:
         if isinstance(command, Command) and command.shortcut:
-            keys = QKeySequence(command.shortcut).toString(QKeySequence.SequenceFormat.NativeText)
+            known = QKeySequence.listFromString(command.shortcut)
+            keys = ", ".join(one.toString(QKeySequence.SequenceFormat.NativeText) for one in known)
             text = command.text.replace("&", "").rstrip("…")
             groups.setdefault(command.menu.split("/")[0], []).append((keys, text))
     groups |= {"Mouse": list(MOUSE), "Fields": list(FIELDS), "Lists": list(LISTS), "3D view": list(VIEW_KEYS.items())}
