@@ -83,8 +83,8 @@ def error_map_figure(path: Path, error: Float, limit: float, sigma: float) -> st
 
 
 def steps_figure(report: ReportInput, shown: int) -> str:
-    """Depth error and completeness from step to step; `shown`: the step shown in detail."""
-    steps = [one.step for one in report.record.steps]
+    """Depth error and completeness from step to step, counted from 1; `shown`: the step shown in detail, from 0."""
+    steps, shown = [one.step + 1 for one in report.record.steps], shown + 1
     style: dict[str, Any] = {"lw": 1.1, "marker": "o", "ms": 2.6 if len(steps) < 60 else 0}
     with figure(2.9) as made:
         error, rows = made.subplots(2, 1, sharex=True, height_ratios=(1.6, 1))

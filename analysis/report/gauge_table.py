@@ -71,7 +71,7 @@ def cells(row: Mapping[str, Any]) -> list[str]:
     several = row["readings"] > 1
     verdict = MARKS.get(row["verdict"] or "", "not measured" if row["reason"] else NONE)
     if several:
-        verdict += f", worst of {row['readings']}: step {row['step']}"
+        verdict += f", worst of {row['readings']}: step {row['step'] + 1}"
     return [
         TITLES[row["kind"]],
         value_text(row["value"], row["sigma"], unit),

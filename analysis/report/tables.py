@@ -93,7 +93,7 @@ def step_table(report: ReportInput) -> tuple[list[str], list[list[str]], bool]:
     for one in (steps[i] for i in picked):
         m = one.depth_z
         rows.append(
-            [str(one.step), count(one.points), percent(one.completeness)]
+            [str(one.step + 1), count(one.points), percent(one.completeness)]
             + [micrometres(value) for value in (m.bias, m.sigma, m.rmse, m.p95)]
             + [percent(m.outlier_rate)]
         )

@@ -9,7 +9,7 @@ from analysis.report.model import ReportInput
 from analysis.report.sample import Rows
 from analysis.report.units import NONE, count, micrometres, percent
 
-TERM_COLUMNS = ("n", "predicted sigma", "true RMSE", "within ±1 sigma", "within ±2 sigma")
+TERM_COLUMNS = ("n", "sigma, median", "sigma, RMS", "true RMSE", "within ±1 sigma", "within ±2 sigma")
 MEANS = (10, 100)
 """Numbers of neighbouring scan lines over which means are taken."""
 LEAST = 0.1
@@ -41,11 +41,11 @@ def term_rows(rows: Rows) -> list[tuple[str, list[str]]]:
         )
     if np.any(systematic > 0.0):
         known = systematic[np.isfinite(error) & np.isfinite(systematic)]
-        told.append(("calibration, common to all", [count(len(known)), micrometres(_rms(known)), *[NONE] * 3]))
+        told.append(("calibration, common to all", [count(len(known)), *_sizes(known), *[NONE] * 3]))
         told.append(("noise and calibration", _cells(error, np.hypot(random, systematic))))
     if _rms(np.nan_to_num(sheet)) > LEAST * _rms(np.nan_to_num(random)):
         known = sheet[np.isfinite(error) & np.isfinite(sheet)]
-        told.append(("sheet's own width, from the truth", [count(len(known)), micrometres(_rms(known)), *[NONE] * 3]))
+        told.append(("sheet's own width, from the truth", [count(len(known)), *_sizes(known), *[NONE] * 3]))
         all_of_it = np.hypot(np.hypot(random, systematic), np.nan_to_num(sheet))
         told.append(("noise, calibration and sheet", _cells(error, all_of_it)))
     return told
@@ -54,15 +54,20 @@ def term_rows(rows: Rows) -> list[tuple[str, list[str]]]:
 def _cells(error: np.ndarray, sigma: np.ndarray) -> list[str]:
     known = np.isfinite(error) & np.isfinite(sigma)
     if not known.any():
-        return [count(0), *[NONE] * 4]
+        return [count(0), *[NONE] * (len(TERM_COLUMNS) - 1)]
     e, s = np.abs(error[known]), sigma[known]
     return [
         count(len(e)),
-        micrometres(_rms(s)),
+        *_sizes(s),
         micrometres(_rms(e)),
         percent(float(np.mean(e <= s))),
         percent(float(np.mean(e <= 2.0 * s))),
     ]
+
+
+def _sizes(sigma: np.ndarray) -> tuple[str, str]:
+    """Median, and root of the mean squares, which is that of the squared errors but hangs on the few least sure."""
+    return micrometres(float(np.median(sigma)) if len(sigma) else 0.0), micrometres(_rms(sigma))
 
 
 def _rms(values: np.ndarray) -> float:

@@ -111,7 +111,7 @@ def _content(report: ReportInput, process: Drawing, meanwhile: Callable[[], None
             *filter(None, [sample_note(found)]),
         ],
         "several": len(record.steps) > 1,
-        "shown_step": frame.step,
+        "shown_step": frame.step + 1,
         "frame_count": len(record.steps),
         "picture_note": note,
         "steps_picture": steps,
@@ -154,7 +154,7 @@ def _detail(report: ReportInput, frame: FrameResult, i: int) -> dict[str, Any]:
     if len(report.scene.lasers) > 1:
         title += f": {plain(report.scene.lasers[i].name)}"
     if len(report.record.steps) > 1:
-        title += f", step {frame.step}"
+        title += f", step {frame.step + 1}"
     white = report.display_max
     if white is None:
         white = float(np.max(laser.image)) if laser.image is not None else 1.0

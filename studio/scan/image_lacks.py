@@ -14,11 +14,15 @@ BLURRED_PX = 4.0 * SHARP_PX
 """Diameter of the blur disc from which it is most of a line's width, where the design's read-out is red as well."""
 
 
-def image_lacks(project: Project, measured: Sequence[Measured], known: Mapping[str, str] = {}) -> dict[str, str]:
-    """Sentences by kind, with those that were known of other frames before; measured: by laser."""
-    told = dict(known)
-    for kind, remark in (("speckle", speckle_remark), ("defocus", defocus_remark)):
-        text = "" if kind in told else remark(project, measured)
+def image_lacks(
+    project: Project, measured: Sequence[Measured], known: Mapping[str, str] = {}, step: int | None = None
+) -> dict[str, str]:
+    """Sentences by kind, with those that were known of other frames before; measured: by laser; step: of a scan."""
+    told, of = dict(known), "" if step is None else f" in step {step + 1}"
+    for kind, text in (
+        ("speckle", "" if "speckle" in told else speckle_remark(project, measured, of)),
+        ("defocus", "" if "defocus" in told else defocus_remark(project, measured)),
+    ):
         if text:
             told[kind] = text
     return told

@@ -94,7 +94,7 @@ class Measuring:
             if self._compared is None:
                 self._compared = compared_methods(result)
             chosen = [laser.extractions[0] for laser in result.lasers]
-            self.lacks = image_lacks(self._project, chosen, self.lacks)
+            self.lacks = image_lacks(self._project, chosen, self.lacks, result.step)
             for i, laser in enumerate(result.lasers):
                 best = laser.extractions[0]
                 self._points.add(cloud(best.points, best.errors, i, result.step, self._project.scene))

@@ -33,9 +33,10 @@ class Measured(Protocol):
     def errors(self) -> Errors: ...
 
 
-def speckle_remark(project: Project, measured: Sequence[Measured]) -> str:
+def speckle_remark(project: Project, measured: Sequence[Measured], of: str = "") -> str:
     """By the first laser that drew a line; empty where the sensor has speckle, or it would change little.
 
+    of: which of several frames they are of, in words.
     Fully developed and polarised, as of a laser on a rough surface (`speckle_px`), times the depth of a pixel.
     """
     if project.sensor.speckle != "off":
@@ -45,9 +46,9 @@ def speckle_remark(project: Project, measured: Sequence[Measured]) -> str:
         robust = one.errors.depth_z.robust_sigma
         if sigma > robust:
             return (
-                f"Laser speckle is switched off in the sensor: these errors, {micrometres(robust)} robust sigma, have "
-                f"none of it, where a laser on a rough surface scatters depth by about {micrometres(sigma)}. Switch it "
-                "on (sensor, Laser speckle) for what a real scanner of this kind meets."
+                f"Laser speckle is switched off in the sensor: these errors, {micrometres(robust)} robust sigma{of}, "
+                f"have none of it, where a laser on a rough surface scatters depth by about {micrometres(sigma)}. "
+                "Switch it on (sensor, Laser speckle) for what a real scanner of this kind meets."
             )
     return ""
 

@@ -54,7 +54,7 @@ def test_the_report_tells_cover_by_term():
     told = dict(term_rows(rows))
     both = dict(zip(TERM_COLUMNS, told["noise and calibration"], strict=True))
     alone = dict(zip(TERM_COLUMNS, told["each point: noise"], strict=True))
-    assert both["predicted sigma"].startswith("50") and alone["predicted sigma"].startswith("30")
+    assert both["sigma, RMS"].startswith("50") and alone["sigma, RMS"].startswith("30")
     # an offset of 4/3 sigma: the normal distribution between -2 - 4/3 and 2 - 4/3
     assert float(alone["within ±2 sigma"].split()[0]) == pytest.approx(74.7, abs=3 * 0.7)
     assert told["mean of 100 scan lines: noise"][0] == "40"

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from studio.qt.core.session import Session
+from studio.scan.redevelop import is_developed_otherwise
 from studio.scan.remarks import scale_head
 
 STOPPED = "This render was stopped early: light is missing, and the figures are of what there is."
 CHANGED = "The scene has changed since: these are the figures of the render as it was."
+MEASURED_OTHERWISE = (
+    "Figures of all steps are as they were scanned: sensor, extraction or calibration has changed since (Measure > "
+    "Measure the scan again)."
+)
 
 
 def heads(session: Session, step_problem: str) -> list[str]:
@@ -19,6 +24,8 @@ def heads(session: Session, step_problem: str) -> list[str]:
         told.append(f"Cell of a study: {render.name}. Your own renders are in the list of the Render workspace.")
     elif session.stale and (render.scan is None or render.frame.step == session.step):
         told.append(CHANGED)
+    if render.scan is not None and is_developed_otherwise(render.project, session.project, render.image_scale):
+        told.append(MEASURED_OTHERWISE)
     if not render.final and not render.refining:
         told.append(STOPPED)
     return [*told, *filter(None, [scale_head(render.scanner_scale)])]

@@ -248,8 +248,24 @@ class PartTab(QWidget):
             text = odd
         elif self.readings and (render := self.session.shown) is not None:
             text = lean_text(render.project.scene, self.laser, render.frame.step)
+        if self._read and (of := self._of_which()):
+            text = f"{of} {text}".strip()
         self.told.setText(text)
         self.told.setVisible(bool(text))
+
+    def _of_which(self) -> str:
+        """Of a scan: the step that is read here, and what the scan itself found of the chosen measure."""
+        render = self.session.shown
+        if render is None or render.scan is None or self.placing is not None:
+            return ""
+        told = f"Of step {render.frame.step + 1} of {render.scan.count}."
+        kept = render.scan.found.manifest.get("measures")
+        if isinstance(kept, list) and 0 <= self.chosen < len(self._read):
+            own = [one for one in kept if isinstance(one, dict) and one.get("name") == self._read[self.chosen].name]
+            verdicts = own[0].get("verdicts") if own else None
+            if isinstance(verdicts, dict) and set(verdicts) - {"none"}:
+                told += f" All steps, as scanned: {', '.join(f'{count} {name}' for name, count in verdicts.items())}."
+        return told
 
     def _lay_out(self) -> None:
         menu = QMenu(self.add)

@@ -20,7 +20,7 @@ from studio.qt.core.session import Session
 from studio.qt.shell.missing_files import may_open
 from studio.runtime.error_messages import trouble
 from studio.runtime.preferences import PreferencesFile, recovery_folder
-from studio.scan.scan_folder import ScanFolder, image_scale_of, open_folder
+from studio.scan.scan_folder import ScanFolder, image_scale_of, measured_project, open_folder
 from studio.scan.scan_results import holds_scan, is_scan_of, source_of
 
 MAX_NAME = 200
@@ -46,10 +46,10 @@ def template(key: str, autosave: Autosave) -> Document:
 def _scanned(found: ScanFolder) -> Document:
     """The project of a scan: the file it was made from, or, where that has changed since, what the scan kept of it.
 
-    InputError: meshes or textures are missing.
+    What it kept is with the measures and settings of its last measurement. InputError: meshes or textures are missing.
     """
     source = source_of(found)
-    project = found.project if source is None else Project.load(source)
+    project = measured_project(found) if source is None else Project.load(source)
     gone = missing_files(project.scene, found.root)
     if gone:
         cure = "put the project's folder back to where it was when it was scanned"

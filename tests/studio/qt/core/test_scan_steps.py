@@ -150,7 +150,7 @@ class TestOpened:
         assert "as they were scanned" not in said.text()
         with qtbot.waitSignal(opened.session.measured, timeout=20_000):
             opened.session.set(("sensor", "bits"), 8)
-        assert "as they were scanned" in said.text()
+        assert "as they were scanned" in said.text() and "Measure the scan again" in panel.head_text.text()
         panel.scan_bar.scope.setCurrentIndex(1)
         assert "as they were scanned" not in said.text()
         opened.files.count_as_saved(opened.session.project)

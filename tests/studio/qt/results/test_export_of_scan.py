@@ -21,8 +21,10 @@ from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.export_actions import ExportActions
+from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.results.scan_again import KEY, ScanAgain
 from studio.qt.results.scan_bar import ScanBar
+from studio.qt.shell.file_actions import _scanned
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.scan_folder import open_folder
 from tests.studio.scan_of_steps import small_scan
@@ -118,4 +120,11 @@ def test_a_scan_is_measured_again_with_the_measures_of_now(
     (kept,) = open_folder(folder).manifest["measures"]
     assert kept["name"] == "top" and kept["value"] is not None
     assert {path: path.stat().st_mtime_ns for path in folder.glob("frame_*")} == frames
+    panel = ResultsPanel(bench.session)
+    qtbot.addWidget(panel)
+    qtbot.waitUntil(lambda: panel.part.told.text().startswith("Of step 1 of 3."))
+    panel.close()
+    # opened again, where the project's file is another by now, it has what it was measured with
+    file.unlink()
+    assert _scanned(open_folder(folder)).project.measures == (FLATNESS,)
     bench.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import trimesh
 from PySide6.QtCore import Qt
@@ -65,6 +66,9 @@ class TestKinds:
         session.select(("scene", "motion"))
         self.choose(qtbot, inspector, ("scene", "motion"), "Turntable")
         assert session.project.scene.motion.kind == "turntable"
+        self.choose(qtbot, inspector, ("scene", "motion"), "Linear stage")
+        stage = session.project.scene.motion
+        assert abs(np.dot(stage.step, session.project.scene.T_world_laser(0)[:3, 0])) > 0.6e-3, "across the line"
         session.select(("scene", "objects", 1))
         self.choose(qtbot, inspector, ("scene", "objects", 1, "shape"), "Sphere")
         assert session.project.scene.objects[1].shape.kind == "sphere"
