@@ -150,7 +150,9 @@ def fit(
         wrong = np.abs(e) > OUTLIER_SIGMAS * usual
         if round_left == ROUNDS - 1 and usual > DRAWN_SIGMAS:
             found, of_most = _of_most_points(curve_of, start, here, local, direction, len(theta))
-            wrong = found if of_most < usual / DRAWN_SIGMAS else wrong
+            # not where a side of a step would be left without points
+            whole = np.linalg.matrix_rank(by_theta[~found]) == len(theta)
+            wrong = found if of_most < usual / DRAWN_SIGMAS and whole else wrong
         if round_left == 0 or not wrong.any() or len(e) - np.count_nonzero(wrong) <= len(theta):
             break
         here = here.copy()

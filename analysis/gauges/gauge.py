@@ -108,10 +108,12 @@ class Gauge(Model):
                 raise ValueError(f"regions[{i}] goes from {low} m to {high} m; allowed: the second is the larger")
         if self.nominal is None and (self.lower is not None or self.upper is not None):
             raise ValueError("lower and upper are deviations from nominal, which is missing; give it, or none of them")
-        if self.lower is not None and self.upper is not None and self.lower >= self.upper:
+        if self.lower is not None and self.upper is not None and self.lower > self.upper:
             factor, unit = {"m": (1e3, "mm"), "rad": (180.0 / math.pi, "deg"), "m2": (1e6, "mm²")}[self.unit]
             found = f"lower is {factor * self.lower:.6g} {unit} and upper {factor * self.upper:.6g} {unit}"
-            raise ValueError(f"{found}; allowed: lower is below upper, with a minus sign if it is below the nominal")
+            raise ValueError(
+                f"{found}; allowed: lower is not above upper, with a minus sign if it is below the nominal"
+            )
         return self
 
     @property

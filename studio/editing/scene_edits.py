@@ -198,15 +198,20 @@ def move(project: Project, path: FieldPath, index: int) -> Result:
     return replaced(project, path[:-1], tuple(items)), (*path[:-1], index)
 
 
-def set_motion(project: Project, kind: type[BaseModel]) -> Result:
-    """Another kind of motion; what both kinds have in common stays."""
+def new_motion(project: Project, kind: type[BaseModel]) -> NoMotion | LinearStage | Turntable | PoseList:
+    """Of another kind; what both kinds have in common stays, and a new stage moves across the line."""
     from studio.editing.forms import Alternative, start_value
 
     assert kind in (NoMotion, LinearStage, Turntable, PoseList)
     motion = start_value(Alternative("", "", kind), project.scene.motion)
     if isinstance(motion, LinearStage) and not isinstance(project.scene.motion, LinearStage):
         motion = motion.model_copy(update={"step": across_the_line(project.scene)})
-    return replaced(project, ("scene", "motion"), motion), ("scene", "motion")
+    return motion  # type: ignore[no-any-return]
+
+
+def set_motion(project: Project, kind: type[BaseModel]) -> Result:
+    """As of `new_motion`. InputError: something else of the project does not go with it."""
+    return replaced(project, ("scene", "motion"), new_motion(project, kind)), ("scene", "motion")
 
 
 def _append(project: Project, path: FieldPath, item: SceneObject | LineLaser | PointLight | RectangleLight) -> Result:

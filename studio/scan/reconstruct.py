@@ -12,6 +12,7 @@ from analysis.report.record import ScanRecord
 from render.base.errors import InputError
 from render.frame import Frame
 from render.output.frame_files import read_frame
+from render.run import never
 from render.world.material_checks import scene_warnings
 from render.world.world import build_world
 from studio.project.date_and_time import now
@@ -84,6 +85,8 @@ def _measured(
         measuring.finish()
         if not measuring.record.steps or not project.scene.lasers:
             raise InputError("the scan holds no laser image", where=str(found.folder))
+        # the old points go now: what would be cancelled from here on would leave the folder without any
+        clock.cancelled = never
         with scan_folder.replacing(found, out) as measured:
             files = measuring.write_points(out)
             figures = summarise(measuring.record)

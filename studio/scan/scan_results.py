@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,15 @@ from studio.project.input_files import check_unchanged
 from studio.project.project import Project
 from studio.scan.point_sample import PointSample
 from studio.scan.result_series import MEASURED, ErrorView
-from studio.scan.scan_folder import MANIFEST, PROJECT, ScanFolder, check_frame, check_kept, image_scale_of
+from studio.scan.scan_folder import (
+    MANIFEST,
+    PROJECT,
+    ScanFolder,
+    check_frame,
+    check_kept,
+    image_scale_of,
+    measured_project,
+)
 from studio.scan.stages import scaled, step_world
 
 LARGEST = 1e12
@@ -53,6 +62,11 @@ class ScanResults:
     """Kind of error -> (lasers, steps, 3): number, sum and sum of squares of the errors, m."""
     one_in: int = 1
     """Of how many points `points` has one."""
+
+    @cached_property
+    def measured_as(self) -> Project:
+        """The project with the settings of the last measurement. InputError: as `measured_project`."""
+        return measured_project(self.found)
 
     @property
     def count(self) -> int:

@@ -10,10 +10,9 @@ import hashlib
 import json
 from pathlib import Path
 
-from render.base.errors import InputError
 from render.base.files import atomic_write
 from studio.runtime.preferences import state_folder
-from studio.study.draft import Data, finished, varies_nothing
+from studio.study.draft import Data, varies_nothing
 
 KEPT = 100
 """Of the last projects."""
@@ -43,10 +42,23 @@ def kept_draft(project: Path, base: str) -> Data | None:
         if file.stat().st_size > LARGEST:
             return None
         draft = json.loads(file.read_text(encoding="utf-8")) | {"base": base}
-        finished(draft | {"sweeps": [sweep for sweep in draft["sweeps"] if _asks(sweep)]})
-    except (OSError, ValueError, TypeError, LookupError, AttributeError, InputError):
+    except (OSError, ValueError, TypeError):
         return None
-    return dict(draft)
+    return dict(draft) if _is_draft(draft) else None
+
+
+def _is_draft(draft: Data) -> bool:
+    """It has what a draft has, be it finished or not."""
+    sweeps = draft.get("sweeps")
+    if not isinstance(draft.get("name"), str) or not isinstance(sweeps, list) or not sweeps:
+        return False
+    return all(
+        isinstance(sweep, dict)
+        and isinstance(sweep.get("name"), str)
+        and isinstance(sweep.get("vary"), list)
+        and all(isinstance(one, dict) and isinstance(one.get("field"), str) for one in sweep["vary"])
+        for sweep in sweeps
+    )
 
 
 def _asks(sweep: Data) -> bool:

@@ -8,9 +8,11 @@ Made once for a session. Whoever looks at another step moves `session.step`.
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
 from render.world.world import World
@@ -40,6 +42,8 @@ class ScanSteps(QObject):
         self.session = session
         self.problem = ""
         """Why the step cannot be shown."""
+        self.measured: dict[Path, Project] = {}
+        """By a scan's folder, as it was measured again in this session, calibration and laser powers included."""
         self.runner = JobRunner(self)
         self.runner.failed.connect(self._fail)
         session.step_changed.connect(self.follow)
@@ -65,6 +69,14 @@ class ScanSteps(QObject):
 
         # a lane of its own: a step asked for meanwhile must not take its place
         self.runner.run("open a scan", f"open {found.folder.name}", work, then)
+
+    def measured_as(self, render: Render) -> Project:
+        """The project, at the scan's image scale, by which all steps of a shown scan were measured last."""
+        assert render.scan is not None
+        try:
+            return self.measured.get(render.scan.found.folder) or render.scan.measured_as
+        except InputError:
+            return render.project
 
     def follow(self) -> None:
         """Read the session's step of the shown scan, where that is not what is shown."""

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QLabel, QVBoxLayout,
 
 from render.base.errors import InputError
 from studio.editing.forms import Alternative, FieldSpec, describe_item, edited, field_path, start_value
-from studio.editing.scene_edits import set_motion
+from studio.editing.scene_edits import new_motion
 from studio.editing.targets import other_frame
 from studio.project.document import FieldPath, value_at
 from studio.qt.core import theme
@@ -275,9 +275,10 @@ class Form(QWidget):
             return
         label = f"change {spec.label.lower()} to {alternative.label.lower()}"
         if path == ("scene", "motion"):  # a stage has its direction from the laser
-            self.session.document.apply(label, set_motion(self.session.project, alternative.type)[0])
+            value: object = new_motion(self.session.project, alternative.type)
         else:
-            self.session.set(path, start_value(alternative, spec.value), label)
+            value = start_value(alternative, spec.value)
+        self.session.set(path, value, label)
         if path in self.kinds:
             self.kinds[path].show_value(describe_item(self.session.project, path).chosen)
 

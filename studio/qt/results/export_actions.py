@@ -17,6 +17,7 @@ from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import show_trouble, suggested
 from studio.qt.core.jobs import JobRunner
+from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Render, Session
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job, Progress
@@ -154,8 +155,9 @@ class ExportActions(QObject):
         def then(written: list[Path]) -> None:
             if writer is export.export_report:
                 render.report = written[0]
-            method = how.project.extraction.method
-            said = f", the points by {method_name(method)}, the project's own method" if kind == "points" else ""
+            method = (how.project if whole is None else scan_steps(self.session).measured_as(render)).extraction.method
+            own = "the project's own method" if whole is None else "as the scan was measured last"
+            said = f", the points by {method_name(method)}, {own}" if kind == "points" else ""
             self._tell(written, said + (f", of {of}" if of else ""), notes)
 
         self._job = self.runner.run(LANE, f"export {path.name}", work, then)

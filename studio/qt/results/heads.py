@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from studio.qt.core.session import Session
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Render, Session
 from studio.scan.redevelop import is_developed_otherwise
 from studio.scan.remarks import scale_head
 
 STOPPED = "This render was stopped early: light is missing, and the figures are of what there is."
 CHANGED = "The scene has changed since: these are the figures of the render as it was."
 MEASURED_OTHERWISE = (
-    "Figures of all steps are as they were scanned: sensor, extraction or calibration has changed since (Measure > "
+    "Figures of all steps are as they were measured: sensor, extraction or calibration has changed since (Measure > "
     "Measure the scan again)."
 )
 
@@ -24,8 +25,16 @@ def heads(session: Session, step_problem: str) -> list[str]:
         told.append(f"Cell of a study: {render.name}. Your own renders are in the list of the Render workspace.")
     elif session.stale and (render.scan is None or render.frame.step == session.step):
         told.append(CHANGED)
-    if render.scan is not None and is_developed_otherwise(render.project, session.project, render.image_scale):
+    if measured_otherwise(session, render):
         told.append(MEASURED_OTHERWISE)
     if not render.final and not render.refining:
         told.append(STOPPED)
     return [*told, *filter(None, [scale_head(render.scanner_scale)])]
+
+
+def measured_otherwise(session: Session, render: Render) -> bool:
+    """A scan, whose points would be others with the sensor, extraction, powers or calibration of now."""
+    if render.scan is None or not render.scan.measured:
+        return False
+    before = scan_steps(session).measured_as(render)
+    return is_developed_otherwise(before, session.project, render.image_scale)

@@ -264,7 +264,9 @@ class PartTab(QWidget):
             own = [one for one in kept if isinstance(one, dict) and one.get("name") == self._read[self.chosen].name]
             verdicts = own[0].get("verdicts") if own else None
             if isinstance(verdicts, dict) and set(verdicts) - {"none"}:
-                told += f" All steps, as scanned: {', '.join(f'{count} {name}' for name, count in verdicts.items())}."
+                told += (
+                    f" All steps, as measured last: {', '.join(f'{count} {name}' for name, count in verdicts.items())}."
+                )
         return told
 
     def _lay_out(self) -> None:

@@ -33,7 +33,7 @@ from studio.qt.core import theme
 from studio.qt.core.icons import dot
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
-from studio.qt.results.heads import heads
+from studio.qt.results.heads import heads, measured_otherwise
 from studio.qt.results.measures_table import MeasuresTable
 from studio.qt.results.part_tab import PartTab
 from studio.qt.results.region_tab import RegionTab
@@ -43,7 +43,6 @@ from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.results_rows import RowPlots
 from studio.qt.results.results_steps import StepsPlot
 from studio.qt.results.scan_bar import ScanBar
-from studio.scan.redevelop import is_developed_otherwise
 from studio.scan.region import Box, Region, scan_errors
 from studio.scan.remarks import frame_remarks, scale_notes
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, error_values, measured_series, table, true_series
@@ -167,7 +166,7 @@ class ResultsPanel(QWidget):
         if (whole := self.scan_bar.whole) is not None:
             self._show_all_steps(whole, laser)
             remarks = whole.remarks()
-            if is_developed_otherwise(render.project, self.session.project, render.image_scale):
+            if measured_otherwise(self.session, render):
                 remarks.insert(0, AS_SCANNED)
         else:
             self._show_histogram()

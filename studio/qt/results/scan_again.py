@@ -33,7 +33,7 @@ class ScanAgain(QObject):
         self.actions[KEY].setEnabled(render is not None and render.scan is not None)
 
     def run(self) -> None:
-        """In the background; cancelled, all is as it was."""
+        """In the background; cancelled while frames are measured, all is as it was."""
         session, document, render = self.session, self.session.document, self.session.shown
         scan = None if render is None else render.scan
         if render is None or scan is None:
@@ -47,6 +47,7 @@ class ScanAgain(QObject):
             measure_scan_again(scan, how.powered, Clock(progress, cancelled))
 
         def then(_: None) -> None:
+            scan_steps(session).measured[folder] = how.powered
             session.message.emit("info", f"All {scan.count} steps were measured again: {folder}")
             if session.document is document:
                 self._show(render)
@@ -62,5 +63,6 @@ class ScanAgain(QObject):
         except InputError as error:
             session.message.emit("error", str(error))
             return
-        session.renders = [render for render in session.renders if render is not before]
+        # another step of it may have been looked at meanwhile
+        session.renders = [render for render in session.renders if render.scan is not scan]
         scan_steps(session).show(found, before.source, before.image_scale)

@@ -15,7 +15,7 @@ def escape(window: MainWindow) -> None:
     """End the tour, or a measure that is being added; a job goes on, and it is said how to stop it."""
     if window.tour is not None:
         window.tour.end()
-    elif cast(Any, window.panels["results"]).give_up():
+    elif window.panels.is_made("results") and cast(Any, window.panels["results"]).give_up():
         return
     elif window.status.job is not None:
         # it leaves fields, menus and drags: once too often must not cost an hour of work

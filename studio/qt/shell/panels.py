@@ -94,6 +94,9 @@ class Panels:
             self._rooms[key].take(self._make(panel))
         return self._made[key]
 
+    def is_made(self, key: str) -> bool:
+        return key in self._made
+
     def when_made(self, key: str, then: Callable[[QWidget], None]) -> None:
         """Call `then` with the panel: now, or as soon as it is there."""
         if key in self._made:

@@ -64,6 +64,8 @@ class StudyWork(LongWork):
         self.loaded: dict[str, Project] = {}
         """Base projects of a study that came from a file; empty: it is of the open project."""
         self.draft: Data = self._begun()
+        self._document, self._changed = session.document, False
+        """Of which the draft is, and whether it was changed in this window."""
         self.chosen = 0
         """The sweep that is edited and whose chart is shown."""
         self.found: Found | None = None
@@ -121,6 +123,7 @@ class StudyWork(LongWork):
         if draft != self.draft:
             self.draft = draft
             self.chosen = min(self.chosen, len(draft["sweeps"]) - 1)
+            self._changed = True
             self._keep()
             self.draft_changed.emit()
             self._rest.start()
@@ -161,6 +164,7 @@ class StudyWork(LongWork):
     def start_anew(self) -> None:
         """An empty study of the open project."""
         self._take({}, new_draft(self.base_name))
+        self._changed = True
         self._keep()
 
     def load(self, path: Path | str) -> None:
@@ -345,12 +349,15 @@ class StudyWork(LongWork):
 
     def _follow_document(self) -> None:
         """A study of the project that was open goes on, as it began; one that has not begun is of the new one."""
+        self._keep()  # of the document before, which may have become a file since the last change
+        self._document = self.session.document
         if self.loaded:
             return
         if self.running or self.found is not None:
             self.loaded = dict(self.found.bases) if self.found is not None else self._run_bases
         else:
             self._take({}, self._begun())
+            self._changed = False
 
     def _begun(self) -> Data:
         """The study of the open project as it was left, else an empty one."""
@@ -358,8 +365,8 @@ class StudyWork(LongWork):
         return (kept_draft(path, self.base_name) if path is not None else None) or new_draft(self.base_name)
 
     def _keep(self) -> None:
-        path = self.session.document.path
-        if path is not None and not self.loaded:
+        path = self._document.path
+        if path is not None and self._changed and not self.loaded:
             keep_draft(path, self.draft)
 
     def _base_from(self, folder: Path, study: Study) -> str:

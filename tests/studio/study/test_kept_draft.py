@@ -33,6 +33,14 @@ def test_it_is_there_again_by_the_name_that_the_project_has_now(tmp_path: Path) 
     assert kept_draft(tmp_path / "other.json", "other.json") is None
 
 
+def test_an_unfinished_one_is_kept_as_well(tmp_path: Path) -> None:
+    """A map of one field is no study yet, and work all the same."""
+    unfinished = draft()
+    unfinished["sweeps"][0] |= {"chart": "map", "sampling": "boundary"}
+    keep_draft(tmp_path / "scanner.json", unfinished)
+    assert kept_draft(tmp_path / "scanner.json", "scanner.json") == unfinished
+
+
 def test_an_emptied_one_is_gone(tmp_path: Path, folder: Path) -> None:
     keep_draft(tmp_path / "scanner.json", draft())
     keep_draft(tmp_path / "scanner.json", new_draft("scanner.json"))

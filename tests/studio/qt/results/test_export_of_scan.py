@@ -21,6 +21,7 @@ from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.export_actions import ExportActions
+from studio.qt.results.heads import measured_otherwise
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.results.scan_again import KEY, ScanAgain
 from studio.qt.results.scan_bar import ScanBar
@@ -120,6 +121,13 @@ def test_a_scan_is_measured_again_with_the_measures_of_now(
     (kept,) = open_folder(folder).manifest["measures"]
     assert kept["name"] == "top" and kept["value"] is not None
     assert {path: path.stat().st_mtime_ns for path in folder.glob("frame_*")} == frames
+    assert not measured_otherwise(bench.session, bench.session.shown)
+    bench.session.set(("sensor", "bits"), 8)
+    assert measured_otherwise(bench.session, bench.session.shown)
+    shown = bench.session.shown
+    again.actions[KEY].trigger()
+    qtbot.waitUntil(lambda: bench.session.shown is not shown)
+    assert not measured_otherwise(bench.session, bench.session.shown)
     panel = ResultsPanel(bench.session)
     qtbot.addWidget(panel)
     qtbot.waitUntil(lambda: panel.part.told.text().startswith("Of step 1 of 3."))

@@ -12,8 +12,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QToolButton
 from pytestqt.qtbot import QtBot
 
+from analysis.gauges.gauge import Gauge
 from render.laser.laser import Waist
 from render.material.material import Texture
+from render.scene.motion import LinearStage
 from render.scene.shape import MeshFile
 from studio.qt.core.session import Session
 from studio.qt.scene import mesh_importer
@@ -76,6 +78,17 @@ class TestKinds:
         self.choose(qtbot, inspector, ("sensor", "band_pass"), "Band pass")
         assert session.project.sensor.band_pass is not None
         assert field(inspector, "sensor", "band_pass", "centre_nm").text() == "450"
+
+    def test_a_motion_that_does_not_go_with_a_measure_is_refused(
+        self, qtbot: QtBot, session: Session, inspector: Inspector
+    ) -> None:
+        stage = LinearStage(step=(0.001, 0.0, 0.0), steps=9)
+        session.set(("scene", "motion"), stage)
+        session.set(("measures",), (Gauge(kind="radius", step=5, regions=((0.0, 0.01),)),))
+        session.select(("scene", "motion"))
+        with qtbot.waitSignal(session.message, check_params_cb=lambda level, text: level == "error"):
+            self.choose(qtbot, inspector, ("scene", "motion"), "Nothing moves")
+        assert session.project.scene.motion == stage
 
     def test_a_mesh_file_is_chosen_copied_and_used(
         self, qtbot: QtBot, session: Session, inspector: Inspector, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

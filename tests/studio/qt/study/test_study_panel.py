@@ -335,3 +335,18 @@ def test_a_study_that_was_not_run_is_there_when_the_project_is_opened_again(desk
     assert work.draft == left
     work.close()
     live(again).close()
+
+
+def test_a_window_that_changed_nothing_takes_no_study_away(desk: Desk, tmp_path: Path) -> None:
+    """Of two windows on one project the one in which nothing was put together may be closed last."""
+    file = tmp_path / "plane.json"
+    other = Session(Document(Project.load(file), file))
+    idle = one_of(StudyWork, other)
+    desk.small([1.0, 2.0])
+    idle.close()
+    live(other).close()
+    again = Session(Document(Project.load(file), file))
+    work = one_of(StudyWork, again)
+    assert work.draft == desk.work.draft
+    work.close()
+    live(again).close()
