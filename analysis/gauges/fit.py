@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.gauges.profile import Profile
 from analysis.gauges.spikes import spikes
-from analysis.measures import robust_sigma
+from analysis.measures import MAD_TO_SIGMA, robust_sigma
 from render.base.arrays import Float
 
 Curve = Callable[[Float, Float], tuple[Float, Float, Float]]
@@ -28,7 +28,6 @@ DRAWN_SIGMAS = 3.0
 """A usual miss from which far points may have drawn the curve to them: they have if most lie so much nearer another."""
 DRAWN, DRAWN_SEED = 50, 11
 """Curves that are drawn by chance then: with a third of the points false, 15 of them have no false one in three."""
-MEDIAN_TO_SIGMA = 1.4826
 GRAZING = 1e-3
 """Sine of the angle between curve and d below which a point slides along the curve and tells nothing of it."""
 FOOT_STEPS = 3
@@ -204,7 +203,7 @@ def _of_most_points(
         middle = float(np.median(np.abs(e)))
         if middle < least:
             best, least = e, middle
-    usual = max(1.0, MEDIAN_TO_SIGMA * least)
+    usual = max(1.0, MAD_TO_SIGMA * least)
     return np.abs(best) > OUTLIER_SIGMAS * usual, usual
 
 

@@ -14,7 +14,7 @@ from render.base.pose import Pose, invert, transform_points
 from render.laser.laser import LineLaser
 from render.material.lambertian import Lambertian
 from render.scene.lights import PointLight, RectangleLight
-from render.scene.motion import LinearStage, NoMotion, PoseList, Turntable
+from render.scene.motion import LinearStage, Motion, NoMotion, PoseList, Turntable
 from render.scene.scene import SceneObject
 from render.scene.shape import MeshFile, Parametric, Plane
 from studio.editing.placement import (
@@ -198,15 +198,15 @@ def move(project: Project, path: FieldPath, index: int) -> Result:
     return replaced(project, path[:-1], tuple(items)), (*path[:-1], index)
 
 
-def new_motion(project: Project, kind: type[BaseModel]) -> NoMotion | LinearStage | Turntable | PoseList:
+def new_motion(project: Project, kind: type[BaseModel]) -> Motion:
     """Of another kind; what both kinds have in common stays, and a new stage moves across the line."""
     from studio.editing.forms import Alternative, start_value
 
     assert kind in (NoMotion, LinearStage, Turntable, PoseList)
-    motion = start_value(Alternative("", "", kind), project.scene.motion)
+    motion: Motion = start_value(Alternative("", "", kind), project.scene.motion)
     if isinstance(motion, LinearStage) and not isinstance(project.scene.motion, LinearStage):
         motion = motion.model_copy(update={"step": across_the_line(project.scene)})
-    return motion  # type: ignore[no-any-return]
+    return motion
 
 
 def set_motion(project: Project, kind: type[BaseModel]) -> Result:

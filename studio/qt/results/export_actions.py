@@ -31,7 +31,8 @@ from studio.scan.scan_results import ScanResults
 from studio.scan.stages import Clock
 
 if TYPE_CHECKING:
-    from studio.scan.export import Exported
+    from studio.project.project import Project
+    from studio.scan.export import Exported, Writer
 
 KINDS = {
     "export_html": ("Report (*.html)", ".html", "report"),
@@ -130,20 +131,12 @@ class ExportActions(QObject):
             "height map": partial(export_height_map, render.scan),
             "film": partial(export_film, render.scan),
         }
-        writer = writers[kind]
 
         def work(progress: Progress, cancelled: Cancel) -> list[Path]:
             progress(path.name, 0.0)  # how far it is, nobody knows
-            nonlocal writer
+            writer = writers[kind]
             if whole is not None:
-                from studio.scan import whole_scan
-
-                clock = Clock(progress, cancelled)
-                of_all = {
-                    "points": partial(whole_scan.export_scan_points, whole),
-                    "report": partial(whole_scan.export_scan_report, whole, how.powered, clock),
-                }
-                writer = of_all[kind]
+                writer = _of_all_steps(kind, whole, how.powered, Clock(progress, cancelled))
             as_shown = whole is not None or current or kind in ("frame", "height map", "film")
             what = shown if as_shown else _measured(shown, how, noise, cancelled)
             if kind == "height map":  # nobody was asked about the file beside the picture
@@ -153,7 +146,7 @@ class ExportActions(QObject):
         notes = scale_notes(render.scanner_scale)
 
         def then(written: list[Path]) -> None:
-            if writer is export.export_report:
+            if kind == "report" and whole is None:
                 render.report = written[0]
             method = (how.project if whole is None else scan_steps(self.session).measured_as(render)).extraction.method
             own = "the project's own method" if whole is None else "as the scan was measured last"
@@ -203,6 +196,14 @@ def _is_there(what: str, render: Render) -> bool:
     if what == "height map":
         return render.scan is not None and render.scan.measured
     return what == "frame" or bool(render.images if what == "image" else render.measurements)
+
+
+def _of_all_steps(kind: str, scan: ScanResults, project: Project, clock: Clock) -> Writer:
+    from studio.scan import whole_scan
+
+    if kind == "points":
+        return partial(whole_scan.export_scan_points, scan)
+    return partial(whole_scan.export_scan_report, scan, project, clock)
 
 
 def _measured(shown: Exported, how: Development, noise: bool, cancelled: Cancel) -> Exported:

@@ -202,10 +202,8 @@ class SweepEditor(QWidget):
         values: dict[str, Any] = {"sampling": sampling}
         values["samples"] = self.work.sweep.get("samples", SAMPLES) if sampling == "sobol" else None
         values["tolerance"] = self.work.sweep.get("tolerance", TOLERANCE) if sampling == "bisection" else None
-        if "effects" in (
-            sampling,
-            self.work.sweep.get("sampling"),
-        ):  # no fields, with a chart of their own
+        # effects are no fields, and have a chart of their own
+        if "effects" in (sampling, self.work.sweep.get("sampling")):
             values |= {"vary": [], "chart": "budget" if sampling == "effects" else "sweep"}
         if sampling == "boundary":
             values["chart"] = "map"
