@@ -1,4 +1,4 @@
-"""The profile in the plane of a laser, and the covariance of whatever is worked out from it."""
+"""The profile in a section of the part, and the covariance of whatever is worked out from it."""
 
 from __future__ import annotations
 
@@ -87,20 +87,20 @@ class Profile:
         return np.asarray(solve_banded((0, 1), banded, amplitude))
 
 
-def measured_profile(points: Points, errors: Errors | None, T_laser_camera: Float) -> Profile:
-    """Profile of the points that have coordinates and a sigma.
+def measured_profile(points: Points, errors: Errors | None, T_section_camera: Float) -> Profile:
+    """Profile of the points that have coordinates and a sigma, in the y and z of a section: a laser's plane or another.
 
     With `errors`, what the sheet's own width moves the line by, known from the truth, counts as one systematic error.
     """
     here = points.valid & np.isfinite(points.sigma_pixel) & (points.sigma_pixel > 0.0)
     order = np.flatnonzero(here)[np.argsort(points.index[here], kind="stable")]
-    to_plane = np.stack([T_laser_camera[1, :3], -T_laser_camera[2, :3]])
-    by_pixel = points.gradient[order] @ to_plane.T
-    shared = [] if points.calibration is None else [np.einsum("ij,mjk->mik", to_plane, points.calibration[order])]
+    to_section = np.stack([T_section_camera[1, :3], -T_section_camera[2, :3]])
+    by_pixel = points.gradient[order] @ to_section.T
+    shared = [] if points.calibration is None else [np.einsum("ij,mjk->mik", to_section, points.calibration[order])]
     if errors is not None:
         shared.append((by_pixel * np.nan_to_num(errors.sheet_bias[order])[:, None])[:, :, None])
     return Profile(
-        position=_in_plane(T_laser_camera, points.camera[order]),
+        position=_in_section(T_section_camera, points.camera[order]),
         random=by_pixel * points.sigma_pixel[order, None],
         systematic=np.concatenate([np.zeros((len(order), 2, 0)), *shared], axis=2),
         index=points.index[order],
@@ -108,9 +108,9 @@ def measured_profile(points: Points, errors: Errors | None, T_laser_camera: Floa
     )
 
 
-def true_profile(curve: LaserCurve, T_laser_camera: Float, measured: Profile) -> Profile:
+def true_profile(curve: LaserCurve, T_section_camera: Float, measured: Profile) -> Profile:
     """The exact line, where it is lit; its points weigh as the measured ones beside them."""
-    position = _in_plane(T_laser_camera, curve.point[curve.irradiance > 0.0])
+    position = _in_section(T_section_camera, curve.point[curve.irradiance > 0.0])
     order = np.argsort(measured.position[:, 0], kind="stable")
     weight = np.tile([0.0, ANY_SIGMA], (len(position), 1))
     if len(order):
@@ -120,6 +120,6 @@ def true_profile(curve: LaserCurve, T_laser_camera: Float, measured: Profile) ->
     return Profile(position, weight, np.zeros((len(position), 2, 0)), index, np.ones(len(position)))
 
 
-def _in_plane(T_laser_camera: Float, camera: Float) -> Float:
-    laser = transform_points(T_laser_camera, camera)
-    return np.stack([laser[:, 1], -laser[:, 2]], axis=1)
+def _in_section(T_section_camera: Float, camera: Float) -> Float:
+    there = transform_points(T_section_camera, camera)
+    return np.stack([there[:, 1], -there[:, 2]], axis=1)

@@ -105,6 +105,8 @@ class ReportInput:
     """Date and time of the run, as it shall be printed."""
     measures: tuple[dict[str, Any], ...] = ()
     """The part's measures, as the scan's record has them."""
+    measures_note: str = ""
+    """In which section they were read, where that matters."""
     delivery: Delivery = field(default_factory=Delivery)
     """Whom it is handed to."""
     logo: str = ""

@@ -334,6 +334,8 @@ def _print_results(result: dict[str, Any]) -> None:
         print_table("Measures", found, header=("Measure", *gauge_table.COLUMNS))
         for text in gauge_table.reasons(result["measures"]):
             print(f"not measured: {text}")
+        if result.get("measures_note"):
+            print(result["measures_note"])
     for row in result.get("results", [])[:1]:
         if row["sampled_scan_lines"] < row["scan_lines"]:
             sample = f"a sample of {row['sampled_scan_lines']} of {row['scan_lines']} scan lines"

@@ -38,7 +38,7 @@ Kind = Literal[
 ITEMS = (Camera, Scene, Sensor, RenderSettings, ExtractionSettings, LineLaser, SceneObject, PointLight, RectangleLight,
          Delivery)  # fmt: skip
 """What the scene tree shows as items of their own, and so no form of another item repeats."""
-HIDDEN = ("kind", "source", "schema_version", "sha256", "calibration", "measures")
+HIDDEN = ("kind", "source", "schema_version", "sha256", "calibration", "measures", "measured_in")
 FINE_UNITS = {(Camera, "pixel_pitch"): "µm", (Waist, "radius"): "µm", (Divergence, "full_angle"): "mrad",
               (Delivery, "lower"): "µm", (Delivery, "upper"): "µm"}  # fmt: skip
 PLAIN = Unit()

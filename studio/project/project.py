@@ -30,6 +30,8 @@ from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.project.validation_messages import input_error
 
 MAX_SEED = 2**63 - 1
+READ_OFF = ("measures", "measured_in", "delivery")
+"""Fields that neither render nor develop nor find a line: they say what is read off it, and how it is told."""
 _KEY = re.compile(r"([A-Za-z_]\w*)|\[(\d+)\]")
 """A part of a path: a name, or an index."""
 
@@ -53,6 +55,9 @@ class Project(Model):
     calibration: Calibration = Calibration()
     measures: tuple[Gauge, ...] = quantity(
         (), label="Measures", help="Dimensions of the part, read off every profile.", max_length=MOST_GAUGES
+    )
+    measured_in: Literal["laser_plane", "upright"] = quantity(
+        "laser_plane", label="Measured in", help="The section that measures are read in."
     )
     delivery: Delivery = Delivery()
     _folder: Path = PrivateAttr(default_factory=Path)
@@ -168,6 +173,10 @@ class Project(Model):
                 node = node[_there(key, node, place)]
             node[_there(keys[-1] if keys else place, node, place)] = to_jsonable_python(value)
         return self.from_data(data, "replaced").in_folder(self.folder)
+
+    def read_as(self, other: Self) -> Self:
+        """The same project, with what `other` reads off what was measured: measures of the part, and the report."""
+        return self.model_copy(update={name: getattr(other, name) for name in READ_OFF})
 
     def to_text(self) -> str:
         """The file's text: every value written out, so that a project outlives a change of defaults."""

@@ -17,29 +17,30 @@ from analysis.gauges.of_scan import Patch, patch
 from analysis.gauges.profile import Profile, measured_profile, true_profile
 from analysis.gauges.read import Reading, read
 from render.base.files import atomic_write
-from render.base.pose import invert
 from render.frame import Frame
 from studio.project.found_motion import measured_pose
 from studio.project.project import Project
 from studio.scan.own_files import MEASURE_COLUMNS
+from studio.scan.sheet_lean import Section, T_section_camera
 from studio.scan.stages import Measurement
 
 OF_SCAN = "it is of a whole scan: run one (F6, Motion), or Measure > Measure the scan again"
 FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error", "error_in_sigmas")
 
 
-def profiles(project: Project, frame: Frame, found: Measurement) -> tuple[Profile, Profile]:
-    """Measured and exact profile of a laser."""
-    T_laser_camera = invert(project.scene.T_camera_laser(found.laser))
-    measured = measured_profile(found.points, found.errors, T_laser_camera)
-    return measured, true_profile(frame.curves[found.laser], T_laser_camera, measured)
+def profiles(project: Project, frame: Frame, found: Measurement, section: Section) -> tuple[Profile, Profile]:
+    """Measured and exact profile of a laser, in a section."""
+    T = T_section_camera(project.scene, found.laser, frame.step, section)
+    measured = measured_profile(found.points, found.errors, T)
+    return measured, true_profile(frame.curves[found.laser], T, measured)
 
 
 def readings(project: Project, frame: Frame, found: Sequence[Measurement]) -> tuple[Reading, ...]:
     """Of the measures that are of this frame's step; found: of each laser."""
     there = [gauge for gauge in project.measures if not gauge.of_scan and gauge.laser < len(found)]
     wanted = [gauge for gauge in there if gauge.step in (None, frame.step)]
-    both = {laser: profiles(project, frame, found[laser]) for laser in {gauge.laser for gauge in wanted}}
+    lasers, section = {gauge.laser for gauge in wanted}, project.measured_in
+    both = {laser: profiles(project, frame, found[laser], section) for laser in lasers}
     return tuple(read(gauge, frame.step, *both[gauge.laser]) for gauge in wanted)
 
 
@@ -50,7 +51,7 @@ def patches(project: Project, frame: Frame, found: Sequence[Measurement]) -> tup
         if gauge.of_scan and gauge.laser < len(found):
             there = T_first_step(scene, frame.step), scene.T_camera_laser(gauge.laser)
             poses = measured_pose(scene, project.calibration.motion, frame.step), scene.T_world_camera(frame.step)
-            both = profiles(project, frame, found[gauge.laser])
+            both = profiles(project, frame, found[gauge.laser], "laser_plane")  # brought onto the part by poses
             kept.append(patch(gauge, *both, *(there[0] @ pose @ there[1] for pose in poses)))
     return tuple(kept)
 

@@ -23,6 +23,7 @@ from studio.scan.gauging import measures_record
 from studio.scan.measuring import Measuring
 from studio.scan.redevelop import Development, development
 from studio.scan.run_record import ended_by_clock, run_text
+from studio.scan.sheet_lean import section_note
 from studio.scan.stages import Clock, develop_step, moved_world
 from studio.scan.summary import summarise
 
@@ -92,6 +93,7 @@ def _measured(
             figures = summarise(measuring.record)
             notes = [*cautions.notes(figures), *(light_note(found.project, how.powered) if aimed else ())]
             measured["measures"] = measures_record(project.measures, measuring.record.readings)
+            measured["measures_note"] = section_note(project)
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
             measured["remarks"] = measuring.remarks()
             if any(getattr(requested, name) != getattr(found.project, name) for name in scan_folder.MEASURED_WITH):
@@ -111,6 +113,7 @@ def _measured(
         "image_scale": image_scale,
         "results": measured["results"],
         "measures": measured["measures"],
+        "measures_note": measured["measures_note"],
         "notes": notes,
         "extraction": measured["extraction"],
         "seconds": clock.seconds,

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from analysis.line.settings import Method
-from analysis.report.delivery import Delivery
 from render.base.errors import Cancelled
 from render.base.threads import Cancel
 from render.camera.camera import Lens
@@ -102,7 +101,6 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
         "sensor": now.sensor,
         "extraction": extraction,
         "seed": now.seed,
-        "delivery": now.delivery,
         "measures": tuple(one for one in now.measures if one.laser < len(scene.lasers)),
     }
     if len(now.scene.lasers) == len(scene.lasers) and _size(now.scene) == _size(scene):
@@ -113,7 +111,7 @@ def development(rendered: Project, now: Project, image_scale: float = 1.0) -> De
     allowed = [
         power if laser.power > 0.0 else 0.0 for power, laser in zip(powers, scene.lasers, strict=True)
     ]  # a laser that was off left no light
-    return Development(rendered.model_copy(update=update), tuple(allowed))
+    return Development(rendered.read_as(now).model_copy(update=update), tuple(allowed))
 
 
 def _size(scene: Scene) -> tuple[int, int]:
@@ -122,7 +120,7 @@ def _size(scene: Scene) -> tuple[int, int]:
 
 def is_developed_otherwise(rendered: Project, now: Project, image_scale: float = 1.0) -> bool:
     """`now` develops a frame of `rendered`, or finds its line, otherwise than that itself does."""
-    rendered, now = (one.model_copy(update={"measures": (), "delivery": Delivery()}) for one in (rendered, now))
+    now = now.read_as(rendered)
     how, before = development(rendered, now, image_scale), development(rendered, rendered)
     return (how.project.model_copy(update={"seed": rendered.seed}), how.laser_power) != (
         before.project,

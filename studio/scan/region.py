@@ -19,6 +19,7 @@ from studio.project.input_files import input_files
 from studio.scan.own_files import check_not_read
 from studio.scan.result_series import ErrorView, error_values, measured_series
 from studio.scan.scan_results import COLUMNS
+from studio.scan.sheet_lean import Section
 from studio.scan.stages import Measurement
 
 
@@ -30,6 +31,8 @@ class Region:
     low: float
     high: float
     """Scan lines, or m across the fan."""
+    section: Section = "laser_plane"
+    """Of the profile in which it is across the fan."""
 
     @property
     def title(self) -> str:
@@ -39,15 +42,15 @@ class Region:
 
     def of(self, found: Measurement, scene: Scene) -> NDArray[np.bool_]:
         """(m,) the points within it."""
-        series = measured_series(found, scene)
+        series = measured_series(found, scene, self.section)
         place = series.index if self.along == "scan lines" else 1e-3 * series.across
         return np.asarray(found.points.valid & (place >= self.low) & (place <= self.high))
 
-    def across(self, found: Measurement, scene: Scene) -> tuple[float, float] | None:
+    def across(self, found: Measurement, scene: Scene, section: Section) -> tuple[float, float] | None:
         """From and to, m across the fan, for a measure of the part; None: fewer than two points are within it."""
         if self.along == "fan":
             return self.low, self.high
-        place = measured_series(found, scene).across[self.of(found, scene)]
+        place = measured_series(found, scene, section).across[self.of(found, scene)]
         if len(place) < 2 or not np.ptp(place) > 0.0:
             return None
         # half a pitch beyond the outermost points, so that noise does not decide whether they count
@@ -83,10 +86,10 @@ class Box:
         here = self.holds(np.stack([points[name] for name in "xyz"], axis=1))
         return np.asarray(here & (points["laser"] == laser))
 
-    def across(self, found: Measurement, scene: Scene) -> tuple[float, float] | None:
+    def across(self, found: Measurement, scene: Scene, section: Section) -> tuple[float, float] | None:
         """As of `Region.across`."""
         places = found.points.index[self.of(found, scene)]
-        return Region("scan lines", places.min(), places.max()).across(found, scene) if len(places) else None
+        return Region("scan lines", places.min(), places.max()).across(found, scene, section) if len(places) else None
 
 
 def region_table(

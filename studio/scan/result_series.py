@@ -11,9 +11,10 @@ import numpy as np
 from analysis.error import Errors
 from analysis.measures import FEWEST, Measures, error_statistics, median_length
 from render.base.arrays import Float
-from render.base.pose import invert, transform_points
+from render.base.pose import transform_points
 from render.frame import LaserCurve
 from render.scene.scene import Scene
+from studio.scan.sheet_lean import Section, T_section_camera
 from studio.scan.stages import Measurement
 
 ErrorKind = Literal["depth", "surface", "position"]
@@ -25,7 +26,7 @@ MOST_BINS = 81
 
 @dataclass(frozen=True)
 class Series:
-    """(n,) a sample of the line: where it is on the image and in the laser's plane. NaN breaks a curve."""
+    """(n,) a sample of the line: where it is on the image and in a section of the part. NaN breaks a curve."""
 
     index: Float
     """Scan line."""
@@ -34,9 +35,9 @@ class Series:
     depth: Float
     """mm, `depth_z`."""
     across: Float
-    """mm along the fan, in the laser's frame."""
+    """mm along the fan, in the section's frame."""
     distance: Float
-    """mm from the laser along its axis."""
+    """mm from the laser along its axis, or below it."""
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,10 @@ MEASURED = (
 """Rows of the table of measures in the view's unit, and what each is called elsewhere."""
 
 
-def true_series(curve: LaserCurve, scene: Scene, laser: int) -> Series:
+def true_series(curve: LaserCurve, scene: Scene, laser: int, step: int = 0, section: Section = "laser_plane") -> Series:
     """The exact line, broken where it is interrupted."""
-    made = _series(curve.index.astype(np.float64), curve.position, curve.depth_z, curve.point, scene, laser)
+    T = T_section_camera(scene, laser, step, section)
+    made = _series(curve.index.astype(np.float64), curve.position, curve.depth_z, curve.point, T)
     jump = (np.abs(np.diff(curve.index)) > 1) | (np.abs(np.diff(curve.position)) > GAP)
     at = np.flatnonzero(jump) + 1
     return Series(
@@ -81,12 +83,13 @@ def true_series(curve: LaserCurve, scene: Scene, laser: int) -> Series:
     )
 
 
-def measured_series(measurement: Measurement, scene: Scene) -> Series:
+def measured_series(measurement: Measurement, scene: Scene, section: Section = "laser_plane") -> Series:
     """The points of a measurement, in their order; NaN where a peak gave no point."""
     points = measurement.points
     along = points.pixel[:, 0 if points.axis == "rows" else 1]
     index = points.index.astype(np.float64)
-    return _series(index, along, points.depth_z, points.camera, scene, measurement.laser)
+    T = T_section_camera(scene, measurement.laser, measurement.step, section)
+    return _series(index, along, points.depth_z, points.camera, T)
 
 
 def error_values(errors: Errors, view: ErrorView) -> Float:
@@ -155,6 +158,6 @@ def bias_uncertainty(found: Measurement, view: ErrorView) -> float:
     return 2.0 * error_statistics(error[known], points.index[known], length)[0][1]
 
 
-def _series(index: Float, position: Float, depth: Float, points: Float, scene: Scene, laser: int) -> Series:
-    in_laser = transform_points(invert(scene.T_camera_laser(laser)), points)
-    return Series(index, position, 1e3 * depth, 1e3 * in_laser[:, 1], 1e3 * in_laser[:, 2])
+def _series(index: Float, position: Float, depth: Float, points: Float, T_section_camera: Float) -> Series:
+    there = transform_points(T_section_camera, points)
+    return Series(index, position, 1e3 * depth, 1e3 * there[:, 1], 1e3 * there[:, 2])

@@ -19,6 +19,7 @@ from studio.project.found_motion import true_motion, values_of
 from studio.project.project import Project
 from studio.scan.gauging import measures_record, patches, readings
 from studio.scan.logo import logo_uri
+from studio.scan.sheet_lean import section_note
 from studio.scan.spacetime_window import Passing
 from studio.scan.stages import Clock, Measurement, measure_step
 
@@ -112,6 +113,7 @@ def report_input(
         created=created,
         image_scale=image_scale,
         measures=tuple(measures_record(project.measures, record.readings)),
+        measures_note=section_note(project),
         delivery=project.delivery,
         logo=logo,
         calibration=_found(project),

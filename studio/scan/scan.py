@@ -29,6 +29,7 @@ from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.render_goal import goal_of
 from studio.scan.run_record import ended_by_clock, run_text
+from studio.scan.sheet_lean import section_note
 from studio.scan.stages import Clock, Measurement, develop_step, moved_world, scaled, validated
 from studio.scan.summary import profile_rate, summarise
 
@@ -135,6 +136,7 @@ def run_scan(
             result["profiles_per_second"] = profile_rate(measuring.record, clock.seconds)
             result["results"] = summarise(measuring.record)
             result["measures"] = measures_record(project.measures, measuring.record.readings)
+            result["measures_note"] = section_note(project)
             result["remarks"] = measuring.remarks()
         noise = reached_noise(
             foreseen,

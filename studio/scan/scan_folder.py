@@ -19,7 +19,7 @@ from typing import Any, TypeGuard
 from render.base.errors import InputError
 from render.base.files import atomic_write, inside, sha256, unfinished_write
 from studio.project.input_files import check_unchanged, listed
-from studio.project.project import Project
+from studio.project.project import READ_OFF, Project
 from studio.project.strict_json import pretty, read_object
 from studio.scan.folder_lock import hold
 from studio.scan.own_files import check_replaceable, is_own
@@ -28,9 +28,9 @@ from studio.scan.rendered_from import check_rendered_from, differences, made_of
 MANIFEST, PROJECT = "scan.json", "scan_project.json"
 POINTS, REPORT = ("points.ply", "points.csv", "measures.csv"), ("report.html", "report.pdf")
 FORMAT, FORMAT_VERSION = "blazer-scan", 2
-MEASURED = ("results", "measures", "extraction", "notes", "remarks", "measured_with")
+MEASURED = ("results", "measures", "measures_note", "extraction", "notes", "remarks", "measured_with")
 """What a manifest tells of points, beside the report's files."""
-MEASURED_WITH = ("sensor", "extraction", "measures", "delivery")
+MEASURED_WITH = ("sensor", "extraction", *READ_OFF)
 """Parts of a project that may be others than those that its frames were rendered with."""
 FRAME = re.compile(r"frame_(\d{4,})(\.state\.npz|\.png|\.exr|\.json)")
 """A PNG goes before the files that tell whose it is."""

@@ -200,6 +200,7 @@ def _comparable(project: Project) -> Project:
             "render": RenderSettings(),
             "seed": 0,
             "measures": (),
+            "measured_in": "laser_plane",
             "delivery": Delivery(),
         }
     )

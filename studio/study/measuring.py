@@ -111,7 +111,7 @@ def _of_the_part(
     if not gauges or line.image is None:
         return {}
     found = Measurement(frame.step, points.laser, line.image, line, points, errors)
-    both = profiles(frame.project, frame, found)
+    both = profiles(frame.project, frame, found, frame.project.measured_in)
     return of_the_part([read(gauge, frame.step, *both) for gauge in gauges])
 
 

@@ -227,8 +227,7 @@ class DevelopPanel(QWidget):
     def _project_changed(self) -> None:
         before, self._followed = self._followed, self.session.project
         after = self._followed
-        read_off = {"measures": after.measures, "delivery": after.delivery}
-        if before.model_copy(update=read_off) != after:
+        if before.read_as(after) != after:
             self._follow_project()
             self.refresh()  # measures of the part are read off what was measured
 

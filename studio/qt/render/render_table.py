@@ -35,7 +35,7 @@ FEWEST_PX = 190
 def as_kept(session: Session, render: Render, name: str) -> Kept:
     """A render of the session as a column of the table."""
     found = best(render.measurements, session.project) if render.measurements else []
-    read = readings(render.project.model_copy(update={"measures": session.project.measures}), render.frame, found)
+    read = readings(render.project.read_as(session.project), render.frame, found)
     return Kept(name, render.created, render.project, render.scanner_scale, figures_of(found), readings=read)
 
 

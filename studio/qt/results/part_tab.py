@@ -9,6 +9,7 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QComboBox,
     QHBoxLayout,
     QHeaderView,
     QLabel,
@@ -33,8 +34,13 @@ from studio.qt.results.results_profile import ProfilePlot
 from studio.scan.gauging import kept_readings, profiles, read_each
 from studio.scan.remarks import best
 from studio.scan.scan_folder import measured_project
-from studio.scan.sheet_lean import lean_text
+from studio.scan.sheet_lean import Section, lean_text
 
+SECTIONS: dict[Section, str] = {"laser_plane": "In the laser's plane", "upright": "In an upright section"}
+SECTION_TIP = (
+    "What measures and profile are of: the laser's plane, as a scanner delivers it, in which heights are longer where "
+    "it leans; or an upright section, in which a part that is the same all along its way under the sheet is as drawn"
+)
 HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
 NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
 
@@ -63,10 +69,15 @@ class PartTab(QWidget):
         self.editor = PartEditor(session)
         self.add: QPushButton = text_button("Add", "Read another dimension off the profile")
         self.remove = text_button("Delete", "The chosen measure")
+        self.section = QComboBox()
+        for value, title in SECTIONS.items():
+            self.section.addItem(title, value)
+        self.section.setToolTip(SECTION_TIP)
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
         self._lay_out()
         self.remove.clicked.connect(self.delete)
+        self.section.activated.connect(self._choose_section)
         self.table.itemSelectionChanged.connect(self._select)
         self.drawing.moving.connect(self._moving)
         self.drawing.moved.connect(self._moved)
@@ -81,7 +92,9 @@ class PartTab(QWidget):
             found = best(render.measurements, render.developed_by(self.session.project))
             used = {laser, *(gauge.laser for gauge in self.session.project.measures)}
             self._profiles = {
-                i: profiles(render.project, render.frame, one) for i, one in enumerate(found) if i in used
+                i: profiles(render.project, render.frame, one, self.session.project.measured_in)
+                for i, one in enumerate(found)
+                if i in used
             }
         self.refresh()
 
@@ -89,6 +102,7 @@ class PartTab(QWidget):
         """Read and show all measures anew."""
         render = self.session.shown
         self._read = self.session.project.measures
+        self.section.setCurrentIndex(self.section.findData(self.session.project.measured_in))
         self.chosen = min(self.chosen, len(self._read) - 1)
         step = 0 if render is None else render.frame.step
         self.readings = read_each(self._read, step, self._profiles) if self._profiles else ()
@@ -150,6 +164,9 @@ class PartTab(QWidget):
     def _end_placing(self) -> None:
         self.placing, self._placed = None, []
         self.placing_changed.emit()
+
+    def _choose_section(self, index: int) -> None:
+        self.session.set(("measured_in",), self.section.itemData(index), "section of the measures")
 
     def _own(self) -> Gauge | None:
         """The chosen measure, where it is of the profile that is shown."""
@@ -247,7 +264,7 @@ class PartTab(QWidget):
         elif 0 <= self.chosen < len(self._read) and (odd := beside_nominal(self._read[self.chosen])):
             text = odd
         elif self.readings and (render := self.session.shown) is not None:
-            text = lean_text(render.project.scene, self.laser, render.frame.step)
+            text = lean_text(render.project.scene, self.laser, render.frame.step, self.session.project.measured_in)
         if self._read and (of := self._of_which()):
             text = f"{of} {text}".strip()
         self.told.setText(text)
@@ -260,6 +277,8 @@ class PartTab(QWidget):
             return ""
         told = f"Of step {render.frame.step + 1} of {render.scan.count}."
         kept = render.scan.found.manifest.get("measures")
+        if measured_project(render.scan.found).measured_in != self.session.project.measured_in:
+            return f"{told} All steps were measured in the other section: Measure > Measure the scan again."
         if isinstance(kept, list) and 0 <= self.chosen < len(self._read):
             own = [one for one in kept if isinstance(one, dict) and one.get("name") == self._read[self.chosen].name]
             verdicts = own[0].get("verdicts") if own else None
@@ -288,6 +307,7 @@ class PartTab(QWidget):
         buttons.addWidget(self.add)
         buttons.addWidget(self.remove)
         buttons.addStretch(1)
+        buttons.addWidget(self.section)
         column = QVBoxLayout(self)
         column.setContentsMargins(4, 6, 4, 0)
         column.addLayout(buttons)

@@ -5,11 +5,9 @@ Of a scan they are of the step that is looked at; the measures and the histogram
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from html import escape
 
-import numpy as np
 from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QResizeEvent
 from PySide6.QtWidgets import (
@@ -28,7 +26,6 @@ from PySide6.QtWidgets import (
 )
 
 from analysis.report.colour import TRUTH, method_colour, method_name
-from analysis.report.units import digits
 from studio.qt.core import theme
 from studio.qt.core.icons import dot
 from studio.qt.core.scan_steps import scan_steps
@@ -43,6 +40,7 @@ from studio.qt.results.results_profile import ProfilePlot
 from studio.qt.results.results_rows import RowPlots
 from studio.qt.results.results_steps import StepsPlot
 from studio.qt.results.scan_bar import ScanBar
+from studio.qt.results.scan_line_reading import reading
 from studio.scan.region import Box, Region, scan_errors
 from studio.scan.remarks import frame_remarks, scale_notes
 from studio.scan.result_series import ERROR_VIEWS, ErrorView, error_values, measured_series, table, true_series
@@ -110,14 +108,16 @@ class ResultsPanel(QWidget):
             plot.chosen.connect(self.pin)
         for ranged in (self.rows.ranged, session.range_dragged):
             ranged.connect(lambda low, high: self.choose(Region("scan lines", low, high)))
-        self.profile.ranged.connect(lambda low, high: self.choose(Region("fan", 1e-3 * low, 1e-3 * high)))
+        self.profile.ranged.connect(
+            lambda low, high: self.choose(Region("fan", 1e-3 * low, 1e-3 * high, self.profile.section))
+        )
         self.region.changed.connect(self._show_region)
         self.part.placing_changed.connect(lambda: self.figures.setCurrentIndex(PART))
         self.by_step.chosen.connect(session.look_at_step)
         self.scan_bar.scope_changed.connect(self.refresh)
         self.scan_steps.told.connect(self._tell_head)
         session.renders_changed.connect(self._another_render)
-        session.project_changed.connect(self._tell_head)
+        session.project_changed.connect(self._project_changed)
         session.step_changed.connect(lambda: self.by_step.mark(session.step))
         session.step_changed.connect(self._tell_head)
         session.measured.connect(self.refresh)
@@ -156,11 +156,12 @@ class ResultsPanel(QWidget):
             return
         scene, shown, view = render.project.scene, self.shown(), self.view
         curve = render.frame.curves[laser]
-        truth = true_series(curve, scene, laser)
-        series = {method: measured_series(one, scene) for method, one in shown.items()}
+        section = self.session.project.measured_in
+        truth = true_series(curve, scene, laser, render.frame.step, section)
+        series = {method: measured_series(one, scene, section) for method, one in shown.items()}
         errors = {method: error_values(one.errors, view) for method, one in shown.items()}
         self.rows.show_series(curve.axis, truth, {method: (series[method], errors[method]) for method in shown}, view)
-        self.profile.show_series(truth, series)
+        self.profile.show_series(truth, series, section)
         self.part.follow(laser)
         self.region.show_measurements(shown, view, laser)
         if (whole := self.scan_bar.whole) is not None:
@@ -230,6 +231,12 @@ class ResultsPanel(QWidget):
         self.head_text.setToolTip("".join(f"<p>{escape(text)}</p>" for text in told))
         self.head.setVisible(bool(told))
 
+    def _project_changed(self) -> None:
+        if self.session.project.measured_in != self.profile.section:
+            self.refresh()
+        else:
+            self._tell_head()
+
     def _another_render(self) -> None:
         render = self.session.shown
         names = [] if render is None else [laser.name for laser in render.project.scene.lasers]
@@ -250,24 +257,9 @@ class ResultsPanel(QWidget):
         scan_line, shown, view = self.session.hovered, self.shown(), self.view
         self.rows.mark(scan_line)
         self.profile.mark(scan_line)
-        parts, first = [], None
-        for method, one in shown.items():
-            for i in np.flatnonzero(one.points.index == (-1 if scan_line is None else scan_line))[:1]:
-                error = float(error_values(one.errors, view)[i])
-                depth = 1e3 * float(one.points.depth_z[i])
-                said = (
-                    f"{'+' if error > 0 else ''}{digits(error)} {view.unit}"
-                    if math.isfinite(error)
-                    else "no truth here"
-                )
-                parts.append(f"<span style='color:{method_colour(method)}'>●</span> {depth:.3f} mm ({said})")
-                first = error if first is None and math.isfinite(error) else first
+        text, first = reading(scan_line, shown, view, "" if self.scan_lines is None else self.scan_lines[0])
         self.histogram.mark(first)
-        if scan_line is None:
-            self.reading.setText("")
-            return
-        name = "Column" if self.scan_lines is not None and self.scan_lines[0] == "columns" else "Row"
-        self.reading.setText(f"<b>{name} {scan_line}</b>&nbsp;&nbsp; {'&nbsp;&nbsp; '.join(parts) or 'no point'}")
+        self.reading.setText(text)
 
     def _hover(self, scan_line: int | None) -> None:
         self.session.hover(self.pinned if scan_line is None else scan_line)
@@ -292,7 +284,11 @@ class ResultsPanel(QWidget):
         self.region.choose(None)
         render = self.session.shown
         found = next(iter(self.shown().values()), None)
-        across = None if render is None or found is None else region.across(found, render.project.scene)
+        across = (
+            None
+            if render is None or found is None
+            else region.across(found, render.project.scene, self.profile.section)
+        )
         if across is None:
             self.session.message.emit("warning", f"No points within {region.title}: drag where the profile is")
         else:

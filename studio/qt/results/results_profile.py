@@ -1,4 +1,6 @@
-"""The profile: the line's points in the laser's plane, as a scanner would deliver them, over the true profile."""
+"""The profile: the line's points in the laser's plane, as a scanner would deliver them, or in an upright section, over
+the true profile.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ from analysis.report.colour import TRUTH, method_colour
 from studio.qt.core import theme
 from studio.qt.results import plots
 from studio.scan.result_series import Series
+from studio.scan.sheet_lean import Section
 
+HEIGHT: dict[Section, str] = {"laser_plane": "Distance from the laser", "upright": "Below the laser, upright"}
 NEAR = 30.0
 """px; the mouse hovers a sample that is no farther than this."""
 
@@ -21,7 +25,8 @@ class ProfilePlot(plots.PointedPlots):
     """Distance from the laser over the place along its fan, both mm. Nearer is up."""
 
     def __init__(self) -> None:
-        self.plot = plots.new_plot("Along the fan / mm", "Distance from the laser", "mm", plots.RangeBox())
+        self.section: Section = "laser_plane"
+        self.plot = plots.new_plot("Along the fan / mm", HEIGHT[self.section], "mm", plots.RangeBox())
         super().__init__(self.plot)
         self.plot.invertY(True)
         self.truth = plots.curve(TRUTH)
@@ -33,8 +38,11 @@ class ProfilePlot(plots.PointedPlots):
         self._shown: dict[str, Series] = {}
         self.repaint_theme()
 
-    def show_series(self, truth: Series | None, measured: dict[str, Series]) -> None:
+    def show_series(self, truth: Series | None, measured: dict[str, Series], section: Section) -> None:
         """measured: by method."""
+        if section != self.section:
+            self.section = section
+            self.plot.setLabel("left", f"{HEIGHT[section]} / mm")
         for item in self._dots:
             self.plot.removeItem(item)
         self._dots, self._shown = [], measured

@@ -18,6 +18,7 @@ from studio.qt.results.results_panel import PART, REGION, ResultsPanel
 from studio.scan.gauging import readings
 from studio.scan.redevelop import develop_again, development, measure_again
 from studio.scan.region import Region
+from studio.scan.sheet_lean import sheet_lean
 from studio.scan.stages import Measurement
 from tests.studio.qt.small_session import small_project, small_render, small_session
 
@@ -236,3 +237,24 @@ def test_a_tolerance_without_its_nominal_says_so(panel: ResultsPanel) -> None:
     panel.figures.setCurrentIndex(PART)
     panel.part.table.selectRow(0)
     assert "Allowed is 21.02\u00a0mm to 21.02\u00a0mm, without the nominal itself" in panel.part.told.text()
+
+
+def test_an_upright_section_moves_plot_and_measures_and_is_one_step_of_undo(panel: ResultsPanel) -> None:
+    session, part = panel.session, panel.part
+    slope = Gauge(name="slope", kind="point_to_point", regions=(SIDES[0], (-0.05, 0.05)))
+    session.set(("measures",), (slope,))
+    leaning, drawn = part.readings[0], panel.profile.truth.getData()[1]
+    render = session.shown
+    assert render is not None
+    lean = sheet_lean(render.project.scene, 0)
+
+    part.section.setCurrentIndex(1)
+    part.section.activated.emit(1)
+    upright = part.readings[0]
+    assert session.project.measured_in == "upright" and "upright" in panel.profile.plot.getAxis("left").labelText
+    rise = [np.sqrt(one.truth**2 - 0.2**2) for one in (leaning, upright)]
+    assert rise[1] / rise[0] == pytest.approx(np.cos(lean), rel=0.02)
+    span = [np.ptp(values[np.isfinite(values)]) for values in (drawn, panel.profile.truth.getData()[1])]
+    assert span[1] / span[0] == pytest.approx(np.cos(lean), rel=1e-3)
+    session.document.undo()
+    assert part.readings[0].value == leaning.value and part.section.currentIndex() == 0
