@@ -19,9 +19,9 @@ from analysis.gauges.read import Reading, read
 from render.base.files import atomic_write
 from render.frame import Frame
 from studio.project.found_motion import measured_pose
-from studio.project.project import Project
+from studio.project.project import Project, Section
 from studio.scan.own_files import MEASURE_COLUMNS
-from studio.scan.sheet_lean import Section, T_section_camera
+from studio.scan.sheet_lean import T_section_camera
 from studio.scan.stages import Measurement
 
 OF_SCAN = "it is of a whole scan: run one (F6, Motion), or Measure > Measure the scan again"

@@ -16,10 +16,10 @@ from render.base.arrays import Float
 from render.base.errors import InputError
 from render.scene.scene import Scene
 from studio.project.input_files import input_files
+from studio.project.project import Section
 from studio.scan.own_files import check_not_read
 from studio.scan.result_series import ErrorView, error_values, measured_series
 from studio.scan.scan_results import COLUMNS
-from studio.scan.sheet_lean import Section
 from studio.scan.stages import Measurement
 
 

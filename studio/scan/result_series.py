@@ -14,7 +14,8 @@ from render.base.arrays import Float
 from render.base.pose import transform_points
 from render.frame import LaserCurve
 from render.scene.scene import Scene
-from studio.scan.sheet_lean import Section, T_section_camera
+from studio.project.project import Section
+from studio.scan.sheet_lean import T_section_camera
 from studio.scan.stages import Measurement
 
 ErrorKind = Literal["depth", "surface", "position"]

@@ -25,6 +25,7 @@ from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
 from analysis.report.gauge_table import MARKS, beside_nominal, small_text, value_text
 from analysis.report.units import NONE
+from studio.project.project import Section
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
 from studio.qt.results.measures_table import ReadOnlyTable
@@ -34,12 +35,18 @@ from studio.qt.results.results_profile import ProfilePlot
 from studio.scan.gauging import kept_readings, profiles, read_each
 from studio.scan.remarks import best
 from studio.scan.scan_folder import measured_project
-from studio.scan.sheet_lean import Section, lean_text
+from studio.scan.sheet_lean import lean_text
 
-SECTIONS: dict[Section, str] = {"laser_plane": "In the laser's plane", "upright": "In an upright section"}
+SECTIONS: dict[Section, str] = {
+    "laser_plane": "In the laser's plane",
+    "upright": "In an upright section",
+    "across_x": "In a section across X",
+    "across_y": "In a section across Y",
+    "across_z": "In a section across Z",
+}
 SECTION_TIP = (
     "What measures and profile are of: the laser's plane, as a scanner delivers it, in which heights are longer where "
-    "it leans; or an upright section, in which a part that is the same all along its way under the sheet is as drawn"
+    "it leans; or a section across a direction along which the part is the same, in which it is as drawn"
 )
 HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
 NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
@@ -278,7 +285,7 @@ class PartTab(QWidget):
         told = f"Of step {render.frame.step + 1} of {render.scan.count}."
         kept = render.scan.found.manifest.get("measures")
         if measured_project(render.scan.found).measured_in != self.session.project.measured_in:
-            return f"{told} All steps were measured in the other section: Measure > Measure the scan again."
+            return f"{told} All steps were measured in another section: Measure > Measure the scan again."
         if isinstance(kept, list) and 0 <= self.chosen < len(self._read):
             own = [one for one in kept if isinstance(one, dict) and one.get("name") == self._read[self.chosen].name]
             verdicts = own[0].get("verdicts") if own else None

@@ -1,6 +1,4 @@
-"""The profile: the line's points in the laser's plane, as a scanner would deliver them, or in an upright section, over
-the true profile.
-"""
+"""The profile: the points in the laser's plane, as a scanner would deliver them, or in a section; and the true one."""
 
 from __future__ import annotations
 
@@ -11,12 +9,11 @@ import pyqtgraph as pg
 from PySide6.QtCore import QPointF
 
 from analysis.report.colour import TRUTH, method_colour
+from studio.project.project import Section
 from studio.qt.core import theme
 from studio.qt.results import plots
 from studio.scan.result_series import Series
-from studio.scan.sheet_lean import Section
 
-HEIGHT: dict[Section, str] = {"laser_plane": "Distance from the laser", "upright": "Below the laser, upright"}
 NEAR = 30.0
 """px; the mouse hovers a sample that is no farther than this."""
 
@@ -26,7 +23,7 @@ class ProfilePlot(plots.PointedPlots):
 
     def __init__(self) -> None:
         self.section: Section = "laser_plane"
-        self.plot = plots.new_plot("Along the fan / mm", HEIGHT[self.section], "mm", plots.RangeBox())
+        self.plot = plots.new_plot("Along the fan / mm", _height(self.section), "mm", plots.RangeBox())
         super().__init__(self.plot)
         self.plot.invertY(True)
         self.truth = plots.curve(TRUTH)
@@ -42,7 +39,7 @@ class ProfilePlot(plots.PointedPlots):
         """measured: by method."""
         if section != self.section:
             self.section = section
-            self.plot.setLabel("left", f"{HEIGHT[section]} / mm")
+            self.plot.setLabel("left", f"{_height(section)} / mm")
         for item in self._dots:
             self.plot.removeItem(item)
         self._dots, self._shown = [], measured
@@ -90,3 +87,7 @@ class ProfilePlot(plots.PointedPlots):
                 if squared[i] < best:
                     best, found = float(squared[i]), int(series.index[i])
         return found
+
+
+def _height(section: Section) -> str:
+    return "Distance from the laser" if section == "laser_plane" else "From the laser, in the section"

@@ -15,7 +15,8 @@ from render.base.pose import Pose, transform_points
 from render.frame import LaserCurve
 from render.laser.laser import LineLaser
 from render.scene.scene import Rig, Scene
-from studio.scan.sheet_lean import Section, T_section_camera, lean_text, sheet_lean
+from studio.project.project import Section
+from studio.scan.sheet_lean import T_section_camera, lean_text, sheet_lean
 from tests.render.scenes import paper_camera
 
 RADIUS, STEP = 0.15, 0.02
@@ -77,6 +78,7 @@ def test_an_upright_section_has_the_parts_own_dimensions(lean: float) -> None:
     longer = 1.0 / math.cos(math.radians(lean))
 
     assert measured(scene, "upright", "step", *sides) == pytest.approx(STEP, rel=1e-9)
+    assert measured(scene, "across_x", "step", *sides) == pytest.approx(STEP, rel=1e-9)
     assert measured(scene, "upright", "radius", (-0.08, 0.08)) == pytest.approx(RADIUS, rel=1e-9)
     assert measured(scene, "laser_plane", "step", *sides) == pytest.approx(STEP * longer, rel=1e-9)
 
@@ -92,6 +94,15 @@ def test_an_upright_section_holds_the_vertical_and_no_more_turn_than_that(lean: 
     assert T_section_world[0, 2] == pytest.approx(0.0, abs=1e-12)
     if lean == 0.0:
         np.testing.assert_allclose(T, T_section_camera(scene, 0, 0, "laser_plane"), atol=1e-12)
+
+
+def test_only_the_section_across_the_part_shows_it_where_the_sheet_is_rolled_too() -> None:
+    """As over the joint of the sample, which leans to the side: its level normal is not along the part."""
+    scene = looking_down(25.0, 15.0)
+    assert measured(scene, "across_x", "radius", (-0.08, 0.08)) == pytest.approx(RADIUS, rel=1e-9)
+    assert abs(measured(scene, "upright", "radius", (-0.08, 0.08)) / RADIUS - 1.0) > 1e-3
+    assert "along the world's X" in lean_text(scene, 0, 0, "across_x")
+    assert "runs nearly along the world's Y" in lean_text(looking_down(25.0, 4.0), 0, 0, "across_y")
 
 
 def test_a_level_sheet_is_read_in_its_own_plane() -> None:

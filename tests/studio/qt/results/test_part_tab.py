@@ -251,7 +251,7 @@ def test_an_upright_section_moves_plot_and_measures_and_is_one_step_of_undo(pane
     part.section.setCurrentIndex(1)
     part.section.activated.emit(1)
     upright = part.readings[0]
-    assert session.project.measured_in == "upright" and "upright" in panel.profile.plot.getAxis("left").labelText
+    assert session.project.measured_in == "upright" and "section" in panel.profile.plot.getAxis("left").labelText
     rise = [np.sqrt(one.truth**2 - 0.2**2) for one in (leaning, upright)]
     assert rise[1] / rise[0] == pytest.approx(np.cos(lean), rel=0.02)
     span = [np.ptp(values[np.isfinite(values)]) for values in (drawn, panel.profile.truth.getData()[1])]
