@@ -56,8 +56,10 @@ def tolerance_text(lower: float | None, upper: float | None, unit: str) -> str:
 
 
 def beside_nominal(gauge: Gauge) -> str:
-    """What to say of a tolerance that lets no part pass that is as large as its nominal; empty: of any other."""
+    """What to say of a tolerance that no part meets, or none that is as large as its nominal; empty: of any other."""
     lower, upper, nominal = gauge.lower, gauge.upper, gauge.nominal
+    if nominal is not None and lower == upper == 0.0:
+        return "Both limits are zero: no part passes, as none is known without any uncertainty."
     if nominal is None or not ((lower or 0.0) > 0.0 or (upper or 0.0) < 0.0):
         return ""
     scale, name = scale_and_unit(gauge.unit)
@@ -71,7 +73,7 @@ def cells(row: Mapping[str, Any]) -> list[str]:
     several = row["readings"] > 1
     verdict = MARKS.get(row["verdict"] or "", "not measured" if row["reason"] else NONE)
     if several:
-        verdict += f", worst of {row['readings']}: step {row['step'] + 1}"
+        verdict += f", worst: step {row['step'] + 1} of {row['readings']}"
     return [
         TITLES[row["kind"]],
         value_text(row["value"], row["sigma"], unit),

@@ -137,8 +137,9 @@ def _all(plan: Plan) -> Iterator[tuple[bool, str]]:
             continue  # nothing in the scene makes such light, or none that the pilot met
         yield from _step(step, plan)
     if plan.pilot_steps:
-        steps = f"pilots on the steps {', '.join(map(str, plan.pilot_steps))}, of which the largest share counts"
-        yield True, f"the same for all {plan.frame_count} frames: {steps}"
+        steps = ", ".join(str(step + 1) for step in plan.pilot_steps)
+        told = f"pilots on steps {steps} of {plan.frame_count}, of which the largest share counts"
+        yield True, f"the same for all frames: {told}"
 
 
 def _step(step: TransportStep, plan: Plan) -> Iterator[tuple[bool, str]]:

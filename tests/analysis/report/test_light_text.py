@@ -78,7 +78,7 @@ def test_a_thin_lens_and_the_pilots_of_a_scan_are_said_with_their_numbers():
     first, last = plan_lines(plan)
     assert "f/2.8 focused at 0.8 m, 4.22 mm of aperture sampled, plane of focus tilted by 3 deg" in first
     assert "in 52% of the image no depth is in focus" in first
-    assert last == "the same for all 5 frames: pilots on the steps 0, 4, of which the largest share counts"
+    assert last == "the same for all frames: pilots on steps 1, 5 of 5, of which the largest share counts"
     assert "far away" in plan_lines(replace(plan, lens=replace(lens, focus_distance=None)))[0]
 
 

@@ -237,6 +237,8 @@ def test_a_tolerance_without_its_nominal_says_so(panel: ResultsPanel) -> None:
     panel.figures.setCurrentIndex(PART)
     panel.part.table.selectRow(0)
     assert "Allowed is 21.02\u00a0mm to 21.02\u00a0mm, without the nominal itself" in panel.part.told.text()
+    with_a_step(panel.session, nominal=0.021, lower=0.0, upper=0.0)
+    assert "Both limits are zero: no part passes" in panel.part.told.text()
 
 
 def test_an_upright_section_moves_plot_and_measures_and_is_one_step_of_undo(panel: ResultsPanel) -> None:
