@@ -42,9 +42,9 @@ class Draw(Model):
         ranged = self.kind in ("uniform", "logarithmic", "normal", "integer")
         if ranged:
             if self.low is None or self.high is None or not self.low < self.high:
-                raise ValueError(f"{self.kind} has no range; allowed: low below high")
+                raise ValueError(f"{self.field} is drawn from {self.low} to {self.high}; allowed: low below high")
             if self.kind == "logarithmic" and self.low <= 0.0:
-                raise ValueError("a logarithmic range reaches 0; allowed: low above 0")
+                raise ValueError(f"{self.field}: a logarithmic range reaches 0; allowed: low above 0")
             if self.kind == "integer" and not (self.low.is_integer() and self.high.is_integer()):
                 raise ValueError("an integer is drawn between integers; allowed: whole numbers for low and high")
             if self.kind == "normal":

@@ -33,6 +33,10 @@ class Found:
     answers: tuple[Answer, ...]
     """Of each sweep."""
 
+    def is_of(self, study: Study, bases: Mapping[str, Project]) -> bool:
+        """Whether a study's cells may join it: its numbers are decided by the same things."""
+        return self.study.digest(dict(self.bases)) == study.digest(dict(bases))
+
     def cell_of(self, number: int, spot: int) -> Cell:
         """The cell behind a spot of a sweep's chart: of its repeats the one that is nearest to their mean."""
         answer = self.answers[number]

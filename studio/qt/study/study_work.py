@@ -30,6 +30,10 @@ from studio.study.folder_run import Found, in_window, opened, run_into
 from studio.study.kept_draft import keep_draft, kept_draft
 from studio.study.study import Study, base_project
 
+OF_ANOTHER = (
+    "The folder holds a study of another set-up: the project, what is fixed or the image scale has changed since. "
+    "Choose another folder, or undo the change."
+)
 REST_MS = 250
 """Without a change before it is worked out what the study takes."""
 
@@ -212,6 +216,11 @@ class StudyWork(LongWork):
             self.unseen.cancel("estimate")
             # nothing is wrong with a sweep that nobody has filled in yet
             self._tell("" if varies_nothing(self.draft) else self._said(error))
+            return
+        if self.found is not None and not self.found.is_of(study, bases):
+            self.estimate = None
+            self.unseen.cancel("estimate")
+            self._tell(OF_ANOTHER)
             return
         self._tell("")  # what was wrong before no longer is
         rows = self.found.rows if self.found is not None else {}

@@ -350,3 +350,19 @@ def test_a_window_that_changed_nothing_takes_no_study_away(desk: Desk, tmp_path:
     assert work.draft == desk.work.draft
     work.close()
     live(again).close()
+
+
+def test_a_project_that_has_changed_since_is_told_in_place_of_going_on(
+    desk: Desk, qtbot: QtBot, tmp_path: Path
+) -> None:
+    desk.small([2.0, 20.0])
+    desk.work.choose_folder(tmp_path / "out")
+    run(qtbot, desk)
+    qtbot.waitUntil(lambda: desk.work.estimate is not None)
+    assert desk.session.set(POWER, 0.033)
+    desk.work.look_ahead()
+    assert "study of another set-up" in desk.panel.problem.text() and not desk.panel.foot.run.isEnabled()
+    desk.session.document.undo()
+    desk.work.look_ahead()
+    assert desk.work.problem == ""
+    qtbot.waitUntil(lambda: desk.work.estimate is not None)
