@@ -13,6 +13,9 @@ from analysis.gauges.spikes import NEIGHBOURS, spikes
 
 UNSURE = 10.0
 """Times the section's median sigma: a straight line over such a point's place knows more than the point."""
+UNSEEN, UNSEEN_SHARE = 5.0, 0.02
+"""Times the usual distance between points, of one that is a stretch without any; of the section, what all of these may
+be before it is told."""
 MISSING = 0.05
 """Of a section's length at either end, beyond which a section without points has no area."""
 
@@ -43,6 +46,19 @@ def section_points(profile: Profile, region: tuple[float, float], frame: Frame) 
     false = spikes(local[wide], np.linalg.norm(profile.random[wide], axis=1))
     taken = slice(max(first - 1, 0) - begin, last + 1 - begin)
     return np.asarray(wide[taken][~false[taken]])
+
+
+def unseen(profile: Profile, region: tuple[float, float], frame: Frame) -> str:
+    """What to say of stretches without points, over which an area knows nothing; empty: there are none."""
+    along = frame.local(profile.position[section_points(profile, region, frame)])[:, 0]
+    apart = np.diff(np.clip(along, *section(region, frame)))
+    wide = apart[apart > UNSEEN * np.median(apart)] if len(apart) else apart
+    if wide.sum() <= UNSEEN_SHARE * (region[1] - region[0]):
+        return ""
+    return (
+        f"{1e3 * wide.sum():.3g} mm of its section are not seen and carry no points: straight lines join what is seen, "
+        "and its sigma does not know what lies there"
+    )
 
 
 def area_above(profile: Profile, region: tuple[float, float], frame: Frame) -> Fit:

@@ -204,7 +204,22 @@ def _of_most_points(
         if middle < least:
             best, least = e, middle
     usual = max(1.0, MAD_TO_SIGMA * least)
-    return np.abs(best) > OUTLIER_SIGMAS * usual, usual
+    return _off_at_a_leap(best, OUTLIER_SIGMAS * usual), usual
+
+
+def _off_at_a_leap(e: Float, limit: float) -> NDArray[np.bool_]:
+    """(n,) the misses beyond a limit, in runs that a leap of as much parts from a neighbour.
+
+    False points stand apart from the line. Where a line leaves the curve bit by bit it has another shape, such as a
+    cylinder that is cut aslant, and what is asked for is the curve through all of it.
+    """
+    off = np.abs(e) > limit
+    run = np.append(0, np.cumsum(off[1:] != off[:-1]))
+    leap = np.abs(np.diff(e)) > limit
+    parted = np.zeros(run[-1] + 1, dtype=np.bool_)
+    edge = run[1:] != run[:-1]
+    parted[run[1:][edge & leap]] = parted[run[:-1][edge & leap]] = True
+    return np.asarray(off & parted[run])
 
 
 def birge(white: Float, free: float) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.gauges.area import area_above, section, without_unsure
+from analysis.gauges.area import area_above, section, unseen, without_unsure
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import REGIONS, Gauge, Verdict
 from analysis.gauges.profile import Profile
@@ -17,6 +17,8 @@ from render.base.arrays import Float
 NAN = float("nan")
 FLATTEST = 1e-6
 """Angle, rad, between two lines below which they do not cross anywhere near."""
+STRAIGHTEST = 10.0
+"""Lengths of its region, of the radius of an edge: beyond, the points are those of a flat side."""
 SPARE = 2
 """Points that a curve needs beyond its parameters."""
 PARAMETERS = {"radius": 3, "straightness": 3, "peak": 3, "gap": 3}
@@ -41,6 +43,8 @@ class Reading:
     """Of the exact line, by the same definition."""
     reason: str = ""
     """Why there is no value."""
+    remark: str = ""
+    """What its sigma does not know of."""
 
     @property
     def sigma(self) -> float:
@@ -72,7 +76,9 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
     random, systematic = measured.sigmas(gradient)
     used = np.count_nonzero(np.any([one.here for one in fits], axis=0))
     ratio = max(one.ratio for one in fits)
-    return Reading(gauge, step, value, ratio * random, systematic, int(used), _true_value(gauge, truth))
+    remark = unseen(measured, gauge.regions[1], fits[0].frame) if gauge.kind == "area" else ""
+    sigma, count = ratio * random, int(used)
+    return Reading(gauge, step, value, sigma, systematic, count, _true_value(gauge, truth), remark=remark)
 
 
 def _true_value(gauge: Gauge, truth: Profile | None) -> float:
@@ -119,7 +125,7 @@ def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | s
 NOTHING = {
     "peak": "the profile has no peak within its region",
     "radius": "no circle fits the points",
-    "gap": "no circles fit the points",
+    "gap": "its regions hold no round edges; drag over where each edge turns down, or take a width",
     "area": "its points end before the section does",
     "step": "no two levels fit the points",
 }
@@ -147,7 +153,8 @@ def curves_of(gauge: Gauge, profile: Profile, parts: list[Float]) -> tuple[list[
             return fits, lambda theta: _height_of_peak(fits, theta, gauge.regions[1])
         case "gap":
             edges = [fit(profile, part, lambda here: circle, circle_start) for part in parts]
-            return edges, lambda theta: _between_circles(edges, theta)
+            widest = [STRAIGHTEST * (high - low) for low, high in gauge.regions]
+            return edges, lambda theta: _between_circles(edges, theta, widest)
         case "area":
             line = _polynomial(profile, parts[0], 1)
             above = area_above(profile, gauge.regions[1], line.frame)
@@ -192,7 +199,10 @@ def _of_lines(gauge: Gauge, lines: list[tuple[Float, Float]]) -> float:
     return -_cross(u, crossing(q, v, r, w) - p)
 
 
-def _between_circles(fits: list[Fit], theta: Sequence[Float]) -> float:
+def _between_circles(fits: list[Fit], theta: Sequence[Float], widest: list[float]) -> float:
+    """NaN: an edge has a larger radius than the widest, m."""
+    if any(abs(values[2]) > radius for values, radius in zip(theta, widest, strict=True)):
+        return NAN
     first, second = (one.frame.out(values[:2]) for one, values in zip(fits, theta, strict=True))
     return float(np.linalg.norm(second - first) - abs(theta[0][2]) - abs(theta[1][2]))
 

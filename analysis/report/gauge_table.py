@@ -92,5 +92,6 @@ def plain_cells(row: Mapping[str, Any]) -> list[str]:
 
 
 def reasons(rows: list[dict[str, Any]]) -> list[str]:
-    """Why measures have no value, a sentence each."""
-    return [f"{row['name']}: {row['reason']}" for row in rows if row["reason"]]
+    """Why measures have no value, and what their sigmas do not know of, a sentence each."""
+    told = [f"{row['name']} is not measured: {row['reason']}" for row in rows if row["reason"]]
+    return told + [f"{row['name']}: {text}" for row in rows if (text := row.get("remark")) and not row["reason"]]

@@ -333,7 +333,7 @@ def _print_results(result: dict[str, Any]) -> None:
         found = [(row["name"], *gauge_table.plain_cells(row)) for row in result["measures"]]
         print_table("Measures", found, header=("Measure", *gauge_table.COLUMNS))
         for text in gauge_table.reasons(result["measures"]):
-            print(f"not measured: {text}")
+            print(text)
         if result.get("measures_note"):
             print(result["measures_note"])
     for row in result.get("results", [])[:1]:

@@ -131,5 +131,5 @@ def _row(one: Reading) -> dict[str, Any]:
     row["step"] = one.step
     row |= {name: getattr(one, name) for name in FIGURES}
     row |= {"points": one.points, "nominal": gauge.nominal, "lower": gauge.lower, "upper": gauge.upper}
-    row |= {"verdict": one.verdict, "reason": one.reason}
+    row |= {"verdict": one.verdict, "reason": one.reason, "remark": one.remark}
     return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}

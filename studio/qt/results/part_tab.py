@@ -268,6 +268,8 @@ class PartTab(QWidget):
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
         elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].reason:
             text = self.readings[self.chosen].reason.capitalize()
+        elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].remark:
+            text = f"{self.readings[self.chosen].remark}."
         elif 0 <= self.chosen < len(self._read) and (odd := beside_nominal(self._read[self.chosen])):
             text = odd
         elif self.readings and (render := self.session.shown) is not None:

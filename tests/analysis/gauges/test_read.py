@@ -146,3 +146,20 @@ def test_noise_that_is_wild_everywhere_leaves_a_value_or_a_reason(kind: str) -> 
     for noise in np.random.default_rng(5).standard_cauchy((40, len(ACROSS))):
         reading = read(gauge(kind), 0, profile(height, noise=20.0 * noise), None)
         assert reading.reason or (np.isfinite(reading.value) and reading.sigma > 0.0)
+
+
+def test_a_gap_between_flat_sides_is_none_and_says_what_to_drag_over() -> None:
+    height = np.where(np.abs(ACROSS) < 0.005, -0.504, -0.5)
+    for noise in (None, *noises(3, 1.0, seed=3)):
+        reading = read(gauge("gap"), 0, profile(height, noise=noise), profile(height))
+        assert np.isnan(reading.value) and np.isnan(reading.truth) and "no round edges" in reading.reason
+
+
+def test_a_cylinder_that_is_cut_aslant_has_the_radius_of_its_exact_line() -> None:
+    """An ellipse: a circle that is near most of it would leave out other points each time."""
+    height = -0.5 + 1.121 * np.sqrt(0.01**2 - np.minimum(ACROSS**2, 0.0099**2))
+    for low, high in ((-0.007, 0.007), (-0.008, 0.006), (-0.009, 0.005)):
+        asked = gauge("radius").model_copy(update={"regions": ((low, high),)})
+        for noise in noises(5, 1.0, seed=5):
+            reading = read(asked, 0, profile(height, sigma=3e-6, noise=noise), profile(height, sigma=3e-6))
+            assert abs(reading.error_in_sigmas) < 4.0 and reading.points > 0.9 * (high - low) / PITCH

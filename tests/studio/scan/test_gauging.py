@@ -72,7 +72,7 @@ def test_other_measures_are_read_off_the_same_frames(scanned: Path, tmp_path: Pa
     assert told[1]["value"] is None and "too few points" in told[1]["reason"]
     assert measured_project(open_folder(scanned)).measures == project.measures
     shown = call("reconstruct", scanned, "--project", file, "--out", tmp_path)
-    assert "Straightness (bow)" in shown and "not measured: away: too few points" in shown
+    assert "Straightness (bow)" in shown and "away is not measured: too few points" in shown
 
 
 def test_the_worst_reading_speaks_for_a_measure() -> None:
