@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.distance import nearest_triangle, signed_distance, triangle_normals
 from analysis.gauges.gauge import Verdict
+from analysis.measures import robust_sigma
 from render.base.arrays import Float, Int
 from render.base.errors import InputError
 from render.base.pose import invert, rotation_matrix, transform_points
@@ -34,6 +35,11 @@ LEVER = 1e-3
 HELD_BY = ("primary 1", "primary 2", "primary 3", "secondary 1", "secondary 2", "tertiary")
 FEWEST = 6
 SMALL = 0.25
+
+
+def false_points(value: Float) -> NDArray[np.bool_]:
+    """(m,) deviations that are far off all others, as of points that are no part of the surface."""
+    return np.asarray(np.abs(value - np.median(value)) > FAR * robust_sigma(value))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.deviation import ABOVE, BELOW, UNDECIDED, WITHIN, verdict_of, verdicts
+from analysis.deviation import ABOVE, BELOW, UNDECIDED, WITHIN, false_points, verdict_of, verdicts
 from analysis.report.deviation_figure import DeviationMap, draw
 from analysis.report.gauge_table import MARKS
 from analysis.report.model import ReportInput
@@ -44,6 +44,7 @@ def front(report: ReportInput) -> dict[str, Any] | None:
         "text": [line for line in told.text.splitlines() if line.strip()],
         "verdict": verdict,
         "verdict_text": VERDICTS[verdict],
+        "judged": _judged(bool(surface["verdict"]), gauges),
         "rule": RULE if verdict != "none" else "",
         "surface": surface,
         "map": _map(report, rows) if len(rows) else None,
@@ -69,15 +70,31 @@ def _gauge_verdict(row: dict[str, Any]) -> str:
     return "undecided" if row["reason"] else str(row["verdict"] or "undecided")
 
 
+def _judged(surface: bool, gauges: list[str]) -> str:
+    """What the verdict is of: the surface, measures, and how many of these have a tolerance."""
+    having = sum(bool(one) for one in gauges)
+    of = ["the surface"] if surface else []
+    if having:
+        of.append(f"{count(having)} of {count(len(gauges))} measures" if len(gauges) > 1 else "the measure")
+    if not of:
+        return ""
+    without = len(gauges) - having
+    rest = "" if without == 0 else "; the other has no tolerance" if without == 1 else "; the others have no tolerance"
+    return f"Of {' and '.join(of)}{rest}."
+
+
 def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
     """Verdict and table of the surface's deviation."""
     told, value = report.delivery, -rows["off_surface"]
     if len(value) == 0:
         return {"verdict": "undecided" if told.has_tolerance else "", "mark": "", "rows": []}
+    false = false_points(value)
+    kept = value[~false]
     table = [
         ("Points", count(len(value))),
-        ("Mean deviation", micrometres(float(value.mean()), 2)),
-        ("95 % of the points deviate less than", micrometres(float(np.percentile(np.abs(value), 95.0)))),
+        ("False ones, far off all others", f"{count(int(false.sum()))} ({percent(float(false.mean()), 2)})"),
+        ("Mean deviation, without them", micrometres(float(kept.mean()), 2)),
+        ("95 % deviate less than, without them", micrometres(float(np.percentile(np.abs(kept), 95.0)))),
     ]
     if not told.has_tolerance:
         return {"verdict": "", "mark": "", "rows": table}

@@ -17,7 +17,6 @@ from analysis.cloud import Cloud, at_first_step, merge, ply_pieces
 from analysis.deviation import (
     ABOVE,
     BELOW,
-    FAR,
     UNDECIDED,
     WITHIN,
     Aligned,
@@ -26,6 +25,7 @@ from analysis.deviation import (
     Verdicts,
     best_fit,
     deviations,
+    false_points,
     three_two_one,
     turn_and_shift,
     verdict_of,
@@ -102,7 +102,7 @@ class Compared:
         value, aligned = self.found.value, self.found.aligned
         median = float(np.median(value))
         robust = robust_sigma(value)
-        false = np.abs(value - median) > FAR * robust
+        false = false_points(value)
         shift, turn = turn_and_shift(aligned.motion, self.found.points)
         counts = None
         if self.verdicts is not None:

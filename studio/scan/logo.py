@@ -10,11 +10,17 @@ import numpy as np
 from analysis.report.style import image_uri
 from render.base.errors import InputError
 from render.base.files import inside, read_bytes
+from studio.project.project import Project
 
 MOST_BYTES = 16 * 2**20
 WIDEST, TALLEST = 640, 240
 """px in the page."""
 MOST_PIXELS = 50_000_000
+
+
+def logo_remarks(project: Project, root: Path) -> list[str]:
+    """Why its logo is not in a project's report: for who makes it, and not for who is handed it."""
+    return [*filter(None, [logo_uri(project.delivery.logo, root)[1]])]
 
 
 def logo_uri(name: str, root: Path) -> tuple[str, str]:

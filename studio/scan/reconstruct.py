@@ -20,6 +20,7 @@ from studio.project.project import Project
 from studio.scan import scan_folder
 from studio.scan.cautions import Cautions, is_aimed, light_note
 from studio.scan.gauging import measures_record
+from studio.scan.logo import logo_remarks
 from studio.scan.measuring import Measuring
 from studio.scan.redevelop import Development, development
 from studio.scan.run_record import ended_by_clock, run_text
@@ -95,7 +96,7 @@ def _measured(
             measured["measures"] = measures_record(project.measures, measuring.record.readings)
             measured["measures_note"] = section_note(project)
             measured |= {"results": figures, "extraction": measuring.notes(), "notes": notes}
-            measured["remarks"] = measuring.remarks()
+            measured["remarks"] = [*measuring.remarks(), *logo_remarks(project, root)]
             if any(getattr(requested, name) != getattr(found.project, name) for name in scan_folder.MEASURED_WITH):
                 measured["measured_with"] = requested.model_dump(mode="json", include=set(scan_folder.MEASURED_WITH))
             if report:

@@ -93,9 +93,9 @@ def report_input(
 ) -> ReportInput:
     """What a report is made of; `world` is that of step 0, `seconds` the wall time by stage, `run` as of `run_text`.
 
-    The logo is looked for in the project's folder; one that cannot be shown is a note.
+    The logo is looked for in the project's folder; one that cannot be shown is left out.
     """
-    logo, trouble = logo_uri(project.delivery.logo, project.folder)
+    logo, _ = logo_uri(project.delivery.logo, project.folder)
     return ReportInput(
         title=project.name,
         scene=project.scene,
@@ -109,7 +109,7 @@ def report_input(
         seconds={name: value for name, value in seconds.items() if name not in record.seconds},
         seed=project.seed,
         versions=versions(),
-        notes=(*notes, *filter(None, [trouble])),
+        notes=tuple(notes),
         created=created,
         image_scale=image_scale,
         measures=tuple(measures_record(project.measures, record.readings)),

@@ -25,6 +25,7 @@ from studio.scan.frames_ahead import rendered_frames
 from studio.scan.gauging import measures_record
 from studio.scan.kernel_warm_up import PREPARING, needed, warm_up
 from studio.scan.line_extraction import check_chooser
+from studio.scan.logo import logo_remarks
 from studio.scan.measuring import Measuring
 from studio.scan.options import Listener, Scan, ScanOptions
 from studio.scan.render_goal import goal_of
@@ -137,7 +138,7 @@ def run_scan(
             result["results"] = summarise(measuring.record)
             result["measures"] = measures_record(project.measures, measuring.record.readings)
             result["measures_note"] = section_note(project)
-            result["remarks"] = measuring.remarks()
+            result["remarks"] = [*measuring.remarks(), *logo_remarks(project, root)]
         noise = reached_noise(
             foreseen,
             quality_from(written.light[0]["groups"]),

@@ -22,6 +22,7 @@ from studio.qt.forms.form import Form
 from studio.qt.scene import mesh_importer, scene_actions
 from studio.qt.scene.mesh_bar import MeshBar, take_mesh
 from studio.qt.scene.scene_icons import item_icon
+from studio.scan.logo import logo_uri
 
 TITLES = {"scene": "Scene", "rig": "Rig", "camera": "Camera", "sensor": "Sensor", "render": "Render settings",
           "extraction": "Line extraction", "delivery": "Report to hand over",
@@ -124,10 +125,13 @@ class Inspector(QWidget):
 
     def _show_problem(self) -> None:
         """Why the selection is not as it is set: in words, and at its fields."""
-        text = self.session.problem_of(self.session.selection)
+        text, problems = self.session.problem_of(self.session.selection), self.session.problems
+        if self.session.selection == ("delivery",):
+            text = logo_uri(self.session.project.delivery.logo, self.session.document.root)[1]
+            problems = {**problems, ("delivery", "logo"): text} if text else problems
         self.problem.setText(text)
         self.problem.setVisible(bool(text))
-        self.form.mark(self.session.problems)
+        self.form.mark(problems)
 
     def _fill_menus(self, path: FieldPath, is_list: bool) -> None:
         self.presets.menu().clear()

@@ -6,11 +6,12 @@ import re
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from analysis.report.delivery import Delivery
-from analysis.report.front import front
+from analysis.report.front import _surface, front
 from analysis.report.model import ReportInput
 from analysis.report.write import render_page
 from tests.analysis.report.test_report import make_report
@@ -93,3 +94,24 @@ def test_a_tolerance_has_its_limits_in_order_and_one_alone_is_one() -> None:
 def test_a_scan_without_points_is_told_of_as_well() -> None:
     report = replace(make_report(found=False), delivery=Delivery(customer="Ada", lower=-1e-3, upper=1e-3))
     assert told(report)["verdict"] == "undecided" and "Ada" in render_page(report)
+
+
+def test_a_verdict_says_how_many_measures_it_is_of() -> None:
+    rows = (gauge("pass"), {**gauge(None), "lower": None, "upper": None}, {**gauge(None), "lower": None, "upper": None})
+    report = replace(handed(customer="Ada", lower=-0.2, upper=0.2), measures=rows)
+    found = told(report)
+    assert found["verdict"] == "pass"
+    assert found["judged"] == "Of the surface and 1 of 3 measures; the others have no tolerance."
+    assert found["judged"] in render_page(report)
+
+
+def test_the_mean_deviation_is_of_the_surface_and_false_points_are_counted() -> None:
+    report = handed(customer="Ada")
+    rows = report.record.chosen().rows
+    rows = rows[rows["valid"] & np.isfinite(rows["off_surface"])].copy()
+    false = rows.copy()
+    false["off_surface"][:3] = 0.05
+    clean, told_of = (_surface(report, one)["rows"] for one in (rows, false))
+    assert [row[0] for row in clean][1:3] == ["False ones, far off all others", "Mean deviation, without them"]
+    assert clean[1][1].startswith("0 (") and told_of[1][1].startswith("3 (")
+    assert abs(float(told_of[2][1].split()[0])) < 1e6 * 0.05 / len(rows)

@@ -291,3 +291,12 @@ def test_several_selected_are_told_without_pushing_the_fields_out(session: Sessi
     assert inspector.form.parentWidget().minimumSizeHint().width() <= before
     session.select(LASER)
     assert "selected" not in inspector.hint.text()
+
+
+def test_a_logo_that_cannot_be_shown_is_told_at_its_field(session: Session, inspector: Inspector) -> None:
+    session.select(("delivery",))
+    assert not inspector.problem.isVisibleTo(inspector)
+    session.set(("delivery", "logo"), "/somewhere/else/logo.png")
+    assert "/somewhere/else/logo.png is not shown" in inspector.problem.text()
+    session.set(("delivery", "logo"), "")
+    assert not inspector.problem.isVisibleTo(inspector)
