@@ -46,6 +46,8 @@ class Measures:
     """Within +-2 predicted sigma; 0.954 when the prediction is honest and the errors are normal."""
 
 
+CLIPPED = 3.0
+"""Robust sigmas from the median to which errors count in their correlation."""
 EMPTY = Measures(0, *[float("nan")] * 9)
 
 
@@ -172,6 +174,9 @@ def _autocorrelation(error: Float, index: NDArray[np.intp], rank: NDArray[np.int
     adjacent = np.flatnonzero(np.diff(lines) == 1)
     if len(adjacent) < 3:
         return float("nan")
+    # two neighbours at an edge err alike and may be a hundred times the usual error: they are not to speak for all
+    reach = CLIPPED * robust_sigma(e)
+    e = np.clip(e, np.median(e) - reach, np.median(e) + reach) if reach > 0.0 else e
     e = e - np.mean(e)
     variance = float(np.mean(e**2))
     return float(np.mean(e[adjacent] * e[adjacent + 1]) / variance) if variance > 0.0 else float("nan")

@@ -13,6 +13,8 @@ ENOUGH = 30
 """Least number of points from which a conclusion is drawn."""
 SHEET_PX = 0.01
 """Bias by the sheet's width, px, above which it is mentioned: the uncertainty of a good line."""
+TOLD_OF_NOISE = 0.3
+"""Of the robust sigma, from which on the calibration's error is told."""
 DOMINATED = 3.0
 """RMSE over robust sigma from which a few outliers are told: without any it is near 1, on textured parts near 2."""
 LITTLE = 0.5
@@ -101,18 +103,28 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
             f"{count(found.false_rows)} scan lines carry a point although no line crosses their centre, at the ends of "
             "the line or from stray light. Their distance from the surface counts, their depth has no truth."
         )
+    # what most points err by, all alike and each on its own
+    usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)
+    dominated = found.depth_z.rmse > DOMINATED * usual
     if found.u.outlier_rate > 0.002:
         said.append(
             f"{percent(found.u.outlier_rate)} of the points are outliers, wrong by more than a pixel and five times "
-            "the usual error: a wrong peak, or an edge. They dominate the RMSE; the robust sigma leaves them out."
+            f"the usual error: a wrong peak, or an edge. {'They dominate the RMSE; t' if dominated else 'T'}he robust "
+            "sigma leaves them out."
         )
-    elif found.outliers and found.depth_z.rmse > DOMINATED * found.depth_z.robust_sigma:
+    elif found.outliers and dominated:
         few = "1 point is an outlier" if found.outliers == 1 else f"{count(found.outliers)} points are outliers"
         them = "it" if found.outliers == 1 else "them"
         said.append(
             f"{few}, wrong by more than a pixel and five times the usual error. Of {count(found.points)} points that "
             f"is few, but the RMSE of {micrometres(found.depth_z.rmse)} is mostly of {them}; the robust sigma, which "
             f"leaves {them} out, is {micrometres(found.depth_z.robust_sigma)}."
+        )
+    if found.calibration > TOLD_OF_NOISE * found.depth_z.robust_sigma:
+        said.append(
+            f"Points were made with a calibration, whose own error is common to all of them: "
+            f"{micrometres(found.calibration)} in depth as it is told (one sigma, median). The mean error of "
+            f"{micrometres(found.depth_z.bias, 2)} holds it, which averaging does not remove."
         )
     if abs(found.u.bias) > max(0.3 * found.u.robust_sigma, 5 * found.u.sigma / np.sqrt(found.u.count)):
         said.append(

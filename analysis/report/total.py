@@ -58,6 +58,8 @@ class Total:
     """Fraction of the points that are saturated."""
     sheet_bias: tuple[float, float] = (0.0, 0.0)
     """RMS and 95th percentile, px, of the bias of the positions by the sheet's width; 0: not known."""
+    calibration: float = 0.0
+    """m, median standard deviation of `depth_z` by the calibration; 0: it is taken as exact."""
 
     @property
     def completeness(self) -> float:
@@ -94,11 +96,17 @@ def total(chosen: Chosen) -> Total:
         narrow=_share(rows["width"][np.isfinite(rows["width"])] < NARROW_PX),
         saturated=_share(rows["flag"] == Flag.SATURATED),
         sheet_bias=_sheet_bias(rows["sheet_bias"]),
+        calibration=_median(rows["sigma_systematic"]),
     )
 
 
 def _share(there: NDArray[np.bool_]) -> float:
     return float(np.mean(there)) if len(there) else 0.0
+
+
+def _median(values: Float) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else 0.0
 
 
 def _sheet_bias(values: Float) -> tuple[float, float]:

@@ -60,6 +60,7 @@ ERROR_VIEWS = (
 
 
 UNCERTAINTY = "Bias known to"
+COVERED = "Within 2 sigma"
 MEASURED = (
     ("RMSE", "rmse"),
     ("Bias", "bias"),
@@ -144,8 +145,20 @@ def table(found: list[Measurement], view: ErrorView) -> list[tuple[str, str, lis
         ("False scan lines", "", [float(one.errors.false_rows) for one in found]),
     ]
     rows.append(("Outliers", "%", [100.0 * one.outlier_rate for one in of]))
-    rows.append(("Within 2 sigma", "%", [100.0 * one.coverage for one in of]))
+    rows.append((COVERED, "%", [100.0 * _covered(one, view) for one in found]))
     return rows
+
+
+def _covered(found: Measurement, view: ErrorView) -> float:
+    """Share of the errors within twice their sigma, which holds noise and, of points, the calibration."""
+    points, errors = found.points, found.errors
+    if view.kind == "position" or points.calibration is None:
+        return measures(errors, view.kind).coverage
+    noise = points.sigma_depth if view.kind == "depth" else errors.sigma_off_surface
+    common = points.sigma_depth_systematic if view.kind == "depth" else points.sigma_systematic
+    error, sigma = error_values(errors, view) / view.scale, np.hypot(noise, common)
+    known = np.isfinite(error) & np.isfinite(sigma)
+    return float(np.mean(np.abs(error[known]) <= 2.0 * sigma[known])) if known.any() else math.nan
 
 
 def bias_uncertainty(found: Measurement, view: ErrorView) -> float:

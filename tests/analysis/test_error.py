@@ -208,6 +208,14 @@ def test_nothing_visible_gives_only_false_rows():
     assert errors.surface.count == errors.u.count == 0
 
 
+def test_two_neighbours_at_an_edge_do_not_correlate_the_rest():
+    error = np.random.default_rng(4).standard_normal(1000)
+    error[500:502] = 35.0
+    index, nobody = np.arange(1000), np.zeros(1000, dtype=int)
+    found = measure(error, np.ones(1000), np.inf, index, nobody)
+    assert abs(found.autocorrelation) < 4 / math.sqrt(1000)
+
+
 def test_smoothed_errors_show_in_the_autocorrelation():
     random = np.random.default_rng(8)
     smooth = np.convolve(random.standard_normal(4100), np.ones(5) / 5, mode="valid")

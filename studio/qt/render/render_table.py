@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 from render.base.errors import InputError
 from render.world.world import build_world
 from studio.project.date_and_time import read_out
+from studio.project.project import Project
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import text_button
@@ -36,14 +37,21 @@ def as_kept(session: Session, render: Render, name: str) -> Kept:
     """A render of the session as a column of the table."""
     found = best(render.measurements, session.project) if render.measurements else []
     read = readings(render.project.read_as(session.project), render.frame, found)
-    return Kept(name, render.created, render.project, render.scanner_scale, figures_of(found), readings=read)
+    return Kept(name, render.created, _measured(render), render.scanner_scale, figures_of(found), readings=read)
+
+
+def _measured(render: Render) -> Project:
+    """The render's project with sensor, lens, powers and extraction as they were when its figures were measured."""
+    made = render.made_from.get("measurements")
+    return render.project if made is None or not render.measurements else made[1].powered
 
 
 def keep_render(session: Session, render: Render, name: str) -> Kept:
     """With the project. InputError: the project has no file yet, or files cannot be written."""
     if session.document.path is None:
         raise InputError("the project has no folder of its own yet", cure="save it first")
-    made = Kept(name, "", render.project, render.scanner_scale, as_kept(session, render, name).figures)
+    shown = as_kept(session, render, name)
+    made = Kept(name, "", shown.project, render.scanner_scale, shown.figures)
     kept = keep(session.document.root, made, render.frame)
     session.message.emit("info", f"Kept {name} in {kept.folder}")
     return kept

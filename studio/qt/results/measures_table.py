@@ -11,9 +11,8 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTab
 from analysis.report.colour import method_name
 from analysis.report.units import digits
 from studio.qt.core import theme
-from studio.scan.result_series import UNCERTAINTY
+from studio.scan.result_series import COVERED, UNCERTAINTY
 
-COVERED = "Within 2 sigma"
 HONEST = 88.0
 """Percent within 2 sigma below which more than noise moves the line; the report remarks on it from there as well."""
 EXPLAINED = {
@@ -28,8 +27,9 @@ EXPLAINED = {
     "Robust sigma": "The spread as it would be without outliers.",
     "95 % within": "95 % of the errors are smaller than this.",
     "Outliers": "Errors larger than a pixel and than five times the usual error.",
-    COVERED: "Share of the errors within twice the sigma predicted from the image's noise: 95 % where noise alone "
-    "moves the line. Less: something else moves it too, as texture and edges under the line, or too few pixels.",
+    COVERED: "Share of the errors within twice the predicted sigma, of the image's noise and, where points are made "
+    "with a calibration, of that: 95 % where nothing else moves the line. Less: texture or edges under it, or too few "
+    "pixels. A calibration's error is common to all points, so that all of them may be within or without.",
 }
 
 ROW_PX = 22

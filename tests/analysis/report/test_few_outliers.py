@@ -33,3 +33,19 @@ def test_outliers_that_make_the_rmse_are_told(outliers: int, size_px: float, tol
     said = " ".join(remarks_with_outliers(outliers, size_px))
     assert ("outlier" in said) == bool(told)
     assert told in said
+
+
+def test_a_bias_that_all_points_have_is_not_laid_to_outliers() -> None:
+    """With a calibration that is off: one outlier makes less of the RMSE than what is common to all."""
+    scene, frames = make_frames(steps=STEPS)
+    noise = 0.6 + 0.1 * np.random.default_rng(2).standard_normal(100)
+    noise[:1] = 15.0
+    for i, frame in enumerate(frames):
+        laser = frame.lasers[0]
+        changed = dataclasses.replace(laser, extractions=(extraction(scene, laser.curve, 0, "likelihood", noise),))
+        frames[i] = dataclasses.replace(frame, lasers=(changed,))
+    found = total(report_of(scene, frames).record.chosen())
+    said = " ".join(remarks(found))
+    assert "is mostly of" not in said and "dominate" not in said
+    with_calibration = " ".join(remarks(dataclasses.replace(found, calibration=found.depth_z.robust_sigma)))
+    assert "common to all of them" in with_calibration and "common to all of them" not in said

@@ -12,7 +12,9 @@ from render.base.errors import InputError
 from studio.project.document import Document
 from studio.qt.core.session import Render, Session
 from studio.qt.render.history import History, title
-from studio.qt.render.render_table import keep_render
+from studio.qt.render.render_table import as_kept, keep_render
+from studio.scan.kept_renders import kept_renders
+from studio.scan.redevelop import develop_again, development, measure_again
 from tests.studio.qt.small_session import small_project, small_render
 
 
@@ -46,6 +48,26 @@ def test_a_render_is_kept_found_again_and_opened(qtbot: QtBot, tmp_path: Path) -
     table.write(tmp_path / "table.csv")
     assert (tmp_path / "table.csv").read_text().startswith(",Render 1,ten bits,ten bits")
     table.close()
+
+
+def test_figures_stand_beside_the_settings_that_they_were_measured_with(qtbot: QtBot, tmp_path: Path) -> None:
+    """Not beside the exposure with which the render began, when it was developed by another since."""
+    file = tmp_path / "project.json"
+    project = small_project().save(file)
+    session = Session(Document(project, file))
+    world, frame = small_render()
+    render = Render(1, project, world, frame)
+    longer = session.project.replaced({"sensor.exposure_time": 0.009, "scene.rig.lasers[0].power": 0.005})
+    how = development(project, longer)
+    images = develop_again(frame, how)
+    render.measurements = measure_again(frame, world, how, images, ("likelihood",), cancelled=lambda: False)
+    render.made_from["measurements"] = frame, how
+    session.add_render(render)
+    shown = as_kept(session, render, "one")
+    assert shown.project.sensor.exposure_time == 0.009 and shown.project.scene.lasers[0].power == 0.005
+    kept = keep_render(session, render, "one")
+    (again,), wrong = kept_renders(tmp_path)
+    assert again.project.sensor.exposure_time == 0.009 and not wrong and kept.project == shown.project
 
 
 def test_a_project_without_a_file_keeps_nothing(qtbot: QtBot) -> None:
