@@ -22,6 +22,8 @@ from studio.preview.preview import Lit, Look
 
 SHARP_PX = 1.0
 """A blur disc up to this diameter counts as in focus."""
+BLURRED_PX = 4.0 * SHARP_PX
+"""Diameter of the blur disc from which it is most of a line's width."""
 HALF = 0.5
 
 

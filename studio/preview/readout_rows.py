@@ -8,12 +8,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 from studio.editing.units import Unit
-from studio.preview.estimates import SHARP_PX
+from studio.preview.estimates import BLURRED_PX, SHARP_PX
 from studio.preview.inspection import DIM_ELECTRONS, NARROW_PX, WIDE_PX
 from studio.preview.readouts import Range, Readouts
 
 Level = Literal["", "warning", "error"]
 NOTHING = "-"
+MUCH_SATURATED = 0.2
+"""Share of the scan lines from which the line is no longer measured as it would be."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +170,7 @@ def _saturation(r: Readouts) -> Row:
     )
     if r.saturated is None or r.peak_electrons is None:
         return Row("saturated", "Saturated", NOTHING, "", "", help)
-    level: Level = "error" if r.saturated > 0.2 else "warning" if r.saturated > 0.01 else ""
+    level: Level = "error" if r.saturated > MUCH_SATURATED else "warning" if r.saturated > 0.01 else ""
     full = r.peak_electrons.high / r.full_well
     return Row("saturated", "Saturated", f"{r.saturated:.0%}", f"{full:.0%} of full well", level, help)
 
@@ -184,7 +186,7 @@ def _focus(r: Readouts) -> Row:
     if r.blur_px is None:
         return Row("blur", "Defocus blur", NOTHING, note, "", help)
     worst = r.blur_px.high
-    level: Level = "" if worst <= SHARP_PX else "warning" if worst <= 4.0 * SHARP_PX else "error"
+    level: Level = "" if worst <= SHARP_PX else "warning" if worst <= BLURRED_PX else "error"
     return Row("blur", "Defocus blur", f"{worst:.1f} px", note, level, help)
 
 
@@ -196,16 +198,33 @@ def _sigma(r: Readouts) -> Row:
     if r.photon_sigma is None or r.speckle_sigma is None or r.speckled_sigma is None:
         return Row("sigma", "Depth noise, sigma", NOTHING, "", "", help)
     photon, speckle = micrometres(r.photon_sigma), micrometres(r.speckle_sigma)
+    supposed, level = _supposed(r)
+    if supposed:
+        help += f" Here it is foretold for a line that is {supposed[len('as if ') :]}, which this one is not."
     if not r.speckled:
         both = micrometres(r.speckled_sigma)
         help += (
             f" The sensor's is off: images have none, where a laser on a rough surface would make it {both} µm. "
             "Switch it on in the sensor, under Laser speckle, for what a real scanner meets."
         )
-        return Row("sigma", "Depth noise, sigma", f"{photon} µm", f"with speckle {both}", "", help)
+        return Row("sigma", "Depth noise, sigma", f"{photon} µm", _both(f"with speckle {both}", supposed), level, help)
     help += f" Here: {photon} µm from photons, {speckle} µm from speckle."
     note = f"speckle {speckle}" if r.speckle_sigma > r.photon_sigma else f"photons {photon}"
-    return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", note, "", help)
+    return Row("sigma", "Depth noise, sigma", f"{micrometres(r.speckled_sigma)} µm", _both(note, supposed), level, help)
+
+
+def _supposed(r: Readouts) -> tuple[str, Level]:
+    """What the depth's noise takes the line to be, and it is not."""
+    wrong = []
+    if r.blur_px is not None and r.blur_px.high > BLURRED_PX:
+        wrong.append("in focus")
+    if r.saturated is not None and r.saturated > MUCH_SATURATED:
+        wrong.append("unsaturated")
+    return (f"as if {' and '.join(wrong)}", "warning") if wrong else ("", "")
+
+
+def _both(note: str, more: str) -> str:
+    return f"{note}, {more}" if more else note
 
 
 def _length(value: float) -> str:

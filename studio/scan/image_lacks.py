@@ -6,12 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from studio.preview.estimates import SHARP_PX, blur_px
+from studio.preview.estimates import BLURRED_PX, blur_px
 from studio.project.project import Project
 from studio.scan.speckle_remark import Measured, speckle_remark
-
-BLURRED_PX = 4.0 * SHARP_PX
-"""Diameter of the blur disc from which it is most of a line's width, where the design's read-out is red as well."""
 
 
 def image_lacks(

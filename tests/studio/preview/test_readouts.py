@@ -147,6 +147,14 @@ def test_depth_noise_is_that_of_the_sensor_as_it_is_set() -> None:
     assert "switch it on" in told_off.help.lower() and "switch it on" not in told_on.help.lower()
 
 
+def test_depth_noise_says_where_it_takes_the_line_to_be_sharp_and_unsaturated() -> None:
+    blurred = replaced(sample("plane"), (*CAMERA, "lens", "focus_distance"), 0.3)
+    exposed = replaced(sample("plane"), ("sensor", "exposure_time"), 4 * sample("plane").sensor.exposure_time)
+    for project, told in ((sample("plane"), ""), (blurred, "as if in focus"), (exposed, "as if unsaturated")):
+        found = next(row for row in rows(read(project, "plane")) if row.key == "sigma")
+        assert (told in found.note and found.level == "warning") if told else "as if" not in found.note
+
+
 def test_nothing_lit_leaves_what_the_rig_alone_decides() -> None:
     project = replaced(sample("plane"), ("scene", "objects"), ())
     r = read(project, "plane")
