@@ -25,6 +25,8 @@ POLITENESS = 5
 """Added to the niceness of a job's threads, so that the window's thread is served first."""
 EARLIEST_ESTIMATE = 0.5
 """Seconds of work before the time left is told."""
+LONG_START = 10.0
+"""s without any progress that are no measure of what follows."""
 SMALL_SHARE, LONG_WORK = 0.05, 20.0
 """Of the work, by which alone nobody can judge the rest, and seconds from which a poor estimate is better than none."""
 
@@ -85,6 +87,8 @@ class Job(Generic[Result]):
         self._seconds = 0.0
         self._told = 0.0
         """Seconds of work when `done` was told last."""
+        self._begun = (0.0, 0.0)
+        """Seconds of work, and how much was done then, from which on the rest is foretold."""
 
     @property
     def state(self) -> State:
@@ -106,8 +110,11 @@ class Job(Generic[Result]):
         enough = 0.01 if self.seconds >= LONG_WORK else SMALL_SHARE
         if self.ended or self.done < enough or self.seconds < EARLIEST_ESTIMATE:
             return None
+        begun, first = self._begun
+        if self.done <= first:
+            return None
         # time that passes since the work told how far it is makes what is left less, not more
-        left = self._told / self.done - self.seconds
+        left = (self._told - begun) / (self.done - first) * (1.0 - first) + begun - self.seconds
         return left if left > 0.0 else None
 
     def start(self) -> None:
@@ -158,6 +165,8 @@ class Job(Generic[Result]):
         done = min(max(done, 0.0), 1.0)
         if done != self.done:
             self._told = self.seconds
+            if self.done == 0.0 and self._told > LONG_START:
+                self._begun = self._told, done  # until then workers started, which the rest does not do again
         self.stage, self.done = stage, done
 
     def _run(self) -> None:

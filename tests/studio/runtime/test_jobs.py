@@ -161,6 +161,31 @@ def test_time_left_follows_the_progress_and_never_grows_between_two_reports(monk
     assert job.seconds_left is None
 
 
+def test_a_long_start_is_not_taken_for_the_pace_of_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers of a study that start for a minute made 18 cells of ten seconds a matter of twenty minutes."""
+    clock = [0.0]
+    monkeypatch.setattr(jobs, "time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    go, told, end = (threading.Event() for _ in range(3))
+
+    def work(progress: Progress, cancelled: Cancel) -> None:
+        clock[0] = 70.0
+        progress("1 of 18 cells", 1 / 18)
+        told.set()
+        go.wait(180)
+        clock[0] = 90.0
+        progress("3 of 18 cells", 3 / 18)
+        told.set()
+        end.wait(180)
+
+    job = started(work)
+    assert told.wait(180) and job.seconds_left is None
+    told.clear()
+    go.set()
+    assert told.wait(180) and job.seconds_left == pytest.approx(150.0)
+    end.set()
+    job.join()
+
+
 def test_bad_input_is_told_in_its_own_words() -> None:
     def work(progress: Progress, cancelled: Cancel) -> None:
         raise InputError("the mesh is missing", where="part.stl", cure="choose the file again")
