@@ -112,6 +112,8 @@ def _surface(report: ReportInput, rows: Any) -> dict[str, Any]:
         ("Proved below", percent(shares[BELOW], 2)),
     ]
     verdict = verdict_of(judged)
+    if false.any() and (without := verdict_of(judged[~false])) != verdict:
+        table.append(("Verdict without the false ones", MARKS[without]))
     return {"verdict": verdict, "mark": MARKS[verdict], "rows": table}
 
 

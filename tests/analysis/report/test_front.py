@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from analysis.report.delivery import Delivery
 from analysis.report.front import _surface, front
+from analysis.report.gauge_table import MARKS
 from analysis.report.model import ReportInput
 from analysis.report.write import render_page
 from tests.analysis.report.test_report import make_report
@@ -115,3 +116,5 @@ def test_the_mean_deviation_is_of_the_surface_and_false_points_are_counted() -> 
     assert [row[0] for row in clean][1:3] == ["False ones, far off all others", "Mean deviation, without them"]
     assert clean[1][1].startswith("0 (") and told_of[1][1].startswith("3 (")
     assert abs(float(told_of[2][1].split()[0])) < 1e6 * 0.05 / len(rows)
+    decided = _surface(handed(customer="Ada", lower=-0.04, upper=0.04), false)
+    assert decided["verdict"] == "fail" and decided["rows"][-1] == ("Verdict without the false ones", MARKS["pass"])
