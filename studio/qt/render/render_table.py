@@ -30,7 +30,7 @@ from studio.scan.remarks import best
 from studio.study.side_by_side import side_by_side, write_table
 
 HINT = "Figures are followed by their difference from the first column's. Settings that all have alike are left out."
-FEWEST_PX = 190
+FEWEST_PX = 230
 
 
 def as_kept(session: Session, render: Render, name: str) -> Kept:
@@ -100,7 +100,7 @@ class RenderTable(QDialog):
         column.addWidget(self.table, 1)
         column.addWidget(told)
         column.addLayout(buttons)
-        self.resize(min(1200, 260 + FEWEST_PX * max(2, len(self.renders))), 480)
+        self.resize(min(1280, 340 + FEWEST_PX * max(2, len(self.renders))), 480)
         self.open_button.clicked.connect(self.open_chosen)
         self.export.clicked.connect(self._ask)
         self.table.itemSelectionChanged.connect(self._show_buttons)
