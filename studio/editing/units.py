@@ -49,6 +49,12 @@ class Unit:
         shown = shown or SHOWN.get(stored, stored)
         return cls(stored, shown, 1.0 / FACTORS[stored][shown] if stored in FACTORS else 1.0)
 
+    @classmethod
+    def named(cls, shown: str) -> Unit:
+        """The unit that is written like this: "mm", "µm", "°", "px"."""
+        stored = next((stored for stored, units in FACTORS.items() if shown in units), shown)
+        return cls.of(stored, shown)
+
     def format(self, value: float) -> str:
         """A stored value as shown, without the unit: no needless digits, no exponent where a person can do without."""
         measured = self.stored in FACTORS or self.shown in ("deg", "mm")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSignalBlocker, Qt
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QComboBox,
-    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from studio.editing.units import Unit
 from studio.project.calibration import Calibration
 from studio.qt.calibrate.calibration_work import BOARD, CalibrationWork
 from studio.qt.calibrate.keeping import FORMS, save, use, use_file
@@ -26,6 +27,7 @@ from studio.qt.calibrate.view_table import ViewTable
 from studio.qt.core.jobs import JobRunner, time_left
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import ElidedLabel, text_button, thin_bar
+from studio.qt.forms.unit_box import UnitBox
 from studio.runtime.jobs import Job, State
 
 EMPTY = (
@@ -88,17 +90,15 @@ class CalibratePanel(QWidget):
         )
         for box in (self.what, self.lens, self.carried):
             box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-        self.target = QDoubleSpinBox(minimum=0.0, maximum=1e6, decimals=1, singleStep=5.0, suffix=" µm")
+        self.target = UnitBox(Unit.named("µm"), 0.0, 1e6, 1, singleStep=5.0)
         self.target.setSpecialValueText("not said")
         self.target.setToolTip("Depth error that is enough: the next pose is not asked for below it")
-        self.target.setKeyboardTracking(False)
-        self.nearest, self.farthest = (
-            QDoubleSpinBox(minimum=0.0, maximum=1e5, decimals=0, singleStep=10.0, suffix=" mm") for _ in range(2)
-        )
+        self.target.setAccessibleName("Depth error that is enough")
+        self.nearest, self.farthest = (UnitBox(Unit.named("mm"), 0.0, 1e5, 0, singleStep=10.0) for _ in range(2))
         for side in (self.nearest, self.farthest):
             side.setSpecialValueText("boards")
             side.setToolTip("Between which distances depth is measured; boards: as near and as far as they are")
-            side.setKeyboardTracking(False)
+            side.setAccessibleName("Distance")
             side.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.views = ViewTable(self.work)
         self.empty = QLabel(EMPTY, wordWrap=True)
@@ -235,6 +235,8 @@ class CalibratePanel(QWidget):
         self.target.valueChanged.connect(lambda value: work.choose_target(value or None))
         for side in (self.nearest, self.farthest):
             side.valueChanged.connect(self._choose_range)
+        for box in (self.target, self.nearest, self.farthest):
+            box.refused.connect(partial(self.session.message.emit, "warning"))
         self.stop.clicked.connect(work.stop)
         self.save.clicked.connect(self.ask_and_save)
         self.use.clicked.connect(lambda: use(work))

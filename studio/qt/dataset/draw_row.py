@@ -6,13 +6,14 @@ import math
 from typing import Any
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QDoubleSpinBox, QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from superqt import QRangeSlider
 
 from studio.dataset.recipe import Draw
 from studio.editing.forms import PLAIN, words
 from studio.editing.units import Unit
 from studio.qt.core.widgets import ElidedLabel
+from studio.qt.forms.unit_box import UnitBox
 
 RANGED = ("uniform", "logarithmic", "normal", "integer")
 STEPS = 1000
@@ -27,6 +28,8 @@ class DrawRow(QWidget):
     """The slider spans the range that the recipe's file has, and half of it on either side."""
 
     chosen = Signal(float, float)
+    refused = Signal(str)
+    """Why what was typed is not taken over."""
 
     def __init__(self, draw: Draw, label: str, unit: Unit = PLAIN, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -38,7 +41,7 @@ class DrawRow(QWidget):
         layout.setContentsMargins(0, 2, 0, 2)
         layout.setColumnStretch(1, 1)
         layout.addWidget(self.name, 0, 0, 1, 3)
-        self.boxes: tuple[QDoubleSpinBox, ...] = ()
+        self.boxes: tuple[UnitBox, ...] = ()
         if draw.kind not in RANGED or draw.low is None or draw.high is None:
             told = QLabel(said(draw), wordWrap=True)
             told.setObjectName("muted")
@@ -74,20 +77,20 @@ class DrawRow(QWidget):
         self.slider.setValue([min(max(round(STEPS * place), 0), STEPS) for place in places])
         self.slider.blockSignals(False)
 
-    def _box(self, value: float) -> QDoubleSpinBox:
+    def _box(self, value: float) -> UnitBox:
         whole = self.draw.kind == "integer"
         span = (self.draw.high or 0.0) - (self.draw.low or 0.0)
         smallest = (abs(self.draw.low or span) if self.logarithmic else span) * self.unit.factor
         decimals = 0 if whole else max(0, min(9, 2 - math.floor(math.log10(smallest))))
-        box = QDoubleSpinBox(decimals=decimals, minimum=-1e9, maximum=1e9)
+        box = UnitBox(self.unit, -1e9, 1e9, decimals)
+        box.setAccessibleName(self.name.text())
+        box.refused.connect(self.refused)
         box.setSingleStep(1.0 if whole else 10.0 ** (1 - decimals))
-        box.setSuffix(f" {self.unit.shown}" if self.unit.shown else "")
-        box.setKeyboardTracking(False)
         box.setFixedWidth(BOX_WIDTH)
         self._put(box, value)
         return box
 
-    def _put(self, box: QDoubleSpinBox, value: float) -> None:
+    def _put(self, box: UnitBox, value: float) -> None:
         box.blockSignals(True)
         box.setValue(value * self.unit.factor)
         box.blockSignals(False)

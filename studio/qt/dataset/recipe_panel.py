@@ -103,6 +103,7 @@ class RecipePanel(QWidget):
         ]
         for number, row in enumerate(self.rows):
             row.chosen.connect(partial(self.work.set_range, number))
+            row.refused.connect(partial(self.session.message.emit, "warning"))
             self.inside.insertWidget(number, row)
 
     def _fill_files(self, menu: QMenu) -> None:

@@ -169,7 +169,7 @@ class TextField(QLineEdit):
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         if self.invalid:
-            _outline(self)
+            outline(self)
 
 
 class NumbersField(TextField):
@@ -318,13 +318,13 @@ class ChoiceField(QComboBox):
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         if self.invalid:
-            _outline(self)
+            outline(self)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
 
 
-def _outline(field: QWidget) -> None:
+def outline(field: QWidget) -> None:
     """Around what will not do."""
     painter = QPainter(field)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)

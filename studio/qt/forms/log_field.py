@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QLabel, QSlider, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QWidget
+
+from studio.editing.units import Unit
+from studio.qt.forms.unit_box import UnitBox
 
 STEPS = 1000
 """Of the slider."""
@@ -17,6 +20,8 @@ class LogField(QWidget):
     changed = Signal(float, bool)
     """The value, and whether the slider is held."""
     released = Signal()
+    refused = Signal(str)
+    """Why what was typed is not taken over."""
 
     def __init__(self, low: float, high: float, factor: float, unit: str, decimals: int = 3) -> None:
         super().__init__()
@@ -24,10 +29,8 @@ class LogField(QWidget):
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setMaximum(STEPS)
         self.slider.setMinimumWidth(60)
-        self.box = QDoubleSpinBox(decimals=decimals, minimum=0.0, maximum=high * factor)
-        self.box.setSuffix(f" {unit}")
-        self.box.setKeyboardTracking(False)
-        self.box.setStepType(QDoubleSpinBox.StepType.AdaptiveDecimalStepType)
+        self.box = UnitBox(Unit.named(unit), 0.0, high * factor, decimals)
+        self.box.setStepType(UnitBox.StepType.AdaptiveDecimalStepType)
         self.box.setMinimumWidth(104)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -37,6 +40,7 @@ class LogField(QWidget):
         layout.addWidget(self.box)
         self.slider.valueChanged.connect(self._slid)
         self.slider.sliderReleased.connect(self.released)
+        self.box.refused.connect(self.refused)
         self.box.valueChanged.connect(lambda shown: self.changed.emit(shown / self.factor, False))
 
     def set_value(self, value: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import get_args
 
 import numpy as np
@@ -165,6 +166,7 @@ class DevelopPanel(QWidget):
         self.gain.changed.connect(self._setter(("sensor", "gain"), "gain"))
         for field in (self.exposure, self.gain):
             field.released.connect(self._end_merge)
+            field.refused.connect(partial(self.session.message.emit, "warning"))
         self.automatic_gain.clicked.connect(self._choose_gain)
         self.automatic_exposure.clicked.connect(self.expose)
         self.bits.activated.connect(lambda i: session.set(("sensor", "bits"), self.bits.itemData(i), "bit depth"))
@@ -267,6 +269,7 @@ class DevelopPanel(QWidget):
         for i, field in enumerate(self.powers):
             field.changed.connect(self._setter(("scene", "rig", "lasers", i, "power"), f"power of laser {i + 1}"))
             field.released.connect(self._end_merge)
+            field.refused.connect(partial(self.session.message.emit, "warning"))
             self._power_rows.addWidget(field)
 
     def _another_frame(self) -> None:

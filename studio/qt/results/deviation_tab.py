@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import get_args
 
@@ -11,7 +12,6 @@ from PySide6.QtGui import QHideEvent, QImage, QPixmap, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
-    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -26,11 +26,13 @@ from analysis.report.deviation_figure import draw
 from render.base.errors import InputError
 from render.scene.shape import Unit
 from studio.commands.deviation import details, sentence
+from studio.editing.units import Unit as ShownUnit
 from studio.project.step_file import is_step
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, ShownDeviation
 from studio.qt.core.widgets import ElidedLabel, text_button
+from studio.qt.forms.unit_box import UnitBox
 from studio.qt.results.shown_points import NOTHING, are_there, shown_points
 from studio.runtime.error_messages import trouble
 from studio.scan.deviation import Compared, Question, compare_cloud, map_of, write_deviation
@@ -84,6 +86,8 @@ class DeviationTab(QWidget):
         self.map = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
         self.map.setMinimumSize(1, 1)
         self._lay_out()
+        for limit in (self.least, self.most):
+            limit.refused.connect(partial(session.message.emit, "warning"))
         self.choose.clicked.connect(self._choose)
         self.as_scanned.clicked.connect(lambda: self.take_nominal(None))
         self.alignment.currentIndexChanged.connect(self._show_rows)
@@ -256,19 +260,17 @@ class DeviationTab(QWidget):
         self._show_rows()
 
 
-def _limit(value: float) -> QDoubleSpinBox:
+def _limit(value: float) -> UnitBox:
     """um; its least value means that there is none."""
-    box = QDoubleSpinBox()
-    box.setRange(-MOST_UM, MOST_UM)
-    box.setDecimals(1)
-    box.setSuffix(" µm")
+    box = UnitBox(ShownUnit.named("µm"), -MOST_UM, MOST_UM, 1)
     box.setSpecialValueText("none")
+    box.setAccessibleName("Tolerance")
     box.setValue(value)
     box.setMinimumWidth(box.fontMetrics().horizontalAdvance("-1000.0 µm") + 32)
     return box
 
 
-def _metres(limit: QDoubleSpinBox) -> float | None:
+def _metres(limit: UnitBox) -> float | None:
     return None if limit.value() == limit.minimum() else 1e-6 * limit.value()
 
 

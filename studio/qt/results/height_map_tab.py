@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,6 @@ import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QTimer
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
-    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -24,11 +24,13 @@ from analysis.height_map import HeightMap, along, encoded
 from analysis.report.colour import method_colour
 from render.base.errors import InputError
 from render.output.tone_mapping import pyramid
+from studio.editing.units import Unit
 from studio.qt.core import theme
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import ElidedLabel, text_button, upper_and_lower
+from studio.qt.forms.unit_box import UnitBox
 from studio.qt.image.image_item import PictureView
 from studio.qt.results import plots
 from studio.qt.viewport.colour_bar import ColourBar
@@ -61,11 +63,10 @@ class HeightMapTab(QWidget):
         self._scan: ScanResults | None = None
         """Of which the map is, or will be."""
         self.scale = ColourScale(about_zero=False)
-        self.pitch = QDoubleSpinBox(decimals=4, minimum=0.0, maximum=1000.0, singleStep=0.05)
-        self.pitch.setSuffix(" mm")
+        self.pitch = UnitBox(Unit.named("mm"), 0.0, 1000.0, 4, singleStep=0.05)
+        self.pitch.setAccessibleName("Cells")
         self.pitch.setSpecialValueText("as many cells as points")
         self.pitch.setToolTip("Width of a cell")
-        self.pitch.setKeyboardTracking(False)
         self.export = text_button(
             "Export…", "16 bit, with scale, offset and the value of no height in a file beside it"
         )
@@ -96,6 +97,7 @@ class HeightMapTab(QWidget):
         self._rest = QTimer(self, singleShot=True, interval=REST_MS)
         self._rest.timeout.connect(self.make)
         self._lay_out()
+        self.pitch.refused.connect(partial(session.message.emit, "warning"))
         self.pitch.valueChanged.connect(lambda _: self._rest.start())
         self.export.clicked.connect(self._ask)
         self.bar.scaled.connect(self._rescale)

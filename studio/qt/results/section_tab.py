@@ -5,6 +5,7 @@ While the tab is looked at the plane stands in the 3D view, where it is moved an
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,6 @@ from PySide6.QtWidgets import (
     QBoxLayout,
     QCheckBox,
     QComboBox,
-    QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
@@ -31,11 +31,13 @@ from analysis.section import Plane
 from render.base.arrays import Float, Int
 from render.base.errors import InputError
 from render.world.world import build_world
+from studio.editing.units import Unit
 from studio.qt.core import theme
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, ShownSection
 from studio.qt.core.widgets import text_button
+from studio.qt.forms.unit_box import UnitBox
 from studio.qt.results import plots
 from studio.qt.results.shown_points import NOTHING, are_there, shown_points
 from studio.runtime.error_messages import trouble
@@ -43,6 +45,7 @@ from studio.scan.section import Section, from_pieces, write_section
 
 LANE = "section"
 NORMALS = {"across x": (1.0, 0.0, 0.0), "across y": (0.0, 1.0, 0.0), "level (across z)": (0.0, 0.0, 1.0)}
+MM = Unit.named("mm")
 REST_MS = 120
 LOW, WIDE = 330, 480
 """px of height, below which the plot has no room under the fields; of width, from which it has some beside them."""
@@ -63,9 +66,9 @@ class SectionTab(QWidget):
         for name, normal in NORMALS.items():
             self.normal.addItem(name, normal)
         self.normal.addItem("by its normal", None)
-        self.own = [_box(-1.0, 1.0, value, "", 5) for value in (1.0, 0.0, 0.0)]
-        self.through = [_box(-1e5, 1e5, 0.0, "") for _ in range(3)]
-        self.thickness = _box(0.001, 1000.0, 1.0, " mm")
+        self.own = [_box("Normal", Unit(), -1.0, 1.0, value, 5) for value in (1.0, 0.0, 0.0)]
+        self.through = [_box("Through", MM, -1e5, 1e5, 0.0) for _ in range(3)]
+        self.thickness = _box("Slab", MM, 0.001, 1000.0, 1.0)
         self.middle = text_button("To the middle", "The plane through the middle of the points")
         self.export = text_button("Export…", "DXF (mm, layers TRUE and MEASURED) or CSV")
         self.in_view = QCheckBox("In 3D")
@@ -86,6 +89,7 @@ class SectionTab(QWidget):
         self._lay_out()
         for box in (*self.own, *self.through, self.thickness):
             box.valueChanged.connect(self._moved)
+            box.refused.connect(partial(session.message.emit, "warning"))
         self.normal.currentIndexChanged.connect(self._another_normal)
         self.middle.clicked.connect(self.to_middle)
         self.export.clicked.connect(self._ask)
@@ -265,7 +269,7 @@ class SectionTab(QWidget):
         self.normals = _row(self.own)
         self.form.addRow("Plane", self.normal)
         self.form.addRow("Normal", self.normals)
-        self.form.addRow("Through / mm", _row(self.through))
+        self.form.addRow("Through", _row(self.through))
         self.form.addRow("Slab", self.thickness)
         buttons = QHBoxLayout()
         buttons.addWidget(self.middle)
@@ -291,19 +295,17 @@ class SectionTab(QWidget):
         self.column.setDirection(direction)
 
 
-def _box(low: float, high: float, value: float, suffix: str, decimals: int = 3) -> QDoubleSpinBox:
-    box = QDoubleSpinBox()
-    box.setRange(low, high)
-    box.setDecimals(decimals)
-    box.setSuffix(suffix)
+def _box(name: str, unit: Unit, low: float, high: float, value: float, decimals: int = 3) -> UnitBox:
+    box = UnitBox(unit, low, high, decimals)
+    box.setAccessibleName(name)
     box.setValue(value)
     box.setMinimumWidth(48)
     box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-    box.setButtonSymbols(QDoubleSpinBox.ButtonSymbols.NoButtons)  # three side by side have no room for arrows
+    box.setButtonSymbols(UnitBox.ButtonSymbols.NoButtons)  # three side by side have no room for arrows
     return box
 
 
-def _row(boxes: list[QDoubleSpinBox]) -> QWidget:
+def _row(boxes: list[UnitBox]) -> QWidget:
     held = QWidget()
     row = QHBoxLayout(held)
     row.setContentsMargins(0, 0, 0, 0)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import (
-    QDoubleSpinBox,
     QFormLayout,
     QHBoxLayout,
     QMenu,
@@ -21,6 +21,7 @@ from studio.editing.units import Unit
 from studio.project.document import FieldPath
 from studio.qt.core.widgets import ElidedLabel
 from studio.qt.forms.fields import tool_button
+from studio.qt.forms.unit_box import UnitBox
 
 if TYPE_CHECKING:
     from studio.qt.viewport.viewport import Viewport
@@ -122,15 +123,11 @@ class ViewportBar(QWidget):
         gizmo = self._viewport.gizmo
         menu, inner = QMenu(self), QWidget()
         form = QFormLayout(inner)
-        move, turn = QDoubleSpinBox(), QDoubleSpinBox()
-        for box, suffix, value, most in (
-            (move, " mm", 1e3 * gizmo.move_step, 1000.0),
-            (turn, "°", math.degrees(gizmo.turn_step), 90.0),
-        ):
-            box.setDecimals(2)
-            box.setRange(0.01, most)
-            box.setSuffix(suffix)
-            box.setValue(value)
+        move, turn = UnitBox(Unit.named("mm"), 0.01, 1000.0, 2), UnitBox(Unit.named("°"), 0.01, 90.0, 2)
+        move.setValue(1e3 * gizmo.move_step)
+        turn.setValue(math.degrees(gizmo.turn_step))
+        for box in (move, turn):
+            box.refused.connect(partial(gizmo.session.message.emit, "warning"))
         move.valueChanged.connect(lambda value: setattr(gizmo, "move_step", 1e-3 * value))
         turn.valueChanged.connect(lambda value: setattr(gizmo, "turn_step", math.radians(value)))
         form.addRow("Move with Ctrl", move)

@@ -194,3 +194,21 @@ def test_a_section_begins_along_the_line(
     panel.show_tab(panel.section)
     qtbot.waitUntil(lambda: panel.section.section is not None)
     assert panel.section.normal.currentIndex() == across
+
+
+def test_tolerance_and_slab_are_typed_in_any_unit(panel: NominalPanel, session: Session, qtbot: QtBot) -> None:
+    told: list[tuple[str, str]] = []
+    session.message.connect(lambda kind, text: told.append((kind, text)))
+    panel.deviation.most.selectAll()
+    qtbot.keyClicks(panel.deviation.most, "0.5 mm")
+    qtbot.keyClick(panel.deviation.most, Qt.Key.Key_Return)
+    assert panel.deviation.question().upper == pytest.approx(5e-4)
+    slab = panel.section.thickness
+    slab.selectAll()
+    qtbot.keyClicks(slab, "2000 um")
+    qtbot.keyClick(slab, Qt.Key.Key_Return)
+    assert slab.value() == 2.0 and not told
+    slab.selectAll()
+    qtbot.keyClicks(slab, "thin")
+    qtbot.keyClick(slab, Qt.Key.Key_Return)
+    assert told == [("warning", "Slab: this is not a number; allowed: a number in mm")]
