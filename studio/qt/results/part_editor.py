@@ -89,6 +89,7 @@ class PartEditor(QWidget):
             field.setAccessibleName(spec.label)
             field.entered.connect(partial(self._enter, name))
             field.refused.connect(self._tell)
+            field.given_up.connect(partial(self._tell_given_up, name))
             if name == "nominal":
                 # while it is typed, so that Tab goes on to them
                 field.textEdited.connect(lambda text: self._allow_limits(bool(text.strip())))
@@ -101,12 +102,14 @@ class PartEditor(QWidget):
         try:
             self._set(name, value)
         except InputError as error:
-            if not field.hasFocus():
-                self.session.message.emit("warning", f"{reason(error)}. The value is as it was")
             field.reject()
             self._tell(reason(error))
             return
         self._tell("")
+
+    def _tell_given_up(self, name: str) -> None:
+        told = f"{self.fields[name].spec.label}: {self.problem.text()}. The value is as it was"
+        self.session.message.emit("warning", told)
 
     def _drag(self, name: str, value: Any) -> None:
         try:

@@ -89,6 +89,8 @@ class ParameterRow(QWidget):
 
     changed = Signal(object)
     removed = Signal()
+    given_up = Signal(str)
+    """Why what was typed is dropped, as its field is left."""
 
     def __init__(self, project: Project, parameter: Data, spec: FieldSpec | None) -> None:
         """spec: None, the base project has no such field."""
@@ -167,6 +169,7 @@ class ParameterRow(QWidget):
             self.values.setToolTip(f"Values in {spec.unit.shown}" if spec.unit.shown else "Values")
             self.values.entered.connect(lambda values: self._change(values=values))
             self.values.refused.connect(self._tell)
+            self.values.given_up.connect(self._tell_given_up)
             line.addWidget(self.values, 1)
             unit = QLabel(spec.unit.shown)
             unit.setObjectName("muted")
@@ -190,11 +193,15 @@ class ParameterRow(QWidget):
         field.entered.connect(lambda value: self._change(**{name: float(value)}))
         field.dragged.connect(lambda value: self._change(**{name: float(value)}))
         field.refused.connect(self._tell)
+        field.given_up.connect(self._tell_given_up)
         return field
 
     def _tell(self, why: str) -> None:
         self.reason.setText(why[:1].upper() + why[1:])
         self.reason.setVisible(bool(why))
+
+    def _tell_given_up(self) -> None:
+        self.given_up.emit(f"{self.reason.text()}. The value is as it was")
 
     def _change(self, **values: Any) -> None:
         self._tell("")

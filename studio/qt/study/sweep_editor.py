@@ -100,6 +100,8 @@ class SweepEditor(QWidget):
         self.has_limit.setToolTip("A bar that a set-up has to keep: a line in the chart, and what a search looks for")
         self.side = ChoiceField([("at most", True, "Broken above"), ("at least", False, "Broken below")])
         self.limit = NumberField(FieldSpec("limit", "Limit", "", "number", 0.0))
+        self.limit.refused.connect(self.limit.setToolTip)
+        self.limit.given_up.connect(self._tell_given_up)
         self._lay_out()
         self._connect()
         work.draft_changed.connect(self.refresh)
@@ -155,6 +157,7 @@ class SweepEditor(QWidget):
             for number, row in enumerate(self.rows):
                 row.changed.connect(partial(work.set_values, number))
                 row.removed.connect(partial(self._remove, number))
+                row.given_up.connect(partial(work.session.message.emit, "warning"))
                 self.list.addWidget(row)
         for row, parameter in zip(self.rows, vary, strict=True):
             row.refresh(parameter)
@@ -165,6 +168,10 @@ class SweepEditor(QWidget):
     def _remove(self, number: int) -> None:
         vary = self.work.sweep["vary"]
         self.work.change_sweep(vary=[*vary[:number], *vary[number + 1 :]])
+
+    def _tell_given_up(self) -> None:
+        told = f"Limit: {self.limit.toolTip()}. The value is as it was"
+        self.work.session.message.emit("warning", told)
 
     def _show_limit(self) -> None:
         limit = self.work.sweep.get("limit")

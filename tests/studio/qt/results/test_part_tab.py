@@ -161,6 +161,22 @@ def test_a_tolerance_needs_its_nominal(panel: ResultsPanel, qtbot: QtBot) -> Non
     assert (changed.name, changed.nominal, changed.lower) == ("ground", 0.0, pytest.approx(-1e-4))
 
 
+@pytest.mark.parametrize(("typed", "why"), [("abc", "this is not a number"), ("1e30", "must be at most")])
+def test_what_tab_drops_is_told(panel: ResultsPanel, qtbot: QtBot, typed: str, why: str) -> None:
+    with_a_step(panel.session)
+    panel.figures.setCurrentIndex(PART)
+    panel.part.table.selectRow(0)
+    nominal = panel.part.editor.fields["nominal"]
+    panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)
+    nominal.setFocus()
+    qtbot.keyClicks(nominal, typed)
+    with qtbot.waitSignal(panel.session.message) as told:
+        qtbot.keyClick(nominal, Qt.Key.Key_Tab)
+    assert told.args[0] == "warning" and told.args[1].startswith(f"Nominal: {why}")
+    assert told.args[1].endswith("The value is as it was") and nominal.text() == ""
+
+
 def test_tab_goes_from_the_nominal_on_to_its_tolerances(panel: ResultsPanel, qtbot: QtBot) -> None:
     with_a_step(panel.session)
     panel.figures.setCurrentIndex(PART)

@@ -106,6 +106,18 @@ class TestDraft:
             {"field": "scene.rig.lasers[0].power", "values": pytest.approx([0.005, 0.02, 0.04])}
         ]
 
+    def test_values_that_will_not_do_are_told_as_the_field_is_left(self, qtbot: QtBot, desk: Desk) -> None:
+        told: list[tuple[str, str]] = []
+        desk.vary(POWER[:-1], POWER[-1])
+        desk.session.message.connect(lambda kind, text: told.append((kind, text)))
+        for field in (desk.panel.editor.rows[0].low, desk.panel.editor.limit):
+            field.textEdited.emit("much")
+            field.setText("much")
+            field.pending = True
+            field.leave()
+        assert [kind for kind, _ in told] == ["warning", "warning"]
+        assert all("not a number" in text and text.endswith("The value is as it was") for _, text in told)
+
     def test_a_field_is_varied_once_however_often_it_is_asked_for(self, desk: Desk) -> None:
         desk.vary(NOISE[:1], NOISE[1])
         desk.vary(NOISE[:1], NOISE[1])
