@@ -22,7 +22,7 @@ from PySide6.QtGui import (
     QPen,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QApplication, QCheckBox, QComboBox, QLineEdit, QToolButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit, QToolButton, QWidget
 
 from render.base.errors import InputError
 from studio.editing.forms import FieldSpec, choice_label
@@ -240,13 +240,6 @@ class CurvePlot(QWidget):
         painter.drawText(ends, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, f"{low:g} nm")
         painter.drawText(ends, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, f"{high:g} nm")
         painter.end()
-
-
-def leave_typing() -> None:
-    """What is being typed anywhere counts from now on, as if its field had been left."""
-    field = QApplication.focusWidget()
-    if isinstance(field, TextField):
-        field.leave()
 
 
 class FlagField(QCheckBox):

@@ -38,6 +38,13 @@ class UnitBox(QDoubleSpinBox):
             return reason(error)
         return ""
 
+    def leave(self) -> None:
+        """Take over what was typed, as something else is done now; what will not do is dropped, and told."""
+        problem = self.problem
+        self.interpretText()
+        if problem:
+            self._refuse(f"{problem}. The value is as it was")
+
     def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
         """All may be typed; what it is worth is told at its end."""
         try:
@@ -56,10 +63,8 @@ class UnitBox(QDoubleSpinBox):
         super().keyPressEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        problem = self.problem
+        self.leave()
         super().focusOutEvent(event)
-        if problem:
-            self._refuse(f"{problem}. The value is as it was")
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)

@@ -24,7 +24,7 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import Session, one_of
 from studio.qt.core.widgets import Scrolled, room_for_a_window
-from studio.qt.forms.fields import leave_typing
+from studio.qt.forms.leaving import leave_typing
 from studio.qt.render.python_copy import copy_shown
 from studio.qt.results.export_actions import ExportActions
 from studio.qt.results.measure_actions import MeasureActions
@@ -32,6 +32,7 @@ from studio.qt.results.scan_again import ScanAgain
 from studio.qt.scene import scene_actions
 from studio.qt.scene.mesh_bar import replace_mesh
 from studio.qt.scene.mesh_importer import choose_meshes, import_meshes
+from studio.qt.shell.command_keys import CommandKeys
 from studio.qt.shell.command_search import CommandSearch
 from studio.qt.shell.escape import escape
 from studio.qt.shell.file_actions import FileActions
@@ -89,6 +90,7 @@ class MainWindow(QMainWindow):
         self.setDockOptions(QMainWindow.DockOption.AllowTabbedDocks | QMainWindow.DockOption.AllowNestedDocks)
         self.resize(1440, 900)
         self.commands = Actions(self, before=leave_typing)
+        CommandKeys(self)
         self.runner = JobRunner(self)
         self.panels = Panels(session, self.runner, making)
         self.docks = self._make_docks()

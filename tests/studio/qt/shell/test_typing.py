@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, cast
 
 import pytest
-from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QEnterEvent
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtGui import QEnterEvent, QKeyEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -93,3 +93,28 @@ def test_keys_are_for_the_3d_view_that_the_mouse_comes_over(window: MainWindow, 
     tree.setFocus()
     QApplication.sendEvent(view, enter)
     assert view.hasFocus()
+
+
+def test_ctrl_and_a_letter_is_the_menus_while_something_is_typed(window: MainWindow, power: Any, qtbot: QtBot) -> None:
+    window.commands["export_html"].setEnabled(True)
+    asked: list[str] = []
+    for key in ("export_html", "duplicate"):
+        window.commands[key].triggered.disconnect()
+        window.commands[key].triggered.connect(lambda _, key=key: asked.append(key))
+    type_into(qtbot, power, "35", key=None)
+    qtbot.keyClick(power, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
+    qtbot.keyClick(power, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier)
+    assert asked == ["export_html", "duplicate"] and power.text() == "35"
+    qtbot.keyClick(power, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+    assert power.selectedText() == "35", "keys of editing stay the field's"
+
+
+@pytest.mark.parametrize("letter", "EDNOSPILQ")
+def test_a_field_leaves_the_keys_of_the_menus_alone(window: MainWindow, power: Any, qtbot: QtBot, letter: str) -> None:
+    """However its platform means them: it would say by accepting what overrides a shortcut that it wants the key."""
+    type_into(qtbot, power, "35", key=None)
+    key, control = getattr(Qt.Key, f"Key_{letter}"), Qt.KeyboardModifier.ControlModifier
+    event = QKeyEvent(QEvent.Type.ShortcutOverride, key, control)
+    event.ignore()
+    QApplication.sendEvent(power, event)
+    assert not event.isAccepted()
