@@ -16,11 +16,11 @@ from analysis.report.colour import method_name
 from render.base.threads import Cancel
 from studio.qt.core.actions import Actions
 from studio.qt.core.dialogs import show_trouble, suggested
-from studio.qt.core.jobs import JobRunner
+from studio.qt.core.jobs import RENDER, JobRunner
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Render, Session
 from studio.runtime.error_messages import trouble
-from studio.runtime.jobs import Job, Progress
+from studio.runtime.jobs import Job, Progress, State
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.film import export_film
 from studio.scan.height_map import export_height_map
@@ -153,8 +153,22 @@ class ExportActions(QObject):
             said = f", the points by {method_name(method)}, {own}" if kind == "points" else ""
             self._tell(written, said + (f", of {of}" if of else ""), notes)
 
+        self._tell_wait(path)
         self._job = self.runner.run(LANE, f"export {path.name}", work, then)
         self.preferences.change(folder=str(path.parent))
+
+    def _tell_wait(self, path: Path) -> None:
+        """At once, where it will take a while: the status bar shows the render, and not what is written beside it."""
+        running, rendering, before = self.runner.job(LANE), self.runner.job(RENDER), self._job
+        if running is not None:
+            dropped = before is not None and before is not running and before.state is State.QUEUED
+            instead = f", in place of: {before.name}" if before is not None and dropped else ""
+            told = f"{path.name} is written after: {running.name}{instead}"
+        elif rendering is not None:
+            told = f"{path.name} is being written beside the {rendering.name}, which takes longer"
+        else:
+            return
+        self.session.message.emit("info", f"{told}. A message tells when it is there")
 
     def _of_what(self, key: str) -> str:
         """Of a scan: "all 8 steps", or "step 3 of 8"."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,7 @@ from pytestqt.qtbot import QtBot
 from analysis.cloud import write_ply
 from render.base.errors import InputError
 from studio.qt.core.actions import Actions
-from studio.qt.core.jobs import JobRunner
+from studio.qt.core.jobs import RENDER, JobRunner
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
 from studio.qt.results.export_actions import ExportActions
@@ -89,3 +90,33 @@ def test_the_height_map_of_a_scan_is_of_all_its_points(
     )
     assert export(session, tmp_path / "map.png", qtbot, "export_heightmap").startswith(b"\x89PNG")
     assert json.loads((tmp_path / "map.json").read_text())["points"] == 20
+
+
+def test_an_export_that_takes_longer_beside_other_work_is_told_at_once(
+    measured: tuple[Session, DevelopPanel], qtbot: QtBot, tmp_path: Path
+) -> None:
+    session, panel = measured
+    panel.close()
+    window = QMainWindow()
+    qtbot.addWidget(window)
+    runner = JobRunner(window)
+    actions = ExportActions(window, session, runner, PreferencesFile(tmp_path / "p.json"), Actions(window))
+    told: list[str] = []
+    session.message.connect(lambda kind, text: told.append(text))
+    go_on = threading.Event()
+    runner.run(RENDER, "scan", lambda progress, cancelled: go_on.wait())
+    runner.run("export", "export a.csv", lambda progress, cancelled: go_on.wait())
+    for name in ("b.csv", "c.csv"):
+        actions.write("export_csv", tmp_path / name)
+    assert told[0].startswith("b.csv is written after: export a.csv. A message")
+    assert told[1].startswith("c.csv is written after: export a.csv, in place of: export b.csv")
+    go_on.set()
+    qtbot.waitUntil(lambda: not runner.busy)
+    assert (tmp_path / "c.csv").exists() and "Wrote" in told[2]
+    go_on.clear()
+    runner.run(RENDER, "scan", lambda progress, cancelled: go_on.wait())
+    actions.write("export_csv", tmp_path / "d.csv")
+    assert told[3].startswith("d.csv is being written beside the scan")
+    go_on.set()
+    qtbot.waitUntil(lambda: not runner.busy)
+    runner.close()
