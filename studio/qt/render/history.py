@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, QPersistentModelIndex, QPoint, QSize, Qt
-from PySide6.QtGui import QIcon, QImage, QKeyEvent, QPixmap
+from PySide6.QtGui import QIcon, QImage, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 
 from render.base.errors import InputError
 from render.output.tone_mapping import Picture, grey
+from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.dialogs import show_trouble
 from studio.qt.core.session import Render, Session
 from studio.qt.image.compare_view import CompareView
@@ -109,7 +110,7 @@ class History(QWidget):
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.list.setUniformItemSizes(True)
         self.list.setToolTip("Click shows a render, F2 names it, Delete removes it; select two to compare them.")
-        self.list.keyPressEvent = self._key  # type: ignore[method-assign]
+        DeleteKey(self.list, self.delete)
         heading = QLabel("Renders")
         heading.setStyleSheet("font-weight: 600")
         self.compare_button = QPushButton("Compare")
@@ -240,12 +241,6 @@ class History(QWidget):
         count = len(self.list.selectedItems())
         self.compare_button.setEnabled(count == 2)
         self.delete_button.setEnabled(count > 0)
-
-    def _key(self, event: QKeyEvent) -> None:
-        if event.key() == Qt.Key.Key_Delete:
-            self.delete()
-        else:
-            QListWidget.keyPressEvent(self.list, event)
 
     def _menu(self, where: QPoint) -> None:
         item = self.list.itemAt(where)

@@ -26,6 +26,7 @@ from analysis.gauges.read import Reading
 from analysis.report.gauge_table import MARKS, beside_nominal, small_text, value_text
 from analysis.report.units import NONE
 from studio.project.project import Section
+from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
 from studio.qt.results.measures_table import ReadOnlyTable
@@ -73,9 +74,11 @@ class PartTab(QWidget):
         self._read: tuple[Gauge, ...] = ()
         self.drawing = PartDrawing(profile.plot, self)
         self.table = ReadOnlyTable()
+        DeleteKey(self.table, self.delete)
         self.editor = PartEditor(session)
         self.add: QPushButton = text_button("Add", "Read another dimension off the profile")
-        self.remove = text_button("Delete", "The chosen measure")
+        self.remove = text_button("Delete", "The chosen measure (Del in the table)")
+        self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # by Tab it would get a space meant for the table
         self.section = QComboBox()
         for value, title in SECTIONS.items():
             self.section.addItem(title, value)
@@ -156,7 +159,9 @@ class PartTab(QWidget):
         now = self.session.project.measures
         if 0 <= self.chosen < len(now):
             kept = (*now[: self.chosen], *now[self.chosen + 1 :])
-            self.session.set(("measures",), kept, f"delete {now[self.chosen].name}")
+            name = now[self.chosen].name
+            if self.session.set(("measures",), kept, f"delete {name}"):
+                self.session.message.emit("info", f"deleted {name} (Ctrl+Z brings it back)")
 
     def _show_regions(self) -> None:
         """Of the measure that is being added, else of the chosen one."""

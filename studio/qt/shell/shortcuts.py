@@ -26,7 +26,7 @@ FIELDS = (
     ("Esc", "the value as it was; end a drag, a menu"),
     ("Up, Down", "a step; with Shift a tenth of it"),
 )
-LISTS = (("Return", "frame the part"), ("F2", "name a part or a render"), ("Del", "remove a part or a render"))
+LISTS = (("Return", "frame the part"), ("F2", "name a part or a render"), ("Del", "remove what is chosen in it"))
 COLUMNS = (("File", "Render"), ("Edit", "Scene", "Lists", "Help"), ("View", "Measure"), ("Mouse", "Fields", "3D view"))
 
 

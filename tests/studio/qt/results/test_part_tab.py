@@ -276,3 +276,24 @@ def test_an_upright_section_moves_plot_and_measures_and_is_one_step_of_undo(pane
     assert span[1] / span[0] == pytest.approx(np.cos(lean), rel=1e-3)
     session.document.undo()
     assert part.readings[0].value == leaning.value and part.section.currentIndex() == 0
+
+
+def test_a_measure_is_deleted_by_its_key_and_not_by_chance(panel: ResultsPanel, qtbot: QtBot) -> None:
+    gauge = with_a_step(panel.session)
+    panel.figures.setCurrentIndex(PART)
+    part = panel.part
+    part.table.selectRow(0)
+    panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)
+    part.table.setFocus()
+    for key in (Qt.Key.Key_Tab, Qt.Key.Key_Backtab):
+        for _ in range(8):
+            qtbot.keyClick(panel.focusWidget(), key)
+            assert panel.focusWidget() is not part.remove
+    part.table.setFocus()
+    with qtbot.waitSignal(panel.session.message) as told:
+        qtbot.keyClick(part.table, Qt.Key.Key_Delete)
+    assert told.args == ["info", f"deleted {gauge.name} (Ctrl+Z brings it back)"]
+    assert panel.session.project.measures == ()
+    panel.session.document.undo()
+    assert panel.session.project.measures == (gauge,)
