@@ -35,11 +35,15 @@ class ColourScale:
     share: float = 98.0
     """Percent of the values within the limits, where no hand has set these."""
     by_hand: tuple[float, float] | None = None
+    by_share: bool = False
+    """A person has chosen the share, also where others are the first limits."""
 
-    def limits(self, values: Float) -> tuple[float, float]:
-        """Lowest and highest value of its own colour."""
+    def limits(self, values: Float, first: tuple[float, float] | None = None) -> tuple[float, float]:
+        """Lowest and highest value of its own colour; first: until a person chooses others, None: by the share."""
         if self.by_hand is not None:
             return self.by_hand
+        if first is not None and not self.by_share:
+            return first
         finite = values[np.isfinite(values)]
         if self.about_zero:
             top = symmetric_limit(finite, self.share)
@@ -74,7 +78,11 @@ class ColourScale:
 
     def automatic(self, share: float) -> ColourScale:
         """By the values again."""
-        return replace(self, share=share, by_hand=None)
+        return replace(self, share=share, by_hand=None, by_share=True)
+
+    def as_before(self) -> ColourScale:
+        """Without what a hand has set."""
+        return replace(self, by_hand=None)
 
 
 def tick(value: float) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.cloud import merge, ply_pieces
+from analysis.cloud import Cloud, merge, ply_pieces
 from analysis.height_map import HeightMap, encoded, height_map
 from analysis.report.units import digits
 from render.base.errors import InputError
@@ -63,8 +63,13 @@ def write_height_map(points: Path, path: Path, pitch: float | None = None) -> Wr
 
 def read_map(points: Path, pitch: float | None = None) -> HeightMap:
     """Of the points of a PLY. InputError: as `height_map` and `read_ply`."""
-    pieces = [{name: piece[name] for name in NEEDED if name in piece} for piece in ply_pieces(points)]
-    return height_map(merge(pieces), pitch)
+    return height_map(read_points(points), pitch)
+
+
+def read_points(points: Path) -> Cloud:
+    """Of a PLY what is needed of it here. InputError: as `read_ply`."""
+    names = (*NEEDED, "error_depth")
+    return merge([{name: piece[name] for name in names if name in piece} for piece in ply_pieces(points)])
 
 
 def picture(made: HeightMap, scale: ColourScale, limits: tuple[float, float]) -> Picture:

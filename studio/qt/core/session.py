@@ -126,6 +126,8 @@ class ShownDeviation:
     """(n,) m."""
     row: NDArray[np.int32]
     step: NDArray[np.int32]
+    limit: float | None = None
+    """m, of colours, until a person chooses another."""
 
 
 class Session(QObject):

@@ -36,6 +36,7 @@ from studio.qt.forms.unit_box import UnitBox
 from studio.qt.results.shown_points import NOTHING, are_there, shown_points
 from studio.runtime.error_messages import trouble
 from studio.scan.deviation import Compared, Question, compare_cloud, map_of, write_deviation
+from studio.scan.first_range import deviation_limit
 
 LANE = "deviation"
 ALIGNMENTS: dict[Alignment, str] = {
@@ -179,7 +180,7 @@ class DeviationTab(QWidget):
         found, shown = self.compared, None
         if found is not None and self.isVisible() and self.in_view.isChecked():
             row, step = (found.columns[name].astype(np.int32) for name in ("row", "step"))
-            shown = ShownDeviation(found.found.points, found.found.value, row, step)
+            shown = ShownDeviation(found.found.points, found.found.value, row, step, deviation_limit(found))
         self.session.show_deviation(shown)
 
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.height_map import HeightMap, along, encoded
+from analysis.height_map import HeightMap, along, encoded, height_map
 from analysis.report.colour import method_colour
 from render.base.errors import InputError
 from render.output.tone_mapping import pyramid
@@ -37,7 +37,8 @@ from studio.qt.viewport.colour_bar import ColourBar
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
 from studio.scan.colour_scale import PER_METRE, ColourScale
-from studio.scan.height_map import picture, points_of, read_map, sigma_record, sigma_sentence, write_made
+from studio.scan.first_range import height_range
+from studio.scan.height_map import picture, points_of, read_points, sigma_record, sigma_sentence, write_made
 from studio.scan.scan_results import ScanResults
 
 LANE = "height map"
@@ -45,7 +46,7 @@ NOTHING = "A height map is of a scan: run one (F6, Motion), or open the results 
 FILES = "16 bit PNG (*.png);;16 bit TIFF (*.tif *.tiff)"
 HINT = "Drag the line or its ends for another profile; the wheel zooms, a double click shows all."
 REST_MS = 400
-BAR_TIP = "Drag an end to another value; a double click brings back the percentile. Right click: percentiles, mm or µm"
+BAR_TIP = "Drag an end to another value; a double click brings back what was there. Right click: percentiles, mm or µm"
 BAR_PX = 136
 """Beside the picture, for its colour bar."""
 LEAST_PX, TOLD_PX = 300, 240
@@ -63,6 +64,8 @@ class HeightMapTab(QWidget):
         self._scan: ScanResults | None = None
         """Of which the map is, or will be."""
         self.scale = ColourScale(about_zero=False)
+        self._first: tuple[float, float] | None = None
+        """m, what colours show until a person says otherwise."""
         self.pitch = UnitBox(Unit.named("mm"), 0.0, 1000.0, 4, singleStep=0.05)
         self.pitch.setAccessibleName("Cells")
         self.pitch.setSpecialValueText("as many cells as points")
@@ -138,11 +141,16 @@ class HeightMapTab(QWidget):
         folder, pitch = scan.found.folder, 1e-3 * self.pitch.value() or None
         self.told.setText("Making the height map…")
 
-        def then(made: HeightMap) -> None:
-            if scan is self._scan:
-                self._take(made)
+        def work(progress: object, cancelled: object) -> tuple[HeightMap, tuple[float, float] | None]:
+            points = read_points(points_of(folder))
+            return height_map(points, pitch), height_range(points)
 
-        self.runner.run(LANE, "height map", lambda progress, cancelled: read_map(points_of(folder), pitch), then)
+        def then(made: tuple[HeightMap, tuple[float, float] | None]) -> None:
+            if scan is self._scan:
+                self._first = made[1]
+                self._take(made[0])
+
+        self.runner.run(LANE, "height map", work, then)
 
     def write(self, path: Path) -> None:
         """InputError: there is no map, or as of `write_made`."""
@@ -180,7 +188,8 @@ class HeightMapTab(QWidget):
             return
         unit = self.bar.unit_of("map")
         factor = PER_METRE[unit]
-        limits = self.bar.show_scale("Height", unit, self.scale, factor * self.made.heights.ravel())
+        first = None if self._first is None else (factor * self._first[0], factor * self._first[1])
+        limits = self.bar.show_scale("Height", unit, self.scale, factor * self.made.heights.ravel(), first=first)
         low, high = (1e3 / factor * limit for limit in limits)
         rows, columns = self.made.heights.shape
         self.view.item.set_levels(pyramid(picture(self.made, self.scale, (low, high))), (columns, rows))

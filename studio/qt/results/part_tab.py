@@ -93,6 +93,7 @@ class PartTab(QWidget):
         self.drawing.moved.connect(self._moved)
         session.project_changed.connect(self._project_changed)
         session.document_replaced.connect(self.cancel)
+        self.placing_changed.connect(lambda: setattr(profile, "held", self.placing is not None))
 
     def follow(self, laser: int) -> None:
         """Another frame, measurement or laser is shown."""

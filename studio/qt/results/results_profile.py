@@ -12,6 +12,7 @@ from analysis.report.colour import TRUTH, method_colour
 from studio.project.project import Section
 from studio.qt.core import theme
 from studio.qt.results import plots
+from studio.scan.first_range import profile_range
 from studio.scan.result_series import Series
 
 NEAR = 30.0
@@ -33,6 +34,8 @@ class ProfilePlot(plots.PointedPlots):
         self.plot.addItem(self.ring, ignoreBounds=True)
         self._dots: list[Any] = []
         self._shown: dict[str, Series] = {}
+        self.held = False
+        """The axes stay as they are, as ranges are being dragged in them."""
         self.repaint_theme()
 
     def show_series(self, truth: Series | None, measured: dict[str, Series], section: Section) -> None:
@@ -53,8 +56,17 @@ class ProfilePlot(plots.PointedPlots):
             item.setData(series.across[here], series.distance[here])
             self.plot.addItem(item)
             self._dots.append(item)
-        self.plot.enableAutoRange()
+        if not self.held:
+            self._fit(truth)
         self.mark(None)
+
+    def _fit(self, truth: Series | None) -> None:
+        """To the part: false points may be far from it; a double click shows them too."""
+        ends = profile_range(truth, list(self._shown.values()))
+        if ends is None or not all(high > low for low, high in ends):
+            self.plot.enableAutoRange()
+        else:
+            self.plot.setRange(xRange=ends[0], yRange=ends[1], padding=0.02)
 
     def mark(self, scan_line: int | None) -> None:
         """A ring around the samples of a scan line."""

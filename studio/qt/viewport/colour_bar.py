@@ -12,7 +12,7 @@ from studio.qt.core import theme
 from studio.scan.colour_scale import PER_METRE, SHARES, ColourScale, tick
 
 TIP = (
-    "Drag an end to another value; a double click brings back the percentile. Right click: percentiles, "
+    "Drag an end to another value; a double click brings back what was there. Right click: percentiles, "
     "mm or \u00b5m, colours by error or by height"
 )
 REACH_PX = 9
@@ -37,6 +37,8 @@ class ColourBar(QWidget):
         self.title, self.unit, self.note = "", "", ""
         self.scale = ColourScale()
         self.limits = (-1.0, 1.0)
+        self.by_share = True
+        """No hand and no first limits decide."""
         self.units = {"error": "\u00b5m", "height": "mm", "deviation": "\u00b5m", "map": "mm"}
         """In which lengths of each meaning are told."""
         self.meaning = "error"
@@ -53,11 +55,18 @@ class ColourBar(QWidget):
         return self.units[meaning]
 
     def show_scale(
-        self, title: str, unit: str, scale: ColourScale, values: Float, image_scale: float = 1.0
+        self,
+        title: str,
+        unit: str,
+        scale: ColourScale,
+        values: Float,
+        image_scale: float = 1.0,
+        first: tuple[float, float] | None = None,
     ) -> tuple[float, float]:
-        """Give the limits of (n,) values, and show them."""
+        """Give the limits of (n,) values, and show them; first: as of `ColourScale.limits`."""
         self.title, self.unit, self.scale = title, unit, scale
-        self.limits = scale.limits(values)
+        self.limits = scale.limits(values, first)
+        self.by_share = scale.by_hand is None and (first is None or scale.by_share)
         self.note = f"at {image_scale:.3g} x size" if image_scale != 1.0 else ""
         self.update()
         return self.limits
@@ -68,7 +77,7 @@ class ColourBar(QWidget):
         for share in SHARES:
             action = made.addAction(f"{share:g} % of the points")
             action.setCheckable(True)
-            action.setChecked(self.scale.by_hand is None and self.scale.share == share)
+            action.setChecked(self.by_share and self.scale.share == share)
             action.triggered.connect(lambda _=False, share=share: self.scaled.emit(self.scale.automatic(share)))
         if self.unit in PER_METRE:
             made.addSeparator()
@@ -133,7 +142,7 @@ class ColourBar(QWidget):
         event.accept()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        self.scaled.emit(self.scale.automatic(self.scale.share))
+        self.scaled.emit(self.scale.as_before())
         event.accept()
 
     def eventFilter(self, watched: QObject, event: object) -> bool:

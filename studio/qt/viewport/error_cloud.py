@@ -114,7 +114,7 @@ class ErrorCloud(QObject):
     def choose(self, view: ErrorView) -> None:
         """Another kind of error, with limits of its own."""
         self.error_view = view
-        self.scales["error"] = self.scales["error"].automatic(self.scales["error"].share)
+        self.scales["error"] = self.scales["error"].as_before()
         self._draw()
 
     def colour_by_height(self, by_height: bool) -> None:
@@ -217,8 +217,12 @@ class ErrorCloud(QObject):
         self._first = first
         self.points = at_step(first, self.session.project.scene, self.session.step) if len(first) else first
         title, unit, self.errors = self._values(first)
-        low, high = self.bar.show_scale(title, unit, self.scales[self.meaning], self.errors, self.image_scale)
-        _give(self._data, self.points, self.scales[self.meaning].colours(self.errors, low, high))
+        scale, limits = self.scales[self.meaning], None
+        if deviation is not None and deviation.limit is not None:
+            top = deviation.limit * PER_METRE[unit]
+            limits = (-top, top)
+        low, high = self.bar.show_scale(title, unit, scale, self.errors, self.image_scale, limits)
+        _give(self._data, self.points, scale.colours(self.errors, low, high))
         self._mark()
         self._draw_box()
         self._show_or_hide()

@@ -131,6 +131,10 @@ def test_the_deviation_colours_the_points_while_it_is_looked_at(
     found = tab.compared
     assert found is not None and cloud.meaning == "deviation" and cloud.bar.title == "Deviation"
     np.testing.assert_allclose(cloud.errors, 1e6 * found.found.value)
+    assert cloud.limit == pytest.approx(200.0), "twice the tolerance, whatever false points there are"
+    cloud.bar.units["deviation"] = "mm"
+    cloud.bar.unit_chosen.emit()
+    assert cloud.limit == pytest.approx(0.2)
     tab.in_view.setChecked(False)
     assert cloud.meaning == "error" and len(cloud.points) == len(session.shown.scan.points["x"])
     tab.in_view.setChecked(True)

@@ -297,3 +297,15 @@ def test_a_measure_is_deleted_by_its_key_and_not_by_chance(panel: ResultsPanel, 
     assert panel.session.project.measures == ()
     panel.session.document.undo()
     assert panel.session.project.measures == (gauge,)
+
+
+def test_the_axes_stay_while_a_measure_is_placed(panel: ResultsPanel, qtbot: QtBot) -> None:
+    """What is measured anew meanwhile moved the places that were just dragged to."""
+    panel.part.start("step")
+    view = panel.profile.plot.vb
+    panel.profile.plot.setRange(xRange=(-10.0, 10.0), yRange=(100.0, 200.0), padding=0.0)
+    panel.refresh()
+    assert view.viewRange()[0] == pytest.approx([-10.0, 10.0])
+    panel.part.cancel()
+    panel.refresh()
+    assert view.viewRange()[0] != pytest.approx([-10.0, 10.0])
