@@ -156,6 +156,8 @@ class Session(QObject):
     """The shown render was developed and measured again (power, exposure, method)."""
     render_asked = Signal()
     """A panel other than the render panel asks for a render with the present settings."""
+    results_asked = Signal(object)
+    """The scan in a folder is to be opened."""
     problems_changed = Signal()
     """`problems` are others."""
     vary_asked = Signal(object, object)

@@ -32,6 +32,7 @@ from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.results.heads import heads, measured_otherwise
 from studio.qt.results.measures_table import MeasuresTable
+from studio.qt.results.nothing_yet import NothingYet
 from studio.qt.results.part_tab import PartTab
 from studio.qt.results.region_tab import RegionTab
 from studio.qt.results.remarks_list import Remarks
@@ -47,10 +48,6 @@ from studio.scan.result_series import ERROR_VIEWS, ErrorView, error_values, meas
 from studio.scan.scan_results import COLUMNS, ScanResults
 from studio.scan.stages import Measurement
 
-NOTHING = (
-    "Nothing is measured yet. Render the frame (F5), run a scan, or open the results of one: "
-    "line, points and errors appear here, those of a scan that runs when it has ended."
-)
 BY_STEP_ONLY = "The scan's files hold this error in sum only; choose Figures of this step"
 AS_SCANNED = "All steps are as they were scanned; what changed since in exposure or extraction is in this step's."
 STEPS, NOTICE = 2, 3
@@ -385,8 +382,6 @@ class ResultsPanel(QWidget):
         inside.addLayout(top)
         inside.addLayout(bar)
         inside.addWidget(across, 1)
-        nothing = QLabel(NOTHING, alignment=Qt.AlignmentFlag.AlignCenter, wordWrap=True)
-        nothing.setObjectName("muted")
         self.stack = QStackedLayout(self)
-        self.stack.addWidget(nothing)
+        self.stack.addWidget(NothingYet(self.session))
         self.stack.addWidget(content)

@@ -83,6 +83,7 @@ class FileActions(QObject):
         self._regular.start()
         self._keeps = True
         session.project_changed.connect(self._rest.start)
+        session.results_asked.connect(lambda folder: self.open_results(folder))
 
     @property
     def unsaved(self) -> bool:
