@@ -144,6 +144,12 @@ def find(folder: Path) -> list[Recovery]:
     return sorted(found, key=lambda recovery: recovery.when, reverse=True)
 
 
+def find_of(folder: Path, project_file: Path) -> list[Recovery]:
+    """Of these, the changes of one project file, wherever it is reached from."""
+    file = project_file.resolve()
+    return [left for left in find(folder) if left.path is not None and left.path.resolve() == file]
+
+
 def sweep(folder: Path) -> None:
     """Drop what crashes left behind beside the work: files half-written, drafts and locks that nothing refers to."""
     for path in (*folder.glob(".[0-9]*.json"), *folder.glob("[0-9]*-*-*"), *folder.glob("[0-9]*.lock")):

@@ -62,7 +62,9 @@ def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> bo
     button = QMessageBox.StandardButton
     box = QMessageBox(QMessageBox.Icon.Question, "Recovery", f"Open the unsaved work on “{name}”?", parent=parent)
     box.setObjectName("recovery")
-    others = f" {count - 1} older ones stay for the next start." if count > 1 else ""
+    others = {1: "", 2: " An older one stays for the next time."}.get(
+        count, f" {count - 1} older ones stay for the next time."
+    )
     box.setInformativeText(f"The program did not close properly. It kept the work of {when}.{others}")
     opened = box.addButton("Open it", QMessageBox.ButtonRole.AcceptRole)
     box.addButton("Throw it away", QMessageBox.ButtonRole.DestructiveRole)

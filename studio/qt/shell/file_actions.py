@@ -8,7 +8,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QWidget
 
 from render.base.errors import InputError
-from studio.project.autosave import Autosave, find, sweep
+from studio.project.autosave import Autosave, Recovery, find, find_of, sweep
 from studio.project.date_and_time import read_out
 from studio.project.document import Document
 from studio.project.project import Project, project_file
@@ -74,8 +74,8 @@ class FileActions(QObject):
         super().__init__(window)
         self.window, self.session, self.preferences = window, session, preferences
         self.autosave = autosave or Autosave(recovery_folder())
-        self._pristine = session.project
-        """As it came from a template or a file: closing it unchanged needs no question."""
+        self._pristine: Project | None = session.project
+        """As it came from a template or a file: closing it unchanged needs no question; None: it came unsaved."""
         self._rest = QTimer(self, singleShot=True, interval=round(1000 * AFTER_A_CHANGE))
         self._rest.timeout.connect(self.keep)
         self._regular = QTimer(self, interval=round(1000 * AT_LEAST_EVERY))
@@ -121,7 +121,8 @@ class FileActions(QObject):
             return False
         if not wanted or (ask and not self.may_close()):
             return False
-        self.replace(document)
+        if not self._offer(find_of(self.autosave.folder, file)):
+            self.replace(document)
         self.preferences.add_recent(file)
         return True
 
@@ -152,9 +153,9 @@ class FileActions(QObject):
         self.results_opened.emit()
         return True
 
-    def replace(self, document: Document) -> None:
-        """Make another document the session's."""
-        self.count_as_saved(document.project)
+    def replace(self, document: Document, unsaved: bool = False) -> None:
+        """Make another document the session's; unsaved: closing it would lose work from the start."""
+        self._pristine = None if unsaved else document.project
         self.autosave.forget()
         self.session.replace_document(document)
         self.session.message.emit("info", f"Opened {document.project.name}")
@@ -205,7 +206,10 @@ class FileActions(QObject):
     def recover(self) -> bool:
         """After a crash: offer what it left behind. True: it was opened."""
         sweep(self.autosave.folder)
-        left = find(self.autosave.folder)
+        return self._offer(find(self.autosave.folder))
+
+    def _offer(self, left: list[Recovery]) -> bool:
+        """The latest of what crashes left behind, to open or to throw away. True: it was opened."""
         if not left:
             return False
         when = read_out(left[0].when)
@@ -216,8 +220,7 @@ class FileActions(QObject):
         if left[0].is_draft:
             document.root = self.autosave.draft()
             carry(document.project, left[0].root, document.root)
-        self.replace(document)
-        self._pristine = document.project.model_copy(update={"name": ""})  # equal to nothing: it is unsaved work
+        self.replace(document, unsaved=True)
         self.keep()
         left[0].discard()
         self.session.message.emit("info", f"Recovered the work of {when}; save it to keep it")

@@ -89,18 +89,55 @@ class TestFiles:
         menu.aboutToShow.emit()
         assert any(small_project.name in action.text() for action in menu.actions())
 
-    def test_work_of_a_crashed_program_is_offered(self, window: MainWindow, qtbot: QtBot) -> None:
+    @staticmethod
+    def left_by_a_crash(window: MainWindow, path: Path | None) -> Autosave:
+        """Unsaved changes of the open project, as a program that was killed leaves them."""
         crashed = Autosave(window.files.autosave.folder)
-        document = Document(window.session.project, None, window.session.document.root)
+        document = Document(window.session.project, path, window.session.document.root)
         document.set(POWER, 0.007)
         crashed.keep(document)
         assert crashed._lock is not None
         crashed._lock.close()
+        return crashed
+
+    def test_work_of_a_crashed_program_is_offered(self, window: MainWindow, qtbot: QtBot) -> None:
+        crashed = self.left_by_a_crash(window, None)
         answer(qtbot, "recovery", "Open it")
         assert window.files.recover()
         assert window.session.project.scene.lasers[0].power == 0.007
         assert window.files.unsaved
         assert not crashed.file.exists() and window.files.autosave.file.exists()
+
+    @pytest.mark.parametrize("saved", [False, True])
+    def test_recovered_work_counts_as_changed(self, window: MainWindow, qtbot: QtBot, saved: bool) -> None:
+        self.left_by_a_crash(window, window.session.document.path if saved else None)
+        answer(qtbot, "recovery", "Open it")
+        assert window.files.recover()
+        assert window.isWindowModified()
+
+    def test_work_of_a_crashed_program_is_offered_when_its_project_is_opened(
+        self, window: MainWindow, qtbot: QtBot, small_project: Path
+    ) -> None:
+        crashed = self.left_by_a_crash(window, small_project)
+        answer(qtbot, "recovery", "Open it")
+        assert window.files.open(small_project)
+        assert window.session.project.scene.lasers[0].power == 0.007
+        assert window.session.document.path == small_project and window.isWindowModified()
+        assert not crashed.file.exists() and window.files.autosave.file.exists()
+
+    def test_work_that_is_not_wanted_leaves_the_project_as_it_was_saved(
+        self, window: MainWindow, qtbot: QtBot, small_project: Path
+    ) -> None:
+        crashed = self.left_by_a_crash(window, small_project)
+        answer(qtbot, "recovery", "Throw it away")
+        assert window.files.open(small_project)
+        assert window.session.project == Project.load(small_project) and not window.isWindowModified()
+        assert not crashed.file.exists()
+
+    def test_work_of_another_project_waits_untouched(self, window: MainWindow, small_project: Path) -> None:
+        crashed = self.left_by_a_crash(window, small_project.with_name("other.json"))
+        assert window.files.open(small_project)
+        assert crashed.file.exists()
 
 
 class TestBadInput:
