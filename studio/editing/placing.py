@@ -57,6 +57,18 @@ def at_baseline(pose: Pose, camera: Float, point: Float, baseline: float) -> Pos
     return _rounded(matrix)
 
 
+def turned_to(pose: Pose, before: Float, after: Float) -> Pose:
+    """A laser turned where it is, by the least angle that takes the ray through one point (3,) through another."""
+    matrix = pose.matrix.copy()
+    origin = matrix[:3, 3]
+    ends = before - origin, after - origin
+    lengths = [float(np.linalg.norm(end)) for end in ends]
+    if min(lengths) < 1e-9:
+        return pose
+    matrix[:3, :3] = least_turn(ends[0] / lengths[0], ends[1] / lengths[1]) @ matrix[:3, :3]
+    return _rounded(matrix)
+
+
 def least_turn(a: Float, b: Float) -> Float:
     """(3, 3) the least rotation that takes one unit vector to another."""
     axis = np.cross(a, b)

@@ -13,7 +13,7 @@ from render.base.arrays import Float
 from render.base.errors import InputError
 from studio.editing.forms import FieldSpec
 from studio.editing.placement import vector
-from studio.editing.placing import at_angle, at_baseline
+from studio.editing.placing import at_angle, at_baseline, turned_to
 from studio.editing.units import Unit
 from studio.preview.preview import Look
 from studio.preview.readouts import Readouts, readouts
@@ -35,12 +35,12 @@ SPECS = {
 """By the key of the read-out's row."""
 LABELS = {"baseline": "baseline", "angle": "triangulation angle", "standoff": "stand-off"}
 DIGITS = 4
-TRIES, NEAR = 4, 1e-4
-"""How often a move is corrected by what is then read, and the share of the value that is near enough."""
-Start = tuple[Project, Float, dict[str, float | None]]
-"""Project, lit point and read-outs before anything moved."""
+TRIES, NEAR = 10, 1e-5
+"""How often a move is corrected by what is then read, and what is near enough, m or rad."""
+Start = tuple[Project, tuple[Float, ...], dict[str, float | None]]
+"""Project, lit point of each laser, and read-outs before anything moved."""
 WIDTH = 88
-NOTHING_LIT = "The camera sees nothing that the laser lights: aim it (T), move one of them, or undo (Ctrl+Z)"
+NOTHING_LIT = "The laser's line is not in the image: aim the laser (T), move one of them, or undo (Ctrl+Z)"
 
 
 class PlacingField(NumberField):
@@ -48,6 +48,10 @@ class PlacingField(NumberField):
 
     why = ""
     """What was typed last was refused for."""
+
+    def explain(self, help: str) -> None:
+        """What it is, or why it takes nothing."""
+        self.setToolTip(help if self.isEnabled() else NOTHING_LIT)
 
     def mark(self, level: str) -> None:
         """In the colour of what is out of range."""
@@ -67,13 +71,14 @@ class PlacingFields(QObject):
         self.session = session
         self.laser = 0
         self.values: dict[str, float | None] = {}
-        self._point: Float = np.zeros(3)
+        self._look: Look | None = None
         self._start: Start | None = None
         self.fields = {key: PlacingField(spec, panel) for key, spec in SPECS.items()}
         for key, field in self.fields.items():
             field.hide()
             field.setAlignment(Qt.AlignmentFlag.AlignRight)
             field.setFixedWidth(WIDTH)
+            field.setPlaceholderText("no line")
             field.entered.connect(partial(self.set, key))
             field.refused.connect(partial(self._tell_why, field))
             field.given_up.connect(partial(self._tell_given_up, key))
@@ -83,19 +88,23 @@ class PlacingFields(QObject):
 
     def show_values(self, look: Look, laser: int, found: Readouts) -> None:
         """Follow the read-outs of a laser."""
-        self.laser, self._point = laser, lit_point(look, laser)
+        self.laser, self._look = laser, look
         self.values = _values(found)
         for key, field in self.fields.items():
             value = self.values[key]
             field.setEnabled(value is not None)
-            field.setToolTip("" if value is not None else NOTHING_LIT)
             if not field.hasFocus() or not field.pending:
                 scale = field.spec.unit.factor
                 field.show_value(None if value is None else float(f"{value * scale:.{DIGITS}g}") / scale)
 
     def set(self, key: str, value: float) -> None:
         """Move the laser, or the rig, so that the read-out becomes a value; one step to undo."""
-        self._move(key, value, (self.session.project, self._point, self.values), "")
+        self._move(key, value, self._now(), "")
+
+    def _now(self) -> Start:
+        look = self._look
+        points = () if look is None else tuple(lit_point(look, i) for i in range(len(look.scene.lasers)))
+        return self.session.project, points, dict(self.values)
 
     def _tell_why(self, field: PlacingField, why: str) -> None:
         """Beside the field, as its row has no room for it."""
@@ -107,7 +116,7 @@ class PlacingFields(QObject):
         self.session.message.emit("warning", told)
 
     def _begin(self) -> None:
-        self._start = (self.session.project, self._point, dict(self.values))
+        self._start = self._now()
         self.session.begin_drag()
 
     def _drag(self, key: str, value: float) -> None:
@@ -122,12 +131,14 @@ class PlacingFields(QObject):
 
     def _move(self, key: str, value: float, start: Start, merge: str) -> None:
         """By as much as makes the read-out the value: what is lit moves over the part, which may be of any shape."""
-        asked, made = value, None
+        asked, made, off = value, None, math.inf
         try:
             for _ in range(TRIES):
-                made = self._moved(key, asked, start)
-                found = self._read(key, made)
-                if found is None or abs(found - value) <= NEAR * abs(value):
+                tried = self._moved(key, asked, start)
+                found = self._read(key, tried)
+                if made is None or (found is not None and abs(found - value) < off):
+                    made, off = tried, math.inf if found is None else abs(found - value)
+                if found is None or off <= NEAR:
                     break
                 asked = SPECS[key].clamped(asked + value - found)
         except InputError as error:
@@ -135,28 +146,38 @@ class PlacingFields(QObject):
             return
         if made is not None:
             self.session.document.apply(f"set the {LABELS[key]}", made, merge)
-            if found is None and not merge:
+            if math.isinf(off) and not merge:
                 why = f"at this {LABELS[key]} the camera sees nothing that the laser lights; Ctrl+Z takes it back"
                 self.session.message.emit("warning", why)
 
     def _moved(self, key: str, value: float, start: Start) -> Project:
-        project, point, before = start
+        project, points, before = start
         scene = project.scene
-        camera = scene.camera.T_rig_camera.matrix[:3, 3]
-        path: FieldPath = ("scene", "rig", "lasers", self.laser, "T_rig_laser")
-        pose = scene.lasers[self.laser].T_rig_laser
+        camera = scene.camera.T_rig_camera.matrix
+        pose, point = scene.lasers[self.laser].T_rig_laser, points[self.laser]
         if key == "baseline":
-            return replaced(project, path, at_baseline(pose, camera, point, value))
+            return replaced(project, _pose_of(self.laser), at_baseline(pose, camera[:3, 3], point, value))
         if key == "angle":
-            return replaced(project, path, at_angle(pose, camera, point, value))
-        away = (value - (before[key] or 0.0)) * scene.T_world_camera()[:3, 2]
-        moved = vector(np.array(scene.rig.T_world_rig.translation) - away)
-        return replaced(project, ("scene", "rig", "T_world_rig", "translation"), moved)
+            return replaced(project, _pose_of(self.laser), at_angle(pose, camera[:3, 3], point, value))
+        farther = value - (before[key] or 0.0)
+        moved = vector(np.array(scene.rig.T_world_rig.translation) - farther * scene.T_world_camera()[:3, 2])
+        project = replaced(project, ("scene", "rig", "T_world_rig", "translation"), moved)
+        for i, lit in enumerate(points):
+            # each laser is aimed to where the camera sees its line at the new distance, which so stays in the image
+            offset = lit - camera[:3, 3]
+            depth = float(offset @ camera[:3, 2])
+            seen = camera[:3, 3] + offset * (depth + farther) / depth
+            project = replaced(project, _pose_of(i), turned_to(scene.lasers[i].T_rig_laser, lit, seen))
+        return project
 
     def _read(self, key: str, project: Project) -> float | None:
         view = live(self.session)
         look = view.preview.look(project, self.session.document.root, view.step, wait=False)
         return _values(readouts(look, self.laser))[key]
+
+
+def _pose_of(laser: int) -> FieldPath:
+    return ("scene", "rig", "lasers", laser, "T_rig_laser")
 
 
 def _values(found: Readouts) -> dict[str, float | None]:

@@ -157,10 +157,11 @@ class ReadoutPanel(QWidget):
                 (value, f"color: {tints[row.level]}; font-weight: 600"),
                 (note, f"color: {colours.muted}"),
             ):
-                label.setToolTip(told)
                 if not isinstance(label, QLabel):
+                    label.explain(told)
                     label.mark(row.level)
                     continue
+                label.setToolTip(told)
                 # a style sheet costs more to set than all the numbers to compute
                 if label.styleSheet() != style:
                     label.setStyleSheet(style)

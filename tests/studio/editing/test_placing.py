@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from render.base.pose import Pose
-from studio.editing.placing import aimed, at_angle, at_baseline
+from studio.editing.placing import aimed, at_angle, at_baseline, turned_to
 
 CAMERA, POINT = np.array([0.01, -0.02, 0.0]), np.array([0.05, 0.02, 0.6])
 LASER = Pose.looking_at((0.2, 0.03, 0.02), (0.05, 0.02, 0.6), (0.1, 1.0, 0.0))
@@ -47,3 +47,11 @@ def test_the_baseline_is_the_one_asked_for_and_the_point_stays_lit(baseline: flo
     assert np.linalg.norm(np.array(pose.translation) - CAMERA) == pytest.approx(baseline, abs=1e-8)
     x, y, z, _ = in_laser(pose)
     assert abs(x) < 1e-8 and abs(y) < 1e-8 and z > 0.0
+
+
+def test_a_laser_turned_to_a_point_meets_it_as_it_met_another() -> None:
+    after = POINT + np.array([0.0, 0.0, -0.3])
+    pose = turned_to(LASER, POINT, after)
+    assert pose.translation == LASER.translation
+    before, now = in_laser(LASER)[:3], in_laser(pose, after)[:3]
+    assert now / np.linalg.norm(now) == pytest.approx(before / np.linalg.norm(before), abs=1e-8)

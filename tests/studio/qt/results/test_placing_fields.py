@@ -37,7 +37,7 @@ def test_a_number_that_is_typed_is_read_afterwards(qtbot: QtBot, key: str, text:
     field.setText(text)
     field.pending = True
     field.enter()
-    assert read(panel, key) == pytest.approx(value, rel=2e-4)
+    assert read(panel, key) == pytest.approx(value, abs=1e-5)
     if key != "standoff":
         assert read(panel, "standoff") == pytest.approx(distance, rel=0.02)
     session.document.undo()
@@ -72,12 +72,39 @@ def test_a_number_that_cannot_be_is_dropped_and_said_why(qtbot: QtBot) -> None:
     assert session.project == before and field.text() == shown and not field.invalid
 
 
-def test_a_rig_that_sees_its_line_no_longer_is_told(qtbot: QtBot) -> None:
+@pytest.mark.parametrize("text", ["300", "350+10"])
+def test_at_another_stand_off_the_laser_meets_the_same_point_with_the_same_baseline(qtbot: QtBot, text: str) -> None:
     panel = panel_on(qtbot)
     field, session = panel.placing.fields["standoff"], panel._session
-    field.setText("100 m")
+    before, baseline = session.project, read(panel, "baseline")
+    field.setText(text)
+    field.pending = True
+    field.enter()
+    assert read(panel, "standoff") == pytest.approx(1e-3 * (300 if text == "300" else 360), abs=1e-5)
+    assert read(panel, "baseline") == pytest.approx(baseline, abs=1e-8)
+    assert all(each.isEnabled() for each in panel.placing.fields.values())
+    session.document.undo()
+    assert session.project == before
+
+
+def test_a_field_that_takes_nothing_says_why(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    field, session = panel.placing.fields["standoff"], panel._session
+    assert "along its axis" in field.toolTip()
+    session.set(("scene", "objects", 0, "visible"), False)
+    qtbot.waitUntil(lambda: not field.isEnabled())
+    assert "not in the image" in field.toolTip() and "T" in field.toolTip()
+    session.document.undo()
+    qtbot.waitUntil(field.isEnabled)
+    assert "along its axis" in field.toolTip()
+
+
+def test_a_rig_that_sees_its_line_no_longer_is_told(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    field, session = panel.placing.fields["angle"], panel._session
+    field.setText("170")
     field.pending = True
     with qtbot.waitSignal(session.message) as told:
         field.enter()
     assert told.args[0] == "warning" and "sees nothing that the laser lights" in told.args[1]
-    assert session.document.undo_label == "set the stand-off"
+    assert session.document.undo_label == "set the triangulation angle"
