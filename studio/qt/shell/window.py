@@ -114,6 +114,7 @@ class MainWindow(QMainWindow):
 
     def switch_to(self, key: str) -> None:
         """Another workspace; the panels stand as they were left there."""
+        one_of(CellOpener, self.session).go_on()
         if self.workspace:
             self._send_back()
             self._remember_arrangement()

@@ -22,13 +22,23 @@ if TYPE_CHECKING:
     from studio.study.folder_run import Found
 
 
+READY = "The cell's frame is ready: a click on its point opens it in Measure; it is in the list of Render as well"
+
+
 class CellOpener(QObject):
+    """Shows a cell where a person still waits for it; who has gone on to something else is told that it is there."""
+
     opened = Signal()
     """A cell is shown: look at it in Measure."""
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
         self.session = session
+        self._waited_for = False
+
+    def go_on(self) -> None:
+        """The person does something else: what is being rendered is not to come in between."""
+        self._waited_for = False
 
     def open(self, found: Found, number: int, spot: int, jobs: JobRunner) -> None:
         """Show the cell behind a spot of a sweep's chart; one that is among the renders already, at once."""
@@ -43,6 +53,8 @@ class CellOpener(QObject):
             session.message.emit("warning", BUSY)
             return
 
+        self._waited_for, before = True, session.shown
+
         def work(progress: Progress, cancelled: Cancel) -> RenderedFrame | str:
             from studio.notebook.frame import render
 
@@ -55,11 +67,11 @@ class CellOpener(QObject):
             if isinstance(frame, str):
                 session.message.emit("error", frame)
             elif session.document is document:
-                self._show(found, number, cell, frame)
+                self._take(found, number, cell, frame, self._waited_for and session.shown is before)
 
         jobs.run(RENDER, "cell of the study", work, then)
 
-    def _show(self, found: Found, number: int, cell: Cell, frame: RenderedFrame) -> None:
+    def _take(self, found: Found, number: int, cell: Cell, frame: RenderedFrame, show: bool) -> None:
         from studio.study.charts import shown
 
         made = Render(
@@ -73,6 +85,11 @@ class CellOpener(QObject):
             source=cell.project,
             cell=cell.key,
         )
+        if not show:
+            self.session.renders.append(made)
+            self.session.renders_changed.emit()
+            self.session.message.emit("info", READY)
+            return
         self.session.add_render(made)
         told = f"Repeat {cell.repeat + 1} of {found.study.repeats}, rendered again: a study keeps numbers, no frames"
         self.session.message.emit("info", told)

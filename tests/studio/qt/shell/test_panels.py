@@ -12,6 +12,7 @@ from studio.editing.forms import describe
 from studio.qt.core.session import one_of
 from studio.qt.shell.panels import PANELS, Room
 from studio.qt.shell.window import MainWindow
+from studio.qt.study.cell_opener import CellOpener
 from studio.qt.study.study_work import StudyWork
 from tests.studio.qt.conftest import new_window
 
@@ -89,3 +90,12 @@ def test_a_field_is_varied_before_the_study_workspace_was_seen(own_window: MainW
     assert [each["field"] for each in one_of(StudyWork, own_window.session).sweep["vary"]] == [
         "scene.rig.lasers[0].power"
     ]
+
+
+def test_another_workspace_is_a_sign_that_a_cell_of_a_study_is_no_longer_waited_for(
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone_on: list[str] = []
+    monkeypatch.setattr(one_of(CellOpener, window.session), "go_on", lambda: gone_on.append(window.workspace))
+    window.switch_to("measure")
+    assert gone_on == ["setup"]

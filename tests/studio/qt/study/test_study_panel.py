@@ -274,6 +274,23 @@ class TestRun:
         assert len(desk.session.renders) == 1
         develop.close()
 
+    def test_who_has_gone_on_is_told_of_the_frame_and_sees_what_was_shown(
+        self, qtbot: QtBot, desk: Desk, tmp_path: Path
+    ) -> None:
+        desk.small([2.0])
+        desk.work.choose_folder(tmp_path / "results")
+        run(qtbot, desk)
+        told: list[str] = []
+        desk.session.message.connect(lambda level, text: told.append(text))
+        with qtbot.assertNotEmitted(desk.charts.opener.opened):
+            desk.charts.open(0)
+            desk.charts.opener.go_on()
+            qtbot.waitUntil(lambda: bool(desk.session.renders))
+        assert desk.session.shown is None and told[-1].startswith("The cell's frame is ready")
+        with qtbot.waitSignal(desk.charts.opener.opened):
+            desk.charts.open(0)
+        assert desk.session.shown is desk.session.renders[0]
+
     def test_results_of_another_day_are_opened(self, qtbot: QtBot, desk: Desk, tmp_path: Path) -> None:
         desk.small([2.0, 20.0])
         desk.work.choose_folder(tmp_path / "results")
