@@ -32,7 +32,8 @@ class MeasuredSet:
             return f"no line found on {len(found)} {line.axis}; {line.note}"
         sigma = float(np.nanmedian(line.sigma_u[found, 0]))
         width = float(np.median(line.width[found, 0]))
-        return f"{found.sum()} of {len(found)} {line.axis}, sigma {sigma:.3f} px, width {width:.2f} px"
+        told = f"{found.sum()} of {len(found)} {line.axis}, sigma {sigma:.3f} px, width {width:.2f} px"
+        return f"{told}; {line.note}" if line.note else told
 
 
 def measured_set(

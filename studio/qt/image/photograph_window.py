@@ -47,6 +47,9 @@ EMPTY = "Drop photographs of the line here, several of one set, or add them."
 FILTER = "Images ({});;All files (*)"
 CHOICES = {"colour": ("auto", "mono", "red", "green", "blue"), "axis": ("auto", "rows", "columns")}
 AUTO = "auto"
+NO_RENDER = "Nothing is rendered yet: Render (F5), and the image appears here"
+NOT_CHOSEN = "No render is chosen: choose one in the list of the Render workspace"
+NOT_DEVELOPED = "The render is being developed; its image appears here"
 CONTROLS = 300
 """px of width."""
 
@@ -85,7 +88,7 @@ class PhotographWindow(QWidget):
         self.problem.setObjectName("error")
         self.chosen.setObjectName("muted")
         self.view, self.rendered = PictureView(), PictureView()
-        self.no_render = QLabel("nothing is rendered yet: Render, then measure or choose a photograph again")
+        self.no_render = QLabel(NO_RENDER)
         self.no_render.setObjectName("muted")
         self.sure, self.doubtful = (pg.ScatterPlotItem(size=3, pen=None) for _ in range(2))
         self.region = pg.RectROI((0, 0), (1, 1), sideScalers=True)
@@ -96,6 +99,7 @@ class PhotographWindow(QWidget):
         self._lay_out()
         self._connect()
         self._refresh()
+        self._show_rendered()
 
     def add(self, paths: Sequence[Path]) -> None:
         """More photographs of the set; the first of them is shown."""
@@ -315,6 +319,9 @@ class PhotographWindow(QWidget):
         shown = self.session.shown
         there = shown is not None and bool(shown.images)
         self.no_render.setVisible(not there)
+        self.no_render.setText(
+            NO_RENDER if not self.session.renders else NOT_CHOSEN if shown is None else NOT_DEVELOPED
+        )
         if shown is None or not there:
             return
         scene, frame, images = shown.project.scene, shown.frame, list(shown.images)

@@ -50,13 +50,14 @@ def test_the_line_of_each_is_drawn_where_it_is_and_told_with_what_was_chosen(qtb
         u, v = points(made)
         assert len(u) > 0.98 * HEIGHT
         assert np.median(np.abs(u - SCENE.centre[v.astype(int)])) < 0.25
-    assert f"of {HEIGHT} rows" in made.told.text() and "laser's colour: red" in made.chosen.text()
+    assert f"of {HEIGHT} rows" in made.told.text() and "smoothed along the line over" in made.told.text()
+    assert "laser's colour: red" in made.chosen.text()
     qtbot.waitUntil(lambda: made.runner.job(PICTURE) is None)
     assert made.view.item.size == photograph(SCENE, seed=1).shape[1::-1]
 
 
 def test_the_rendered_image_of_the_project_stands_beside_it(qtbot, made):
-    assert made.no_render.isVisible()
+    assert made.no_render.isVisible() and "being developed" in made.no_render.text()
     shown = made.session.shown
     scene = shown.project.scene
     shown.images.append(develop(shown.frame, scene, shown.project.sensor, seed=1))
@@ -64,6 +65,23 @@ def test_the_rendered_image_of_the_project_stands_beside_it(qtbot, made):
     assert not made.no_render.isVisible()
     qtbot.waitUntil(lambda: made.runner.job(RENDERED) is None)
     assert made.rendered.item.size == (scene.camera.width, scene.camera.height)
+
+
+def test_a_render_that_was_there_before_the_window_is_shown_without_a_photograph(qtbot):
+    session = small_session(rendered=True)
+    shown = session.shown
+    shown.images.append(develop(shown.frame, shown.project.scene, shown.project.sensor, seed=1))
+    window = PhotographWindow(session)
+    qtbot.addWidget(window)
+    window.show()
+    assert not window.no_render.isVisible()
+    qtbot.waitUntil(lambda: window.runner.job(RENDERED) is None)
+    session.show(None)
+    assert window.no_render.isVisible() and "No render is chosen" in window.no_render.text()
+    session.renders.clear()
+    session.renders_changed.emit()
+    assert "Nothing is rendered yet" in window.no_render.text()
+    window.runner.close()
 
 
 def test_a_rectangle_limits_what_is_looked_at(qtbot, made):
