@@ -27,18 +27,15 @@ from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
 from render.sensor.develop import Image
-from studio.editing.units import Unit
-from studio.preview.readouts import readouts
-from studio.preview.remedies import FILLED, automatic_exposure
+from studio.preview.remedies import FILLED
 from studio.project.document import FieldPath
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.live_preview import live
 from studio.qt.core.session import Render, Session
 from studio.qt.core.widgets import text_button
 from studio.qt.forms.log_field import LogField
 from studio.qt.image.line_overlay import swatch
+from studio.qt.render.automatic_exposure import filling
 from studio.runtime.jobs import Job, Progress
-from studio.scan.exposure import filling_exposure
 from studio.scan.redevelop import Development, develop_again, development, measure_again
 from studio.scan.results import METHODS
 from studio.scan.stages import Measurement
@@ -194,26 +191,14 @@ class DevelopPanel(QWidget):
         """Choose the exposure time; where no line is to be seen it stays, and that is told."""
         session = self.session
         try:
-            time = self._filling()
+            found = filling(session)
         except InputError as error:
             session.message.emit("error", str(error))
             return
-        if time is None:
+        if found is None:
             session.message.emit("error", "no laser line is in the image: there is nothing to expose by")
-        elif session.set(("sensor", "exposure_time"), time, "automatic exposure"):
-            session.message.emit("info", f"exposure {Unit.of('s').with_unit(time)}")
-
-    def _filling(self) -> float | None:
-        """Exposure time, s, of the shown render, or of the estimate where that is small or no longer of the scene."""
-        project, render = self.session.project, self.session.shown
-        if render is not None and render.final and render.scanner_scale == 1.0 and not render.is_stale(project):
-            how = development(render.project, project)
-            return filling_exposure(how.project, render.frame, how.laser_power, FILLED)
-        live(self.session).refresh()
-        look = live(self.session).look
-        found = [automatic_exposure(project, readouts(look, i)) for i in range(len(look.scene.lasers))]
-        times = [one[1].sensor.exposure_time for one in found if one is not None]
-        return min(times) if times else None
+        elif session.set(("sensor", "exposure_time"), found.time, "automatic exposure"):
+            session.message.emit("info", found.told)
 
     def _end_merge(self) -> None:
         self.session.document.end_merge()

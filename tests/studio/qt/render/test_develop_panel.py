@@ -164,9 +164,11 @@ def test_exposures_and_the_choice_of_peaks_are_the_projects_and_told(qtbot, pane
 
 def test_one_click_exposes_by_the_render_and_is_one_step_to_undo(qtbot, panel):
     session = panel.session
-    before = session.project.sensor.exposure_time
+    before, told = session.project.sensor.exposure_time, []
+    session.message.connect(lambda level, text: told.append(text))
     with qtbot.waitSignal(session.measured, timeout=20000):
         qtbot.mouseClick(panel.automatic_exposure, Qt.MouseButton.LeftButton)
+    assert "brightest pixels at 70% of full scale, by Render 1" in told[-1]
     time = session.project.sensor.exposure_time
     assert time != before and session.document.undo_label == "automatic exposure"
     settle(qtbot, panel)
@@ -177,6 +179,23 @@ def test_one_click_exposes_by_the_render_and_is_one_step_to_undo(qtbot, panel):
     assert np.quantile(rows, 0.95) < 0.95 and np.quantile(rows, 0.995) > 0.6
     session.document.undo()
     assert session.project.sensor.exposure_time == before
+
+
+def test_a_render_that_cannot_be_exposed_by_is_named_with_the_reason(qtbot, panel):
+    session, told = panel.session, []
+    session.message.connect(lambda level, text: told.append(text))
+    qtbot.waitUntil(lambda: not live(session).is_loading)
+    session.shown.name = "mine"
+    session.shown.cell = "some"
+    panel.expose()
+    assert "mine is a cell of a study" in told[-1]
+    session.shown.cell = ""
+    session.shown.final = False
+    panel.expose()
+    assert "mine is not finished" in told[-1]
+    session.set(("scene", "rig", "lasers", 0, "wavelength_nm"), 660.0)
+    panel.expose()
+    assert "as estimated for the present scene, as mine is of another scene" in told[-1]
 
 
 def test_without_a_render_the_exposure_is_as_estimated(qtbot, panel):
