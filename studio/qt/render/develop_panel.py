@@ -29,8 +29,9 @@ from render.frame import Frame
 from render.sensor.develop import Image
 from studio.preview.remedies import FILLED
 from studio.project.document import FieldPath
+from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.jobs import JobRunner
-from studio.qt.core.session import Render, Session
+from studio.qt.core.session import Render, Session, one_of
 from studio.qt.core.widgets import text_button
 from studio.qt.forms.log_field import LogField
 from studio.qt.image.line_overlay import swatch
@@ -179,6 +180,8 @@ class DevelopPanel(QWidget):
             action.toggled.connect(self._methods_changed)
         self._images_ready.connect(self._take_images)
         self.runner.failed.connect(self._tell_failure)
+        # old figures are pale beside the new brightness
+        one_of(FiguresAge, session).changed.connect(self.table.setDisabled)
 
     def _setter(self, path: FieldPath, label: str) -> Callable[[float, bool], None]:
         def set_value(value: float, held: bool) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.scan_steps import scan_steps
-from studio.qt.core.session import Render, Session
+from studio.qt.core.session import Render, Session, one_of
 from studio.scan.redevelop import is_developed_otherwise
 from studio.scan.remarks import scale_head
 
 STOPPED = "This render was stopped early: light is missing, and the figures are of what there is."
+MEASURING = "Measuring… until then these are the figures of the settings before."
 CHANGED = "The scene has changed since: these are the figures of the render as it was."
 MEASURED_OTHERWISE = (
     "Figures of all steps are as they were measured: sensor, extraction or calibration has changed since (Measure > "
@@ -21,6 +23,8 @@ def heads(session: Session, step_problem: str) -> list[str]:
     told = [f"Step {session.step + 1} cannot be shown: {step_problem}"] if step_problem else []
     if render is None:
         return told
+    if one_of(FiguresAge, session).old:
+        told.append(MEASURING)
     if render.cell:
         told.append(f"Cell of a study: {render.name}. Your own renders are in the list of the Render workspace.")
     elif session.stale and (render.scan is None or render.frame.step == session.step):

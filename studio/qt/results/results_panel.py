@@ -27,9 +27,10 @@ from PySide6.QtWidgets import (
 
 from analysis.report.colour import TRUTH, method_colour, method_name
 from studio.qt.core import theme
+from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.icons import dot
 from studio.qt.core.scan_steps import scan_steps
-from studio.qt.core.session import Session
+from studio.qt.core.session import Session, one_of
 from studio.qt.results.heads import heads, measured_otherwise
 from studio.qt.results.measures_table import MeasuresTable
 from studio.qt.results.nothing_yet import NothingYet
@@ -113,6 +114,7 @@ class ResultsPanel(QWidget):
         self.by_step.chosen.connect(session.look_at_step)
         self.scan_bar.scope_changed.connect(self.refresh)
         self.scan_steps.told.connect(self._tell_head)
+        one_of(FiguresAge, session).changed.connect(self._tell_head)
         session.renders_changed.connect(self._another_render)
         session.project_changed.connect(self._project_changed)
         session.step_changed.connect(lambda: self.by_step.mark(session.step))

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
+from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.live_preview import live
+from studio.qt.core.session import one_of
 from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.results.heads import MEASURING, heads
+from studio.scan.redevelop import development
 from tests.studio.qt.small_session import small_session
 
 
@@ -127,7 +132,7 @@ def test_many_changes_in_a_row_end_with_the_last_one(qtbot, panel):
         session.set(("sensor", "exposure_time"), 1e-3 * (1 + i))
     qtbot.waitUntil(lambda: not panel.busy)
     assert len(count) <= 5
-    from studio.scan.redevelop import develop_again, development
+    from studio.scan.redevelop import develop_again
 
     how = development(session.shown.project, session.project)
     assert np.array_equal(count[-1].pixels, develop_again(session.shown.frame, how)[0].pixels)
@@ -246,3 +251,34 @@ def test_while_light_is_to_come_one_method_measures_and_the_last_frame_is_develo
     assert set(render.measurements) == {"likelihood", "gaussian", "centre_of_mass"}
     assert len(developed) == 2 and render.measurements["likelihood"] is second
     made.close()
+
+
+def test_figures_of_the_settings_before_are_told_until_they_are_measured_again(qtbot, panel, monkeypatch):
+    from studio.qt.render import develop_panel
+
+    session, go_on, measure = panel.session, threading.Event(), develop_panel.measure_again
+    age = one_of(FiguresAge, session)
+    assert not age.old and panel.table.isEnabled()
+
+    def slowly(*given, **more):
+        assert go_on.wait(60.0)
+        return measure(*given, **more)
+
+    monkeypatch.setattr(develop_panel, "measure_again", slowly)
+    with qtbot.waitSignal(age.changed):
+        session.set(("sensor", "exposure_time"), 1.1 * session.project.sensor.exposure_time)
+    assert MEASURING in heads(session, "") and not panel.table.isEnabled()
+    with qtbot.waitSignal(age.changed):
+        go_on.set()
+    assert MEASURING not in heads(session, "") and panel.table.isEnabled()
+
+
+def test_what_is_measured_at_once_is_not_told(qtbot, panel):
+    session = panel.session
+    age = one_of(FiguresAge, session)
+    render, made = session.shown, session.shown.made_from["measurements"]
+    session.set(("sensor", "exposure_time"), 1.1 * session.project.sensor.exposure_time)
+    assert age._timer.isActive() and not age.old
+    render.made_from["measurements"] = (made[0], development(render.project, session.project))
+    session.measured.emit()
+    assert not age._timer.isActive() and not age.old

@@ -1,0 +1,48 @@
+"""Whether the figures of the shown render are still of the sensor settings before: measuring takes its time."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from studio.qt.core.session import Session
+from studio.scan.redevelop import development
+
+NOTICED_MS = 300
+"""What is measured sooner is not worth a word."""
+
+
+class FiguresAge(QObject):
+    """Made once for a session by `one_of`."""
+
+    changed = Signal(bool)
+    """`old` is another."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.session = session
+        self.old = False
+        self._timer = QTimer(self, singleShot=True, interval=NOTICED_MS)
+        self._timer.timeout.connect(lambda: self._tell(self._behind()))
+        for changed in (session.project_changed, session.renders_changed, session.measured):
+            changed.connect(self._follow)
+
+    def _follow(self) -> None:
+        if not self._behind():
+            self._timer.stop()
+            self._tell(False)
+        elif not self.old and not self._timer.isActive():
+            self._timer.start()
+
+    def _behind(self) -> bool:
+        """Of light that is still to come the settings decide alone: its frame is always ahead of the figures."""
+        render = self.session.shown
+        made = None if render is None else render.made_from.get("measurements")
+        if render is None or made is None:
+            return False
+        how = development(render.project, render.developed_by(self.session.project), render.image_scale)
+        return made[1] != how
+
+    def _tell(self, old: bool) -> None:
+        if old != self.old:
+            self.old = old
+            self.changed.emit(old)
