@@ -45,6 +45,15 @@ class ElidedLabel(QLabel):
         )
 
 
+def keep_room(label: QLabel, lines: int) -> None:
+    """For so many lines at least, also while it is hidden: what stands below stays where it is as the text changes."""
+    label.setMinimumHeight(lines * label.fontMetrics().lineSpacing())
+    label.setAlignment(Qt.AlignmentFlag.AlignTop)
+    policy = label.sizePolicy()
+    policy.setRetainSizeWhenHidden(True)
+    label.setSizePolicy(policy)
+
+
 def text_button(text: str, tip: str = "", name: str = "") -> QPushButton:
     """name: for the style sheet."""
     button = QPushButton(text)

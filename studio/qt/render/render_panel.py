@@ -225,9 +225,10 @@ class RenderPanel(QWidget):
         layout.addLayout(hold)
         layout.addWidget(self.bar)
         layout.addWidget(self.stage)
+        layout.addWidget(self.history, 1)
+        # texts last: of any length, they must not move what is clicked
         layout.addWidget(self.errors)
         layout.addWidget(self.plan)
-        layout.addWidget(self.history, 1)
 
     def _connect(self) -> None:
         session, runner = self.session, self.runner

@@ -14,6 +14,7 @@ from studio.editing.forms import describe_item
 from studio.editing.units import Unit
 from studio.project.document import FieldPath
 from studio.qt.core.session import Session
+from studio.qt.core.widgets import keep_room
 from studio.qt.forms.fields import TextField, reason
 from studio.qt.forms.number_field import NumberField
 
@@ -32,6 +33,7 @@ class PartEditor(QWidget):
         self.fields: dict[str, TextField] = {}
         self.problem = QLabel(wordWrap=True)
         self.problem.setObjectName("error")
+        keep_room(self.problem, 1)
         self.problem.hide()
         self._grid = QGridLayout(self)
         self._grid.setContentsMargins(0, 0, 0, 0)

@@ -28,7 +28,7 @@ from analysis.report.units import NONE
 from studio.project.project import Section
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.session import Session
-from studio.qt.core.widgets import text_button
+from studio.qt.core.widgets import keep_room, text_button
 from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing, verdict_colour
 from studio.qt.results.part_editor import PartEditor
@@ -85,6 +85,7 @@ class PartTab(QWidget):
         self.section.setToolTip(SECTION_TIP)
         self.told = QLabel(wordWrap=True)
         self.told.setObjectName("muted")
+        keep_room(self.told, 3)
         self._lay_out()
         self.remove.clicked.connect(self.delete)
         self.section.activated.connect(self._choose_section)

@@ -292,3 +292,15 @@ def test_the_goal_is_the_line_or_the_errors_of_the_image(panel: RenderPanel) -> 
     assert session.project.render.goal is not None and session.project.render.goal.depth == 0.25
     session.document.undo()
     assert panel.goal.value() == 0.0
+
+
+def test_texts_of_a_render_leave_the_list_where_it_is(qtbot, panel):
+    panel.resize(340, 1200)
+    places = []
+    for errors in ("", "laser: error 0.05%<br>" * 8):
+        panel.errors.setText(errors)
+        panel.errors.setVisible(bool(errors))
+        panel.layout().activate()
+        watched = (panel.history.list, panel.history.delete_button, panel.start_button)
+        places.append([widget.mapTo(panel, QPoint(0, 0)).y() for widget in watched])
+    assert places[0] == places[1]

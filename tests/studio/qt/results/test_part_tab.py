@@ -309,3 +309,24 @@ def test_the_axes_stay_while_a_measure_is_placed(panel: ResultsPanel, qtbot: QtB
     panel.part.cancel()
     panel.refresh()
     assert view.viewRange()[0] != pytest.approx([-10.0, 10.0])
+
+
+def test_texts_that_come_and_go_leave_table_and_fields_where_they_are(panel: ResultsPanel, qtbot: QtBot) -> None:
+    with_a_step(panel.session)
+    panel.figures.setCurrentIndex(PART)
+    panel.part.table.selectRow(0)
+    qtbot.waitUntil(panel.part.editor.isVisible)
+
+    def places() -> list[int]:
+        panel.part.layout().activate()
+        panel.part.editor.layout().activate()
+        watched = (panel.part.table, panel.part.editor.fields["nominal"])
+        return [widget.mapTo(panel.part, QPoint(0, 0)).y() for widget in watched]
+
+    before = places()
+    panel.part.start("step")
+    panel.part.editor._tell("must be at most 1 m")
+    assert panel.part.told.isVisible() and panel.part.editor.problem.isVisible() and places() == before
+    panel.part.told.hide()
+    panel.part.editor._tell("")
+    assert places() == before
