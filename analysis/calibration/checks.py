@@ -41,13 +41,14 @@ class Halves:
             return f"two halves of the views {'agree' if self.p >= ALARM else 'differ'} (p = {self.p:.2g})"
         if self.p >= ALARM:
             return (
-                f"two halves of the views agree: {1e6 * self.difference:.0f} um apart in depth, "
-                f"{1e6 * self.expected:.0f} expected (p = {self.p:.2f})"
+                f"two halves of the views agree: in depth they are {1e6 * self.difference:.0f} um apart, where their "
+                f"noise explains {1e6 * self.expected:.0f} um; by chance all their parameters together differ at least "
+                f"as much in {self.p:.0%} of such calibrations"
             )
         return (
-            f"two halves of the views differ by {1e6 * self.difference:.0f} um in depth where "
-            f"{1e6 * self.expected:.0f} were expected (p = {self.p:.1g}): something that is not modelled, such as a "
-            "lens with more terms, a bent board, or focus that moved, is in the views"
+            f"two halves of the views differ: in depth they are {1e6 * self.difference:.0f} um apart, where their "
+            f"noise explains {1e6 * self.expected:.0f} um (p = {self.p:.1g} of all parameters together): something "
+            "that is not modelled, such as a lens with more terms, a bent board, or focus that moved, is in the views"
         )
 
 

@@ -86,10 +86,11 @@ def virtual_views(
                 break
         else:
             raise InputError(
-                "the camera sees no such board",
-                where="--board",
-                found=f"{board.columns} x {board.rows} corners of {1e3 * board.square:g} mm",
-                cure=f"a smaller board, or other --nearest and --farthest than {depth[0]:g} and {depth[1]:g} m",
+                f"the camera sees too little of a board of {board.columns} x {board.rows} corners that are "
+                f"{1e3 * board.square:g} mm apart, from {1e3 * depth[0]:.4g} to {1e3 * depth[1]:.4g} mm before it",
+                where="board",
+                allowed=f"{LEAST_SEEN:.0%} of its corners in the image",
+                cure="take a smaller board, or hold it at other distances (--nearest and --farthest)",
             )
         views.append(view)
         rotations.append(rotation)

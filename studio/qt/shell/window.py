@@ -126,8 +126,7 @@ class MainWindow(QMainWindow):
             self.rearrange()
         QTimer.singleShot(0, self, partial(self._fit_panels, size))
         self.commands[SWITCH[wanted.key]].setChecked(True)
-        if self._cloud is not None:
-            self._cloud.pin(wanted.key == "measure")
+        self.panels.when_made("viewport", self._pin)
         self.preferences.change(workspace=wanted.key)
 
     def rearrange(self) -> None:
@@ -226,7 +225,11 @@ class MainWindow(QMainWindow):
         from studio.qt.shell.points_in_3d import points_in_3d
 
         self._cloud = points_in_3d(self.session, self.panels, viewport)
-        self._cloud.pin(self.workspace == "measure")
+
+    def _pin(self, viewport: Any) -> None:
+        """The workspace says what stands in the 3D view beside the scene."""
+        self.cloud.pin(self.workspace == "measure")
+        viewport.ghost.show(self.workspace != "measure")
 
     def start_tour(self) -> None:
         """Show the way around, from the start."""

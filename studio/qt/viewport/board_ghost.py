@@ -21,6 +21,7 @@ class BoardGhost(QObject):
     def __init__(self, session: Session, view: Any) -> None:
         super().__init__(view)
         self.session, self.view = session, view
+        self._wanted = True
         self.shapes = Lines(opacity=OPACITY)
         self.shapes.actor.PickableOff()
         view.renderer.AddActor(self.shapes.actor)
@@ -28,10 +29,16 @@ class BoardGhost(QObject):
             changed.connect(self.refresh)
         self.refresh()
 
+    def show(self, wanted: bool) -> None:
+        """Or hide it: where points are looked at, it would stand before them."""
+        if wanted != self._wanted:
+            self._wanted = wanted
+            self.refresh()
+
     def refresh(self) -> None:
         ghost, scene = self.session.ghost, self.session.project.scene
         self.shapes.colour(theme.colours().accent)
-        self.shapes.actor.SetVisibility(len(ghost) > 0)
+        self.shapes.actor.SetVisibility(self._wanted and len(ghost) > 0)
         points = transform_points(scene.T_world_camera(self.session.step), ghost.reshape(-1, 3))
         self.shapes.faces(points, np.arange(len(points)).reshape(ghost.shape[:2]))
         self.view.redraw()

@@ -11,7 +11,7 @@ import pytest
 from analysis.calibration import robust
 from analysis.calibration.adjust import Prior, adjust, view_information
 from analysis.calibration.calibrate import Request, calibrate
-from analysis.calibration.checks import choose_lens, halves, whiteness
+from analysis.calibration.checks import Halves, choose_lens, halves, whiteness
 from analysis.calibration.degenerate import complaints
 from analysis.calibration.depth import depth_error, depth_jacobian, working_volume
 from analysis.calibration.estimate import Estimate, free_parameters
@@ -260,3 +260,10 @@ def test_the_whole_way_tells_what_to_photograph_where_nothing_can_be_found() -> 
         assert "tilted" in str(error)
     else:
         assert any("tilted by 20 to 40 deg" in one for one in found.faults)
+
+
+def test_the_chance_is_told_of_all_parameters_and_not_of_the_depths_beside_it() -> None:
+    agreed, differing = Halves(8e-6, 81e-6, 0.57).sentence, Halves(81e-6, 8e-6, 1e-5).sentence
+    assert "8 um apart, where their noise explains 81 um; by chance all their parameters together" in agreed
+    assert agreed.endswith("at least as much in 57% of such calibrations")
+    assert "81 um apart, where their noise explains 8 um (p = 1e-05 of all parameters together)" in differing

@@ -100,7 +100,11 @@ class TestPictures:
         assert boards.caption.text().startswith("Enough") and len(boards.items.edge.getData()[0]) == 0
 
     def test_the_ghost_for_the_3d_view_is_in_the_same_place(self, solved: Desk) -> None:
-        work, ghost = solved.work, solved.session.ghost
+        work = solved.work
+        assert work.virtual and len(solved.session.ghost) == 0, "nobody holds a virtual board"
+        work.virtual = False
+        work.solved_changed.emit()
+        ghost = solved.session.ghost
         assert work.solved is not None and work.solved.result.advice is not None
         advice = work.solved.result.advice
         corners = ghost.reshape(-1, 3)
@@ -129,6 +133,11 @@ class TestPictures:
         assert now.estimate.rotation[-1] == pytest.approx(advice.rotation, abs=2e-3)
         # a line of a virtual board has a point on every eighth row, and the advice counts on one on each
         assert 0.6 < (before.depth[0].rms - now.depth[0].rms) / advice.gain < 1.1
+
+    def test_what_is_not_asked_for_reads_as_a_sentence(self, solved: Desk) -> None:
+        panel = solved.panel
+        assert (panel.nearest.text(), panel.farthest.text()) == ("nearest board", "farthest board")
+        assert panel.target.text() == "as little as possible"
 
     def test_depth_is_told_over_the_range_that_is_asked_for(self, qtbot: QtBot, solved: Desk) -> None:
         solved.panel.nearest.setValue(600)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
@@ -99,3 +100,15 @@ def test_another_workspace_is_a_sign_that_a_cell_of_a_study_is_no_longer_waited_
     monkeypatch.setattr(one_of(CellOpener, window.session), "go_on", lambda: gone_on.append(window.workspace))
     window.switch_to("measure")
     assert gone_on == ["setup"]
+
+
+def test_the_board_to_be_held_does_not_stand_before_the_points(window: MainWindow) -> None:
+    square = np.array([[[-0.1, -0.1, 0.5], [0.1, -0.1, 0.5], [0.1, 0.1, 0.5], [-0.1, 0.1, 0.5]]])
+    window.session.show_ghost(square)
+    actor = window.panels["viewport"].ghost.shapes.actor  # type: ignore[attr-defined]
+    assert actor.GetVisibility()
+    window.switch_to("measure")
+    assert not actor.GetVisibility() and window.cloud.pinned
+    window.switch_to("setup")
+    assert actor.GetVisibility() and not window.cloud.pinned
+    window.session.show_ghost(np.zeros((0, 4, 3)))

@@ -318,6 +318,10 @@ def test_the_board_s_ghost_stands_before_the_camera(viewport: Viewport) -> None:
     assert actor.GetVisibility() and data.n_cells == 1
     pose = session.project.scene.T_world_camera()
     np.testing.assert_allclose(data.points, square[0] @ pose[:3, :3].T + pose[:3, 3], atol=1e-6)
+    viewport.ghost.show(False)
+    assert not actor.GetVisibility()
+    viewport.ghost.show(True)
+    assert actor.GetVisibility()
     session.show_ghost(np.zeros((0, 4, 3)))
     assert not actor.GetVisibility()
 
