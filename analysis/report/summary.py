@@ -7,7 +7,7 @@ import numpy as np
 from analysis.report.colour import method_name
 from analysis.report.model import ReportInput
 from analysis.report.total import NARROW_PX, Total, total
-from analysis.report.units import count, micrometres, percent, pixels
+from analysis.report.units import count, counted, micrometres, percent, pixels
 
 ENOUGH = 30
 """Least number of points from which a conclusion is drawn."""
@@ -95,13 +95,15 @@ def remarks(found: Total, image_scale: float = 1.0) -> list[str]:
     if LITTLE <= found.completeness < 0.95:
         missed = found.truth_rows - found.measured_rows
         said.append(
-            f"{count(missed)} scan lines on which the line can be seen ({percent(missed / found.truth_rows)}) have no "
-            "right measurement: the line there is too faint, cut, or overlaid."
+            f"{counted(missed, 'scan line')} on which the line can be seen ({percent(missed / found.truth_rows)}) "
+            f"{'has' if missed == 1 else 'have'} no right measurement: the line there is too faint, cut, or overlaid."
         )
     if found.false_rows:
+        their = "its" if found.false_rows == 1 else "their"
+        carry = f"{'carries' if found.false_rows == 1 else 'carry'} a point although no line crosses {their}"
         said.append(
-            f"{count(found.false_rows)} scan lines carry a point although no line crosses their centre, at the ends of "
-            "the line or from stray light. Their distance from the surface counts, their depth has no truth."
+            f"{counted(found.false_rows, 'scan line')} {carry} centre, at the ends of the line or from stray light. "
+            f"{their.capitalize()} distance from the surface counts, {their} depth has no truth."
         )
     # what most points err by, all alike and each on its own
     usual = np.hypot(found.depth_z.median, found.depth_z.robust_sigma)

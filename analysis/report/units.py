@@ -72,3 +72,8 @@ def count(value: float) -> str:
     if value >= 1e7:
         return f"{value / 1e6:,.0f}\u00a0million".replace(",", "\u2009")
     return f"{value:,.0f}".replace(",", "\u2009")
+
+
+def counted(number: float, noun: str) -> str:
+    """ "1 line", "1 820 lines"."""
+    return f"{count(number)} {noun}{'' if number == 1 else 's'}"

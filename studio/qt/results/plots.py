@@ -142,9 +142,7 @@ class PointedPlots(pg.GraphicsLayoutWidget):  # type: ignore[misc]
         self.hovered.emit(None)
 
     def _move(self, position: QPointF) -> None:
-        scan_line = self.scan_line_at(position)
-        if scan_line is not None:
-            self.hovered.emit(scan_line)
+        self.hovered.emit(self.scan_line_at(position))
 
     def _click(self, event: Any) -> None:
         scan_line = self.scan_line_at(event.scenePos())

@@ -159,6 +159,7 @@ class ResultsPanel(QWidget):
         truth = true_series(curve, scene, laser, render.frame.step, section)
         series = {method: measured_series(one, scene, section) for method, one in shown.items()}
         errors = {method: error_values(one.errors, view) for method, one in shown.items()}
+        self.rows.count = render.frame.shape[0 if curve.axis == "rows" else 1]
         self.rows.show_series(curve.axis, truth, {method: (series[method], errors[method]) for method in shown}, view)
         self.profile.show_series(truth, series, section)
         self.part.follow(laser)

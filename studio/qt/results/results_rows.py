@@ -39,6 +39,8 @@ class RowPlots(plots.PointedPlots):
         self._drawn: list[tuple[pg.PlotItem, Any]] = []
         self._shown: dict[str, tuple[Series, Float]] = {}
         self.limit = 1.0
+        self.count: int | None = None
+        """Scan lines of the image; None: not known. Beside them nothing is pointed at."""
         self.repaint_theme()
 
     def show_series(
@@ -107,5 +109,6 @@ class RowPlots(plots.PointedPlots):
         for plot in self.plots:
             point = plots.at(plot, position)
             if point is not None:
-                return round(point.x())
+                scan_line = round(point.x())
+                return scan_line if self.count is None or 0 <= scan_line < self.count else None
         return None

@@ -27,6 +27,7 @@ from PySide6.QtWidgets import (
 
 from analysis.cloud import Cloud
 from analysis.report.colour import TRUTH, method_colour
+from analysis.report.units import counted
 from analysis.section import Plane
 from render.base.arrays import Float, Int
 from render.base.errors import InputError
@@ -239,7 +240,8 @@ class SectionTab(QWidget):
         self.truth.setData(*lines.T, connect="finite")
         self.dots.setData(*(1e3 * made.measured[:, :2]).T)
         self.plot.enableAutoRange()
-        self.told.setText(f"{len(made.true)} lines of the true part, {len(made.measured)} points within the slab")
+        part, points = counted(len(made.true), "line"), counted(len(made.measured), "point")
+        self.told.setText(f"{part} of the true part, {points} within the slab")
         self.export.setEnabled(bool(made.true) or len(made.measured) > 0)
         self._place()
 

@@ -24,7 +24,7 @@ from analysis.report.record import record_of
 from analysis.report.summary import headline, remarks
 from analysis.report.tables import scene_tables
 from analysis.report.total import total
-from analysis.report.units import digits, micrometres
+from analysis.report.units import counted, digits, micrometres
 from analysis.report.write import PLAIN_NOTE, render_page, write_report
 from analysis.triangulate import triangulate
 from render.base.counts import RAYS
@@ -287,6 +287,11 @@ def test_remarks_name_what_is_wrong():
     assert "10 scan lines" in said(
         extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 10, np.nan, noise))
     ).replace("\u2009", "")
+    shown = total(report_of(scene, [frame]).record.chosen())
+    false = remarks(dataclasses.replace(shown, false_rows=1)), remarks(dataclasses.replace(shown, false_rows=2))
+    assert [told[0].split(" although")[0] for told in false] == [
+        "1 scan line carries a point", "2 scan lines carry a point"
+    ]  # fmt: skip
     assert "outliers" in said(extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 3, 9.0, noise)))
     narrow = dataclasses.replace(first.line, width=0.3 * np.ones_like(first.line.width))
     assert "narrower" in said(dataclasses.replace(first, line=narrow))
@@ -345,6 +350,7 @@ def test_numbers_are_written_for_people():
     assert [digits(x) for x in (0.0, 1.0, -12.345, 1234.5, 0.00123, 3e-9, math.nan)] == [
         "0", "1.00", "-12.3", "1234", "0.00123", "3.00e-09", "–",  # noqa: RUF001
     ]  # fmt: skip
+    assert [counted(n, "line") for n in (0, 1, 1820)] == ["0 lines", "1 line", "1\u2009820 lines"]
     assert micrometres(2.17e-5) == "21.7\u00a0µm"
     assert micrometres(0.0123) == "12.3\u00a0mm"
 

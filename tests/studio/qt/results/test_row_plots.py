@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from PySide6.QtCore import QPointF
 from pytestqt.qtbot import QtBot
 
 from studio.qt.results.results_rows import RowPlots
@@ -44,3 +45,16 @@ def test_large_errors_have_room_for_their_sign(plots: RowPlots) -> None:
     axis = plots.error.getAxis("left")
     assert axis.tickStrings([-200_000.0, 0.0, 200_000.0], 1.0, 200_000.0) == ["-200k", "0", "200k"]
     assert axis.tickStrings([-50.0, 0.0, 50.0], 1.0, 50.0) == ["-50", "0", "50"]
+
+
+def test_beside_the_rows_of_the_image_nothing_is_pointed_at(plots: RowPlots, qtbot: QtBot) -> None:
+    plots.resize(600, 500)
+    plots.show()
+    qtbot.waitExposed(plots)
+    plots.count = len(ROWS)
+    pointed: list[int | None] = []
+    plots.hovered.connect(pointed.append)
+    for row in (-20.0, 250.0, 510.0):
+        plots.error.setXRange(-60.0, 560.0, padding=0.0)
+        plots._move(plots.error.vb.mapViewToScene(QPointF(row, 0.0)))
+    assert pointed == [None, 250, None]
