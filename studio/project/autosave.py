@@ -146,8 +146,7 @@ def find(folder: Path) -> list[Recovery]:
 
 def find_of(folder: Path, project_file: Path) -> list[Recovery]:
     """Of these, the changes of one project file, wherever it is reached from."""
-    file = project_file.resolve()
-    return [left for left in find(folder) if left.path is not None and left.path.resolve() == file]
+    return [left for left in find(folder) if left.path is not None and _same(left.path, project_file)]
 
 
 def sweep(folder: Path) -> None:
@@ -171,6 +170,14 @@ def _read(file: Path) -> Recovery:
         raise InputError("a damaged recovery file", where=str(file))
     loaded = Project.from_data(project, str(file))
     return Recovery(file, loaded, None if path is None else Path(path), Path(root), str(data.get("when", "")))
+
+
+def _same(path: Path, file: Path) -> bool:
+    """A path of a damaged file may be none at all."""
+    try:
+        return path.samefile(file)
+    except (OSError, ValueError):
+        return False
 
 
 def _held(lock: Path) -> bool:

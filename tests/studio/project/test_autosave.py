@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from render.base.errors import InputError
-from studio.project.autosave import Autosave, find, sweep
+from studio.project.autosave import Autosave, find, find_of, sweep
 from studio.project.date_and_time import read_out
 from studio.project.document import Document
 from studio.project.project import Project
@@ -146,6 +146,26 @@ def test_recovered_work_knows_the_file_it_came_from(document: Document, tmp_path
     assert recovered.path == tmp_path / "mine.json" and recovered.dirty
     recovered.save()
     assert Project.load(tmp_path / "mine.json").seed == 77
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a right there")
+def test_the_work_of_a_project_is_found_however_its_file_is_reached(
+    document: Document, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    document.save(tmp_path / "mine.json")
+    document.set(("seed",), 77)
+    program = Autosave(tmp_path / "kept")
+    program.keep(document)
+    end_without_closing(program)
+    (tmp_path / "link.json").symlink_to(tmp_path / "mine.json")
+    (tmp_path / "other.json").write_text("{}")
+    monkeypatch.chdir(tmp_path)
+    for reached in (Path("mine.json"), tmp_path / "link.json"):
+        assert [left.project.seed for left in find_of(tmp_path / "kept", reached)] == [77]
+    assert find_of(tmp_path / "kept", tmp_path / "other.json") == []
+    damaged = json.loads(program.file.read_text()) | {"path": "\0"}
+    program.file.write_text(json.dumps(damaged))
+    assert find_of(tmp_path / "kept", tmp_path / "mine.json") == []
 
 
 def test_a_running_program_keeps_its_own(document: Document, tmp_path: Path) -> None:
