@@ -287,11 +287,6 @@ def test_remarks_name_what_is_wrong():
     assert "10 scan lines" in said(
         extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 10, np.nan, noise))
     ).replace("\u2009", "")
-    shown = total(report_of(scene, [frame]).record.chosen())
-    false = remarks(dataclasses.replace(shown, false_rows=1)), remarks(dataclasses.replace(shown, false_rows=2))
-    assert [told[0].split(" although")[0] for told in false] == [
-        "1 scan line carries a point", "2 scan lines carry a point"
-    ]  # fmt: skip
     assert "outliers" in said(extraction(scene, curve, 0, "likelihood", np.where(np.arange(100) < 3, 9.0, noise)))
     narrow = dataclasses.replace(first.line, width=0.3 * np.ones_like(first.line.width))
     assert "narrower" in said(dataclasses.replace(first, line=narrow))
