@@ -46,7 +46,7 @@ OF_A_FILE = {
     "check": ("Calibration file to check", "Whether {} still holds"),
 }
 """What a person is asked for, and what is shown of the answer."""
-LENSES = (("Lens by held-out views", None), *((f"{terms} distortion terms", terms) for terms in (0, 4, 5, 8, 12, 14)))
+LENSES = (("By held-out views", None), *((f"{terms} distortion terms", terms) for terms in (0, 4, 5, 8, 12, 14)))
 CARRIED = (("Board put by hand", None), ("Carried by…", "camera"), ("Carried by a robot's hand…", "board"))
 TABLES = "Tables (*.csv);;All files (*)"
 FILES = "Calibrations (*.json);;All files (*)"
