@@ -17,6 +17,16 @@ from render.base.arrays import Float
 NAN = float("nan")
 FLATTEST = 1e-6
 """Angle, rad, between two lines below which they do not cross anywhere near."""
+MISFIT = 3.0
+"""Times their sigmas by which points miss a curve, from which on the shape there is told to be another."""
+OTHER_SHAPE = (
+    "points miss the curve in its regions by {:.0f} times their sigma: the shape there is another, and value and truth "
+    "hang on where the regions end"
+)
+MISFITS = {
+    "peak": "points miss its parabola by {:.0f} times their sigma: value and truth may be off the top; of a flat one "
+    "take a step height, else a narrower region"
+}
 STRAIGHTEST = 10.0
 """Lengths of its region, of the radius of an edge: beyond, the points are those of a flat side."""
 SPARE = 2
@@ -77,6 +87,8 @@ def read(gauge: Gauge, step: int, measured: Profile, truth: Profile | None) -> R
     used = np.count_nonzero(np.any([one.here for one in fits], axis=0))
     ratio = max(one.ratio for one in fits)
     remark = unseen(measured, gauge.regions[1], fits[0].frame) if gauge.kind == "area" else ""
+    if not remark and ratio > MISFIT:
+        remark = MISFITS.get(gauge.kind, OTHER_SHAPE).format(ratio)
     sigma, count = ratio * random, int(used)
     return Reading(gauge, step, value, sigma, systematic, count, _true_value(gauge, truth), remark=remark)
 
@@ -123,7 +135,7 @@ def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | s
 
 
 NOTHING = {
-    "peak": "the profile has no peak within its region",
+    "peak": "the profile has no peak within its region; of a flat top take a step height",
     "radius": "no circle fits the points",
     "gap": "its regions hold no round edges; drag over where each edge turns down, or take a width",
     "area": "its points end before the section does",

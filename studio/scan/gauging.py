@@ -93,12 +93,16 @@ def _number(value: object) -> float:
 
 
 def worst(found: Sequence[Reading]) -> Reading:
-    """Of one measure over the steps: one without a value first, then by verdict, then the farthest from the middle."""
+    """Of one measure over the steps: one without a value first, then by verdict, then the farthest off.
+
+    Off the middle of its tolerance, or, without a nominal, off the truth.
+    """
 
     def badness(one: Reading) -> tuple[bool, bool, bool, float]:
         gauge = one.gauge
         middle = (gauge.nominal or 0.0) + 0.5 * ((gauge.lower or 0.0) + (gauge.upper or 0.0))
-        off = 0.0 if gauge.nominal is None or one.reason else abs(one.value - middle)
+        off = one.error if gauge.nominal is None else one.value - middle
+        off = abs(off) if math.isfinite(off) and not one.reason else 0.0
         return bool(one.reason), one.verdict == "fail", one.verdict == "undecided", off
 
     return max(found, key=badness)

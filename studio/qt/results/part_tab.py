@@ -274,7 +274,8 @@ class PartTab(QWidget):
             count = f" ({len(self._placed) + 1} of {len(names)})" if len(names) > 1 else ""
             text = f"<b>{TITLES[self.placing]}</b>: drag across the {names[len(self._placed)]}{count}. Esc gives up."
         elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].reason:
-            text = self.readings[self.chosen].reason.capitalize()
+            reason = self.readings[self.chosen].reason
+            text = reason[:1].upper() + reason[1:]
         elif 0 <= self.chosen < len(self.readings) and self.readings[self.chosen].remark:
             text = f"{self.readings[self.chosen].remark}."
         elif 0 <= self.chosen < len(self._read) and (odd := beside_nominal(self._read[self.chosen])):

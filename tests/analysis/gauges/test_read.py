@@ -163,3 +163,14 @@ def test_a_cylinder_that_is_cut_aslant_has_the_radius_of_its_exact_line() -> Non
         for noise in noises(5, 1.0, seed=5):
             reading = read(asked, 0, profile(height, sigma=3e-6, noise=noise), profile(height, sigma=3e-6))
             assert abs(reading.error_in_sigmas) < 4.0 and reading.points > 0.9 * (high - low) / PITCH
+
+
+def test_a_flat_top_with_rounded_edges_says_that_it_is_no_peak() -> None:
+    beside = np.abs(ACROSS)
+    height = -0.5 + np.where(beside < 0.006, 0.01 - 0.0002 * (np.maximum(beside - 0.002, 0.0) / 0.003) ** 2, 0.0)
+    asked = gauge("peak").model_copy(update={"regions": ((-0.019, -0.01), (-0.005, 0.005))})
+    noise = noises(1, 1.0, seed=9)[0]
+    reading = read(asked, 0, profile(height, sigma=1e-6, noise=noise), profile(height, sigma=1e-6))
+    assert "of a flat one take a step height" in reading.remark
+    true, _ = shape("peak")
+    assert read(gauge("peak"), 0, profile(true, noise=noise), profile(true)).remark == ""

@@ -75,6 +75,12 @@ def test_other_measures_are_read_off_the_same_frames(scanned: Path, tmp_path: Pa
     assert "Straightness (bow)" in shown and "away is not measured: too few points" in shown
 
 
+def test_the_worst_reading_without_a_nominal_is_the_farthest_off_the_truth() -> None:
+    gauge = Gauge(kind="step", regions=((-0.08, -0.01), (0.01, 0.08)))
+    readings = [Reading(gauge, step, value=0.01 + off, truth=0.01) for step, off in enumerate((1e-6, -2e-5, 9e-6))]
+    assert worst(readings).step == 1
+
+
 def test_the_worst_reading_speaks_for_a_measure() -> None:
     gauge = Gauge.model_validate({"name": "a", **LEVEL})
     good = Reading(gauge, 0, value=0.0, sigma_random=1e-5, sigma_systematic=0.0)
