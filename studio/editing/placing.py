@@ -10,6 +10,9 @@ from render.base.arrays import Float
 from render.base.pose import Pose, rotation_matrix
 from studio.editing.placement import vector
 
+MOSTLY = math.cos(math.radians(2.0))
+"""Cosine from which a laser is turned about its fan's axis alone, so that a rig that was built straight stays so."""
+
 
 def aimed(pose: Pose, point: Float) -> Pose:
     """A laser turned where it is, by the least angle that takes its axis through a point (3,), in the rig's frame."""
@@ -25,7 +28,8 @@ def aimed(pose: Pose, point: Float) -> Pose:
 def at_angle(pose: Pose, camera: Float, point: Float, angle: float) -> Pose:
     """A laser turned about a point (3,) in the plane of laser, point and camera (3,) until they enclose an angle, rad.
 
-    It keeps its distance from the point, and lights it as before; all in the rig's frame.
+    It keeps its distance from the point, and lights it as before; all in the rig's frame. Where its fan stands nearly
+    across that plane it turns about the fan's own axis, and stays as straight as it was.
     """
     matrix = pose.matrix.copy()
     to_camera, to_laser = camera - point, matrix[:3, 3] - point
@@ -34,7 +38,8 @@ def at_angle(pose: Pose, camera: Float, point: Float, angle: float) -> Pose:
     if sine < 1e-12:  # they see the point from one side: away along the sheet's normal
         normal, sine = np.cross(to_camera, matrix[:3, 0]), 0.0
     now = math.atan2(sine, float(to_camera @ to_laser))
-    turn = rotation_matrix(normal / np.linalg.norm(normal) * (angle - now))
+    axis = _fan_axis(matrix, normal / np.linalg.norm(normal))
+    turn = rotation_matrix(axis * (angle - now))
     matrix[:3, :3] = turn @ matrix[:3, :3]
     matrix[:3, 3] = point + turn @ to_laser
     return _rounded(matrix)
@@ -43,30 +48,44 @@ def at_angle(pose: Pose, camera: Float, point: Float, angle: float) -> Pose:
 def at_baseline(pose: Pose, camera: Float, point: Float, baseline: float) -> Pose:
     """A laser moved along the line from the camera (3,) to it, to that distance, m, and aimed at a point as before.
 
-    What met the point goes on meeting it: the rotation is that which the direction to the point makes.
+    The sheet goes on meeting the point: it turns about its fan's axis, or as the direction to the point does.
     """
     matrix = pose.matrix.copy()
     offset = matrix[:3, 3] - camera
     length = float(np.linalg.norm(offset))
     direction = offset / length if length > 1e-9 else matrix[:3, 0]
     place = camera + baseline * direction
-    before, after = point - matrix[:3, 3], point - place
-    turn = least_turn(before / np.linalg.norm(before), after / np.linalg.norm(after))
+    turn = _turn(matrix, point - matrix[:3, 3], point - place)
     matrix[:3, :3] = turn @ matrix[:3, :3]
     matrix[:3, 3] = place
     return _rounded(matrix)
 
 
 def turned_to(pose: Pose, before: Float, after: Float) -> Pose:
-    """A laser turned where it is, by the least angle that takes the ray through one point (3,) through another."""
+    """A laser turned where it is, about its fan's axis if that will do, from a point (3,) that it meets to another."""
     matrix = pose.matrix.copy()
-    origin = matrix[:3, 3]
-    ends = before - origin, after - origin
-    lengths = [float(np.linalg.norm(end)) for end in ends]
-    if min(lengths) < 1e-9:
+    ends = before - matrix[:3, 3], after - matrix[:3, 3]
+    if min(float(np.linalg.norm(end)) for end in ends) < 1e-9:
         return pose
-    matrix[:3, :3] = least_turn(ends[0] / lengths[0], ends[1] / lengths[1]) @ matrix[:3, :3]
+    matrix[:3, :3] = _turn(matrix, *ends) @ matrix[:3, :3]
     return _rounded(matrix)
+
+
+def _turn(matrix: Float, before: Float, after: Float) -> Float:
+    """(3, 3) about the fan's axis from one direction (3,) to another, or the least where one of them runs along it."""
+    across = matrix[:3, 1]
+    flat = [end - across * (across @ end) for end in (before, after)]
+    shares = [
+        float(np.linalg.norm(part) / np.linalg.norm(end)) for part, end in zip(flat, (before, after), strict=True)
+    ]
+    ends = flat if min(shares) > MOSTLY else [before, after]
+    return least_turn(*(end / np.linalg.norm(end) for end in ends))
+
+
+def _fan_axis(matrix: Float, normal: Float) -> Float:
+    """The fan's axis, on the side of a unit normal (3,), where they are nearly the same; else the normal."""
+    along = float(matrix[:3, 1] @ normal)
+    return matrix[:3, 1] * math.copysign(1.0, along) if abs(along) > MOSTLY else normal
 
 
 def least_turn(a: Float, b: Float) -> Float:

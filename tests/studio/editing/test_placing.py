@@ -55,3 +55,16 @@ def test_a_laser_turned_to_a_point_meets_it_as_it_met_another() -> None:
     assert pose.translation == LASER.translation
     before, now = in_laser(LASER)[:3], in_laser(pose, after)[:3]
     assert now / np.linalg.norm(now) == pytest.approx(before / np.linalg.norm(before), abs=1e-8)
+
+
+def test_a_rig_that_was_built_straight_stays_so() -> None:
+    """Also where what is lit lies a little beside its plane, as on a part that is not: no turn but about the fan."""
+    straight, lit = Pose(translation=(0.1, 0.0, 0.0), rotation=(0.0, -0.3, 0.0)), np.array([0.0, 0.002, 0.32])
+    made = (
+        at_angle(straight, np.zeros(3), lit, math.radians(25.0)),
+        at_baseline(straight, np.zeros(3), lit, 0.2),
+        turned_to(straight, lit, np.array([0.0, 0.001, 0.2])),
+    )
+    for pose in made:
+        assert pose.translation[1] == pytest.approx(0.0, abs=1e-12)
+        assert pose.rotation[0] == pytest.approx(0.0, abs=1e-12) and pose.rotation[2] == pytest.approx(0.0, abs=1e-12)
