@@ -9,7 +9,7 @@ import json
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +55,8 @@ class Kept:
     """None: it is in this session alone."""
     readings: tuple[Reading, ...] = ()
     """Of the part's measures, as the project has them now; of a render of this session alone."""
+    stopped: bool = False
+    """Before it was finished, so that light is missing."""
 
 
 def figures_of(found: Sequence[Measurement]) -> dict[str, float]:
@@ -107,12 +109,13 @@ def keep(root: Path, what: Kept, frame: Frame) -> Kept:
         "name": what.name,
         "created": created,
         "image_scale": what.image_scale,
+        "stopped": what.stopped,
         "figures": {name: value if math.isfinite(value) else None for name, value in what.figures.items()},
         "inputs": input_hashes(what.project.scene, root),
     }
     with atomic_write(folder / RECORD) as temporary:
         temporary.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    return Kept(what.name, created, what.project, what.image_scale, what.figures, folder)
+    return replace(what, created=created, folder=folder, readings=())
 
 
 def kept_renders(root: Path) -> tuple[list[Kept], list[str]]:
@@ -152,4 +155,5 @@ def _read(path: Path) -> Kept:
         if key in FIGURES
     }
     project = Project.load(path.parent / PROJECT)
-    return Kept(name, created, project, float(scale), numbers, path.parent)
+    stopped = record.get("stopped") is True
+    return Kept(name, created, project, float(scale), numbers, path.parent, stopped=stopped)

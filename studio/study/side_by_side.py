@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.report.gauge_table import small_text, value_text
+from analysis.report.gauge_table import scale_and_unit, small_text, value_text
 from analysis.report.units import digits
 from render.base.csv_file import write_csv
+from studio.project.project import Project
 from studio.scan.kept_renders import FIGURES, Kept
+from studio.scan.stages import scaled_sensor
 from studio.study.changes import changes
 
 NONE = "-"
@@ -24,6 +26,8 @@ class Row:
     cells: tuple[str, ...]
     measured: bool
     """A figure, not a setting."""
+    values: tuple[float, ...] = ()
+    """Of a figure, all its digits, in the unit of the label."""
 
 
 def side_by_side(renders: Sequence[Kept]) -> list[Row]:
@@ -32,18 +36,20 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
         return []
     first = renders[0]
     scales = tuple(f"{one.image_scale:.3g}" for one in renders)
-    rows = [Row("Image scale", scales, False)] if len(set(scales)) > 1 else []
+    rows = [Row("Image scale", scales, False)] if set(scales) != {"1"} else []
+    if any(one.stopped for one in renders):
+        rows.append(Row("Finished", tuple("stopped early" if one.stopped else "yes" for one in renders), False))
     for name, unit in FIGURES.items():
         values = [one.figures.get(name, math.nan) for one in renders]
         if not any(map(math.isfinite, values)):
             continue
         cells = [_cell(value, values[0] if k else math.nan) for k, value in enumerate(values)]
-        rows.append(Row(f"{name} / {unit}", tuple(cells), True))
+        rows.append(Row(f"{name} / {unit}", tuple(cells), True, tuple(values)))
     rows += _measures(renders)
     labels: dict[str, str] = {}
     found: list[dict[str, tuple[str, str]]] = []
     for one in renders:
-        differing = {change.field: change for change in changes(first.project, one.project)}
+        differing = {change.field: change for change in changes(_at_full_scale(first), _at_full_scale(one))}
         labels |= {field: change.label for field, change in differing.items()}
         found.append({field: (change.a, change.b) for field, change in differing.items()})
     for field, label in labels.items():
@@ -52,6 +58,12 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
         own = next(each[field][0] for each in found if field in each)
         rows.append(Row(label, tuple(each[field][1] if field in each else own for each in found), False))
     return rows
+
+
+def _at_full_scale(render: Kept) -> Project:
+    """Its project with the exposure of the scanner, which a smaller image has less of as its pixels are larger."""
+    sensor = scaled_sensor(render.project.sensor, 1.0 / render.image_scale)
+    return render.project.model_copy(update={"sensor": sensor})
 
 
 def _measures(renders: Sequence[Kept]) -> list[Row]:
@@ -66,13 +78,18 @@ def _measures(renders: Sequence[Kept]) -> list[Row]:
             if math.isfinite(value - values[0]):
                 sign = "+" if value > values[0] else ""
                 cells[k] += f" ({sign}{small_text(value - values[0], unit)})"
-        rows.append(Row(name, tuple(cells), True))
+        scale, shown = scale_and_unit(unit)
+        told = tuple(scale * value for value in values)
+        rows.append(Row(f"{name} / {shown.strip()}", tuple(cells), True, told))
     return rows
 
 
 def write_table(path: Path, renders: Sequence[Kept], rows: Sequence[Row]) -> None:
     """As CSV. InputError: the file cannot be written."""
-    write_csv(path, ["", *(one.name for one in renders)], ([row.label, *row.cells] for row in rows))
+    numbers = {row.label: [f"{value:.9g}" if math.isfinite(value) else "" for value in row.values] for row in rows}
+    write_csv(
+        path, ["", *(one.name for one in renders)], ([row.label, *(numbers[row.label] or row.cells)] for row in rows)
+    )
 
 
 def _cell(value: float, first: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -21,14 +22,16 @@ from render.world.world import build_world
 from studio.project.date_and_time import read_out
 from studio.project.project import Project
 from studio.qt.core.dialogs import export_csv, show_trouble
-from studio.qt.core.session import Render, Session
+from studio.qt.core.figures_age import FiguresAge
+from studio.qt.core.session import Render, Session, one_of
 from studio.qt.core.widgets import text_button
 from studio.runtime.error_messages import trouble
 from studio.scan.gauging import readings
 from studio.scan.kept_renders import Kept, figures_of, keep, kept_renders, open_kept
 from studio.scan.remarks import best
-from studio.study.side_by_side import side_by_side, write_table
+from studio.study.side_by_side import Row, side_by_side, write_table
 
+MEASURING = "The shown render is being measured with the settings of now; its figures are still those of before."
 HINT = "Figures are followed by their difference from the first column's. Settings that all have alike are left out."
 FEWEST_PX = 230
 
@@ -37,7 +40,8 @@ def as_kept(session: Session, render: Render, name: str) -> Kept:
     """A render of the session as a column of the table."""
     found = best(render.measurements, session.project) if render.measurements else []
     read = readings(render.project.read_as(session.project), render.frame, found)
-    return Kept(name, render.created, _measured(render), render.scanner_scale, figures_of(found), readings=read)
+    scale, figures = render.scanner_scale, figures_of(found)
+    return Kept(name, render.created, _measured(render), scale, figures, readings=read, stopped=not render.final)
 
 
 def _measured(render: Render) -> Project:
@@ -51,7 +55,7 @@ def keep_render(session: Session, render: Render, name: str) -> Kept:
     if session.document.path is None:
         raise InputError("the project has no folder of its own yet", cure="save it first")
     shown = as_kept(session, render, name)
-    made = Kept(name, "", shown.project, render.scanner_scale, shown.figures)
+    made = replace(shown, created="", readings=())
     kept = keep(session.document.root, made, render.frame)
     session.message.emit("info", f"Kept {name} in {kept.folder}")
     return kept
@@ -80,32 +84,49 @@ class RenderTable(QDialog):
         self.setObjectName("render-table")
         self.setWindowTitle("Renders side by side")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        own = [as_kept(session, render, name) for render, name in shown]
-        kept, self.wrong = kept_renders(session.document.root) if session.document.path is not None else ([], [])
-        self.renders = [*own, *kept]
-        self.rows = side_by_side(self.renders)
+        self._shown = shown
+        self._kept, self.wrong = kept_renders(session.document.root) if session.document.path is not None else ([], [])
+        self.renders, self.rows = self._read()
         self.table = QTableWidget()
         self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.table.setAlternatingRowColors(True)
         self.table.setShowGrid(False)
         self.open_button = text_button("Open", "The kept render of the chosen column, in the history")
         self.export = text_button("Export as CSV…")
-        told = QLabel("\n".join([HINT, *self.wrong]), wordWrap=True)
-        told.setObjectName("muted")
+        self.told = QLabel(wordWrap=True)
+        self.told.setObjectName("muted")
         buttons = QHBoxLayout()
         buttons.addWidget(self.open_button)
         buttons.addWidget(self.export)
         buttons.addStretch(1)
         column = QVBoxLayout(self)
         column.addWidget(self.table, 1)
-        column.addWidget(told)
+        column.addWidget(self.told)
         column.addLayout(buttons)
         self.resize(min(1280, 340 + FEWEST_PX * max(2, len(self.renders))), 480)
         self.open_button.clicked.connect(self.open_chosen)
         self.export.clicked.connect(self._ask)
         self.table.itemSelectionChanged.connect(self._show_buttons)
+        session.measured.connect(self._refresh)
+        self.age = one_of(FiguresAge, session)
+        self.age.changed.connect(self._tell)
         self._fill()
+        self._tell()
         self._show_buttons()
+
+    def _read(self) -> tuple[list[Kept], list[Row]]:
+        """Columns and rows, by the figures of now."""
+        renders = [*(as_kept(self.session, render, name) for render, name in self._shown), *self._kept]
+        return renders, side_by_side(renders)
+
+    def _refresh(self) -> None:
+        self.renders, self.rows = self._read()
+        self._fill()
+        self._tell()
+
+    def _tell(self) -> None:
+        measuring = [MEASURING] if self.age.old else []
+        self.told.setText("\n".join([*measuring, HINT, *self.wrong]))
 
     def chosen(self) -> Kept | None:
         """The kept render of the column that is chosen."""

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import Reading
 from studio.project.project import Project
 from studio.scan.kept_renders import Kept
+from studio.scan.stages import scaled
 from studio.study.side_by_side import side_by_side, write_table
 
 
@@ -64,4 +66,21 @@ def test_measures_of_the_part_are_read_of_every_render() -> None:
         for name, project, value in zip("ab", (plain, with_one), values, strict=True)
     ]
     (row,) = side_by_side(renders)
-    assert row.label == "rise" and row.cells == ("21.1664\u00a0mm", "21.1714\u00a0mm (+5.00\u00a0µm)")
+    assert row.label == "rise / mm" and row.cells == ("21.1664\u00a0mm", "21.1714\u00a0mm (+5.00\u00a0µm)")
+
+
+def test_a_smaller_render_has_the_exposure_of_the_scanner_and_what_is_unfinished_says_so(tmp_path: Path) -> None:
+    one, *_ = renders()
+    short = one.project.replaced({"sensor.exposure_time": 0.001})
+    small = [
+        Kept(name, "", scaled(each, 0.25), 0.25, {"Depth RMSE": 20.0})
+        for name, each in (("a", one.project), ("b", short))
+    ]
+    small[1] = replace(small[1], stopped=True, figures={"Depth RMSE": 15.5123456})
+    rows = {row.label: row.cells for row in side_by_side(small)}
+    assert rows["Image scale"] == ("0.25", "0.25") and rows["Finished"] == ("yes", "stopped early")
+    (exposure,) = [cells for label, cells in rows.items() if "xposure" in label]
+    assert exposure[1] == "1 ms"
+    write_table(tmp_path / "t.csv", small, side_by_side(small))
+    with open(tmp_path / "t.csv", newline="", encoding="utf-8") as file:
+        assert ["Depth RMSE / µm", "20", "15.5123456"] in list(csv.reader(file))
