@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import hashlib
 import multiprocessing
+import os
 import pickle
+import threading
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing.connection import wait as wait_for
 from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any, TypeVar
@@ -177,12 +180,21 @@ def _nothing() -> None:
     """The first task of a process."""
 
 
+def _end_with_the_driver() -> None:
+    """A driver that was killed can ask for nothing, and nobody would take what is found."""
+    driver = multiprocessing.parent_process()
+    if driver is not None:
+        wait_for([driver.sentinel])
+        os._exit(1)
+
+
 def _begin(begin: Callable[[], None], prepared: Event, stop: Event) -> None:
     """In each process: Ctrl-C is the driver's to hear, and kernels are loaded before anything is timed."""
     global _stopped
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_the_driver, name="end with the driver", daemon=True).start()
     _stopped = stop.is_set
     prepared.wait()
     if not stop.is_set():
