@@ -46,9 +46,10 @@ class Halves:
                 f"as much in {self.p:.0%} of such calibrations"
             )
         return (
-            f"two halves of the views differ: in depth they are {1e6 * self.difference:.0f} um apart, where their "
-            f"noise explains {1e6 * self.expected:.0f} um (p = {self.p:.1g} of all parameters together): something "
-            "that is not modelled, such as a lens with more terms, a bent board, or focus that moved, is in the views"
+            "two halves of the views differ in their parameters, all together, by more than noise explains but in "
+            f"{100.0 * self.p:.1g} % of such calibrations; in depth they are {1e6 * self.difference:.0f} um apart, "
+            f"where noise explains {1e6 * self.expected:.0f} um: unless it is that chance, something that is not "
+            "modelled, such as a lens with more terms, a bent board, or focus that moved, is in the views"
         )
 
 
