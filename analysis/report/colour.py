@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import get_args
+
+from analysis.line.settings import Method
 
 INK, MUTED, GRID, PAPER = "#1c2733", "#67737f", "#e2e6ea", "#ffffff"
 ACCENT = "#0b6e8a"
@@ -16,7 +19,11 @@ DIVERGING = "RdBu_r"
 
 # Okabe & Ito (2008), chosen to be told apart by every common colour vision
 METHODS = {"likelihood": "#d55e00", "gaussian": "#8a5aa8", "centre_of_mass": "#009e73"}
-OTHERS = ("#b58900", "#c2438f", "#7a5230", "#3d5a80")
+OTHERS = (
+    "#b58900", "#c2438f", "#7a5230", "#3d5a80", "#6b8e23", "#882255", "#4b5fd1", "#a3611f", "#5f7f7f", "#e07bb0",
+    "#8c8c00", "#994f88", "#2f6b4f", "#c9505c", "#7d6bb5", "#9a8f5a", "#4f3b78", "#b0764f", "#556b2f", "#a03c78",
+)  # fmt: skip
+"""Of the methods that are chosen more seldom, in their order; one that is none of these has one of them by its name."""
 METHOD_NAMES = {
     "likelihood": "maximum likelihood",
     "gaussian": "Gaussian fit",
@@ -26,7 +33,9 @@ METHOD_NAMES = {
 
 def method_colour(method: str) -> str:
     """The colour of an extraction method, the same in every figure."""
-    return METHODS.get(method) or OTHERS[sum(method.encode("utf-8", "replace")) % len(OTHERS)]
+    seldom = [name for name in get_args(Method) if name not in METHODS]
+    place = seldom.index(method) if method in seldom else sum(method.encode("utf-8", "replace"))
+    return METHODS.get(method) or OTHERS[place % len(OTHERS)]
 
 
 def method_name(method: str) -> str:

@@ -76,7 +76,7 @@ def run_into(
 
         def tell(done: int, known: int) -> None:
             nonlocal next_look
-            first = "" if done > before else "; the first ones wait for their workers to start"
+            first = "" if done > before else "; the first ones are under way, or wait for their workers to start"
             progress(f"{done} of {known} cells{first}", (done - before) / max(known - before, 1))
             now = time.monotonic()
             if now >= next_look:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from studio.qt.core.session import Session
@@ -40,7 +42,9 @@ class FiguresAge(QObject):
         if render is None or made is None:
             return False
         how = development(render.project, render.developed_by(self.session.project), render.image_scale)
-        return made[1] != how
+        # measures of the part are read off at once, and change no figure
+        before = replace(made[1], project=made[1].project.read_as(how.project))
+        return before != how
 
     def _tell(self, old: bool) -> None:
         if old != self.old:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtGui import QColor, QIcon, QPixmap
+from PySide6.QtCore import QPointF
+from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout
 
 from analysis.line.result import Line
@@ -29,6 +30,21 @@ def swatch(colour: str, size: int = 10) -> QIcon:
     pixmap.fill(QColor(colour))
     icon = QIcon(pixmap)
     icon.addPixmap(pixmap, QIcon.Mode.Disabled)  # a colour is information, also where nothing can be clicked
+    return icon
+
+
+def ticked_swatch(colour: str, size: int = 16) -> QIcon:
+    """The same for a menu, which shows an icon in place of its tick: with a tick in it where the action is checked."""
+    icon = swatch(colour, size)
+    pixmap = QPixmap(size, size)
+    pixmap.fill(QColor(colour))
+    painter = QPainter(pixmap)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(QPen(QColor("white"), 0.15 * size))
+    painter.drawPolyline([QPointF(x * size, y * size) for x, y in ((0.2, 0.5), (0.42, 0.74), (0.82, 0.26))])
+    painter.end()
+    icon.addPixmap(pixmap, QIcon.Mode.Normal, QIcon.State.On)
+    icon.addPixmap(pixmap, QIcon.Mode.Active, QIcon.State.On)
     return icon
 
 

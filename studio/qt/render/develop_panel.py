@@ -34,7 +34,7 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Render, Session, one_of
 from studio.qt.core.widgets import text_button
 from studio.qt.forms.log_field import LogField
-from studio.qt.image.line_overlay import swatch
+from studio.qt.image.line_overlay import swatch, ticked_swatch
 from studio.qt.render.automatic_exposure import filling
 from studio.runtime.jobs import Job, Progress
 from studio.scan.redevelop import Development, develop_again, development, measure_again
@@ -150,7 +150,7 @@ class DevelopPanel(QWidget):
         layout.addStretch(1)
 
     def _method_action(self, method: Method) -> QAction:
-        action = QAction(swatch(method_colour(method)), method_name(method), self)
+        action = QAction(ticked_swatch(method_colour(method)), method_name(method), self)
         action.setCheckable(True)
         action.setChecked(method in METHODS)
         self.methods_menu.addAction(action)

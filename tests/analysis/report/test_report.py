@@ -8,13 +8,14 @@ import math
 import re
 import zlib
 from html.parser import HTMLParser
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 from analysis.error import compare
 from analysis.line.result import Flag, Line
+from analysis.line.settings import Method
 from analysis.report import picture
 from analysis.report.colour import method_colour, wavelength_colour
 from analysis.report.error_figures import nice_limit
@@ -337,7 +338,7 @@ def test_wavelengths_look_like_their_colour(wavelength, order):
 
 
 def test_methods_keep_apart_by_colour():
-    assert len({method_colour(m) for m in ("likelihood", "gaussian", "centre_of_mass")}) == 3
+    assert len({method_colour(m) for m in get_args(Method)}) == len(get_args(Method))
     assert method_colour("new method") == method_colour("new method")
 
 

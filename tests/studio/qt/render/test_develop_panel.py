@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QIcon
 
+from analysis.gauges.gauge import Gauge
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.live_preview import live
 from studio.qt.core.session import one_of
@@ -282,3 +284,24 @@ def test_what_is_measured_at_once_is_not_told(qtbot, panel):
     render.made_from["measurements"] = (made[0], development(render.project, session.project))
     session.measured.emit()
     assert not age._timer.isActive() and not age.old
+
+
+def test_measures_of_the_part_make_no_figure_old(qtbot, panel):
+    """They are read off at once: the words that measuring goes on stood until the exposure was changed."""
+    session = panel.session
+    age = one_of(FiguresAge, session)
+    gauge = Gauge(kind="step", regions=((-0.25, -0.15), (0.15, 0.25)))
+    session.set(("measures",), (gauge,))
+    session.set(("measured_in",), "upright")
+    assert not age._timer.isActive() and not age.old
+    session.document.undo()
+    session.document.undo()
+
+
+def test_a_chosen_method_has_a_tick_in_its_colour(qtbot, panel):
+    """A menu shows the colour in place of a tick, so that nobody saw which were chosen."""
+    action = panel.methods_menu.actions()[0]
+    shown = [
+        action.icon().pixmap(16, 16, QIcon.Mode.Normal, state).toImage() for state in (QIcon.State.Off, QIcon.State.On)
+    ]
+    assert shown[0] != shown[1]
