@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeyEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
@@ -163,6 +163,13 @@ class PhotographWindow(QWidget):
     def dropEvent(self, event: QDropEvent) -> None:
         accept_copy(event)
         self.add(dragged_files(event))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Escape closes it, as it does a dialog."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.close()
+        else:
+            super().keyPressEvent(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:
         # the window may be opened again: the runner stays, what runs ends

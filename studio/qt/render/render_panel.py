@@ -346,6 +346,7 @@ class RenderPanel(QWidget):
 
     def _tell_progress(self, job: Job[None]) -> None:
         if job is self._job:
+            self.pause_button.setText(_to_pause(job))
             self.bar.setValue(round(1000 * job.done))
             left = "paused" if job.state is State.PAUSED else time_left(job.seconds_left)
             self.stage.setText(f"{job.stage}   {left}")
@@ -382,9 +383,13 @@ class RenderPanel(QWidget):
         for button in (self.pause_button, self.keep_button, self.cancel_button):
             button.setVisible(running)
             button.setEnabled(job is not None and not job.cancel_asked)
-        self.pause_button.setText("Go on" if job is not None and job.state is State.PAUSED else "Pause")
+        self.pause_button.setText(_to_pause(job))
         self.bar.setVisible(running)
         self.stage.setVisible(running)
         if not running:
             self.bar.setValue(0)
             self.stage.clear()
+
+
+def _to_pause(job: Job[None] | None) -> str:
+    return "Go on" if job is not None and job.state is State.PAUSED else "Pause"

@@ -150,6 +150,11 @@ class ReadoutPanel(QWidget):
             if isinstance(value, QLabel):
                 value.setText(row.value)
             note.setText(row.note)
+            if row.note:
+                # a range that comes and goes would move the fields below from under the mouse
+                policy = note.sizePolicy()
+                policy.setRetainSizeWhenHidden(True)
+                note.setSizePolicy(policy)
             note.setVisible(bool(row.note) and row.key not in offered)
             told = f"<p>{row.label}: {row.help}</p>" + (f"<p>{row.note}</p>" if row.note else "")
             for label, style in (

@@ -89,7 +89,7 @@ class StatusBar(QStatusBar):
         """Hold the job that is shown, or let it go on."""
         if self.job is not None:
             self.job.resume() if self.job.state is State.PAUSED else self.job.pause()
-            self.follow(self.job)
+            self.runner.progress.emit(self.job)  # for the panel that has such a button as well
 
     def cancel_work(self) -> None:
         """Stop the job that is shown; what it has given so far stays."""

@@ -138,3 +138,8 @@ def test_photographs_are_dropped_on_it_and_cleared(qtbot, made, tmp_path):
     assert [path.name for path in made.paths] == ["1.png", "2.png", "3.png"]
     made.clear()
     assert not made.paths and made.names.count() == 0 and not made.measure_button.isEnabled()
+
+
+def test_escape_closes_it_as_it_does_a_dialog(qtbot, made):
+    qtbot.keyClick(made, Qt.Key.Key_Escape)
+    assert not made.isVisible()

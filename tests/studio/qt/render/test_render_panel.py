@@ -126,6 +126,10 @@ def test_pause_holds_the_render_and_go_on_continues_it(qtbot, panel):
     job = panel.runner.job()
     press(qtbot, panel.pause_button)
     assert job.state is State.PAUSED and panel.pause_button.text() == "Go on"
+    job.resume()
+    panel.runner.progress.emit(job)  # as the status bar does
+    assert panel.pause_button.text() == "Pause"
+    press(qtbot, panel.pause_button)
 
     def stands() -> bool:
         before = panel.session.shown.world.rays.rays

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton
@@ -90,3 +91,17 @@ def test_what_would_fix_it_is_applied_by_a_click_and_undone(qtbot: QtBot) -> Non
     qtbot.waitUntil(lambda: panel._fix["saturated"].isVisible())
     panel._fix["saturated"].click()  # the same in its row
     qtbot.waitUntil(lambda: value_of(panel, "saturated") == "0%" and not panel._fix["saturated"].isVisible())
+
+
+def test_a_range_that_goes_moves_no_field_below_it(qtbot: QtBot) -> None:
+    panel = panel_on(qtbot)
+    _, _, note = panel._labels["angle"]
+    note.setText("12.0 to 14.0")
+    panel._rows = tuple(replace(row, note="12.0 to 14.0") if row.key == "angle" else row for row in panel._rows)
+    panel._paint()
+    qtbot.wait(20)
+    below = panel.placing.fields["standoff"].y()
+    panel._rows = tuple(replace(row, note="") if row.key == "angle" else row for row in panel._rows)
+    panel._paint()
+    qtbot.wait(20)
+    assert panel.placing.fields["standoff"].y() == below and not note.isVisible()
