@@ -144,7 +144,9 @@ def describe(model: BaseModel) -> tuple[FieldSpec, ...]:
     for derived in DERIVED.get(owner, ()):
         place = next(i for i, spec in enumerate(specs) if spec.name == derived.before)
         limits: dict[str, Any] = {"unit": Unit.of(derived.unit), "low": 0.0, "low_open": True}
-        value = derived.read(model)
+        value, stored = derived.read(model), specs[place]
+        if stored.high is not None and stored.value:
+            limits["high"] = stored.high * value / stored.value  # as much as what it is stored as, told in its own unit
         specs.insert(
             place,
             FieldSpec(derived.name, derived.label, derived.help, "number", value, assign=derived.assign, **limits),

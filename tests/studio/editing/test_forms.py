@@ -230,6 +230,11 @@ class TestMaterials:
 
 
 class TestLinkedFields:
+    def test_a_focal_length_is_bounded_as_fx_is_and_in_its_own_unit(self, project: Project) -> None:
+        """1e9 mm was refused with the limit of fx, in px and without a unit, which it was below."""
+        camera = project.scene.camera
+        assert spec(camera, "focal_length").high == pytest.approx(1e7 * camera.pixel_pitch)
+
     def test_a_typed_focal_length_sets_fx_and_fy(self, project: Project) -> None:
         changed = edited(project, CAMERA, spec(project.scene.camera, "focal_length"), 0.016)
         assert changed.scene.camera.fx == pytest.approx(0.016 / 3.45e-6)
