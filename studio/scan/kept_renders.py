@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from analysis.gauges.read import Reading
 from render.base.errors import InputError
@@ -46,7 +46,7 @@ class Kept:
     name: str
     created: str
     project: Project
-    """As it was rendered, at its image scale."""
+    """As it was rendered, at its image scale, with sensor, lens and extraction as its figures were measured."""
     image_scale: float
     """Of the image, to the scanner's."""
     figures: dict[str, float]
@@ -55,6 +55,8 @@ class Kept:
     """None: it is in this session alone."""
     readings: tuple[Reading, ...] = ()
     """Of the part's measures, as the project has them now; of a render of this session alone."""
+    laser_power: tuple[float, ...] = ()
+    """W, of each laser, with which it was measured; none: as it was rendered, which its light is of."""
     stopped: bool = False
     """Before it was finished, so that light is missing."""
 
@@ -109,6 +111,7 @@ def keep(root: Path, what: Kept, frame: Frame) -> Kept:
         "name": what.name,
         "created": created,
         "image_scale": what.image_scale,
+        "laser_power": list(what.laser_power),
         "stopped": what.stopped,
         "figures": {name: value if math.isfinite(value) else None for name, value in what.figures.items()},
         "inputs": input_hashes(what.project.scene, root),
@@ -155,5 +158,10 @@ def _read(path: Path) -> Kept:
         if key in FIGURES
     }
     project = Project.load(path.parent / PROJECT)
-    stopped = record.get("stopped") is True
-    return Kept(name, created, project, float(scale), numbers, path.parent, stopped=stopped)
+    power, stopped = record.get("laser_power"), record.get("stopped") is True
+    powers = tuple(map(float, power)) if _are_powers(power, len(project.scene.lasers)) else ()
+    return Kept(name, created, project, float(scale), numbers, path.parent, (), powers, stopped)
+
+
+def _are_powers(found: Any, count: int) -> TypeGuard[list[float]]:
+    return isinstance(found, list) and len(found) == count and all(isinstance(one, float | int) for one in found)

@@ -12,6 +12,7 @@ from analysis.report.units import digits
 from render.base.csv_file import write_csv
 from studio.project.project import Project
 from studio.scan.kept_renders import FIGURES, Kept
+from studio.scan.redevelop import Development
 from studio.scan.stages import scaled_sensor
 from studio.study.changes import changes
 
@@ -49,7 +50,12 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
     labels: dict[str, str] = {}
     found: list[dict[str, tuple[str, str]]] = []
     for one in renders:
-        differing = {change.field: change for change in changes(_at_full_scale(first), _at_full_scale(one))}
+        differing = {
+            # of an exposure that was scaled to and fro the last digits may differ
+            change.field: change
+            for change in changes(_as_measured(first), _as_measured(one))
+            if change.a != change.b
+        }
         labels |= {field: change.label for field, change in differing.items()}
         found.append({field: (change.a, change.b) for field, change in differing.items()})
     for field, label in labels.items():
@@ -60,10 +66,13 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
     return rows
 
 
-def _at_full_scale(render: Kept) -> Project:
-    """Its project with the exposure of the scanner, which a smaller image has less of as its pixels are larger."""
-    sensor = scaled_sensor(render.project.sensor, 1.0 / render.image_scale)
-    return render.project.model_copy(update={"sensor": sensor})
+def _as_measured(render: Kept) -> Project:
+    """Its project with its lasers' powers, and the exposure of the scanner, which a smaller image has less of."""
+    project = render.project
+    if render.laser_power:
+        project = Development(project, render.laser_power).powered
+    sensor = scaled_sensor(project.sensor, 1.0 / render.image_scale)
+    return project.model_copy(update={"sensor": sensor})
 
 
 def _measures(renders: Sequence[Kept]) -> list[Row]:
@@ -86,10 +95,13 @@ def _measures(renders: Sequence[Kept]) -> list[Row]:
 
 def write_table(path: Path, renders: Sequence[Kept], rows: Sequence[Row]) -> None:
     """As CSV. InputError: the file cannot be written."""
-    numbers = {row.label: [f"{value:.9g}" if math.isfinite(value) else "" for value in row.values] for row in rows}
-    write_csv(
-        path, ["", *(one.name for one in renders)], ([row.label, *(numbers[row.label] or row.cells)] for row in rows)
-    )
+    header = ["", *(one.name for one in renders)]
+    write_csv(path, header, ([row.label, *_for_file(row)] for row in rows))
+
+
+def _for_file(row: Row) -> list[str]:
+    """Numbers with all their digits, texts as they are."""
+    return [f"{value:.9g}" if math.isfinite(value) else "" for value in row.values] or list(row.cells)
 
 
 def _cell(value: float, first: float) -> str:

@@ -43,6 +43,8 @@ class Render:
     """By extraction method: one for each laser."""
     final: bool = True
     """False while it refines, and when it was stopped early."""
+    stopped: bool = False
+    """It was stopped early before it was kept, so that no more of its light comes."""
     name: str = ""
     """As the history shows it; empty: by its number."""
     created: str = ""
@@ -80,7 +82,7 @@ class Render:
     @property
     def refining(self) -> bool:
         """More of its light is to come by itself."""
-        return not self.final and self.state is None
+        return not self.final and self.state is None and not self.stopped
 
     def developed_by(self, now: Project) -> Project:
         """The project, at full scale, by whose sensor, power and extraction it is developed and measured."""

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QToolButton, QVBox
 from analysis.report.colour import DIVERGING
 from render.base.threads import Cancel
 from render.output.tone_mapping import Picture, colour_table, pyramid
+from studio.editing.units import Unit
 from studio.qt.core import theme
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Render
@@ -160,9 +161,24 @@ class CompareView(QWidget):
         self.over.set_clip(float(self.wipe.value()))
         self.scale.setVisible(not wiping)
         unit = self.comparison.unit
-        self.told.setText(f"difference (right minus left): RMS {self.comparison.rms:.4g} {unit}")
+        self.told.setText(f"difference (right minus left): RMS {self.comparison.rms:.4g} {unit}{self._exposed()}")
         if not wiping:
             self._show_scale(unit)
+
+    def _exposed(self) -> str:
+        """How long the images were: renders are developed with the exposure of now as they are looked at."""
+        if self._pair is None or self.quantity.currentData() != "image":
+            return ""
+        made = [(one, one.made_from.get("images")) for one in (self._pair[0], self._pair[2])]
+        times = [
+            Unit.of("s").with_unit(float(f"{how[1].project.sensor.exposure_time / one.image_scale**2:.4g}"))
+            for one, how in made
+            if how is not None
+        ]
+        if len(times) < 2:
+            return ""
+        left, right = times
+        return f"; both exposed for {left}" if left == right else f"; exposed for {left} left and {right} right"
 
     def _show_scale(self, unit: str) -> None:
         table = np.ascontiguousarray(np.broadcast_to(colour_table(DIVERGING, 160), (12, 160)))

@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
 from render.base.errors import InputError
 from render.world.world import build_world
 from studio.project.date_and_time import read_out
-from studio.project.project import Project
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.session import Render, Session, one_of
@@ -40,14 +39,17 @@ def as_kept(session: Session, render: Render, name: str) -> Kept:
     """A render of the session as a column of the table."""
     found = best(render.measurements, session.project) if render.measurements else []
     read = readings(render.project.read_as(session.project), render.frame, found)
-    scale, figures = render.scanner_scale, figures_of(found)
-    return Kept(name, render.created, _measured(render), scale, figures, readings=read, stopped=not render.final)
-
-
-def _measured(render: Render) -> Project:
-    """The render's project with sensor, lens, powers and extraction as they were when its figures were measured."""
-    made = render.made_from.get("measurements")
-    return render.project if made is None or not render.measurements else made[1].powered
+    made = render.made_from.get("measurements") if render.measurements else None
+    return Kept(
+        name,
+        render.created,
+        render.project if made is None else made[1].project,
+        render.scanner_scale,
+        figures_of(found),
+        readings=read,
+        laser_power=() if made is None else made[1].laser_power,
+        stopped=not render.final and not render.refining,
+    )
 
 
 def keep_render(session: Session, render: Render, name: str) -> Kept:
@@ -68,7 +70,7 @@ def open_render(session: Session, kept: Kept) -> Render:
     world = build_world(kept.project.scene, root, frame.step)
     number = max([render.number for render in session.renders], default=0) + 1
     render = Render(number, kept.project, world, frame, name=kept.name, created=read_out(kept.created))
-    render.image_scale = kept.image_scale
+    render.image_scale, render.final, render.stopped = kept.image_scale, not kept.stopped, kept.stopped
     render.source = session.project
     session.add_render(render)
     return render

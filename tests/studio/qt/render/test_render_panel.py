@@ -260,6 +260,13 @@ def test_two_renders_are_compared_by_wipe_and_difference(qtbot, panel):
     a, b = window.comparison.a, window.comparison.b
     assert np.allclose(b, a / 2, rtol=1e-5)
     assert window.over.isVisible()
+    assert "exposed" not in window.told.text()  # light is of no exposure
+    how = development(session.renders[0].project, session.renders[0].project)
+    for render in session.renders:
+        render.made_from["images"] = render.frame, how
+    window.quantity.setCurrentIndex(0)
+    window.quantity.activated.emit(0)
+    qtbot.waitUntil(lambda: "both exposed for" in window.told.text())
     window.mode.setCurrentText(DIFFERENCE)
     assert not window.over.isVisible() and "RMS" in window.told.text()
     window.close()

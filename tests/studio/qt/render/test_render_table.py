@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from render.base.errors import InputError
 from studio.project.document import Document
 from studio.qt.core.session import Render, Session
 from studio.qt.render.history import History, title
-from studio.qt.render.render_table import as_kept, keep_render
+from studio.qt.render.render_table import as_kept, keep_render, open_render
 from studio.scan.kept_renders import kept_renders
 from studio.scan.redevelop import develop_again, development, measure_again
+from studio.study.side_by_side import side_by_side
 from tests.studio.qt.small_session import small_project, small_render
 
 
@@ -64,10 +66,28 @@ def test_figures_stand_beside_the_settings_that_they_were_measured_with(qtbot: Q
     render.made_from["measurements"] = frame, how
     session.add_render(render)
     shown = as_kept(session, render, "one")
-    assert shown.project.sensor.exposure_time == 0.009 and shown.project.scene.lasers[0].power == 0.005
-    kept = keep_render(session, render, "one")
+    assert shown.project.sensor.exposure_time == 0.009 and shown.laser_power == (0.005,)
+    keep_render(session, render, "one")
     (again,), wrong = kept_renders(tmp_path)
-    assert again.project.sensor.exposure_time == 0.009 and not wrong and kept.project == shown.project
+    assert not wrong and again.project == shown.project and again.laser_power == (0.005,)
+    two = replace(shown, name="two", laser_power=(0.01,))
+    assert any(row.cells == ("5 mW", "10 mW") for row in side_by_side([again, two]))
+    # its light is that of the render: developed by the same settings the image is the same
+    opened = open_render(session, again)
+    other = develop_again(opened.frame, development(opened.project, longer))
+    assert np.array_equal(other[0].pixels, images[0].pixels) and opened.final
+
+
+def test_a_render_that_was_stopped_is_opened_as_stopped(qtbot: QtBot, tmp_path: Path) -> None:
+    file = tmp_path / "project.json"
+    project = small_project().save(file)
+    session = Session(Document(project, file))
+    world, frame = small_render()
+    render = Render(1, project, world, frame, final=False, stopped=True)
+    session.add_render(render)
+    keep_render(session, render, "half")
+    opened = open_render(session, kept_renders(tmp_path)[0][0])
+    assert not opened.final and not opened.refining and as_kept(session, opened, "again").stopped
 
 
 def test_a_project_without_a_file_keeps_nothing(qtbot: QtBot) -> None:
