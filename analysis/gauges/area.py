@@ -13,6 +13,8 @@ from analysis.gauges.spikes import NEIGHBOURS, spikes
 
 UNSURE = 10.0
 """Times the section's median sigma: a straight line over such a point's place knows more than the point."""
+LONGEST_RUN = 5
+"""Of such points, in a row."""
 UNSEEN, UNSEEN_SHARE = 5.0, 0.02
 """Times the usual distance between points, of one that is a stretch without any; of the section, what all of these may
 be before it is told."""
@@ -27,11 +29,15 @@ def section(region: tuple[float, float], frame: Frame) -> tuple[float, float]:
 
 
 def without_unsure(profile: Profile, region: tuple[float, float]) -> Profile:
-    """The profile less the points of the region that are far less sure than is usual there."""
+    """The profile less the points of the region that are far less sure than is usual there, but for long runs of them,
+    over which a straight line would know less than they do: where a line is saturated they are all that is known."""
     inside = profile.weight(*region) > 0.0
     sigma = np.linalg.norm(profile.random, axis=1)
     usual = float(np.median(sigma[inside])) if inside.any() else 0.0
-    return profile.taken(~inside | (sigma <= UNSURE * usual))
+    unsure = inside & (sigma > UNSURE * usual)
+    run = np.append(0, np.cumsum(unsure[1:] != unsure[:-1])) if len(unsure) else np.zeros(0, np.intp)
+    short = np.bincount(run, minlength=1)[run] <= LONGEST_RUN
+    return profile.taken(~(unsure & short))
 
 
 def section_points(profile: Profile, region: tuple[float, float], frame: Frame) -> NDArray[np.intp]:
@@ -56,8 +62,8 @@ def unseen(profile: Profile, region: tuple[float, float], frame: Frame) -> str:
     if wide.sum() <= UNSEEN_SHARE * (region[1] - region[0]):
         return ""
     return (
-        f"{1e3 * wide.sum():.3g} mm of its section are not seen and carry no points: straight lines join what is seen, "
-        "and its sigma does not know what lies there"
+        f"{1e3 * wide.sum():.3g} mm of its section carry no points, or none that are sure: straight lines join the "
+        "others, and its sigma does not know what lies there"
     )
 
 

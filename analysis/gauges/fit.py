@@ -28,6 +28,8 @@ DRAWN_SIGMAS = 3.0
 """A usual miss from which far points may have drawn the curve to them: they have if most lie so much nearer another."""
 DRAWN, DRAWN_SEED = 50, 11
 """Curves that are drawn by chance then: with a third of the points false, 15 of them have no false one in three."""
+ALONE = 3.0
+"""Times the steps on either side, of a step that stands alone."""
 GRAZING = 1e-3
 """Sine of the angle between curve and d below which a point slides along the curve and tells nothing of it."""
 FOOT_STEPS = 3
@@ -208,17 +210,21 @@ def _of_most_points(
 
 
 def _off_at_a_leap(e: Float, limit: float) -> NDArray[np.bool_]:
-    """(n,) the misses beyond a limit, in runs that a leap of as much parts from a neighbour.
+    """(n,) the misses beyond a limit, in runs that end at a leap of as much from one point to the next.
 
     False points stand apart from the line. Where a line leaves the curve bit by bit it has another shape, such as a
     cylinder that is cut aslant, and what is asked for is the curve through all of it.
     """
     off = np.abs(e) > limit
-    run = np.append(0, np.cumsum(off[1:] != off[:-1]))
-    leap = np.abs(np.diff(e)) > limit
+    step = np.abs(np.diff(e))
+    before, after = np.append(0.0, step[:-1]), np.append(step[1:], 0.0)
+    edge = off[1:] != off[:-1]
+    # steps of a bent line grow bit by bit, those among false points are anything, and behind a soft edge all are off
+    beside = np.where(edge, np.where(off[1:], before, after), np.maximum(before, after))
+    leap = (step > limit) & (step > ALONE * beside)
+    run = np.append(0, np.cumsum(edge | leap))
     parted = np.zeros(run[-1] + 1, dtype=np.bool_)
-    edge = run[1:] != run[:-1]
-    parted[run[1:][edge & leap]] = parted[run[:-1][edge & leap]] = True
+    parted[run[1:][leap]] = parted[run[:-1][leap]] = True
     return np.asarray(off & parted[run])
 
 

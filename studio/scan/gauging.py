@@ -93,17 +93,23 @@ def _number(value: object) -> float:
 
 
 def worst(found: Sequence[Reading]) -> Reading:
-    """Of one measure over the steps: one without a value first, then by verdict, then the farthest off.
+    """Of one measure over the steps: one without a value first, then by verdict, then the least within its limits.
 
-    Off the middle of its tolerance, or, without a nominal, off the truth.
+    Without limits the farthest off its nominal, and without that off the truth.
     """
 
     def badness(one: Reading) -> tuple[bool, bool, bool, float]:
         gauge = one.gauge
-        middle = (gauge.nominal or 0.0) + 0.5 * ((gauge.lower or 0.0) + (gauge.upper or 0.0))
-        off = one.error if gauge.nominal is None else one.value - middle
-        off = abs(off) if math.isfinite(off) and not one.reason else 0.0
-        return bool(one.reason), one.verdict == "fail", one.verdict == "undecided", off
+        if gauge.nominal is None:
+            off = abs(one.error)
+        elif gauge.lower is None and gauge.upper is None:
+            off = abs(one.value - gauge.nominal)
+        else:
+            beyond = one.value - gauge.nominal
+            below, above = (gauge.lower or 0.0) - beyond, beyond - (gauge.upper or 0.0)
+            off = above if gauge.lower is None else below if gauge.upper is None else max(below, above)
+        known = off if math.isfinite(off) and not one.reason else -math.inf
+        return bool(one.reason), one.verdict == "fail", one.verdict == "undecided", known
 
     return max(found, key=badness)
 

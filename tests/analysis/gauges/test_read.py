@@ -174,3 +174,15 @@ def test_a_flat_top_with_rounded_edges_says_that_it_is_no_peak() -> None:
     assert "of a flat one take a step height" in reading.remark
     true, _ = shape("peak")
     assert read(gauge("peak"), 0, profile(true, noise=noise), profile(true)).remark == ""
+
+
+def test_false_points_behind_a_soft_edge_draw_nothing_to_them() -> None:
+    """The line leaves its curve over a few points before it leaps: the leap is within what is off."""
+    for noise in noises(20, 1.0, seed=13):
+        height = np.full(len(ACROSS), -0.5)
+        first = np.searchsorted(ACROSS, 0.004)
+        height[first : first + 4] += 1e-6 * np.array([4.0, 8.0, 12.0, 16.0])
+        height[first + 4 :] += 3e-4
+        asked = gauge("straightness").model_copy(update={"regions": ((-0.01, 0.0101),)})
+        reading = read(asked, 0, profile(height, sigma=1e-6, noise=noise), None)
+        assert abs(reading.value) < 6e-6

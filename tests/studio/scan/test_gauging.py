@@ -81,6 +81,17 @@ def test_the_worst_reading_without_a_nominal_is_the_farthest_off_the_truth() -> 
     assert worst(readings).step == 1
 
 
+@pytest.mark.parametrize(
+    ("limits", "step"), [({"lower": -1e-4}, 0), ({"upper": 1e-4}, 3), ({"lower": -1e-4, "upper": 5e-5}, 3), ({}, 3)]
+)
+def test_the_worst_reading_is_the_nearest_to_its_limit(limits: dict[str, float], step: int) -> None:
+    """Of 39.964 to 40.038 mm, of which none may be below 39.9, the first; the last was told."""
+    gauge = Gauge(kind="step", regions=((-0.08, -0.01), (0.01, 0.08)), nominal=0.04, **limits)
+    values = (0.039964, 0.040001, 0.040022, 0.040038)
+    readings = [Reading(gauge, k, value=value, sigma_random=1e-6, truth=0.04) for k, value in enumerate(values)]
+    assert worst(readings).step == step
+
+
 def test_the_worst_reading_speaks_for_a_measure() -> None:
     gauge = Gauge.model_validate({"name": "a", **LEVEL})
     good = Reading(gauge, 0, value=0.0, sigma_random=1e-5, sigma_systematic=0.0)
