@@ -20,6 +20,8 @@ MOST_POINTS = 5_000_000
 MOST_CELLS = 50_000_000
 BRIDGED = 3.0
 """Longest edge of a triangle that is surface, over the usual one: beyond it there was nothing to see."""
+HOLE = 8.0
+"""The same of two points of one profile, over what neighbours on it are apart."""
 LEVELS = 65535
 """Of 16 bits, less 0, which says that there is no height."""
 FINEST = 1e-9
@@ -66,8 +68,11 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
     except QhullError:
         raise InputError("the points lie on one line, which has no area", cure="scan several steps") from None
     corners = mesh.points[mesh.simplices]
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    is_surface = edges <= BRIDGED * float(np.median(edges))
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    longest = edges.max(axis=1)
+    is_surface = longest <= BRIDGED * float(np.median(longest))
+    if {"step", "row"} <= points.keys():
+        is_surface &= ~_over_holes(cloud, mesh, edges)
     first, second = (corners[:, i] - corners[:, 0] for i in (1, 2))
     area = 0.5 * float(np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])[is_surface].sum())
     if pitch is None:
@@ -99,6 +104,23 @@ def height_map(points: Cloud, pitch: float | None = None) -> HeightMap:
         _median(sigma),
         _median(together),
     )
+
+
+def _over_holes(cloud: Cloud, mesh: Delaunay, edges: Float) -> NDArray[np.bool_]:
+    """(t,) the triangles that join points of one profile across many missing scan lines; edges: (t, 3) as rolled.
+
+    Steps may be far apart, and the usual edge is as long: along a profile points are nearer, and a hole is seen there.
+    """
+    laser = cloud["laser"]
+    order = np.lexsort((cloud["row"], cloud["step"], laser))
+    profile = np.empty(len(order), dtype=np.intp)
+    another = (np.diff(cloud["step"][order]) != 0) | (np.diff(laser[order]) != 0)
+    profile[order] = np.append(0, np.cumsum(another))
+    apart = np.linalg.norm(np.diff(mesh.points[order], axis=0), axis=1)[~another]
+    if len(apart) == 0:
+        return np.zeros(len(edges), dtype=np.bool_)
+    of = profile[mesh.simplices]
+    return np.asarray(np.any((of == np.roll(of, 1, axis=1)) & (edges > HOLE * np.median(apart)), axis=1))
 
 
 def encoded(heights: Float) -> tuple[NDArray[np.uint16], float, float]:

@@ -40,6 +40,19 @@ def test_a_plane_stays_a_plane_and_has_a_cell_for_each_point() -> None:
     assert np.abs(made.heights - (0.1 + 0.2 * x - 0.3 * y))[known].max() < 1e-12
 
 
+def test_a_hole_along_a_profile_has_no_heights_however_far_apart_the_steps_are() -> None:
+    """Over a groove whose bottom the last step did not see, flank was joined to flank: 6 mm too high."""
+    cloud, middle = scan(), 3e-4 * ROWS / 2
+    wide = cloud | {"y": 5.0 * cloud["y"], "z": np.abs(cloud["x"] - middle)}
+    seen = (wide["step"] < STEPS - 1) | (np.abs(wide["row"] - ROWS / 2) > 10)
+    made = height_map({name: column[seen] for name, column in wide.items()}, 3e-4)
+    x, y = places(made)
+    known, last = np.isfinite(made.heights), np.abs(y - 5e-3 * (STEPS - 1)) < 4e-4
+    assert not known[last & (np.abs(x - middle) < 2e-3)].any() and known[last & (np.abs(x - middle) > 4e-3)].any()
+    assert known[np.abs(y - 5e-3 * (STEPS - 2)) < 4e-4].mean() > 0.9
+    assert np.abs(made.heights - np.abs(x - middle))[known].max() < 1.5e-3
+
+
 @pytest.mark.parametrize("length", [1.0, 4.0])
 def test_sigma_and_correlation_of_cells_are_those_of_repeated_clouds(length: float) -> None:
     cloud, trials = scan(length=length), 40
