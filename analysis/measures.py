@@ -41,7 +41,8 @@ class Measures:
     outlier_rate: float
     """Errors larger than `floor` and than 5 robust sigma."""
     autocorrelation: float
-    """Between neighbouring scan lines, outliers left out: near 0 for independent rows, towards 1 after smoothing."""
+    """Between neighbouring scan lines, outliers left out and others counted to 3 robust sigma at most: near 0 for
+    independent rows, towards 1 after smoothing."""
     coverage: float
     """Within +-2 predicted sigma; 0.954 when the prediction is honest and the errors are normal."""
 
@@ -92,7 +93,7 @@ def measure(
         robust_sigma=robust_sigma(e),
         p95=float(np.percentile(np.abs(e), 95)),
         outlier_rate=float(np.mean(out)),
-        autocorrelation=_autocorrelation(e[~out], index[here][~out], rank[here][~out]),
+        autocorrelation=_autocorrelation(_clipped(e[~out]), index[here][~out], rank[here][~out]),
         coverage=float(np.mean(covered)) if len(covered) else float("nan"),
     )
 
@@ -115,8 +116,11 @@ def error_statistics(error: Float, index: NDArray[np.intp], length: float) -> tu
     correlation falls by r^2, of n (1 - r^2) / (1 + r^2) (Bartlett, J. R. Stat. Soc. B 8, 1946).
     """
     count, nobody = len(error), np.full(len(error), np.nan)
-    found = measure(error, nobody, np.inf, index, np.zeros(count, dtype=np.intp))
-    r = max((length - 1.0) / (length + 1.0), found.autocorrelation if math.isfinite(found.autocorrelation) else 0.0)
+    strongest = np.zeros(count, dtype=np.intp)
+    found = measure(error, nobody, np.inf, index, strongest)
+    # of all the error that the spread below holds, of edges as well
+    whole = _autocorrelation(error, index, strongest)
+    r = max((length - 1.0) / (length + 1.0), whole if math.isfinite(whole) else 0.0)
     r = min(max(r, 0.0), 1.0 - 1e-9)
     of_mean = float(shared_rows(np.array((1.0 + r) / (1.0 - r)), count)) / count
     of_square = float(shared_rows(np.array((1.0 + r**2) / (1.0 - r**2)), count)) / count
@@ -166,6 +170,12 @@ def means(
     return np.asarray(e[runs].mean(axis=1)), np.asarray(np.sqrt(variance[runs].mean(axis=1) + together))
 
 
+def _clipped(error: Float) -> Float:
+    """Two neighbours at an edge err alike and may be a hundred times the usual error: they do not speak for all."""
+    reach = CLIPPED * robust_sigma(error)
+    return np.clip(error, np.median(error) - reach, np.median(error) + reach) if reach > 0.0 else error
+
+
 def _autocorrelation(error: Float, index: NDArray[np.intp], rank: NDArray[np.intp]) -> float:
     """Correlation of errors on scan lines i and i + 1, the strongest peak of each."""
     order = np.lexsort((rank, index))
@@ -174,9 +184,6 @@ def _autocorrelation(error: Float, index: NDArray[np.intp], rank: NDArray[np.int
     adjacent = np.flatnonzero(np.diff(lines) == 1)
     if len(adjacent) < 3:
         return float("nan")
-    # two neighbours at an edge err alike and may be a hundred times the usual error: they are not to speak for all
-    reach = CLIPPED * robust_sigma(e)
-    e = np.clip(e, np.median(e) - reach, np.median(e) + reach) if reach > 0.0 else e
     e = e - np.mean(e)
     variance = float(np.mean(e**2))
     return float(np.mean(e[adjacent] * e[adjacent + 1]) / variance) if variance > 0.0 else float("nan")
