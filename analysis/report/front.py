@@ -79,7 +79,11 @@ def _judged(surface: bool, gauges: list[str]) -> str:
     if not of:
         return ""
     without = len(gauges) - having
-    rest = "" if without == 0 else "; the other has no tolerance" if without == 1 else "; the others have no tolerance"
+    rest = ""
+    if without and having:
+        rest = "; the other has no tolerance" if without == 1 else "; the others have no tolerance"
+    elif without:
+        rest = "; the measure has no tolerance" if without == 1 else "; the measures have no tolerance"
     return f"Of {' and '.join(of)}{rest}."
 
 

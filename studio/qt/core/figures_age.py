@@ -27,6 +27,12 @@ class FiguresAge(QObject):
         self._timer.timeout.connect(lambda: self._tell(self._behind()))
         for changed in (session.project_changed, session.renders_changed, session.measured):
             changed.connect(self._follow)
+        self._follow()
+
+    def give_up(self) -> None:
+        """It could not be measured, which is told elsewhere: nothing is on its way."""
+        self._timer.stop()
+        self._tell(False)
 
     def _follow(self) -> None:
         if not self._behind():

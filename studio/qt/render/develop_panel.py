@@ -364,6 +364,7 @@ class DevelopPanel(QWidget):
     def _tell_failure(self, job: Job[object]) -> None:
         if job.problem is not None:
             self.session.message.emit("error", job.problem.text)
+            one_of(FiguresAge, self.session).give_up()
 
 
 def brightness(images: list[Image], names: list[str]) -> str:

@@ -24,6 +24,7 @@ from studio.runtime.jobs import Job, Progress, State
 from studio.runtime.preferences import PreferencesFile
 from studio.scan.film import export_film
 from studio.scan.height_map import export_height_map
+from studio.scan.logo import logo_remarks
 from studio.scan.own_files import check_replaceable
 from studio.scan.redevelop import Development, develop_again, development, measure_again
 from studio.scan.remarks import scale_notes
@@ -144,6 +145,8 @@ class ExportActions(QObject):
             return export.export_unless(cancelled, writer, path, what)
 
         notes = scale_notes(render.scanner_scale)
+        if kind == "report":
+            notes = (*notes, *logo_remarks(now, self.session.document.root))
 
         def then(written: list[Path]) -> None:
             if kind == "report" and whole is None:

@@ -103,7 +103,10 @@ class PlacingFields(QObject):
 
     def _now(self) -> Start:
         look = self._look
-        points = () if look is None else tuple(lit_point(look, i) for i in range(len(look.scene.lasers)))
+        lasers = () if look is None else look.scene.lasers
+        # a laser that was just added or removed is not in the look yet
+        same = look is not None and len(lasers) == len(self.session.project.scene.lasers)
+        points = tuple(lit_point(look, i) for i in range(len(lasers))) if look is not None and same else ()
         return self.session.project, points, dict(self.values)
 
     def _tell_why(self, field: PlacingField, why: str) -> None:
@@ -131,6 +134,8 @@ class PlacingFields(QObject):
 
     def _move(self, key: str, value: float, start: Start, merge: str) -> None:
         """By as much as makes the read-out the value: what is lit moves over the part, which may be of any shape."""
+        if not start[1]:
+            return
         asked, made, off = value, None, math.inf
         try:
             for _ in range(TRIES):

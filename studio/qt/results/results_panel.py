@@ -233,6 +233,9 @@ class ResultsPanel(QWidget):
 
     def _project_changed(self) -> None:
         if self.session.project.measured_in != self.profile.section:
+            region = self.region.region
+            if isinstance(region, Region) and region.along == "fan":
+                self.region.choose(None)  # other points lie there in another section
             self.refresh()
         else:
             self._tell_head()

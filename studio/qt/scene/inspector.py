@@ -127,8 +127,9 @@ class Inspector(QWidget):
         """Why the selection is not as it is set: in words, and at its fields."""
         text, problems = self.session.problem_of(self.session.selection), self.session.problems
         if self.session.selection == ("delivery",):
-            text = logo_uri(self.session.project.delivery.logo, self.session.document.root)[1]
-            problems = {**problems, ("delivery", "logo"): text} if text else problems
+            logo = logo_uri(self.session.project.delivery.logo, self.session.document.root)[1]
+            problems = {**problems, ("delivery", "logo"): logo} if logo else problems
+            text = "\n".join(filter(None, [text, logo]))
         self.problem.setText(text)
         self.problem.setVisible(bool(text))
         self.form.mark(problems)

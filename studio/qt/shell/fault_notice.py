@@ -9,8 +9,9 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QWidget
 
 from studio.qt.core.icons import icon
 from studio.qt.forms.fields import tool_button
-from studio.qt.shell.window import MainWindow, version
+from studio.qt.shell.window import MainWindow
 from studio.runtime.fault_log import Fault
+from studio.runtime.version import version
 
 
 class FaultNotice(QWidget):

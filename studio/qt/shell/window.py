@@ -58,6 +58,7 @@ from studio.qt.study.cell_opener import CellOpener
 from studio.runtime.error_messages import trouble
 from studio.runtime.jobs import Job
 from studio.runtime.preferences import PreferencesFile
+from studio.runtime.version import version
 
 if TYPE_CHECKING:
     from studio.qt.viewport.error_cloud import ErrorCloud
@@ -388,13 +389,3 @@ class MainWindow(QMainWindow):
 def may_be_project(path: Path) -> bool:
     """By its name; a folder may hold one."""
     return path.suffix.lower() == ".json" or path.is_dir()
-
-
-def version() -> str:
-    """Of the program, as it is installed."""
-    from importlib import metadata
-
-    try:
-        return metadata.version("blazer-studio")
-    except metadata.PackageNotFoundError:
-        return ""

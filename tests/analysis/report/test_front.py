@@ -104,6 +104,8 @@ def test_a_verdict_says_how_many_measures_it_is_of() -> None:
     assert found["verdict"] == "pass"
     assert found["judged"] == "Of the surface and 1 of 3 measures; the others have no tolerance."
     assert found["judged"] in render_page(report)
+    none = replace(report, measures=rows[1:])
+    assert told(none)["judged"] == "Of the surface; the measures have no tolerance."
 
 
 def test_the_mean_deviation_is_of_the_surface_and_false_points_are_counted() -> None:
