@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, cast
 
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QEnterEvent, QKeyEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QFileDialog
 from pytestqt.qtbot import QtBot
 
 from studio.qt.shell.window import MainWindow
@@ -95,15 +96,20 @@ def test_keys_are_for_the_3d_view_that_the_mouse_comes_over(window: MainWindow, 
     assert view.hasFocus()
 
 
-def test_ctrl_and_a_letter_is_the_menus_while_something_is_typed(window: MainWindow, power: Any, qtbot: QtBot) -> None:
+def test_ctrl_and_a_letter_is_the_menus_while_something_is_typed(
+    window: MainWindow, power: Any, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, **__: ("", ""))
     window.commands["export_html"].setEnabled(True)
     asked: list[str] = []
-    for key in ("export_html", "duplicate"):
-        window.commands[key].triggered.disconnect()
-        window.commands[key].triggered.connect(lambda _, key=key: asked.append(key))
+    own = [(window.commands[key], partial(asked.append, key)) for key in ("export_html", "duplicate")]
+    for command, told in own:
+        command.triggered.connect(told)
     type_into(qtbot, power, "35", key=None)
     qtbot.keyClick(power, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
     qtbot.keyClick(power, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier)
+    for command, told in own:
+        command.triggered.disconnect(told)
     assert asked == ["export_html", "duplicate"] and power.text() == "35"
     qtbot.keyClick(power, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
     assert power.selectedText() == "35", "keys of editing stay the field's"
