@@ -38,8 +38,8 @@ SMALL = 0.25
 
 
 def false_points(value: Float) -> NDArray[np.bool_]:
-    """(m,) deviations that are far off all others, as of points that are no part of the surface."""
-    return np.asarray(np.abs(value - np.median(value)) > FAR * robust_sigma(value))
+    """(m,) values that are far off all others, as of points that are no part of the surface, or that are NaN."""
+    return ~np.asarray(np.abs(value - np.nanmedian(value)) <= FAR * robust_sigma(value))
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from studio.project.templates import DESCRIPTIONS, template_folder
 from studio.project.validation_messages import input_error
 
 MAX_SEED = 2**63 - 1
-Section = Literal["laser_plane", "upright", "across_x", "across_y", "across_z"]
+ProfileSection = Literal["laser_plane", "upright", "across_x", "across_y", "across_z"]
 """A plane through the part: the laser's, a vertical one, or across an axis of the world."""
 READ_OFF = ("measures", "measured_in", "delivery")
 """Fields that neither render nor develop nor find a line: they say what is read off it, and how it is told."""
@@ -58,7 +58,7 @@ class Project(Model):
     measures: tuple[Gauge, ...] = quantity(
         (), label="Measures", help="Dimensions of the part, read off every profile.", max_length=MOST_GAUGES
     )
-    measured_in: Section = quantity(
+    measured_in: ProfileSection = quantity(
         "laser_plane", label="Measured in", help="The section of the part that profiles and measures are of."
     )
     delivery: Delivery = Delivery()

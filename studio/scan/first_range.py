@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.cloud import Cloud
-from analysis.deviation import FAR
+from analysis.deviation import FAR, false_points
 from analysis.measures import robust_sigma
 from render.base.arrays import Float
 from studio.scan.deviation import Compared
@@ -26,7 +25,7 @@ def deviation_limit(made: Compared) -> float:
     if asked:
         return OVER_TOLERANCE * max(asked)
     value = made.found.value
-    return symmetric_limit(value[_is_near(value)])
+    return symmetric_limit(value[~false_points(value)])
 
 
 def height_range(points: Cloud) -> Ends | None:
@@ -34,9 +33,9 @@ def height_range(points: Cloud) -> Ends | None:
     heights = points["z"]
     errors = points.get("error_depth")
     if errors is not None and np.isfinite(errors).any():
-        heights = heights[_is_near(errors)]
+        heights = heights[~false_points(errors)]
     heights = heights[np.isfinite(heights)]
-    return wider(heights, WIDER) if len(heights) else None
+    return _wider(heights, WIDER) if len(heights) else None
 
 
 def profile_range(truth: Series | None, measured: list[Series]) -> tuple[Ends, Ends] | None:
@@ -46,7 +45,7 @@ def profile_range(truth: Series | None, measured: list[Series]) -> tuple[Ends, E
     if truth is None or exact is None or not exact.any():
         across, distance = (_joined([getattr(one, name) for one in measured]) for name in ("across", "distance"))
         here = np.isfinite(distance)
-        along, up = (wider(values[here], BESIDE) if here.any() else None for values in (across, distance))
+        along, up = (_wider(values[here], BESIDE) if here.any() else None for values in (across, distance))
         return None if along is None or up is None else (along, up)
     index, across, distance = (values[exact] for values in (truth.index, truth.across, truth.distance))
     spread = robust_sigma(_joined([one.distance - np.interp(one.index, index, distance) for one in measured]))
@@ -64,13 +63,8 @@ def _joined(pieces: list[Float]) -> Float:
     return np.concatenate([np.zeros(0), *pieces])
 
 
-def wider(values: Float, share: float) -> Ends | None:
+def _wider(values: Float, share: float) -> Ends | None:
     """From percentile to percentile of finite values, and so much of it more on either side; None: all are alike."""
     low, high = np.percentile(values, ENDS).tolist()
     more = share * (high - low)
     return (low - more, high + more) if high > low else None
-
-
-def _is_near(error: Float) -> NDArray[np.bool_]:
-    """Those that are no false points; one whose error is not known is one."""
-    return np.asarray(np.abs(error - np.nanmedian(error)) <= FAR * robust_sigma(error))

@@ -19,7 +19,7 @@ from analysis.gauges.read import Reading, read
 from render.base.files import atomic_write
 from render.frame import Frame
 from studio.project.found_motion import measured_pose
-from studio.project.project import Project, Section
+from studio.project.project import ProfileSection, Project
 from studio.scan.own_files import MEASURE_COLUMNS
 from studio.scan.sheet_lean import T_section_camera
 from studio.scan.stages import Measurement
@@ -28,7 +28,7 @@ OF_SCAN = "it is of a whole scan: run one (F6, Motion), or Measure > Measure the
 FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error", "error_in_sigmas")
 
 
-def profiles(project: Project, frame: Frame, found: Measurement, section: Section) -> tuple[Profile, Profile]:
+def profiles(project: Project, frame: Frame, found: Measurement, section: ProfileSection) -> tuple[Profile, Profile]:
     """Measured and exact profile of a laser, in a section."""
     T = T_section_camera(project.scene, found.laser, frame.step, section)
     measured = measured_profile(found.points, found.errors, T)

@@ -160,7 +160,7 @@ def _read(path: Path) -> Kept:
     project = Project.load(path.parent / PROJECT)
     power, stopped = record.get("laser_power"), record.get("stopped") is True
     powers = tuple(map(float, power)) if _are_powers(power, len(project.scene.lasers)) else ()
-    return Kept(name, created, project, float(scale), numbers, path.parent, (), powers, stopped)
+    return Kept(name, created, project, float(scale), numbers, path.parent, laser_power=powers, stopped=stopped)
 
 
 def _are_powers(found: Any, count: int) -> TypeGuard[list[float]]:

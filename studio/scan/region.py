@@ -16,7 +16,7 @@ from render.base.arrays import Float
 from render.base.errors import InputError
 from render.scene.scene import Scene
 from studio.project.input_files import input_files
-from studio.project.project import Section
+from studio.project.project import ProfileSection
 from studio.scan.own_files import check_not_read
 from studio.scan.result_series import ErrorView, error_values, measured_series
 from studio.scan.scan_results import COLUMNS
@@ -31,7 +31,7 @@ class Region:
     low: float
     high: float
     """Scan lines, or m across the fan."""
-    section: Section = "laser_plane"
+    section: ProfileSection = "laser_plane"
     """Of the profile in which it is across the fan."""
 
     @property
@@ -46,7 +46,7 @@ class Region:
         place = series.index if self.along == "scan lines" else 1e-3 * series.across
         return np.asarray(found.points.valid & (place >= self.low) & (place <= self.high))
 
-    def across(self, found: Measurement, scene: Scene, section: Section) -> tuple[float, float] | None:
+    def across(self, found: Measurement, scene: Scene, section: ProfileSection) -> tuple[float, float] | None:
         """From and to, m across the fan, for a measure of the part; None: fewer than two points are within it."""
         if self.along == "fan":
             return self.low, self.high
@@ -86,7 +86,7 @@ class Box:
         here = self.holds(np.stack([points[name] for name in "xyz"], axis=1))
         return np.asarray(here & (points["laser"] == laser))
 
-    def across(self, found: Measurement, scene: Scene, section: Section) -> tuple[float, float] | None:
+    def across(self, found: Measurement, scene: Scene, section: ProfileSection) -> tuple[float, float] | None:
         """As of `Region.across`."""
         places = found.points.index[self.of(found, scene)]
         return Region("scan lines", places.min(), places.max()).across(found, scene, section) if len(places) else None

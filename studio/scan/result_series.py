@@ -14,7 +14,7 @@ from render.base.arrays import Float
 from render.base.pose import transform_points
 from render.frame import LaserCurve
 from render.scene.scene import Scene
-from studio.project.project import Section
+from studio.project.project import ProfileSection
 from studio.scan.sheet_lean import T_section_camera
 from studio.scan.stages import Measurement
 
@@ -71,7 +71,9 @@ MEASURED = (
 """Rows of the table of measures in the view's unit, and what each is called elsewhere."""
 
 
-def true_series(curve: LaserCurve, scene: Scene, laser: int, step: int = 0, section: Section = "laser_plane") -> Series:
+def true_series(
+    curve: LaserCurve, scene: Scene, laser: int, step: int = 0, section: ProfileSection = "laser_plane"
+) -> Series:
     """The exact line, broken where it is interrupted."""
     T = T_section_camera(scene, laser, step, section)
     made = _series(curve.index.astype(np.float64), curve.position, curve.depth_z, curve.point, T)
@@ -85,7 +87,7 @@ def true_series(curve: LaserCurve, scene: Scene, laser: int, step: int = 0, sect
     )
 
 
-def measured_series(measurement: Measurement, scene: Scene, section: Section = "laser_plane") -> Series:
+def measured_series(measurement: Measurement, scene: Scene, section: ProfileSection = "laser_plane") -> Series:
     """The points of a measurement, in their order; NaN where a peak gave no point."""
     points = measurement.points
     along = points.pixel[:, 0 if points.axis == "rows" else 1]

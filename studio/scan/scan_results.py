@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from analysis.cloud import INTEGERS, Cloud, ply_pieces
-from analysis.report.delivery import Delivery
 from render.base.arrays import Float
 from render.base.errors import InputError
 from render.base.threads import Cancel
@@ -22,7 +21,7 @@ from render.scene.settings import RenderSettings
 from render.scene.shape import MeshFile
 from render.world.world import World
 from studio.project.input_files import check_unchanged
-from studio.project.project import Project
+from studio.project.project import READ_OFF, Project
 from studio.scan.point_sample import PointSample
 from studio.scan.result_series import MEASURED, ErrorView
 from studio.scan.scan_folder import (
@@ -199,9 +198,7 @@ def _comparable(project: Project) -> Project:
             "scene": scene,
             "render": RenderSettings(),
             "seed": 0,
-            "measures": (),
-            "measured_in": "laser_plane",
-            "delivery": Delivery(),
+            **{name: Project.model_fields[name].default for name in READ_OFF},
         }
     )
 

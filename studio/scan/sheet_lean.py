@@ -14,9 +14,9 @@ import numpy as np
 from render.base.arrays import Float
 from render.base.pose import invert
 from render.scene.scene import Scene
-from studio.project.project import Project, Section
+from studio.project.project import ProfileSection, Project
 
-AXES: dict[Section, str] = {
+AXES: dict[ProfileSection, str] = {
     "across_x": "the world's X",
     "across_y": "the world's Y",
     "across_z": "the world's Z",
@@ -33,7 +33,7 @@ def sheet_lean(scene: Scene, laser: int, step: int = 0) -> float:
     return math.asin(min(abs(float(normal[2])), 1.0))
 
 
-def T_section_camera(scene: Scene, laser: int, step: int, section: Section) -> Float:
+def T_section_camera(scene: Scene, laser: int, step: int, section: ProfileSection) -> Float:
     """(4, 4) from the camera's frame to the section's: x across its plane, y across the fan, z away from the laser.
 
     Both start at the laser; the section's is turned as little as it takes.
@@ -52,7 +52,7 @@ def T_section_camera(scene: Scene, laser: int, step: int, section: Section) -> F
     return invert(T_world_section) @ T_world_camera
 
 
-def section_normal(T_world_laser: Float, section: Section) -> Float:
+def section_normal(T_world_laser: Float, section: ProfileSection) -> Float:
     """(3,) unit, in the world: along which points are carried, on the side of the sheet's own normal.
 
     Of a level sheet no section is upright: its own normal is given.
@@ -75,7 +75,7 @@ def section_note(project: Project) -> str:
     return " ".join(f"{project.scene.lasers[i].name}: {text}" for i, text in zip(lasers, told, strict=True) if text)
 
 
-def lean_text(scene: Scene, laser: int, step: int = 0, section: Section = "laser_plane") -> str:
+def lean_text(scene: Scene, laser: int, step: int = 0, section: ProfileSection = "laser_plane") -> str:
     """What that does to measures; empty: nothing."""
     lean = sheet_lean(scene, laser, step)
     if section in AXES or (section == "upright" and lean <= NEARLY_LEVEL):
@@ -90,7 +90,7 @@ def lean_text(scene: Scene, laser: int, step: int = 0, section: Section = "laser
     )
 
 
-def _carried_text(T_world_laser: Float, section: Section) -> str:
+def _carried_text(T_world_laser: Float, section: ProfileSection) -> str:
     normal = section_normal(T_world_laser, section)
     between = math.acos(min(abs(float(normal @ T_world_laser[:3, 0])), 1.0))
     if between < UPRIGHT:

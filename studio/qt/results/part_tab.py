@@ -25,7 +25,7 @@ from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
 from analysis.report.gauge_table import MARKS, beside_nominal, small_text, value_text
 from analysis.report.units import NONE
-from studio.project.project import Section
+from studio.project.project import ProfileSection
 from studio.qt.core.delete_key import DeleteKey
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import keep_room, text_button
@@ -35,10 +35,9 @@ from studio.qt.results.part_editor import PartEditor
 from studio.qt.results.results_profile import ProfilePlot
 from studio.scan.gauging import kept_readings, profiles, read_each
 from studio.scan.remarks import best
-from studio.scan.scan_folder import measured_project
 from studio.scan.sheet_lean import lean_text
 
-SECTIONS: dict[Section, str] = {
+SECTIONS: dict[ProfileSection, str] = {
     "laser_plane": "In the laser's plane",
     "upright": "In an upright section",
     "across_x": "In a section across X",
@@ -120,8 +119,8 @@ class PartTab(QWidget):
         self.readings = read_each(self._read, step, self._profiles) if self._profiles else ()
         of_scan = any(gauge.of_scan for gauge in self._read)
         if of_scan and self.readings and render is not None and render.scan is not None:
-            scan = render.scan.found
-            kept = kept_readings(self._read, measured_project(scan).measures, scan.manifest.get("measures"))
+            scanned, rows = render.scan.measured_as.measures, render.scan.found.manifest.get("measures")
+            kept = kept_readings(self._read, scanned, rows)
             self.readings = tuple(kept.get(one.gauge, one) for one in self.readings)
         self._show()
         self._show_regions()
@@ -294,7 +293,7 @@ class PartTab(QWidget):
             return ""
         told = f"Of step {render.frame.step + 1} of {render.scan.count}."
         kept = render.scan.found.manifest.get("measures")
-        if measured_project(render.scan.found).measured_in != self.session.project.measured_in:
+        if render.scan.measured_as.measured_in != self.session.project.measured_in:
             return f"{told} All steps were measured in another section: Measure > Measure the scan again."
         if isinstance(kept, list) and 0 <= self.chosen < len(self._read):
             own = [one for one in kept if isinstance(one, dict) and one.get("name") == self._read[self.chosen].name]

@@ -9,7 +9,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QPointF
 
 from analysis.report.colour import TRUTH, method_colour
-from studio.project.project import Section
+from studio.project.project import ProfileSection
 from studio.qt.core import theme
 from studio.qt.results import plots
 from studio.scan.first_range import profile_range
@@ -23,7 +23,7 @@ class ProfilePlot(plots.PointedPlots):
     """Distance from the laser over the place along its fan, both mm. Nearer is up."""
 
     def __init__(self) -> None:
-        self.section: Section = "laser_plane"
+        self.section: ProfileSection = "laser_plane"
         self.plot = plots.new_plot("Along the fan / mm", _height(self.section), "mm", plots.RangeBox())
         super().__init__(self.plot)
         self.plot.invertY(True)
@@ -38,7 +38,7 @@ class ProfilePlot(plots.PointedPlots):
         """The axes stay as they are, as ranges are being dragged in them."""
         self.repaint_theme()
 
-    def show_series(self, truth: Series | None, measured: dict[str, Series], section: Section) -> None:
+    def show_series(self, truth: Series | None, measured: dict[str, Series], section: ProfileSection) -> None:
         """measured: by method."""
         if section != self.section:
             self.section = section
@@ -101,5 +101,5 @@ class ProfilePlot(plots.PointedPlots):
         return found
 
 
-def _height(section: Section) -> str:
+def _height(section: ProfileSection) -> str:
     return "Distance from the laser" if section == "laser_plane" else "From the laser, in the section"

@@ -15,7 +15,7 @@ from render.base.pose import Pose, transform_points
 from render.frame import LaserCurve
 from render.laser.laser import LineLaser
 from render.scene.scene import Rig, Scene
-from studio.project.project import Section
+from studio.project.project import ProfileSection
 from studio.scan.sheet_lean import T_section_camera, lean_text, sheet_lean
 from tests.render.scenes import paper_camera
 
@@ -63,7 +63,7 @@ def line_on_part(scene: Scene) -> LaserCurve:
     return LaserCurve("rows", index, one, point, point[:, 2], one, 0 * index, one, one, one, np.zeros((0, 2, 3)), one)
 
 
-def measured(scene: Scene, section: Section, kind: str, *regions: tuple[float, float]) -> float:
+def measured(scene: Scene, section: ProfileSection, kind: str, *regions: tuple[float, float]) -> float:
     """m; regions: across the fan from the middle of the part."""
     curve = line_on_part(scene)
     nothing = Profile(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 0)), np.zeros(0, int), np.zeros(0))
