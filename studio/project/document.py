@@ -96,12 +96,16 @@ class Document:
             self.project = edit.before
             self._tell()
 
-    def save(self, path: Path | None = None) -> None:
-        """Write the file, whole or not at all. InputError: it cannot be written; the document is unharmed."""
+    def save(self, path: Path | None = None, name: str | None = None) -> None:
+        """Write the file, under another name of the project if one is given, whole or not at all.
+
+        InputError: it cannot be written; the document is unharmed.
+        """
         target = path or self.path
         if target is None:
             raise InputError("the project has no file yet", where=self.project.name, cure="use Save as")
-        project = self.project.save(target)
+        project = self.project if name is None else replaced(self.project, ("name",), name)
+        project = project.save(target)
         self.path, self.root, self.project, self._saved = target, target.parent, project, project
         self._tell()
 

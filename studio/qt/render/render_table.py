@@ -174,4 +174,4 @@ class RenderTable(QDialog):
         self.export.setEnabled(bool(self.rows))
 
     def _ask(self) -> None:
-        export_csv(self, f"{self.session.project.name} renders", "the table", self.write)
+        export_csv(self, self.session.document, "renders", "the table", self.write)

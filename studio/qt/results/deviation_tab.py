@@ -224,7 +224,7 @@ class DeviationTab(QWidget):
             self.take_nominal(Path(chosen))
 
     def _ask(self) -> None:
-        export_csv(self.window(), f"{self.session.project.name} deviation", "the deviation", self.write)
+        export_csv(self.window(), self.session.document, "deviation", "the deviation", self.write)
 
     def _show_rows(self) -> None:
         self.form.setRowVisible(self.spots, self.alignment.currentData() == "3-2-1")

@@ -26,7 +26,7 @@ from render.base.errors import InputError
 from render.output.tone_mapping import pyramid
 from studio.editing.units import Unit
 from studio.qt.core import theme
-from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.dialogs import beside_project, show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import ElidedLabel, text_button, upper_and_lower
@@ -241,7 +241,7 @@ class HeightMapTab(QWidget):
         self._show_profile()
 
     def _ask(self) -> None:
-        start = f"{self.session.project.name.replace('/', '-')} height map.png"
+        start = beside_project(self.session.document, "height map.png")
         chosen, kind = QFileDialog.getSaveFileName(self.window(), "Export", start, FILES)
         if not chosen:
             return

@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from studio.project.date_and_time import read_out
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.core.widgets import text_button
@@ -67,7 +68,8 @@ class NothingYet(QWidget):
         self.folder = None if found is None else found.folder
         self.offer.setVisible(found is not None)
         if found is not None:
-            self.offer.setText(f"Open the results of {found.manifest.get('created') or found.folder.name}")
+            when = read_out(str(found.manifest.get("created") or found.folder.name))
+            self.offer.setText(f"Open the results of {when}")
             self.offer.setToolTip(f"A finished scan of this project: {found.folder}")
 
     def _open(self) -> None:

@@ -118,7 +118,7 @@ class RegionTab(QWidget):
         self.session.message.emit("info", f"Wrote {path}: {count} points, {self.region.title}")
 
     def _ask(self) -> None:
-        export_csv(self.window(), f"{self.session.project.name} region", "the region", self.write)
+        export_csv(self.window(), self.session.document, "region", "the region", self.write)
 
     def _tell(self) -> None:
         there = self.region is not None

@@ -34,7 +34,7 @@ from render.base.errors import InputError
 from render.world.world import build_world
 from studio.editing.units import Unit
 from studio.qt.core import theme
-from studio.qt.core.dialogs import show_trouble
+from studio.qt.core.dialogs import beside_project, show_trouble
 from studio.qt.core.jobs import JobRunner
 from studio.qt.core.session import Session, ShownSection
 from studio.qt.core.widgets import text_button
@@ -254,7 +254,7 @@ class SectionTab(QWidget):
         plots.paint(self.plot)
 
     def _ask(self) -> None:
-        start = f"{self.session.project.name.replace('/', '-')} section.dxf"
+        start = beside_project(self.session.document, "section.dxf")
         chosen, kind = QFileDialog.getSaveFileName(self.window(), "Export", start, FILES)
         if not chosen:
             return

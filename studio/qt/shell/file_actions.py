@@ -250,7 +250,7 @@ class FileActions(QObject):
         document = self.session.document
         try:
             carry(document.project, document.root, path.absolute().parent)
-            document.save(path.absolute())
+            document.save(path.absolute(), self._name_in(path))
         except (InputError, OSError, MemoryError) as error:
             self._tell(error, f"save {path.name}")
             return False
@@ -259,6 +259,13 @@ class FileActions(QObject):
         self.preferences.add_recent(path)
         self.session.message.emit("info", f"Saved {path}")
         return True
+
+    def _name_in(self, path: Path) -> str | None:
+        """The project is called after its new file, unless somebody gave it a name."""
+        document = self.session.document
+        begun = self._pristine.name if self._pristine is not None else None
+        came_with = begun if document.path is None else document.path.stem
+        return path.stem[:MAX_NAME] if document.project.name == came_with and path != document.path else None
 
     def _tell(self, error: BaseException, doing: str) -> None:
         what = trouble(error, doing)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -25,7 +26,8 @@ def test_results_beside_the_project_are_offered(qtbot: QtBot, tmp_path: Path) ->
     beside = folder.rename(file.parent / "scan")
     session.replace_document(Document(Project.load(file), file))
     qtbot.waitUntil(made.offer.isVisible)
-    assert made.offer.text().startswith("Open the results of 20")
+    today = datetime.datetime.now()
+    assert made.offer.text().startswith(f"Open the results of {today.day} {today:%B %Y}, ")
     with qtbot.waitSignal(session.results_asked) as asked:
         qtbot.mouseClick(made.offer, Qt.MouseButton.LeftButton)
     assert asked.args == [beside]

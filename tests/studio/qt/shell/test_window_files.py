@@ -38,6 +38,22 @@ class TestFiles:
         assert not window.session.document.dirty
         assert window.preferences.values.recent[0] == str(tmp_path / "elsewhere" / "mine.json")
 
+    def test_a_project_is_called_after_its_file_unless_it_was_given_a_name(
+        self, window: MainWindow, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    ) -> None:
+        from studio.qt.shell.file_actions import template
+
+        window.files.replace(template("weld_seam", window.files.autosave))
+        for file, name in (("bracket", "bracket"), ("bracket of May", "bracket of May")):
+            choose_file(monkeypatch, tmp_path / f"{file}.json")
+            assert window.files.save_as()
+            assert window.session.project.name == name == Project.load(tmp_path / f"{file}.json").name
+            assert not window.session.document.dirty
+        window.session.set(("name",), "Bracket 12")
+        choose_file(monkeypatch, tmp_path / "third.json")
+        assert window.files.save_as()
+        assert window.session.project.name == "Bracket 12"
+
     def test_a_new_project_does_not_touch_the_one_it_comes_from(self, window: MainWindow) -> None:
         from studio.project.templates import template_folder
         from studio.qt.shell.file_actions import template
