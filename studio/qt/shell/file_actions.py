@@ -144,9 +144,11 @@ class FileActions(QObject):
         if document is not session.document:
             if ask and not self.may_close():
                 return False
-            self.replace(document)
-        if is_scan_of(found, document.project):
-            scan_steps(session).show(found, document.project, scale)
+            left = [] if document.path is None else find_of(self.autosave.folder, document.path)
+            if not self._offer(left):
+                self.replace(document)
+        if is_scan_of(found, session.project):
+            scan_steps(session).show(found, session.project, scale)
         else:
             scan_steps(session).show(found)
         self.preferences.add_recent(folder)

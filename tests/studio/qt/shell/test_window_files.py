@@ -20,6 +20,7 @@ from studio.project.project import Project
 from studio.project.project_files import missing_files
 from studio.qt.shell.window import MainWindow
 from tests.studio.qt.shell.window_hands import answer, choose_file, dialog, drop, files, project_with_missing_mesh
+from tests.studio.scan_of_steps import small_scan
 
 POWER = ("scene", "rig", "lasers", 0, "power")
 
@@ -140,6 +141,17 @@ class TestFiles:
         assert window.session.project.scene.lasers[0].power == 0.007
         assert window.session.document.path == small_project and window.isWindowModified()
         assert not crashed.file.exists() and window.files.autosave.file.exists()
+
+    def test_work_of_a_crashed_program_is_offered_when_results_of_its_project_are_opened(
+        self, window: MainWindow, qtbot: QtBot, tmp_path: Path
+    ) -> None:
+        file, folder = small_scan(tmp_path)
+        crashed = self.left_by_a_crash(window, file)
+        answer(qtbot, "recovery", "Open it")
+        assert window.files.open_results(folder)
+        assert window.session.project.scene.lasers[0].power == 0.007
+        assert window.session.document.path == file and window.isWindowModified()
+        assert not crashed.file.exists()
 
     def test_work_that_is_not_wanted_leaves_the_project_as_it_was_saved(
         self, window: MainWindow, qtbot: QtBot, small_project: Path
