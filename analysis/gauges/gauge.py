@@ -126,6 +126,11 @@ class Gauge(Model):
         """Of the value."""
         return "rad" if self.kind in ("angle", "opening") else "m2" if self.kind == "area" else "m"
 
+    def reads_as(self, other: Gauge) -> bool:
+        """Both have the same value in the same profile, whatever their names and tolerances are."""
+        judged = {"name": self.name, "nominal": None, "lower": None, "upper": None}
+        return self.model_copy(update=judged) == other.model_copy(update=judged)
+
     def verdict(self, value: float, sigma: float) -> Verdict | None:
         """ISO 14253-1 with U = 2 sigma: proved within, proved outside, or neither; None: no tolerance, or no value."""
         if self.nominal is None or (self.lower is None and self.upper is None) or not math.isfinite(value + sigma):

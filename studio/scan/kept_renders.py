@@ -36,6 +36,8 @@ FIGURES = {
     "Completeness": "%",
 }
 """Name -> unit, as they are shown."""
+VALUES = ("value", "sigma_random", "sigma_systematic", "truth")
+"""Of a reading, its numbers: m, of an angle rad, of an area m^2."""
 MOST_KEPT = 500
 
 
@@ -46,7 +48,7 @@ class Kept:
     name: str
     created: str
     project: Project
-    """As it was rendered, at its image scale, with sensor, lens and extraction as its figures were measured."""
+    """As it was rendered, at its image scale; all that measures and reads off is as its figures were made."""
     image_scale: float
     """Of the image, to the scanner's."""
     figures: dict[str, float]
@@ -54,7 +56,7 @@ class Kept:
     folder: Path | None = None
     """None: it is in this session alone."""
     readings: tuple[Reading, ...] = ()
-    """Of the part's measures, as the project has them now; of a render of this session alone."""
+    """Of the measures that `project` has."""
     laser_power: tuple[float, ...] = ()
     """W, of each laser, with which it was measured; none: as it was rendered, which its light is of."""
     stopped: bool = False
@@ -114,11 +116,20 @@ def keep(root: Path, what: Kept, frame: Frame) -> Kept:
         "laser_power": list(what.laser_power),
         "stopped": what.stopped,
         "figures": {name: value if math.isfinite(value) else None for name, value in what.figures.items()},
+        "measures": {one.gauge.name: _written(one) for one in what.readings},
         "inputs": input_hashes(what.project.scene, root),
     }
     with atomic_write(folder / RECORD) as temporary:
         temporary.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    return replace(what, created=created, folder=folder, readings=())
+    return replace(what, created=created, folder=folder)
+
+
+def as_read_now(kept: Kept, project: Project) -> Kept:
+    """With what its readings say of the measures that a project has now; one that was defined otherwise has none."""
+    if kept.project.measured_in != project.measured_in:
+        return replace(kept, readings=())
+    found = [replace(one, gauge=now) for now in project.measures for one in kept.readings if now.reads_as(one.gauge)]
+    return replace(kept, readings=tuple(found))
 
 
 def kept_renders(root: Path) -> tuple[list[Kept], list[str]]:
@@ -152,15 +163,40 @@ def _read(path: Path) -> Kept:
         raise InputError("a damaged kept render", where=str(path))
     if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0.01 <= scale <= 4.0:
         raise InputError("a damaged kept render", where=str(path))
-    numbers = {
-        key: float(value) if isinstance(value, int | float) else math.nan
-        for key, value in figures.items()
-        if key in FIGURES
-    }
+    numbers = {key: _number(value) for key, value in figures.items() if key in FIGURES}
     project = Project.load(path.parent / PROJECT)
     power, stopped = record.get("laser_power"), record.get("stopped") is True
     powers = tuple(map(float, power)) if _are_powers(power, len(project.scene.lasers)) else ()
-    return Kept(name, created, project, float(scale), numbers, path.parent, laser_power=powers, stopped=stopped)
+    readings = _readings(record.get("measures"), project)
+    return Kept(name, created, project, float(scale), numbers, path.parent, readings, powers, stopped)
+
+
+def _written(one: Reading) -> dict[str, Any]:
+    values = {name: getattr(one, name) for name in VALUES}
+    told = {name: value if math.isfinite(value) else None for name, value in values.items()}
+    return {**told, "step": one.step, "points": one.points, "reason": one.reason, "remark": one.remark}
+
+
+def _readings(found: Any, project: Project) -> tuple[Reading, ...]:
+    """Of the project's measures, what was read when it was kept."""
+    records = found if isinstance(found, dict) else {}
+    return tuple(
+        Reading(
+            gauge,
+            record["step"] if isinstance(record.get("step"), int) else None,
+            **{name: _number(record.get(name)) for name in VALUES},
+            points=record["points"] if isinstance(record.get("points"), int) else 0,
+            reason=str(record.get("reason", "")),
+            remark=str(record.get("remark", "")),
+        )
+        for gauge in project.measures
+        if isinstance(record := records.get(gauge.name), dict)
+    )
+
+
+def _number(found: Any) -> float:
+    """NaN where there is none."""
+    return float(found) if isinstance(found, int | float) and not isinstance(found, bool) else math.nan
 
 
 def _are_powers(found: Any, count: int) -> TypeGuard[list[float]]:

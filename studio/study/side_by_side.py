@@ -59,7 +59,7 @@ def side_by_side(renders: Sequence[Kept]) -> list[Row]:
         labels |= {field: change.label for field, change in differing.items()}
         found.append({field: (change.a, change.b) for field, change in differing.items()})
     for field, label in labels.items():
-        if field == "name" or field.startswith("measures"):  # all are read by those of now
+        if field == "name" or field.startswith(("measures", "delivery")):  # all are read by those of now
             continue
         own = next(each[field][0] for each in found if field in each)
         rows.append(Row(label, tuple(each[field][1] if field in each else own for each in found), False))

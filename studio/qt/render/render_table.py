@@ -26,7 +26,7 @@ from studio.qt.core.session import Render, Session, one_of
 from studio.qt.core.widgets import text_button
 from studio.runtime.error_messages import trouble
 from studio.scan.gauging import readings
-from studio.scan.kept_renders import Kept, figures_of, keep, kept_renders, open_kept
+from studio.scan.kept_renders import Kept, as_read_now, figures_of, keep, kept_renders, open_kept
 from studio.scan.remarks import best
 from studio.study.side_by_side import Row, side_by_side, write_table
 
@@ -38,15 +38,15 @@ FEWEST_PX = 230
 def as_kept(session: Session, render: Render, name: str) -> Kept:
     """A render of the session as a column of the table."""
     found = best(render.measurements, session.project) if render.measurements else []
-    read = readings(render.project.read_as(session.project), render.frame, found)
     made = render.made_from.get("measurements") if render.measurements else None
+    project = render.project if made is None else made[1].project
     return Kept(
         name,
         render.created,
-        render.project if made is None else made[1].project,
+        project.read_as(session.project),
         render.scanner_scale,
         figures_of(found),
-        readings=read,
+        readings=readings(render.project.read_as(session.project), render.frame, found),
         laser_power=() if made is None else made[1].laser_power,
         stopped=not render.final and not render.refining,
     )
@@ -57,8 +57,7 @@ def keep_render(session: Session, render: Render, name: str) -> Kept:
     if session.document.path is None:
         raise InputError("the project has no folder of its own yet", cure="save it first")
     shown = as_kept(session, render, name)
-    made = replace(shown, created="", readings=())
-    kept = keep(session.document.root, made, render.frame)
+    kept = keep(session.document.root, replace(shown, created=""), render.frame)
     session.message.emit("info", f"Kept {name} in {kept.folder}")
     return kept
 
@@ -118,7 +117,9 @@ class RenderTable(QDialog):
 
     def _read(self) -> tuple[list[Kept], list[Row]]:
         """Columns and rows, by the figures of now."""
-        renders = [*(as_kept(self.session, render, name) for render, name in self._shown), *self._kept]
+        session = self.session
+        kept = (as_read_now(one, session.project) for one in self._kept)
+        renders = [*(as_kept(session, render, name) for render, name in self._shown), *kept]
         return renders, side_by_side(renders)
 
     def _refresh(self) -> None:
