@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.colour import ACCENT, DIVERGING, INK, MUTED, TRUTH, method_colour, method_name
-from analysis.report.model import FrameResult, ReportInput
+from analysis.report.frame_result import FrameResult
+from analysis.report.model import ReportInput
 from analysis.report.picture import without_margins
 from analysis.report.style import WIDTH, figure, image_uri, png_uri, short
 from render.base.arrays import Float

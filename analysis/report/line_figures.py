@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.colour import TRUTH, method_colour, method_name
-from analysis.report.model import Extraction, LaserResult
+from analysis.report.frame_result import Extraction, LaserResult
 from analysis.report.style import WIDTH, figure, png_uri
 from render.base.arrays import Float
 from render.base.pose import invert, transform_points

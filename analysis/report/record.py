@@ -12,7 +12,7 @@ import numpy as np
 from analysis.gauges.of_scan import Patch, read_scan
 from analysis.gauges.read import Reading
 from analysis.measures import Measures
-from analysis.report.model import FrameResult, frame_rmse
+from analysis.report.frame_result import FrameResult, frame_rmse
 from analysis.report.sample import IMAGE, MOST_LINES, ROW, Rows, Sample, rows_of
 from analysis.report.sums import Sums
 from analysis.report.total import Chosen, depth_measures

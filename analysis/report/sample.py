@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.cloud import at_first_step
-from analysis.report.model import Extraction
+from analysis.report.frame_result import Extraction
 from analysis.spool import Spool
 from render.scene.scene import Scene
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from analysis.report.model import Extraction
+from analysis.report.frame_result import Extraction
 from render.base.arrays import Float
 
 

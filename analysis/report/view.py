@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.report.colour import wavelength_colour
-from analysis.report.model import FrameResult, ReportInput
+from analysis.report.frame_result import FrameResult
+from analysis.report.model import ReportInput
 from render.base.arrays import Float
 from render.base.pose import invert, transform_points
 from render.frame import LaserCurve

@@ -14,11 +14,12 @@ from analysis.report import calibration, gauge_table, plain_picture
 from analysis.report.colour import method_colour, method_name
 from analysis.report.columns import columns, sentence_height, table_height
 from analysis.report.error_figures import error_map_figure, methods_figure, nice_limit, scene_figure, steps_figure
+from analysis.report.frame_result import FrameResult
 from analysis.report.front import front
 from analysis.report.glossary import GLOSSARY
 from analysis.report.light_text import sentences
 from analysis.report.line_figures import camera_figure, profile_figure, three_panel_figure, zoom_figure
-from analysis.report.model import FrameResult, ReportInput
+from analysis.report.model import ReportInput
 from analysis.report.page import page_of
 from analysis.report.picture import Drawing
 from analysis.report.style import plain

@@ -8,7 +8,7 @@ from typing import Any
 
 from analysis.study.intervals import Interval
 from render.base.errors import InputError
-from studio.commands.commands import check_output, load_project, never
+from studio.commands.places import check_output, load_project, never
 from studio.project.project import Project
 from studio.project.project_files import carry
 from studio.runtime.console import print_table, stage_progress

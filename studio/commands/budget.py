@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from studio.commands.commands import folder_name, load_project
+from studio.commands.places import folder_name, load_project
 from studio.commands.study import run_into
 from studio.runtime.workers import Engine
 from studio.study.cells import WHOLE

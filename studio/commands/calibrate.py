@@ -65,7 +65,7 @@ def calibrate_command(what: str, folder: Path | None, *, quiet: bool, as_json: b
     from studio.calibration.material import virtual, with_faults
     from studio.calibration.motion_file import motion_values
     from studio.calibration.words import other_rows
-    from studio.commands.commands import load_project
+    from studio.commands.places import load_project
 
     if what == "check":
         from studio.commands.recheck import check_calibration

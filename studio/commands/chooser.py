@@ -10,7 +10,7 @@ from typing import Any
 from render.base.errors import InputError
 from studio.chooser.network import check_onnx
 from studio.chooser.train import gathered, told_of, trained, write
-from studio.commands.commands import check_output, never
+from studio.commands.places import check_output, never
 from studio.dataset.recipe import Recipe
 from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json

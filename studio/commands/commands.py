@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from render.base.errors import InputError
-from studio.project.project import Project, project_file, template_or_path
-from studio.project.templates import DESCRIPTIONS, new_project, template_folder
+from studio.commands.places import OUTPUT, check_output, chosen_file, folder_name, load_project, never
+from studio.project.project import Project
+from studio.project.templates import DESCRIPTIONS, new_project
 from studio.runtime.console import print_plan, print_table, stage_progress
 from studio.runtime.streams import print_json
 
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
     from studio.scan.options import ScanOptions
     from studio.scan.scan import ScanResult
 
-SAMPLE = "weld_seam"
-OUTPUT = "scan-output"
 SCAN_OPTIONS = {
     "steps": "steps",
     "scale": "image_scale",
@@ -36,17 +33,6 @@ SCAN_OPTIONS = {
     "resume": "resume",
 }
 """Option of the command line -> field of `studio.scan.options.ScanOptions`."""
-
-
-def chosen_file(path: Path | None) -> Path:
-    """The project file at a path (itself, or the one in a folder), or of a template by its name, or the sample's."""
-    return project_file(template_folder(SAMPLE) if path is None else template_or_path(str(path)))
-
-
-def load_project(path: Path | None) -> tuple[Project, Path]:
-    """The project at a path (a file, or a folder with one project), a template, or the sample; and its folder."""
-    file = chosen_file(path)
-    return Project.load(file), file.parent
 
 
 def start_project(
@@ -250,30 +236,6 @@ def rebuild_report(folder: Path, *, threads: int | None, quiet: bool, as_json: b
             found, measured_project(found), found.root, folder, clock, report=True, threads=threads
         )
     _print_reconstruction(result, as_json)
-
-
-def folder_name(name: str) -> str:
-    """A project's name as a folder: lower case, words joined by underscores."""
-    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") or "project"
-
-
-def check_output(folder: Path) -> None:
-    """InputError before any work where results could not be written afterwards."""
-    place = folder
-    while not place.exists() and place != place.parent:
-        place = place.parent
-    if not place.is_dir() or not os.access(place, os.W_OK | os.X_OK):
-        raise InputError(
-            "the output folder cannot be written",
-            where=str(folder),
-            found="a file of that name" if place.is_file() else f"no permission to write in {place}",
-            cure="choose another with --out",
-        )
-
-
-def never() -> bool:
-    """Ctrl-C raises KeyboardInterrupt; nothing else cancels a command."""
-    return False
 
 
 def _print_reconstruction(result: dict[str, Any], as_json: bool) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from render.base.errors import Cancelled, InputError
-from studio.commands.commands import check_output, folder_name, never
+from studio.commands.places import check_output, folder_name, never
 from studio.commands.study import shard_of
 from studio.dataset.contact_sheet import write_contact_sheet
 from studio.dataset.folder import images_in

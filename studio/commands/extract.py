@@ -48,7 +48,7 @@ def extract_images(
 
     given: fields of `ImageOptions`, those of `wishes_of`, and extraction settings.
     """
-    from studio.commands.commands import check_output
+    from studio.commands.places import check_output
 
     options = ImageOptions(**{field.name: given.pop(field.name) for field in fields(ImageOptions)})
     if options.spacetime + options.ridges + (options.hdr is not None) > 1:
@@ -126,7 +126,7 @@ def _extract_group(
 def _prepared(images: tuple[Path, ...], options: ImageOptions, given: dict[str, Any]) -> Prepared:
     """Raises InputError, which names the option."""
     from analysis.line.extract import settings_of
-    from studio.commands.commands import load_project
+    from studio.commands.places import load_project
     from studio.photographs.photograph_set import Look, look_at
     from studio.scan.line_extraction import working_volume
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from render.base.errors import InputError
-from studio.commands.commands import OUTPUT, folder_name, print_scan, scan_into
+from studio.commands.commands import print_scan, scan_into
+from studio.commands.places import OUTPUT, folder_name
 from studio.project.input_files import listed
 from studio.scan.options import ScanOptions
 from studio.scan.results import versions

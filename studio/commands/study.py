@@ -9,7 +9,7 @@ import threading
 from pathlib import Path
 
 from render.base.errors import Cancelled, InputError
-from studio.commands.commands import check_output, folder_name, never
+from studio.commands.places import check_output, folder_name, never
 from studio.project.project import Project
 from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json

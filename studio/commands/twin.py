@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from render.base.errors import InputError
 from studio.commands.advise import check_target, write_project
-from studio.commands.commands import chosen_file, load_project
+from studio.commands.places import chosen_file, load_project
 from studio.runtime.console import print_table, stage_progress
 from studio.runtime.streams import print_json
 from studio.study.study import require_laser

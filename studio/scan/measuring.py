@@ -12,7 +12,7 @@ import numpy as np
 from analysis.cloud import SpooledCloud, cloud, write_csv, write_ply
 from analysis.line.selection.learned import UNLIKE
 from analysis.line.settings import Method
-from analysis.report.model import FrameResult
+from analysis.report.frame_result import FrameResult
 from analysis.report.picture import Drawing
 from analysis.report.record import ScanRecord
 from render.frame import Frame

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from analysis.report.model import FrameResult
+from analysis.report.frame_result import FrameResult
 from render.base.threads import Cancel
 from render.frame import Frame
 from render.run import Run, never

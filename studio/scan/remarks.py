@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 
-from analysis.report.model import Extraction, FrameResult, LaserResult
+from analysis.report.frame_result import Extraction, FrameResult, LaserResult
 from analysis.report.record import ScanRecord, record_of
 from analysis.report.summary import remarks, scale_head, scale_note
 from analysis.report.total import total

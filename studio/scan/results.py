@@ -9,7 +9,8 @@ from importlib import metadata
 
 from analysis.line.settings import Method
 from analysis.report.calibration import FoundCalibration, MotionFound
-from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
+from analysis.report.frame_result import Extraction, FrameResult, LaserResult
+from analysis.report.model import ReportInput
 from analysis.report.record import ScanRecord
 from render.base.model import Model
 from render.frame import Frame

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from analysis.cloud import Cloud, cloud
-from analysis.report.model import FrameResult
+from analysis.report.frame_result import FrameResult
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.scene.motion import LinearStage, NoMotion, Turntable

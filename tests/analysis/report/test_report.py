@@ -19,8 +19,9 @@ from analysis.line.settings import Method
 from analysis.report import picture
 from analysis.report.colour import method_colour, wavelength_colour
 from analysis.report.error_figures import nice_limit
+from analysis.report.frame_result import Extraction, FrameResult, LaserResult
 from analysis.report.line_figures import block_maximum, places
-from analysis.report.model import Extraction, FrameResult, LaserResult, ReportInput
+from analysis.report.model import ReportInput
 from analysis.report.record import record_of
 from analysis.report.summary import headline, remarks
 from analysis.report.tables import scene_tables

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from analysis.cloud import read_ply
-from analysis.report.model import FrameResult
+from analysis.report.frame_result import FrameResult
 from analysis.report.record import ScanRecord
 from render.base.errors import InputError
 from render.checkpoint import RenderState
