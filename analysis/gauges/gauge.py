@@ -59,6 +59,8 @@ TITLES: dict[Kind, str] = {
     "flush": "Flush",
     "area": "Area",
 }
+NEVER_NEGATIVE = ("width", "opening", "radius", "flatness", "point_to_point")
+"""Kinds whose lower limit of 0, as drawings have it, is kept by every part, however uncertain the value is."""
 MOST_GAUGES = 64
 Place = Annotated[float, Field(ge=-100.0, le=100.0)]
 Region = tuple[Place, Place]
@@ -126,6 +128,15 @@ class Gauge(Model):
         """Of the value."""
         return "rad" if self.kind in ("angle", "opening") else "m2" if self.kind == "area" else "m"
 
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Of the value, infinite where there is none; of what is never negative a lower one of 0 is none."""
+        if self.nominal is None:
+            return -math.inf, math.inf
+        low = -math.inf if self.lower is None else self.nominal + self.lower
+        high = math.inf if self.upper is None else self.nominal + self.upper
+        return -math.inf if self.kind in NEVER_NEGATIVE and low <= 0.0 else low, high
+
     def reads_as(self, other: Gauge) -> bool:
         """Both have the same value in the same profile, whatever their names and tolerances are."""
         judged = {"name": self.name, "nominal": None, "lower": None, "upper": None}
@@ -135,8 +146,7 @@ class Gauge(Model):
         """ISO 14253-1 with U = 2 sigma: proved within, proved outside, or neither; None: no tolerance, or no value."""
         if self.nominal is None or (self.lower is None and self.upper is None) or not math.isfinite(value + sigma):
             return None
-        low = -math.inf if self.lower is None else self.nominal + self.lower
-        high = math.inf if self.upper is None else self.nominal + self.upper
+        low, high = self.limits
         uncertainty = 2.0 * sigma
         if value - uncertainty >= low and value + uncertainty <= high:
             return "pass"

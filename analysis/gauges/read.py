@@ -12,6 +12,7 @@ from analysis.gauges.area import area_above, section, unseen, without_unsure
 from analysis.gauges.fit import Fit, circle, circle_start, fit, polynomial, two_levels
 from analysis.gauges.gauge import REGIONS, Gauge, Verdict
 from analysis.gauges.profile import Profile
+from analysis.gauges.undetermined import undetermined
 from render.base.arrays import Float
 
 NAN = float("nan")
@@ -114,6 +115,8 @@ def _value(gauge: Gauge, profile: Profile) -> tuple[float, Float, list[Fit]] | s
     if isinstance(parts := parts_of(gauge, profile), str):
         return parts
     fits, function = curves_of(gauge, profile, parts)
+    if reason := undetermined(gauge, fits):
+        return reason
     theta = [one.theta for one in fits]
     value = function(theta)
     if not math.isfinite(value):

@@ -13,6 +13,7 @@ from analysis.report.gauge_table import MARKS
 from analysis.report.model import ReportInput
 from analysis.report.style import png_uri
 from analysis.report.units import count, degrees, micrometres, millimetres, milliwatts, percent
+from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
 
 VERDICTS = {
@@ -144,12 +145,12 @@ def _how(report: ReportInput, rows: Any) -> list[tuple[str, str]]:
         ("Laser", lasers),
     ]
     if scene.lasers:
-        first = scene.T_camera_laser(0)
-        between = float(np.arccos(np.clip(first[2, 2], -1.0, 1.0)))
-        found += [
-            ("Baseline", millimetres(float(np.linalg.norm(first[:3, 3])))),
-            ("Angle of triangulation", degrees(between)),
-        ]
+        origin = scene.T_camera_laser(0)[:3, 3]
+        found.append(("Baseline", millimetres(float(np.linalg.norm(origin)))))
+        curve = report.record.shown_frame().lasers[0].curve
+        if len(curve.point):
+            between = float(np.median(triangulation_angles(curve.point, origin)))
+            found.append(("Triangulation angle (median)", degrees(between)))
     if len(rows):
         sigma = _sigma(rows)
         found.append(("Uncertainty of a point (two sigma, median)", micrometres(2.0 * float(np.median(sigma)))))

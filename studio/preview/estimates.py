@@ -34,14 +34,6 @@ def line_pixels(lit: Lit) -> Float:
     return np.stack(pair, axis=1)
 
 
-def triangulation_angles(points: Float, origin: Float) -> Float:
-    """(n,) angle at the surface between camera (at 0) and laser, rad; (n, 3) points in the camera frame."""
-    to_laser = origin - points
-    cosine = -np.einsum("ij,ij->i", points, to_laser)
-    cosine /= np.linalg.norm(points, axis=1) * np.linalg.norm(to_laser, axis=1)
-    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
-
-
 def resolution(camera: Camera, plane: Float, pixels: Float, direction: tuple[float, float]) -> Float:
     """(n, 3) m: how far the point in the laser's plane (4,) moves for one pixel of (n, 2) along a unit direction."""
     step = HALF * np.asarray(direction)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float, Float32
 from render.camera.camera import Camera
 from render.frame import Frame, LaserCurve
@@ -158,7 +159,7 @@ def _laser_view(project: Project, frame: Frame, i: int, power: float, ambient: F
     return LaserView(
         name=scene.lasers[i].name,
         baseline=float(np.linalg.norm(origin)),
-        triangulation_angle=_between_rays(curve.point, origin) if some else None,
+        triangulation_angle=float(np.median(triangulation_angles(curve.point, origin))) if some else None,
         scan_lines=camera.height if rows else camera.width,
         scan_lines_hit=len(hit),
         line_length=length,
@@ -218,14 +219,6 @@ def facets(curve: LaserCurve, origin: Float) -> Float:
     tangent = np.gradient(curve.point, axis=0)
     first, second = (np.abs(np.einsum("ij,ij->i", within + sign * out, tangent)) for sign in (1.0, -1.0))
     return np.asarray(within + np.where(first <= second, 1.0, -1.0)[:, None] * out)
-
-
-def _between_rays(points: Float, origin: Float) -> float:
-    """Median angle at the surface between camera (at 0) and laser; (n, 3) points in the camera frame."""
-    to_laser = origin - points
-    cosine = -np.einsum("ij,ij->i", points, to_laser)
-    cosine /= np.linalg.norm(points, axis=1) * np.linalg.norm(to_laser, axis=1)
-    return float(np.median(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
 def _saturated_along(curve: LaserCurve, electrons: Float32 | None, full_well: float) -> float | None:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.triangulation_angle import triangulation_angles
 from render.base.arrays import Float
 from render.camera.camera import Camera
 from studio.preview import estimates
@@ -132,7 +133,7 @@ def readouts(look: Look, laser: int) -> Readouts:
     speckle = speckle_px(camera, source.wavelength_nm, *shown, read, sensor.speckle == "depolarised")
     return replace(
         known,
-        triangulation_angle=_range(estimates.triangulation_angles(curve.point, T_camera_laser[:3, 3])),
+        triangulation_angle=_range(triangulation_angles(curve.point, T_camera_laser[:3, 3])),
         distance=_range(curve.depth_z),
         depth_per_px=_range(depth),
         along_per_px=_range(np.linalg.norm(estimates.resolution(camera, plane, pixels, along), axis=1)),

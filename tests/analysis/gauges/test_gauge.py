@@ -27,6 +27,14 @@ def test_one_limit_decides_alone_and_without_one_there_is_no_verdict() -> None:
     assert gauge("step", nominal=1.0, upper=0.1).verdict(math.nan, 0.1) is None
 
 
+def test_what_cannot_be_negative_keeps_a_lower_limit_of_zero() -> None:
+    """The flatter the part, the less it was proved to be within 0 to 0.2 mm."""
+    for value, verdict in ((1.8e-5, "pass"), (1.9e-4, "undecided"), (3e-4, "fail")):
+        assert gauge("flatness", nominal=0.0, lower=0.0, upper=2e-4).verdict(value, 1e-5) == verdict
+    assert gauge("step", nominal=0.0, lower=0.0, upper=2e-4).verdict(1e-5, 1e-5) == "undecided"
+    assert gauge("radius", nominal=1e-3, lower=-1e-4, upper=2e-4).verdict(1.8e-5, 1e-5) == "fail"
+
+
 def test_a_sigma_as_wide_as_the_tolerance_never_passes() -> None:
     assert gauge("step", nominal=1.0, lower=-0.1, upper=0.1).verdict(1.0, 0.06) == "undecided"
 

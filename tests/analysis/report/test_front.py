@@ -120,3 +120,14 @@ def test_the_mean_deviation_is_of_the_surface_and_false_points_are_counted() -> 
     assert abs(float(told_of[2][1].split()[0])) < 1e6 * 0.05 / len(rows)
     decided = _surface(handed(customer="Ada", lower=-0.04, upper=0.04), false)
     assert decided["verdict"] == "fail" and decided["rows"][-1] == ("Verdict without the false ones", MARKS["pass"])
+
+
+def test_the_triangulation_angle_is_that_at_the_part() -> None:
+    """By the law of cosines, for the middle of the line; the laser's tilt to the optical axis is another angle."""
+    report = handed(customer="Ada")
+    origin = report.scene.T_camera_laser(0)[:3, 3]
+    points = report.record.shown_frame().lasers[0].curve.point
+    far, beside, between = (np.linalg.norm(one, axis=-1) for one in (points, points - origin, origin))
+    closed = np.median(np.degrees(np.arccos((far**2 + beside**2 - between**2) / (2.0 * far * beside))))
+    shown = dict(told(report)["how"])["Triangulation angle (median)"]
+    assert float(shown.rstrip("°")) == pytest.approx(closed, rel=1e-3)
