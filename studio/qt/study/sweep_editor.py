@@ -29,7 +29,7 @@ from studio.editing.units import Unit
 from studio.qt.core.widgets import text_button
 from studio.qt.forms.fields import ChoiceField
 from studio.qt.forms.number_field import NumberField
-from studio.qt.image.line_overlay import swatch
+from studio.qt.image.line_overlay import ticked_swatch
 from studio.qt.study.field_menu import fill_field_menu
 from studio.qt.study.parameter_row import ParameterRow, kind_of
 from studio.qt.study.study_work import StudyWork
@@ -194,7 +194,7 @@ class SweepEditor(QWidget):
         return list(self.work.sweep.get("methods") or self.work.draft.get("methods", ["likelihood"]))
 
     def _method_action(self, method: str) -> QAction:
-        action = self.methods_menu.addAction(swatch(method_colour(method)), method_name(method))
+        action = self.methods_menu.addAction(ticked_swatch(method_colour(method)), method_name(method))
         action.setCheckable(True)
         return action
 
