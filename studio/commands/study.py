@@ -16,6 +16,7 @@ from studio.runtime.streams import print_json
 from studio.runtime.workers import Engine
 from studio.scan.folder_lock import hold
 from studio.scan.interrupt import stop_on_interrupt
+from studio.study.as_begun import begun_in
 from studio.study.begin import begin
 from studio.study.cells import Shard, next_cells
 from studio.study.labels import as_read
@@ -51,6 +52,7 @@ def run_into(
 ) -> None:
     """Measure what is missing of a study in a folder, and write what it says so far."""
     check_output(folder)
+    bases = begun_in(folder, study, bases)
     with begin(folder, study, bases, engine, part) as store:
         known = store.count()
         if not quiet:

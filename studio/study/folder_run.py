@@ -13,6 +13,7 @@ from studio.runtime.console import StageProgress
 from studio.runtime.workers import EVERY_PROCESSOR, Engine
 from studio.scan.folder_lock import hold
 from studio.study.answers import Answer, answers
+from studio.study.as_begun import begun_in
 from studio.study.begin import begin
 from studio.study.cells import Cell, cells_at
 from studio.study.store import Row, Store, described
@@ -71,6 +72,7 @@ def run_into(
     from studio.study.runner import run_study  # takes a while: not before a study runs
 
     progress("preparing", 0.0)
+    bases = begun_in(folder, study, bases)
     with begin(folder, study, bases, engine) as store:
         before, next_look = store.count(), 0.0
 

@@ -24,6 +24,7 @@ from studio.qt.core.jobs import JobRunner
 from studio.qt.core.long_work import LongWork
 from studio.qt.core.session import Session
 from studio.runtime.jobs import Progress
+from studio.study.as_begun import as_begun
 from studio.study.draft import Data, by_names, finished, new_draft, path_text, suggested, varies_nothing
 from studio.study.estimate import Costs, Estimate, costs, estimate
 from studio.study.folder_run import Found, in_window, opened, run_into
@@ -31,8 +32,8 @@ from studio.study.kept_draft import keep_draft, kept_draft
 from studio.study.study import Study, base_project
 
 OF_ANOTHER = (
-    "The folder holds a study of another set-up: the project, what is fixed or the image scale has changed since. "
-    "Choose another folder, or undo the change."
+    "The folder holds a study of another set-up: the project, a measure that it asks for, what is fixed or the image "
+    "scale has changed since. Choose another folder, or undo the change."
 )
 REST_MS = 250
 """Without a change before it is worked out what the study takes."""
@@ -116,7 +117,8 @@ class StudyWork(LongWork):
         document = self.session.document
         own = self.session.project.in_folder(document.root)
         missing = {name: own for name in names if name not in self.loaded}
-        return {**{name: self.loaded[name] for name in names if name in self.loaded}, **missing}
+        bases = {**{name: self.loaded[name] for name in names if name in self.loaded}, **missing}
+        return bases if self.found is None else as_begun(study, bases, self.found.bases)
 
     # the draft
 

@@ -12,9 +12,11 @@ import pytest
 from analysis.gauges.gauge import Gauge
 from render.base.errors import InputError
 from studio.project.project import Project
+from studio.study.as_begun import begun_in
 from studio.study.cells import next_cells
 from studio.study.measures import measure_of, part_names
 from studio.study.measuring import measure_task
+from studio.study.store import Store
 from studio.study.study import Study
 from studio.study.tables import write_tables
 from studio.study.tasks import tasks
@@ -79,3 +81,23 @@ def test_names_say_what_is_there_and_others_are_refused() -> None:
     for name in ("length_error:", "volume_error:x", "depth"):
         with pytest.raises(KeyError):
             measure_of(name)
+
+
+def test_a_folder_that_goes_on_keeps_the_measures_that_it_was_begun_with(tmp_path: Path) -> None:
+    """Those that the study does not ask for; one that it asks for makes another study, told before anything runs."""
+    study, bases = study_of("depth_rmse")
+    with Store(tmp_path, study.digest(bases)) as store:
+        store.describe(study, bases)
+    base = bases["step_block"]
+    for later in ({"measures": []}, {"measured_in": "upright"}, {"measures": [STEP, {**STEP, "name": "Other"}]}):
+        now = {"step_block": base.replaced(later).in_folder(base.folder)}
+        again = begun_in(tmp_path, study, now)
+        assert again == bases and again["step_block"].folder == base.folder
+    asking, _ = study_of("length_error:First step")
+    for later in ({"measured_in": "upright"}, {"measures[0].nominal": 0.02}):
+        now = {"step_block": base.replaced(later).in_folder(base.folder)}
+        assert begun_in(tmp_path, asking, now) == now
+    varied = study.model_copy(update={"set": {**study.set, "measured_in": "across_x"}})
+    now = {"step_block": base.replaced({"measures": []}).in_folder(base.folder)}
+    assert begun_in(tmp_path, varied, now) == now
+    assert begun_in(tmp_path / "other", study, now) == now
