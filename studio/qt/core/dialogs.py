@@ -41,8 +41,8 @@ def show_trouble(parent: QWidget | None, what: Trouble) -> QMessageBox:
     return box
 
 
-def ask_unsaved(parent: QWidget, name: str) -> Answer:
-    """What to do with changes that no file holds."""
+def ask_unsaved(parent: QWidget, name: str, more: str = "") -> Answer:
+    """What to do with changes that no file holds; more: what goes whatever is done with them."""
     button = QMessageBox.StandardButton
     box = QMessageBox(
         QMessageBox.Icon.Question,
@@ -52,10 +52,23 @@ def ask_unsaved(parent: QWidget, name: str) -> Answer:
         parent,
     )
     box.setObjectName("unsaved")
-    box.setInformativeText("Without saving they are lost.")
+    box.setInformativeText("\n\n".join(filter(None, ["Without saving they are lost.", more])))
     box.setDefaultButton(button.Save)
     chosen = box.exec()
     return {button.Save: "save", button.Discard: "discard"}.get(button(chosen), "cancel")  # type: ignore[return-value]
+
+
+def ask_under_way(parent: QWidget, what: str) -> bool:
+    """Whether to go although a render is under way; what: a sentence about it."""
+    box = QMessageBox(QMessageBox.Icon.Question, "Under way", "Stop the render?", parent=parent)
+    box.setObjectName("under-way")
+    box.setInformativeText(what)
+    stopped = box.addButton("Stop it", QMessageBox.ButtonRole.DestructiveRole)
+    stay = box.addButton("Stay", QMessageBox.ButtonRole.RejectRole)
+    box.setDefaultButton(stay)
+    box.setEscapeButton(stay)
+    box.exec()
+    return box.clickedButton() is stopped
 
 
 def ask_recovery(parent: QWidget | None, name: str, when: str, count: int) -> bool:

@@ -65,6 +65,10 @@ class Render:
     """The scan that the frame is a step of; None: it was rendered alone."""
     made_from: dict[str, tuple[Frame, Development]] = field(default_factory=dict)
     """Frame and settings that "images" and "measurements" are of: while light refines, both lag behind."""
+    asked: bool = True
+    """False: the program made it unasked, as its first picture."""
+    kept: bool = False
+    """It is with the project's files, too."""
     cell: str = ""
     """Key of the study's cell that it is: developed and measured by its own `source`, whatever the open project has."""
 

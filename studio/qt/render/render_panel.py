@@ -59,6 +59,8 @@ class RenderPanel(QWidget):
         self._render: Render | None = None
         self._before: Render | None = None
         self._keep = False
+        self.asked = True
+        """By a person: the render under way."""
         self._memory = Memory()
         """Ambient light of before, for renders that only the lasers tell apart."""
         self._warned: set[str] = set()
@@ -130,14 +132,15 @@ class RenderPanel(QWidget):
         render = self.session.shown
         if render is None or render.final or render.state is None or not self._may_start():
             return
-        self._before, self._keep = render, True
+        self._before, self._keep, self.asked = render, True, True
         self._render, state, render.state = render, render.state, None
         self._run(render.project, self.session.document.root, render.frame.step, render.world, state)
 
-    def start(self, image_scale: float | None = None) -> None:
-        """Render the project as it is now; one render at a time."""
+    def start(self, image_scale: float | None = None, asked: bool = True) -> None:
+        """Render the project as it is now; one render at a time. asked: by a person."""
         if not self._may_start():
             return
+        self.asked = asked
         session = self.session
         source, root, step = session.project, session.document.root, session.step
         image_scale = self.scale.currentData() if image_scale is None else image_scale
@@ -334,6 +337,7 @@ class RenderPanel(QWidget):
                 created=time.strftime("%H:%M:%S"),
                 image_scale=image_scale,
                 source=source,
+                asked=self.asked,
             )
             self.session.add_render(self._render)
         else:

@@ -58,6 +58,7 @@ def keep_render(session: Session, render: Render, name: str) -> Kept:
         raise InputError("the project has no folder of its own yet", cure="save it first")
     shown = as_kept(session, render, name)
     kept = keep(session.document.root, replace(shown, created=""), render.frame)
+    render.kept = True
     session.message.emit("info", f"Kept {name} in {kept.folder}")
     return kept
 
@@ -70,7 +71,7 @@ def open_render(session: Session, kept: Kept) -> Render:
     number = max([render.number for render in session.renders], default=0) + 1
     render = Render(number, kept.project, world, frame, name=kept.name, created=read_out(kept.created))
     render.image_scale, render.final, render.stopped = kept.image_scale, not kept.stopped, kept.stopped
-    render.source = session.project
+    render.source, render.kept = session.project, True
     session.add_render(render)
     return render
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
@@ -14,9 +15,17 @@ from studio.project.document import Document
 from studio.project.project import Project, project_file
 from studio.project.project_files import carry, missing_files
 from studio.project.templates import template_folder
-from studio.qt.core.dialogs import TemplateDialog, ask_recovery, ask_unsaved, show_trouble, suggested
+from studio.qt.core.dialogs import (
+    TemplateDialog,
+    ask_recovery,
+    ask_under_way,
+    ask_unsaved,
+    show_trouble,
+    suggested,
+)
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
+from studio.qt.shell.going import Going
 from studio.qt.shell.missing_files import may_open
 from studio.runtime.error_messages import trouble
 from studio.runtime.preferences import PreferencesFile, recovery_folder
@@ -74,6 +83,8 @@ class FileActions(QObject):
         super().__init__(window)
         self.window, self.session, self.preferences = window, session, preferences
         self.autosave = autosave or Autosave(recovery_folder())
+        self.going: Callable[[], Going] = Going
+        """What goes with the document beside its changes."""
         self._pristine: Project | None = session.project
         """As it came from a template or a file: closing it unchanged needs no question; None: it came unsaved."""
         self._rest = QTimer(self, singleShot=True, interval=round(1000 * AFTER_A_CHANGE))
@@ -176,10 +187,11 @@ class FileActions(QObject):
         return self._save(path if path.suffix else path.with_suffix(".json"))
 
     def may_close(self) -> bool:
-        """Whether the document may be given up; asks when there is unsaved work."""
+        """Whether the document may be given up; asks when there is unsaved work, or a render under way."""
+        going = self.going()
         if not self.unsaved:
-            return True
-        answer = ask_unsaved(self.window, self.session.project.name)
+            return not going.render or ask_under_way(self.window, going.render)
+        answer = ask_unsaved(self.window, self.session.project.name, going.told)
         return answer == "discard" or (answer == "save" and self.save())
 
     def count_as_saved(self, project: Project) -> None:

@@ -36,6 +36,7 @@ from studio.qt.shell.command_keys import CommandKeys
 from studio.qt.shell.command_search import CommandSearch
 from studio.qt.shell.escape import escape
 from studio.qt.shell.file_actions import FileActions
+from studio.qt.shell.going import what_goes
 from studio.qt.shell.help import Help, panel_with_focus
 from studio.qt.shell.memory import return_what_is_free
 from studio.qt.shell.panels import PANELS, Making, Panels
@@ -98,6 +99,7 @@ class MainWindow(QMainWindow):
         self.status = StatusBar(session, self.runner, self)
         self.setStatusBar(self.status)
         self.files = FileActions(self, session, self.preferences, autosave)
+        self.files.going = partial(what_goes, session, self.runner, self.panels)
         self.exports = ExportActions(self, session, self.runner, self.preferences, self.commands)
         self.panels.when_made("results", self.exports.follow)
         self.measuring = MeasureActions(self, session, self.commands)
@@ -148,7 +150,7 @@ class MainWindow(QMainWindow):
     def render_first(self) -> None:
         """Of what is open, as large as the scanner's image: its first figures are true ones."""
         if not self.session.renders and not self.runner.busy:
-            self.panels["render"].start(1.0)  # type: ignore[attr-defined]
+            self.panels["render"].start(1.0, asked=False)  # type: ignore[attr-defined]
 
     def choose_theme(self, choice: theme.Choice) -> None:
         theme.apply(choice)

@@ -11,15 +11,26 @@ import pytest
 import trimesh
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QMessageBox
 from pytestqt.qtbot import QtBot
 
 from studio.project.autosave import Autosave
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.project.project_files import missing_files
+from studio.qt.core.jobs import RENDER
+from studio.qt.core.session import Render
 from studio.qt.shell.window import MainWindow
-from tests.studio.qt.shell.window_hands import answer, choose_file, dialog, drop, files, project_with_missing_mesh
+from tests.studio.qt.shell.window_hands import (
+    answer,
+    choose_file,
+    dialog,
+    drop,
+    files,
+    project_with_missing_mesh,
+    until_cancelled,
+)
+from tests.studio.qt.small_session import small_render
 from tests.studio.scan_of_steps import small_scan
 
 POWER = ("scene", "rig", "lasers", 0, "power")
@@ -74,6 +85,29 @@ class TestFiles:
 
     def test_an_untouched_project_closes_without_a_question(self, own_window: MainWindow) -> None:
         assert own_window.close()
+
+    def test_a_render_that_was_asked_for_is_asked_about(
+        self, window: MainWindow, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """In one question, with the changes where there are any; the program's own first picture is nobody's loss."""
+        panel, (world, frame) = window.panels["render"], small_render()
+        kept = [Render(k, window.session.project, world, frame, kept=k == 1, asked=k != 2) for k in (1, 2, 3, 4)]
+        monkeypatch.setattr(window.session, "renders", kept)
+        assert window.files.may_close(), "renders alone are not asked about"
+        window.runner.run(RENDER, "render", until_cancelled)
+        monkeypatch.setattr(panel, "asked", False)
+        assert window.files.may_close()
+        monkeypatch.setattr(panel, "asked", True)
+        answer(qtbot, "under-way", "Stay")
+        assert not window.close() and window.isVisible()
+        answer(qtbot, "under-way", "Stop it")
+        assert window.files.may_close()
+        window.session.set(POWER, 0.005)
+        told: list[str] = []
+        monkeypatch.setattr(QMessageBox, "setInformativeText", lambda box, text: told.append(text))
+        answer(qtbot, "unsaved", "Cancel")
+        assert not window.close()
+        assert "A render is under way" in told[0] and "2 renders of this session go" in told[0]
 
     def test_a_project_dropped_on_the_window_is_opened(
         self, window: MainWindow, qtbot: QtBot, small_project: Path
