@@ -30,6 +30,15 @@ def named_files(item: BaseModel, where: str) -> dict[str, str]:
     return found
 
 
+def in_project(path: str, root: Path) -> str:
+    """A path as a project names it: one that is absolute, of a place inside the project's folder, begins there."""
+    place = Path(path.strip())
+    if not place.is_absolute() or "\0" in path:
+        return path
+    resolved, folder = place.resolve(), root.resolve()
+    return resolved.relative_to(folder).as_posix() if folder in resolved.parents else path
+
+
 def missing_files(scene: Scene, root: Path) -> list[tuple[int, Path]]:
     """Visible objects whose mesh or texture is not there: index and file. InputError: a path that leaves the folder."""
     found = []

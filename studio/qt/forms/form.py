@@ -15,6 +15,7 @@ from studio.editing.forms import Alternative, FieldSpec, describe_item, edited, 
 from studio.editing.scene_edits import new_motion
 from studio.editing.targets import other_frame
 from studio.project.document import FieldPath, value_at
+from studio.project.project_files import in_project
 from studio.qt.core import theme
 from studio.qt.core.session import Session
 from studio.qt.forms.fields import ChoiceField, TextField, reason, tool_button
@@ -146,6 +147,7 @@ class Form(QWidget):
     def change(self, owner: FieldPath, spec: FieldSpec, value: Any, label: str, merge: str) -> str | None:
         """Edit the document; why it was refused, or None."""
         document = self.session.document
+        value = in_project(value, document.root) if spec.kind == "file" else value
         try:
             project = edited(document.project, owner, spec, value)
         except InputError as error:

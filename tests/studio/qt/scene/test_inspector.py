@@ -300,3 +300,12 @@ def test_a_logo_that_cannot_be_shown_is_told_at_its_field(session: Session, insp
     assert "/somewhere/else/logo.png is not shown" in inspector.problem.text()
     session.set(("delivery", "logo"), "")
     assert not inspector.problem.isVisibleTo(inspector)
+
+
+def test_a_whole_path_inside_the_projects_folder_is_taken(qtbot: QtBot, session: Session, inspector: Inspector) -> None:
+    session.select(("delivery",))
+    editor = row(inspector, "delivery", "logo").text
+    for typed, kept in (("textures/logo.png", "textures/logo.png"), ("/elsewhere/logo.png", "/elsewhere/logo.png")):
+        for text in (typed, str(session.document.root / typed)):
+            type_into(qtbot, editor, text)
+            assert session.project.delivery.logo == editor.text() == kept
