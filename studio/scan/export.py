@@ -64,8 +64,10 @@ def export_report(path: Path, what: Exported) -> list[Path]:
 
     _spare_inputs(what, [path])
     first = _first_world(what)
+    rig = what.rendered.scene.rig.model_copy(update={"camera": what.project.scene.camera})  # its lens is that of now
+    scene = what.rendered.scene.model_copy(update={"rig": rig})
     cautions = Cautions(
-        what.rendered.model_copy(update={"sensor": what.project.sensor}),
+        what.rendered.model_copy(update={"sensor": what.project.sensor, "scene": scene}),
         what.image_scale,
         [laser.power for laser in what.project.scene.lasers],
     )

@@ -84,6 +84,12 @@ class Render:
         return self.project.extraction.axis, camera.width, camera.height
 
     @property
+    def measured_as(self) -> Project:
+        """The project by whose sensor, lens and extraction `measurements` were made last."""
+        made = self.made_from.get("measurements")
+        return self.project if made is None else made[1].project
+
+    @property
     def refining(self) -> bool:
         """More of its light is to come by itself."""
         return not self.final and self.state is None and not self.stopped

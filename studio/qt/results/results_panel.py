@@ -172,7 +172,9 @@ class ResultsPanel(QWidget):
         else:
             self._show_histogram()
             self.table.show_measures(list(shown), table(list(shown.values()), view))
-            remarks = frame_remarks(render.project, render.frame, render.measurements) if render.measurements else []
+            remarks = (
+                frame_remarks(render.measured_as, render.frame, render.measurements) if render.measurements else []
+            )
         self._show_by_step(render.scan, laser)
         self._tell_remarks(list(dict.fromkeys([*scale_notes(render.scanner_scale), *remarks])))
         self._tell_head()

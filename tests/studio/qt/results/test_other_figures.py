@@ -169,6 +169,23 @@ def results(qtbot: QtBot) -> ResultsPanel:
     return made
 
 
+def test_remarks_are_of_the_settings_that_it_was_measured_with(qtbot: QtBot) -> None:
+    """Not of those with which it was rendered: another focus is measured anew without a render."""
+    session = small_session(rendered=True)
+    panel, develop = ResultsPanel(session), DevelopPanel(session)
+    for widget in (panel, develop):
+        qtbot.addWidget(widget)
+    with qtbot.waitSignal(session.measured, timeout=20_000):
+        develop.refresh()
+    assert "would be blurred" not in panel.notices[1].text.text()
+    with qtbot.waitSignal(session.measured, timeout=20_000):
+        session.set(("scene", "rig", "camera", "lens", "focus_distance"), 0.05)
+    assert session.shown is not None and not session.stale
+    assert "would be blurred" in panel.notices[1].text.text()
+    panel.close()
+    develop.close()
+
+
 def test_figures_of_a_scene_that_has_changed_say_so(results: ResultsPanel) -> None:
     panel, session = results, results.session
     assert not panel.head_text.text().startswith(CHANGED)
