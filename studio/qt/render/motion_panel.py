@@ -203,9 +203,14 @@ class MotionPanel(QWidget):
         order, self._running = self._running[1], None
         if order.document is self.session.document:
             self.stopped = order
-            self.go_on.setToolTip(f"Go on where the scan into {order.folder} was stopped")
+            size = next((name for name, scale in SCALES.items() if scale == order.image_scale), "")
+            self.go_on.setText(f"Resume ({size})")
+            self.go_on.setToolTip(
+                f"Go on at {size}, as it began, whatever is chosen now, where the scan into {order.folder} was stopped"
+            )
             self.go_on.show()
-            self.session.message.emit("info", f"The scan was stopped; Resume in Motion goes on: {order.folder}")
+            told = f"The scan was stopped; Resume in Motion goes on at {size}: {order.folder}"
+            self.session.message.emit("info", told)
 
     def _forget(self) -> None:
         """Another project was opened: what was scanned of the one before goes."""
