@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QDialog, QFileDialog, QMenu, QWidget
 
 from render.base.errors import InputError
+from studio.editing.units import Unit
 from studio.project.autosave import Autosave, Recovery, find, find_of, sweep
 from studio.project.date_and_time import read_out
 from studio.project.document import Document
@@ -69,6 +70,15 @@ def _scanned(found: ScanFolder) -> Document:
     # its camera is the scan's: the name says so, wherever it is shown or saved
     name = project.name if scale == 1.0 else f"{project.name} at {scale:.3g} x"
     return Document(project.model_copy(update={"name": name[:MAX_NAME]}), None, found.root)
+
+
+def _of_the_images(project: Project, scale: float) -> str:
+    """Why camera and exposure of a scan without its project file are not the scanner's."""
+    exposure, unit = project.sensor.exposure_time, Unit.of("s")
+    return (
+        f"Camera and exposure are those of the scan's images, at {scale:.3g} x: the exposure of "
+        f"{unit.with_unit(exposure)} stands for {unit.with_unit(exposure / scale**2)} of the scanner"
+    )
 
 
 class FileActions(QObject):
@@ -158,6 +168,8 @@ class FileActions(QObject):
             left = [] if document.path is None else find_of(self.autosave.folder, document.path)
             if not self._offer(left):
                 self.replace(document)
+                if document.path is None and scale != 1.0:
+                    self.session.message.emit("info", _of_the_images(document.project, scale))
         if is_scan_of(found, session.project):
             scan_steps(session).show(found, session.project, scale)
         else:

@@ -23,7 +23,7 @@ from studio.qt.render.motion_panel import MotionPanel
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell.window import MainWindow
 from studio.scan.options import Listener, ScanOptions
-from studio.scan.scan_folder import open_folder
+from studio.scan.scan_folder import image_scale_of, open_folder
 from tests.studio.scan_of_steps import SCALE, small_project, small_scan
 
 
@@ -168,8 +168,12 @@ class TestOpened:
         folder = Path(shutil.copytree(scanned[1], tmp_path / "scan"))
         for file in (tmp_path / "project").glob("*.json"):
             file.unlink()
+        told: list[str] = []
+        window.session.message.connect(lambda level, text: told.append(text))
         assert window.files.open(folder)
         render = shown(window, qtbot, 0)
+        assert window.workspace == "measure"
+        assert any("stands for" in text and "at 0.5 x" in text for text in told)
         assert window.session.document.path is None and not window.files.unsaved
         assert "at 0.5 x" in window.session.project.name
         assert render.scanner_scale == SCALE and not window.session.stale
@@ -296,12 +300,15 @@ class TestRun:
         # the frame beside it may have begun as well, and keeps nothing
         assert rendered[0] == 0 and set(rendered) <= {0, 1, 2} and moving.go_on.isVisible()
         begun = len(rendered)
+        moving.scale.setCurrentText("quarter size")
+        assert moving.go_on.text() == "Resume (half size)" and "at half size, as it began" in moving.go_on.toolTip()
         window.session.set(("sensor", "bits"), 8)  # what goes on is what was begun
         with qtbot.waitSignal(moving.runner.finished, timeout=60_000):
             qtbot.mouseClick(moving.go_on, Qt.MouseButton.LeftButton)
         # the first frame of the block teaches the others again
         assert sorted({*rendered[begun:]} - {0}) == [1, 2] and moving.go_on.isHidden()
         assert open_folder(tmp_path / "scan").project.sensor.bits == 12
+        assert image_scale_of(open_folder(tmp_path / "scan")) == 0.5
         shown(window, qtbot, 0)
         window.files.count_as_saved(window.session.project)
 
