@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QDialog, QLineEdit, QListWidget, QListWidgetItem, 
 from studio.qt.core import theme
 from studio.runtime.word_search import found
 
+NOTHING = "Nothing found: no command has these letters"
 SIZE = (560, 420)
 PASSED_ON = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
@@ -68,12 +69,18 @@ class CommandSearch(QDialog):
                 item.setToolTip("Not possible just now")
             self.list.addItem(item)
         self.list.setCurrentRow(0)
+        if self.list.count() == 0:
+            nothing = QListWidgetItem(NOTHING)
+            nothing.setFlags(Qt.ItemFlag.NoItemFlags)
+            self.list.addItem(nothing)
 
     def choose(self) -> None:
         """Do what is marked, after this window has gone: it may open one of its own."""
-        if self.list.currentRow() < 0:
+        item = self.list.currentItem()
+        number = None if item is None else item.data(Qt.ItemDataRole.UserRole)
+        if number is None:
             return
-        action = self.entries[self.list.currentItem().data(Qt.ItemDataRole.UserRole)].action
+        action = self.entries[number].action
         if action.isEnabled():
             self.accept()
             QTimer.singleShot(0, action, action.trigger)

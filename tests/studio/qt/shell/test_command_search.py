@@ -33,5 +33,9 @@ def test_a_command_that_is_not_possible_now_stays_undone(window: MainWindow, qtb
     search.show_found("redo")
     search.choose()
     search.show_found("no such thing")
+    (only,) = [search.list.item(i) for i in range(search.list.count())]
+    assert only.text().startswith("Nothing found") and not only.flags()
+    search.choose()
+    search.list.setCurrentRow(0)
     search.choose()
     assert search.isVisible() is False and window.session.project is before
