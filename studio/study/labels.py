@@ -41,6 +41,15 @@ def as_read(answer: Answer, bases: Collection[Project]) -> tuple[Answer, Labels]
     return shown, {one.field: one.field if spec is None else _label(spec) for one, spec in pairs}
 
 
+def value_text(parameter: Parameter, value: Value, bases: Collection[Project]) -> str:
+    """A value of a field with its unit: "0.9 ms"."""
+    from studio.study.charts import shown  # draws, which takes a while to import
+
+    found = next((spec for base in bases if (spec := spec_of(base, parameter.field)) is not None), None)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return found.unit.with_unit(float(value)) if found is not None and number else shown(value)  # type: ignore[arg-type]
+
+
 def _spec(parameter: Parameter, bases: Collection[Project]) -> FieldSpec | None:
     """Of the first project that has the field; None: it has a label of its own, or no project has it."""
     if parameter.label:

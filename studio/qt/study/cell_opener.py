@@ -72,14 +72,17 @@ class CellOpener(QObject):
         jobs.run(RENDER, "cell of the study", work, then)
 
     def _take(self, found: Found, number: int, cell: Cell, frame: RenderedFrame, show: bool) -> None:
-        from studio.study.charts import shown
+        from studio.study.labels import value_text
 
+        sweep = found.answers[number].sweep
+        pairs, bases = zip(sweep.vary, cell.point, strict=True), found.bases.values()
+        values = (value_text(field, value, bases) for field, value in pairs)
         made = Render(
             max([one.number for one in self.session.renders], default=0) + 1,
             frame.project,
             frame.world,
             frame,
-            name=f"{found.answers[number].sweep.name}: {', '.join(map(shown, cell.point))}, repeat {cell.repeat + 1}",
+            name=f"{sweep.name}: {', '.join(values)}, repeat {cell.repeat + 1}",
             created=time.strftime("%H:%M:%S"),
             image_scale=frame.image_scale,
             source=cell.project,

@@ -14,9 +14,9 @@ from studio.study.answers import Answer, answers
 from studio.study.cells import next_cells
 from studio.study.charts import chart, places
 from studio.study.draft import fields_of, path_text, spec_of
-from studio.study.labels import as_read, interval_text
+from studio.study.labels import as_read, interval_text, value_text
 from studio.study.page import sentences, table, write_page
-from studio.study.study import Study
+from studio.study.study import Parameter, Study
 
 EXPOSURE = "sensor.exposure_time"
 BASELINE = "scene.rig.lasers[0].T_rig_laser.translation[0]"
@@ -81,6 +81,13 @@ def test_an_interval_of_a_single_repeat_is_none() -> None:
     assert interval_text(float("nan"), float("nan")) == "-"
     assert interval_text(0.0, float("inf")) == "0 to -"
     assert interval_text(-1.23456, 2.0, 3) == "-1.23 to 2"
+
+
+def test_a_value_alone_has_the_unit_of_the_inspector() -> None:
+    bases = [Project.load(template_folder("weld_seam") / "project.json")]
+    fields = {EXPOSURE: 0.0009, "render.transport": "direct", "sensor.read_noise": 2.5}
+    told = [value_text(Parameter(field=field, values=(value,)), value, bases) for field, value in fields.items()]
+    assert told == ["0.9 ms", "direct", "2.5 e-"]
 
 
 def test_a_pose_is_varied_by_its_position_and_its_turn() -> None:
