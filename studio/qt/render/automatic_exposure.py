@@ -24,7 +24,7 @@ class Exposure(NamedTuple):
     @property
     def told(self) -> str:
         """A sentence."""
-        aim = f"the line's brightest pixels at {FILLED:.0%} of full scale"
+        aim = f"the line's brightest pixels are aimed at {FILLED:.0%} of full scale"
         return f"Exposure {Unit.of('s').with_unit(self.time)}: {aim}, {self.by}"
 
 

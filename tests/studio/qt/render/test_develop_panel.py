@@ -175,7 +175,7 @@ def test_one_click_exposes_by_the_render_and_is_one_step_to_undo(qtbot, panel):
     session.message.connect(lambda level, text: told.append(text))
     with qtbot.waitSignal(session.measured, timeout=20000):
         qtbot.mouseClick(panel.automatic_exposure, Qt.MouseButton.LeftButton)
-    assert "brightest pixels at 70% of full scale, by Render 1" in told[-1]
+    assert "brightest pixels are aimed at 70% of full scale, by Render 1" in told[-1]
     time = session.project.sensor.exposure_time
     assert time != before and session.document.undo_label == "automatic exposure"
     settle(qtbot, panel)
