@@ -63,8 +63,11 @@ def seconds(value: float) -> str:
 
 
 def percent(value: float, decimals: int = 1) -> str:
-    """Fraction -> "98.2 %"."""
-    return f"{100 * value:.{decimals}f}\u00a0%" if math.isfinite(value) else NONE
+    """Fraction -> "98.2 %"; what is not all of it is never rounded up to 100."""
+    if not math.isfinite(value):
+        return NONE
+    shown = min(100.0 * value, 100.0 - 10.0**-decimals) if value < 1.0 else 100.0 * value
+    return f"{shown:.{decimals}f}\u00a0%"
 
 
 def count(value: float) -> str:

@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from analysis.line.settings import Method
 from analysis.report.colour import hex_colour, method_colour, method_name, wavelength_colour
+from analysis.report.units import percent
 from render.base.errors import InputError
 from render.base.threads import Cancel
 from render.frame import Frame
@@ -352,7 +353,7 @@ class DevelopPanel(QWidget):
                 rows.append(
                     f"<tr><td><span style='color:{method_colour(method)}'>&#9632;</span> {name}&nbsp;&nbsp;</td>"
                     f"<td align='right'>{u:.3f}&nbsp;&nbsp;</td><td align='right'>{1e6 * depth:.1f} µm&nbsp;&nbsp;</td>"
-                    f"<td align='right'>{item.errors.completeness:.1%}</td></tr>"
+                    f"<td align='right'>{percent(item.errors.completeness)}</td></tr>"
                 )
         self.table.setText(f"<table cellspacing='2'>{''.join(rows)}</table>")
         own = next(iter(found.values()), [])

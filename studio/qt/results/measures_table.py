@@ -33,10 +33,13 @@ EXPLAINED = {
 }
 
 ROW_PX = 22
+MOST_OF_ALL = 99.9
+"""%, in three digits."""
 
 
-def shown(value: float) -> str:
-    """Three digits, or all of a whole number."""
+def shown(value: float, unit: str = "") -> str:
+    """Three digits, or all of a whole number; a share that is not all of it is never rounded up to 100 %."""
+    value = min(value, MOST_OF_ALL) if unit == "%" and value < 100.0 else value
     return "-" if math.isnan(value) else f"{value:.0f}" if value == round(value) else digits(value)
 
 
@@ -85,7 +88,7 @@ class MeasuresTable(ReadOnlyTable):
             heading.setToolTip(f"<p>{EXPLAINED[name]}</p>")
             self.setVerticalHeaderItem(row, heading)
             for column, value in enumerate(values):
-                item = self.show_cell(row, column, shown(value))
+                item = self.show_cell(row, column, shown(value, unit))
                 item.setToolTip(f"<p>{EXPLAINED[name]}</p>")
                 if name == COVERED and value < HONEST:
                     item.setForeground(QColor(theme.colours().warning))

@@ -12,9 +12,11 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from analysis.report.units import percent
 from render.world.world import build_world
 from studio.project.project import Project
 from studio.qt.core.session import Render
+from studio.qt.results.measures_table import shown
 from studio.qt.results.results_panel import ResultsPanel
 from studio.qt.shell.window import MainWindow
 from studio.qt.viewport.error_cloud import ErrorCloud
@@ -157,6 +159,12 @@ def test_the_table_says_what_the_measures_say(window: MainWindow, results: Resul
     )
     assert window.cloud.error_view.kind == "position"
     results.error.setCurrentIndex(0)
+
+
+def test_a_share_that_is_not_all_is_never_rounded_up_to_it() -> None:
+    assert [shown(100.0 * count / 2044, "%") for count in (2044, 2043, 2041, 1)] == ["100", "99.9", "99.9", "0.0489"]
+    assert [percent(count / 2044) for count in (2044, 2043)] == ["100.0\u00a0%", "99.9\u00a0%"]
+    assert percent(0.99999, 2) == "99.99\u00a0%" and shown(99.96, "µm") == "100.0"
 
 
 def test_points_hide_when_the_scene_has_changed_but_not_while_measuring(
