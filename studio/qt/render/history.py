@@ -63,7 +63,8 @@ def describe(render: Render) -> str:
         parts.append(f"laser {max(errors):.2%}")
     ambient = render.frame.quality_of("ambient")
     if ambient is not None:
-        parts.append(f"ambient {ambient.work:.0f}")
+        # an average: with a goal most pixels are interpolated
+        parts.append(f"ambient {ambient.work:.{0 if ambient.work >= 10.0 else 1}f} samples a pixel")
     parts.append(f"{sum(render.frame.seconds.values()):.1f} s")
     if not render.final:
         parts.append("under way" if render.refining else "stopped early, Continue goes on")

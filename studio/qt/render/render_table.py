@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QFont
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QDialog,
     QHBoxLayout,
     QLabel,
+    QStyle,
     QTableWidget,
     QTableWidgetItem,
     QVBoxLayout,
@@ -23,7 +24,7 @@ from studio.project.date_and_time import read_out
 from studio.qt.core.dialogs import export_csv, show_trouble
 from studio.qt.core.figures_age import FiguresAge
 from studio.qt.core.session import Render, Session, one_of
-from studio.qt.core.widgets import text_button
+from studio.qt.core.widgets import room_for_a_window, text_button
 from studio.runtime.error_messages import trouble
 from studio.scan.gauging import readings
 from studio.scan.kept_renders import Kept, as_read_now, figures_of, keep, kept_renders, open_kept
@@ -32,7 +33,7 @@ from studio.study.side_by_side import Row, side_by_side, write_table
 
 MEASURING = "The shown render is being measured with the settings of now; its figures are still those of before."
 HINT = "Figures are followed by their difference from the first column's. Settings that all have alike are left out."
-FEWEST_PX = 230
+FEWEST_PX, WIDEST_PX = 230, 1280
 
 
 def as_kept(session: Session, render: Render, name: str) -> Kept:
@@ -105,7 +106,6 @@ class RenderTable(QDialog):
         column.addWidget(self.table, 1)
         column.addWidget(self.told)
         column.addLayout(buttons)
-        self.resize(min(1280, 340 + FEWEST_PX * max(2, len(self.renders))), 480)
         self.open_button.clicked.connect(self.open_chosen)
         self.export.clicked.connect(self._ask)
         self.table.itemSelectionChanged.connect(self._show_buttons)
@@ -115,6 +115,16 @@ class RenderTable(QDialog):
         self._fill()
         self._tell()
         self._show_buttons()
+        self.table.ensurePolished()
+        self.resize(self._wanted().boundedTo(room_for_a_window(self)))
+
+    def _wanted(self) -> QSize:
+        """Room for every column, up to a width at which the eye still finds its way."""
+        table, bar = self.table, self.style().pixelMetric(QStyle.PixelMetric.PM_ScrollBarExtent)
+        columns = max(2 * FEWEST_PX, table.horizontalHeader().length())
+        margins = self.contentsMargins() + self.layout().contentsMargins()
+        beside = table.verticalHeader().sizeHint().width() + 2 * table.frameWidth() + bar
+        return QSize(min(WIDEST_PX, columns + beside + margins.left() + margins.right()), 480)
 
     def _read(self) -> tuple[list[Kept], list[Row]]:
         """Columns and rows, by the figures of now."""

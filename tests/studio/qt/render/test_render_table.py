@@ -12,8 +12,8 @@ from pytestqt.qtbot import QtBot
 from render.base.errors import InputError
 from studio.project.document import Document
 from studio.qt.core.session import Render, Session
-from studio.qt.render.history import History, title
-from studio.qt.render.render_table import as_kept, keep_render, open_render
+from studio.qt.render.history import History, describe, title
+from studio.qt.render.render_table import FEWEST_PX, as_kept, keep_render, open_render
 from studio.scan.kept_renders import kept_renders
 from studio.scan.redevelop import develop_again, development, measure_again
 from studio.study.side_by_side import side_by_side
@@ -37,6 +37,8 @@ def test_a_render_is_kept_found_again_and_opened(qtbot: QtBot, tmp_path: Path) -
     headers = [table.table.horizontalHeaderItem(i).text() for i in range(table.table.columnCount())]  # type: ignore[union-attr]
     assert [text.split("\n")[0] for text in headers] == ["Render 1", "ten bits", "ten bits"]
     assert [row.cells[0] != row.cells[1] for row in table.rows] == [True]
+    qtbot.waitExposed(table)
+    assert table.table.horizontalHeader().length() == 3 * FEWEST_PX <= table.table.viewport().width()
     table.table.setCurrentCell(0, 0)
     assert not table.open_button.isEnabled()
     table.table.setCurrentCell(0, 2)
@@ -88,6 +90,14 @@ def test_a_render_that_was_stopped_is_opened_as_stopped(qtbot: QtBot, tmp_path: 
     keep_render(session, render, "half")
     opened = open_render(session, kept_renders(tmp_path)[0][0])
     assert not opened.final and not opened.refining and as_kept(session, opened, "again").stopped
+
+
+def test_the_list_tells_of_ambient_light_however_few_its_samples_are(qtbot: QtBot) -> None:
+    """With a goal most of its pixels are interpolated."""
+    world, frame = small_render()
+    few = tuple(replace(one, work=0.2) if one.group == "ambient" else one for one in frame.quality)
+    said = describe(Render(1, small_project(), world, replace(frame, quality=few)))
+    assert frame.quality_of("ambient") is not None and "ambient 0.2 samples a pixel" in said
 
 
 def test_a_project_without_a_file_keeps_nothing(qtbot: QtBot) -> None:
