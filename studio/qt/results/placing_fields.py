@@ -78,7 +78,6 @@ class PlacingFields(QObject):
             field.hide()
             field.setAlignment(Qt.AlignmentFlag.AlignRight)
             field.setFixedWidth(WIDTH)
-            field.setPlaceholderText("no line")
             field.entered.connect(partial(self.set, key))
             field.refused.connect(partial(self._tell_why, field))
             field.given_up.connect(partial(self._tell_given_up, key))
@@ -93,6 +92,7 @@ class PlacingFields(QObject):
         for key, field in self.fields.items():
             value = self.values[key]
             field.setEnabled(value is not None)
+            field.setPlaceholderText("no line" if value is None else "")
             if not field.hasFocus() or not field.pending:
                 scale = field.spec.unit.factor
                 field.show_value(None if value is None else float(f"{value * scale:.{DIGITS}g}") / scale)

@@ -90,9 +90,10 @@ def test_at_another_stand_off_the_laser_meets_the_same_point_with_the_same_basel
 def test_a_field_that_takes_nothing_says_why(qtbot: QtBot) -> None:
     panel = panel_on(qtbot)
     field, session = panel.placing.fields["standoff"], panel._session
-    assert "along its axis" in field.toolTip()
+    assert "along its axis" in field.toolTip() and field.placeholderText() == "", "emptied, it says nothing wrong"
     session.set(("scene", "objects", 0, "visible"), False)
     qtbot.waitUntil(lambda: not field.isEnabled())
+    assert field.placeholderText() == "no line"
     assert "not in the image" in field.toolTip() and "T" in field.toolTip()
     session.document.undo()
     qtbot.waitUntil(field.isEnabled)
