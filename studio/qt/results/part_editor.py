@@ -44,6 +44,8 @@ class PartEditor(QWidget):
             self._grid.setColumnStretch(column, share)
         self._made_for: tuple[FieldPath, str] = (), ""
         self._dragged = False
+        self._given_up = ""
+        """Why what was typed was dropped, as its field is about to be left."""
 
     def show_gauge(self, index: int, gauge: Gauge | None) -> None:
         """None: there is none to edit."""
@@ -90,7 +92,7 @@ class PartEditor(QWidget):
             field.setToolTip(spec.help)
             field.setAccessibleName(spec.label)
             field.entered.connect(partial(self._enter, name))
-            field.refused.connect(self._tell)
+            field.refused.connect(self._hear)
             field.given_up.connect(partial(self._tell_given_up, name))
             if name == "nominal":
                 # while it is typed, so that Tab goes on to them
@@ -110,8 +112,13 @@ class PartEditor(QWidget):
         self._tell("")
 
     def _tell_given_up(self, name: str) -> None:
-        told = f"{self.fields[name].spec.label}: {self.problem.text()}. The value is as it was"
-        self.session.message.emit("warning", told)
+        self._given_up = f"{self.fields[name].spec.label}: {self.problem.text()}. The value is as it was"
+        self.session.message.emit("warning", self._given_up)
+
+    def _hear(self, why: str) -> None:
+        """Of a field. What was given up is told until something else is typed."""
+        told, self._given_up = self._given_up, ""
+        self._tell(why or told)
 
     def _drag(self, name: str, value: Any) -> None:
         try:

@@ -177,6 +177,26 @@ def test_what_tab_drops_is_told(panel: ResultsPanel, qtbot: QtBot, typed: str, w
     assert told.args[1].endswith("The value is as it was") and nominal.text() == ""
 
 
+def test_a_tolerance_that_tab_drops_is_told_until_something_else_is_typed(panel: ResultsPanel, qtbot: QtBot) -> None:
+    with_a_step(panel.session, nominal=0.0, lower=2e-6)
+    panel.figures.setCurrentIndex(PART)
+    panel.part.table.selectRow(0)
+    editor = panel.part.editor
+    upper = editor.fields["upper"]
+    panel.activateWindow()
+    qtbot.waitUntil(panel.isActiveWindow)
+    upper.setFocus()
+    qtbot.keyClicks(upper, "-0.002")
+    qtbot.keyClick(upper, Qt.Key.Key_Tab)
+    told = editor.problem.text()
+    assert upper.text() == "" and editor.problem.isVisible()
+    assert told.startswith("Upper") and "lower" in told and told.endswith("The value is as it was")
+    upper.setFocus()
+    assert editor.problem.text() == told
+    qtbot.keyClicks(upper, "0.004")
+    assert not editor.problem.isVisible()
+
+
 def test_tab_goes_from_the_nominal_on_to_its_tolerances(panel: ResultsPanel, qtbot: QtBot) -> None:
     with_a_step(panel.session)
     panel.figures.setCurrentIndex(PART)
