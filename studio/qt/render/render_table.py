@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QMargins, QSize, Qt
 from PySide6.QtGui import QFont
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -116,13 +116,12 @@ class RenderTable(QDialog):
         self._tell()
         self._show_buttons()
         self.table.ensurePolished()
-        self.resize(self._wanted().boundedTo(room_for_a_window(self)))
+        self.resize(self._wanted(column.contentsMargins()).boundedTo(room_for_a_window(self)))
 
-    def _wanted(self) -> QSize:
-        """Room for every column, up to a width at which the eye still finds its way."""
+    def _wanted(self, margins: QMargins) -> QSize:
+        """Room for every column, up to a width at which the eye still finds its way; margins: about the table."""
         table, bar = self.table, self.style().pixelMetric(QStyle.PixelMetric.PM_ScrollBarExtent)
         columns = max(2 * FEWEST_PX, table.horizontalHeader().length())
-        margins = self.contentsMargins() + self.layout().contentsMargins()
         beside = table.verticalHeader().sizeHint().width() + 2 * table.frameWidth() + bar
         return QSize(min(WIDEST_PX, columns + beside + margins.left() + margins.right()), 480)
 
