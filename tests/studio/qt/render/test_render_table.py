@@ -37,8 +37,6 @@ def test_a_render_is_kept_found_again_and_opened(qtbot: QtBot, tmp_path: Path) -
     headers = [table.table.horizontalHeaderItem(i).text() for i in range(table.table.columnCount())]  # type: ignore[union-attr]
     assert [text.split("\n")[0] for text in headers] == ["Render 1", "ten bits", "ten bits"]
     assert [row.cells[0] != row.cells[1] for row in table.rows] == [True]
-    qtbot.waitExposed(table)
-    assert table.table.horizontalHeader().length() == 3 * FEWEST_PX <= table.table.viewport().width()
     table.table.setCurrentCell(0, 0)
     assert not table.open_button.isEnabled()
     table.table.setCurrentCell(0, 2)
@@ -90,6 +88,24 @@ def test_a_render_that_was_stopped_is_opened_as_stopped(qtbot: QtBot, tmp_path: 
     keep_render(session, render, "half")
     opened = open_render(session, kept_renders(tmp_path)[0][0])
     assert not opened.final and not opened.refining and as_kept(session, opened, "again").stopped
+
+
+def test_the_table_opens_with_room_for_its_columns(qtbot: QtBot, tmp_path: Path) -> None:
+    """However long the names of settings are: the second column was cut off."""
+    file = tmp_path / "project.json"
+    long = {"scene.objects[0].name": "the ball of the bearing that was measured in the workshop in May"}
+    project = small_project().replaced(long).save(file)
+    session = Session(Document(project, file))
+    history = History(session)
+    qtbot.addWidget(history)
+    world, frame = small_render()
+    for k, scale in enumerate((1.0, 0.5)):
+        session.add_render(Render(k + 1, project.replaced({"scene.objects[0].scale": scale}), world, frame))
+    table = history.open_table()
+    qtbot.waitExposed(table)
+    assert table.table.verticalHeader().width() > 340
+    assert table.table.horizontalHeader().length() == 2 * FEWEST_PX <= table.table.viewport().width()
+    table.close()
 
 
 def test_the_list_tells_of_ambient_light_however_few_its_samples_are(qtbot: QtBot) -> None:
