@@ -43,6 +43,15 @@ def tell_deviation(folder: Path, **options: Any) -> None:
         print(text.translate(PLAIN))
 
 
+def asked(record: dict[str, Any]) -> str:
+    """What the figures are of: part, nominal, alignment and the tolerance's band."""
+    lower, upper = record["lower"], record["upper"]
+    ends = ["none" if end is None else f"{1e6 * end:+.6g}" for end in (lower, upper)]
+    band = "no tolerance" if lower is None and upper is None else f"tolerance {' / '.join(ends)} µm"
+    aligned = "as measured" if record["alignment"] == "none" else f"aligned by {record['alignment']}"
+    return f"{record['part'] or 'All objects'} against {record['nominal']}, {aligned}, {band}"
+
+
 def sentence(record: dict[str, Any]) -> str:
     """The deviations in one line."""
     spread = f"robust sigma {micrometres(record['robust_sigma'])}, 95 % within {micrometres(record['p95'])}"

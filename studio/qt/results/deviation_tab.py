@@ -25,7 +25,7 @@ from analysis.deviation import Alignment
 from analysis.report.deviation_figure import draw
 from render.base.errors import InputError
 from render.scene.shape import Unit
-from studio.commands.deviation import details, sentence
+from studio.commands.deviation import asked, details, sentence
 from studio.editing.units import Unit as ShownUnit
 from studio.project.step_file import is_step
 from studio.qt.core.dialogs import export_csv, show_trouble
@@ -35,6 +35,7 @@ from studio.qt.core.widgets import ElidedLabel, text_button
 from studio.qt.forms.unit_box import UnitBox
 from studio.qt.results.shown_points import NOTHING, are_there, shown_points
 from studio.runtime.error_messages import trouble
+from studio.runtime.jobs import Job
 from studio.scan.deviation import Compared, Question, compare_cloud, map_of, write_deviation
 from studio.scan.first_range import deviation_limit
 
@@ -46,6 +47,8 @@ ALIGNMENTS: dict[Alignment, str] = {
 }
 FILES = "Nominal part (*.step *.stp *.stl *.ply *.obj *.glb *.gltf *.off)"
 ALL = "All objects"
+CHANGED = "Changed since: Compare again. The figures are still of what they name."
+ANOTHER = "Other points are shown since: Compare again."
 MARGIN = 8
 MOST_UM = 100_000.0
 SPOTS_HINT = "x,y,z of six places on the nominal, mm, world: three, two, one; between them semicolons"
@@ -58,6 +61,7 @@ class DeviationTab(QWidget):
         super().__init__()
         self.session, self.runner = session, runner
         self.compared: Compared | None = None
+        self._running: Job[tuple[Compared, QImage]] | None = None
         self.cad: Path | None = None
         self._picture = QPixmap()
         self.part = QComboBox()
@@ -82,6 +86,10 @@ class DeviationTab(QWidget):
         self.in_view.setToolTip("While this is looked at the points there have the colours of their deviation")
         self.in_view.setChecked(True)
         self.in_view.toggled.connect(self._place)
+        self.changed = QLabel(CHANGED, wordWrap=True)
+        """Beside figures of other inputs than those that stand above them."""
+        self.changed.setObjectName("warning")
+        self.changed.hide()
         self.told = QLabel(wordWrap=True)
         self.told.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.map = QLabel(alignment=Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
@@ -92,10 +100,17 @@ class DeviationTab(QWidget):
         self.choose.clicked.connect(self._choose)
         self.as_scanned.clicked.connect(lambda: self.take_nominal(None))
         self.alignment.currentIndexChanged.connect(self._show_rows)
+        for changed in (
+            *(box.currentIndexChanged for box in (self.part, self.unit, self.alignment)),
+            self.spots.textChanged,
+            *(limit.valueChanged for limit in (self.least, self.most)),
+        ):
+            changed.connect(self._check)
         self.compare_button.clicked.connect(self.compare)
         self.export.clicked.connect(self._ask)
         for signal in (session.renders_changed, session.measured):
             signal.connect(self.refresh)
+        runner.failed.connect(self._tell_failure)
         self.take_nominal(None)
         self.refresh()
 
@@ -109,9 +124,12 @@ class DeviationTab(QWidget):
             self.part.addItems(wanted)
         there = are_there(self.session)
         self.compare_button.setEnabled(there)
+        running, self._running = self._running is not None, None
         self._show(None)
         if not there:
             self.told.setText(NOTHING)
+        elif running:
+            self.told.setText(ANOTHER)
 
     def take_nominal(self, file: Path | None) -> None:
         """A CAD file; None: the part as it was scanned."""
@@ -119,6 +137,7 @@ class DeviationTab(QWidget):
         self.nominal.setText("the part as it was scanned" if file is None else str(file))
         self.as_scanned.setEnabled(file is not None)
         self.unit.setVisible(file is not None and not is_step(file))
+        self._check()
 
     def question(self) -> Question:
         """What is asked. InputError: the spots are no places."""
@@ -130,7 +149,7 @@ class DeviationTab(QWidget):
             cad=self.cad,
             cad_unit=self.unit.currentData(),
             alignment=alignment,
-            datums=_places(self.spots.text()) if alignment == "3-2-1" else (),
+            datums=tuple(_places(self.spots.text())) if alignment == "3-2-1" else (),
             lower=lower,
             upper=upper,
         )
@@ -143,6 +162,7 @@ class DeviationTab(QWidget):
         except InputError as error:
             show_trouble(self.window(), trouble(error, "compare"))
             return
+        self._show(None)
         self.told.setText("Comparing…")
 
         def work(progress: object, cancelled: object) -> tuple[Compared, QImage]:
@@ -155,15 +175,20 @@ class DeviationTab(QWidget):
             return found, picture
 
         def then(found: tuple[Compared, QImage]) -> None:
+            if self._running is not job:
+                return  # of points that are no longer shown
+            self._running = None
             self._picture = QPixmap.fromImage(found[1])
             self._show(found[0])
 
-        self.runner.run(LANE, "compare with the nominal", work, then)
+        job = self._running = self.runner.run(LANE, "compare with the nominal", work, then)
 
     def write(self, path: Path) -> None:
         """InputError: nothing was compared, or a file cannot be written."""
         if self.compared is None:
             raise InputError("nothing was compared yet", cure="press Compare first")
+        if self.is_changed:
+            raise InputError("the figures are of other inputs than those that are shown", cure="press Compare first")
         files = write_deviation(self.compared, path, [] if self.cad is None else [self.cad])
         self.session.message.emit("info", f"Wrote {', '.join(str(file) for file in files)}")
 
@@ -175,10 +200,31 @@ class DeviationTab(QWidget):
         super().hideEvent(event)
         self.session.show_deviation(None)
 
+    @property
+    def is_changed(self) -> bool:
+        """The figures are of other inputs than those that are shown now."""
+        if self.compared is None:
+            return False
+        try:
+            return self.question() != self.compared.question
+        except InputError:
+            return True
+
+    def _check(self) -> None:
+        """An input may have changed; with its old value again the figures count again."""
+        there, changed = self.compared is not None, self.is_changed
+        self.export.setEnabled(there and not changed)
+        if self.changed.isHidden() != changed:
+            return
+        self.changed.setVisible(changed)
+        for widget in (self.told, self.map):
+            widget.setEnabled(not changed)
+        self._place()
+
     def _place(self) -> None:
-        """Into the 3D view, where it is to be seen."""
+        """Into the 3D view, where it is to be seen; what is of other inputs is not, as nothing there would say so."""
         found, shown = self.compared, None
-        if found is not None and self.isVisible() and self.in_view.isChecked():
+        if found is not None and not self.is_changed and self.isVisible() and self.in_view.isChecked():
             row, step = (found.columns[name].astype(np.int32) for name in ("row", "step"))
             shown = ShownDeviation(found.found.points, found.found.value, row, step, deviation_limit(found))
         self.session.show_deviation(shown)
@@ -189,8 +235,8 @@ class DeviationTab(QWidget):
 
     def _show(self, found: Compared | None) -> None:
         self.compared = found
+        self._check()
         self._place()
-        self.export.setEnabled(found is not None)
         self.map.setVisible(found is not None)
         if found is None:
             self.map.setMinimumHeight(1)
@@ -198,7 +244,7 @@ class DeviationTab(QWidget):
             self.told.setText("")
             return
         record = found.record
-        texts = [f"{record['points']} points: {sentence(record)}", *details(record)]
+        texts = [asked(record), f"{record['points']} points: {sentence(record)}", *details(record)]
         self.told.setText("\n".join(texts))
         self._fit()
 
@@ -217,6 +263,11 @@ class DeviationTab(QWidget):
         self.map.setPixmap(scaled)
         # so that the panel scrolls to it where it is low
         self.map.setMinimumHeight(round(scaled.height() / ratio))
+
+    def _tell_failure(self, job: Job[object]) -> None:
+        if job is self._running and job.problem is not None:
+            self._running = None
+            self.told.setText(job.problem.text)
 
     def _choose(self) -> None:
         chosen, _ = QFileDialog.getOpenFileName(self.window(), "Nominal part", str(self.session.document.root), FILES)
@@ -255,6 +306,7 @@ class DeviationTab(QWidget):
         column.setContentsMargins(MARGIN, MARGIN, MARGIN, MARGIN)
         column.addLayout(self.form)
         column.addLayout(buttons)
+        column.addWidget(self.changed)
         column.addWidget(self.told)
         column.addWidget(self.map)
         column.addStretch(1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QMessageBox
 from pytestqt.qtbot import QtBot
 
+from render.base.errors import InputError
 from studio.project.document import Document
 from studio.project.project import Project
 from studio.qt.core.jobs import JobRunner
@@ -93,6 +95,61 @@ def test_spots_that_are_no_places_are_told(panel: NominalPanel) -> None:
     box = tab.window().findChild(QMessageBox, "trouble")
     assert box is not None and tab.compared is None
     box.close()
+
+
+def test_figures_of_other_inputs_say_so_until_they_are_compared_again(
+    panel: NominalPanel, session: Session, tmp_path: Path, qtbot: QtBot
+) -> None:
+    tab = panel.deviation
+    tab.compare()
+    qtbot.waitUntil(lambda: tab.compared is not None)
+    assert "as measured, tolerance -100 / +100 µm" in tab.told.text()
+    assert not tab.changed.isVisible() and tab.export.isEnabled() and session.deviation is not None
+
+    def looks_changed() -> bool:
+        looks = {tab.changed.isVisible(), not tab.export.isEnabled(), session.deviation is None}
+        assert len(looks) == 1
+        return looks.pop()
+
+    for change, back in (
+        (partial(tab.most.setValue, 150.0), partial(tab.most.setValue, 100.0)),
+        (partial(tab.alignment.setCurrentIndex, 1), partial(tab.alignment.setCurrentIndex, 0)),
+        # without spots it cannot even be asked
+        (partial(tab.alignment.setCurrentIndex, 2), partial(tab.alignment.setCurrentIndex, 0)),
+        (partial(tab.take_nominal, tmp_path / "part.stl"), partial(tab.take_nominal, None)),
+    ):
+        change()
+        assert looks_changed() and "Compare again" in tab.changed.text()
+        with pytest.raises(InputError, match="other inputs"):
+            tab.write(tmp_path / "d.csv")
+        back()
+        assert not looks_changed()
+    tab.most.setValue(150.0)
+    tab.compare()
+    qtbot.waitUntil(lambda: tab.compared is not None)
+    assert not looks_changed() and "-100 / +150 µm" in tab.told.text()
+
+
+def test_an_input_that_changes_while_it_is_compared_counts(panel: NominalPanel, session: Session, qtbot: QtBot) -> None:
+    tab = panel.deviation
+    tab.compare()
+    tab.least.setValue(-50.0)
+    qtbot.waitUntil(lambda: tab.compared is not None)
+    assert "-100 / +100 µm" in tab.told.text() and tab.changed.isVisible() and not tab.export.isEnabled()
+    tab.compare()
+    session.measured.emit()
+    qtbot.waitUntil(lambda: not tab.runner.busy)
+    assert tab.compared is None and "Compare again" in tab.told.text(), "of points that are shown no longer"
+
+
+def test_a_comparison_that_fails_leaves_no_figures(panel: NominalPanel, qtbot: QtBot) -> None:
+    tab = panel.deviation
+    tab.compare()
+    qtbot.waitUntil(lambda: tab.compared is not None)
+    tab.alignment.setCurrentIndex(tab.alignment.findData("3-2-1"))
+    tab.compare()
+    qtbot.waitUntil(lambda: "six spots" in tab.told.text())
+    assert tab.compared is None and not tab.map.isVisible() and not tab.export.isEnabled()
 
 
 def test_a_section_follows_its_plane_and_is_written(panel: NominalPanel, tmp_path: Path, qtbot: QtBot) -> None:
