@@ -91,6 +91,7 @@ class RegionTab(QWidget):
         render, region = self.session.shown, self.region
         if render is None or region is None:
             return
+        self._tell()
         scan = self._scan_bar.whole
         if isinstance(region, Box) and scan is not None:
             methods = scan.table(laser, view)[0][:1]
@@ -117,12 +118,23 @@ class RegionTab(QWidget):
             count = export_region(path, self.region, first, render.project.scene, self.session.document.root)
         self.session.message.emit("info", f"Wrote {path}: {count} points, {self.region.title}")
 
+    def _of_which(self, region: Region | Box) -> str:
+        """Of a scan: scan lines and places across the fan are of the step that is looked at, a box may be of all."""
+        render = self.session.shown
+        if render is None or render.scan is None:
+            return ""
+        if isinstance(region, Box) and self._scan_bar.whole is not None:
+            return f", of all {render.scan.count} steps"
+        return f", of step {render.frame.step + 1} of {render.scan.count}"
+
     def _ask(self) -> None:
         export_csv(self.window(), self.session.document, "region", "the region", self.write)
 
     def _tell(self) -> None:
         there = self.region is not None
-        self.title.setText(HINT if self.region is None else f"<b>{self.region.title.capitalize()}</b>")
+        self.title.setText(
+            HINT if self.region is None else f"<b>{self.region.title.capitalize()}{self._of_which(self.region)}</b>"
+        )
         self.title.setObjectName("" if there else "muted")
         self.title.style().polish(self.title)
         for widget in (self.table, self.export, self.clear):
