@@ -12,6 +12,8 @@ from analysis.report.units import NONE, digits
 COLUMNS = ("kind", "value", "sigma", "nominal", "tolerance", "verdict", "error", "error / sigma")
 MARKS = {"pass": "✓\u00a0pass", "fail": "✗\u00a0fail", "undecided": "?\u00a0undecided"}
 """Never by colour alone."""
+COUNTED = ("pass", "undecided", "fail", "no tolerance", "none")
+"""Verdicts in the order in which their counts are told; the last: not measured."""
 PLAIN = str.maketrans({"µ": "u", "²": "2", "°": " deg", "–": "-", "✓": "", "✗": "", "?": "", "\u00a0": " "})  # noqa: RUF001
 FEWEST, MOST = 2, 6
 """Digits after the point, of mm, mm² or degrees."""
@@ -70,10 +72,13 @@ def beside_nominal(gauge: Gauge) -> str:
 def cells(row: Mapping[str, Any]) -> list[str]:
     """Of COLUMNS, from an entry of the scan's record of measures."""
     unit, ratio = row["unit"], row["error_in_sigmas"]
-    several = row["readings"] > 1
     verdict = MARKS.get(row["verdict"] or "", "not measured" if row["reason"] else NONE)
-    if several:
-        verdict += f", worst: step {row['step'] + 1} of {row['readings']}"
+    if row["readings"] > 1 and not row["reason"]:
+        counts = row.get("verdicts") or {}
+        verdict += f": {counts_text(counts)}" if set(counts) - {"no tolerance"} else ""
+        verdict += f", worst{' measured' if 'none' in counts else ''}: step {row['step'] + 1} of {row['readings']}"
+    elif row["readings"] > 1:
+        verdict += f" in any of {row['readings']} steps"
     return [
         TITLES[row["kind"]],
         value_text(row["value"], row["sigma"], unit),
@@ -86,6 +91,12 @@ def cells(row: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def counts_text(counts: Mapping[str, int]) -> str:
+    """ "12 pass, 6 undecided, 2 not measured", of how many readings came to which verdict."""
+    names = {"none": "not measured", "no tolerance": "without a tolerance"}
+    return ", ".join(f"{counts[name]} {names.get(name, name)}" for name in COUNTED if counts.get(name))
+
+
 def plain_cells(row: Mapping[str, Any]) -> list[str]:
     """The same for a terminal, which may know ASCII alone."""
     return [cell.translate(PLAIN).strip() for cell in cells(row)]
@@ -94,4 +105,9 @@ def plain_cells(row: Mapping[str, Any]) -> list[str]:
 def reasons(rows: list[dict[str, Any]]) -> list[str]:
     """Why measures have no value, and what their sigmas do not know of, a sentence each."""
     told = [f"{row['name']} is not measured: {row['reason']}" for row in rows if row["reason"]]
+    told += [
+        f"{row['name']} is not measured in {row['verdicts']['none']} of {row['readings']} steps: {row['first_reason']}"
+        for row in rows
+        if row.get("first_reason") and not row["reason"]
+    ]
     return told + [f"{row['name']}: {text}" for row in rows if (text := row.get("remark")) and not row["reason"]]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ from analysis.gauges.gauge import Gauge
 from analysis.gauges.of_scan import Patch, patch
 from analysis.gauges.profile import Profile, measured_profile, true_profile
 from analysis.gauges.read import Reading, read
-from render.base.files import atomic_write
+from render.base.errors import InputError
+from render.base.files import atomic_write, read_bytes
 from render.frame import Frame
 from studio.project.found_motion import measured_pose
 from studio.project.project import ProfileSection, Project
@@ -25,6 +27,8 @@ from studio.scan.sheet_lean import T_section_camera
 from studio.scan.stages import Measurement
 
 OF_SCAN = "it is of a whole scan: run one (F6, Motion), or Measure > Measure the scan again"
+MOST_BYTES = 256 << 20
+"""Of a table of measures."""
 FIGURES = ("value", "sigma_random", "sigma_systematic", "sigma", "truth", "error", "error_in_sigmas")
 
 
@@ -93,7 +97,7 @@ def _number(value: object) -> float:
 
 
 def worst(found: Sequence[Reading]) -> Reading:
-    """Of one measure over the steps: one without a value first, then by verdict, then the least within its limits.
+    """Of one measure over the steps, one with a value where there is one: by verdict, then the least within its limits.
 
     Without limits the farthest off its nominal, and without that off the truth.
     """
@@ -109,20 +113,58 @@ def worst(found: Sequence[Reading]) -> Reading:
             below, above = (gauge.lower or 0.0) - beyond, beyond - (gauge.upper or 0.0)
             off = above if gauge.lower is None else below if gauge.upper is None else max(below, above)
         known = off if math.isfinite(off) and not one.reason else -math.inf
-        return bool(one.reason), one.verdict == "fail", one.verdict == "undecided", known
+        return not one.reason, one.verdict == "fail", one.verdict == "undecided", known
 
     return max(found, key=badness)
 
 
 def measures_record(gauges: Sequence[Gauge], found: Sequence[Reading]) -> list[dict[str, Any]]:
-    """One entry for each measure: its worst reading, and how many of its readings came to which verdict; SI units."""
+    """One entry for each measure: its worst reading with a value, and how many readings came to which verdict; SI units.
+
+    The verdict is that of all readings: one that was not measured leaves it undecided, where none fails.
+    """
     rows = []
     for gauge in gauges:
         own = [one for one in found if one.gauge == gauge]
         shown = worst(own) if own else Reading(gauge, gauge.step, reason="no frame of its step was measured")
-        counts = Counter("none" if one.reason else one.verdict or "no tolerance" for one in own)
-        rows.append({**_row(shown), "readings": len(own), "verdicts": dict(sorted(counts.items()))})
+        missing = [one.reason for one in own if one.reason]
+        row = _row(shown) | {"readings": len(own), "verdicts": verdict_counts(gauge, own)}
+        if missing and row["verdict"] == "pass":
+            row["verdict"] = "undecided"
+        rows.append({**row, "first_reason": missing[0] if missing else ""})
     return rows
+
+
+def verdict_counts(gauge: Gauge, found: Iterable[Reading]) -> dict[str, int]:
+    """How many readings come to which verdict by the tolerance of a gauge that reads as theirs; none: not measured."""
+    told = ("none" if one.reason else gauge.verdict(one.value, one.sigma) or "no tolerance" for one in found)
+    return dict(sorted(Counter(told).items()))
+
+
+def step_readings(path: Path, scanned: Sequence[Gauge]) -> dict[Gauge, list[Reading]]:
+    """Of a scan's table of measures, as of `write_measures`, what each gauge was read as in each step.
+
+    scanned: the gauges that the scan was measured with. A file that is not there or damaged has nothing.
+    """
+    try:
+        rows = list(csv.DictReader(io.StringIO(read_bytes(path, MOST_BYTES).decode("utf-8"))))
+    except (InputError, UnicodeDecodeError, csv.Error):
+        return {}
+    found: dict[Gauge, list[Reading]] = {gauge: [] for gauge in scanned}
+    by_name = {gauge.name: gauge for gauge in scanned}
+    for row in rows:
+        if (gauge := by_name.get(row.get("name") or "")) is not None:
+            value, random, systematic = (_typed(row.get(name)) for name in FIGURES[:3])
+            reason = row.get("reason") or ("" if math.isfinite(value) else "the table has no value")
+            found[gauge].append(Reading(gauge, None, value, random, systematic, reason=reason))
+    return found
+
+
+def _typed(text: str | None) -> float:
+    try:
+        return float(text or math.nan)
+    except ValueError:
+        return math.nan
 
 
 def write_measures(path: Path, found: Sequence[Reading]) -> None:

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import (
 from analysis.gauges.gauge import MOST_GAUGES, REGIONS, TITLES, Gauge, Kind
 from analysis.gauges.profile import Profile
 from analysis.gauges.read import Reading
-from analysis.report.gauge_table import MARKS, beside_nominal, small_text, value_text
+from analysis.report.gauge_table import MARKS, beside_nominal, counts_text, small_text, value_text
 from analysis.report.units import NONE
 from studio.project.project import ProfileSection
 from studio.qt.core.delete_key import DeleteKey
@@ -33,8 +33,9 @@ from studio.qt.results.measures_table import ReadOnlyTable
 from studio.qt.results.part_drawing import PartDrawing, verdict_colour
 from studio.qt.results.part_editor import PartEditor
 from studio.qt.results.results_profile import ProfilePlot
-from studio.scan.gauging import kept_readings, profiles, read_each
+from studio.scan.gauging import OF_SCAN, kept_readings, profiles, read_each, step_readings, verdict_counts
 from studio.scan.remarks import best
+from studio.scan.scan_results import ScanResults
 from studio.scan.sheet_lean import lean_text
 
 SECTIONS: dict[ProfileSection, str] = {
@@ -49,6 +50,7 @@ SECTION_TIP = (
     "it leans; or a section across a direction along which the part is the same, in which it is as drawn"
 )
 HEADINGS = ("Name", "Value", "Sigma", "Error", "Verdict")
+AGAIN = "Measure > Measure the scan again"
 NONE_YET = "Add a measure and drag its regions in the profile or the row charts."
 
 
@@ -69,6 +71,8 @@ class PartTab(QWidget):
         """Of the project's measures."""
         self.readings: tuple[Reading, ...] = ()
         self._profiles: dict[int, tuple[Profile, Profile]] = {}
+        self._steps: tuple[ScanResults, dict[Gauge, list[Reading]]] | None = None
+        """Of the scan that is shown, what its steps were read as."""
         self._placed: list[tuple[float, float]] = []
         self._read: tuple[Gauge, ...] = ()
         self.drawing = PartDrawing(profile.plot, self)
@@ -287,22 +291,28 @@ class PartTab(QWidget):
         self.told.setVisible(bool(text))
 
     def _of_which(self) -> str:
-        """Of a scan: the step that is read here, and what the scan itself found of the chosen measure."""
+        """Of a scan: whether one step or all are told of, and what all came to, by the tolerance of now."""
         render = self.session.shown
         if render is None or render.scan is None or self.placing is not None:
             return ""
-        told = f"Of step {render.frame.step + 1} of {render.scan.count}."
-        kept = render.scan.found.manifest.get("measures")
-        if render.scan.measured_as.measured_in != self.session.project.measured_in:
-            return f"{told} All steps were measured in another section: Measure > Measure the scan again."
-        if isinstance(kept, list) and 0 <= self.chosen < len(self._read):
-            own = [one for one in kept if isinstance(one, dict) and one.get("name") == self._read[self.chosen].name]
-            verdicts = own[0].get("verdicts") if own else None
-            if isinstance(verdicts, dict) and set(verdicts) - {"none"}:
-                told += (
-                    f" All steps, as measured last: {', '.join(f'{count} {name}' for name, count in verdicts.items())}."
-                )
-        return told
+        scan, gauge = render.scan, self._read[self.chosen] if 0 <= self.chosen < len(self._read) else None
+        told = f"Of step {render.frame.step + 1} of {scan.count}."
+        if gauge is not None and gauge.of_scan:
+            return f"Of all {scan.count} steps together, as measured last." if self._is_kept() else ""
+        if scan.measured_as.measured_in != self.session.project.measured_in:
+            return f"{told} All steps were measured in another section: {AGAIN}."
+        if gauge is None:
+            return f"{told[:-1]}; flatness of all steps." if any(one.of_scan for one in self._read) else told
+        if self._steps is None or self._steps[0] is not scan:
+            self._steps = scan, step_readings(scan.found.folder / "measures.csv", scan.measured_as.measures)
+        found = [readings for was, readings in self._steps[1].items() if was.reads_as(gauge) and readings]
+        if not found:
+            return f"{told} All steps are not measured like this yet: {AGAIN}." if scan.measured else told
+        return f"{told} All steps, as measured last, by the tolerance of now: {_counts(gauge, found[0])}."
+
+    def _is_kept(self) -> bool:
+        """The chosen measure of all steps has what the scan found of it."""
+        return self.chosen < len(self.readings) and self.readings[self.chosen].reason != OF_SCAN
 
     def _lay_out(self) -> None:
         menu = QMenu(self.add)
@@ -334,6 +344,11 @@ class PartTab(QWidget):
 
     def _start_asked(self, kind: Kind, _checked: bool = False) -> None:
         self.start(kind)
+
+
+def _counts(gauge: Gauge, found: list[Reading]) -> str:
+    """Of a gauge's readings in all steps."""
+    return counts_text(verdict_counts(gauge, found))
 
 
 def _free_name(kind: Kind, taken: tuple[Gauge, ...]) -> str:

@@ -14,9 +14,19 @@ from click.testing import CliRunner
 import main
 from analysis.gauges.gauge import Gauge
 from analysis.gauges.read import Reading
+from analysis.report.gauge_table import cells, reasons
+from analysis.report.units import NONE
 from render.base.errors import InputError
 from studio.project.project import Project
-from studio.scan.gauging import kept_readings, measures_record, read_each, worst
+from studio.scan.gauging import (
+    kept_readings,
+    measures_record,
+    read_each,
+    step_readings,
+    verdict_counts,
+    worst,
+    write_measures,
+)
 from studio.scan.scan_folder import measured_project, open_folder
 from tests.studio.small_scan import scan, small_project
 
@@ -99,9 +109,47 @@ def test_the_worst_reading_speaks_for_a_measure() -> None:
     unsure = replace(good, step=2, value=0.05)
     bad = replace(good, step=3, value=-0.2)
     none = Reading(gauge, 4, reason="too few points")
-    for found, shown in ((good, off), 1), ((off, unsure), 2), ((unsure, bad, good), 3), ((bad, none), 4):
+    for found, shown in ((good, off), 1), ((off, unsure), 2), ((unsure, bad, good), 3), ((none, off), 1), ((none,), 4):
         assert worst(found).step == shown
     assert measures_record((gauge,), ())[0]["reason"] == "no frame of its step was measured"
+
+
+def test_a_step_that_was_not_measured_neither_hides_the_others_nor_passes() -> None:
+    """Of 20 steps one had no points, and nothing was told of the others: not that 12 pass, nor that one fails."""
+    gauge = Gauge.model_validate({"name": "a", **LEVEL})
+    good = Reading(gauge, 0, value=0.0, sigma_random=1e-5, sigma_systematic=0.0)
+    none = Reading(gauge, 3, reason="too few points")
+    steps = (good, replace(good, step=1, value=0.03), good, none)
+    for found, verdict, text in (
+        (steps, "undecided", "?\u00a0undecided: 3 pass, 1 not measured, worst measured: step 2 of 4"),
+        ((*steps, replace(good, step=4, value=-0.2)), "fail", "3 pass, 1 fail, 1 not measured, worst measured: step 5"),
+        (steps[:3], "pass", "✓\u00a0pass: 3 pass, worst: step 2 of 3"),
+        ((none, none), None, "not measured in any of 2 steps"),
+    ):
+        (row,) = measures_record((gauge,), found)
+        assert row["verdict"] == verdict and text in cells(row)[5]
+        assert (cells(row)[1] == NONE) == (verdict is None)
+        missing = [one for one in found if one.reason]
+        assert any("not measured" in one and "too few points" in one for one in reasons([row])) == bool(missing)
+
+
+def test_the_table_of_a_scan_is_judged_by_another_tolerance(tmp_path: Path) -> None:
+    level, bow = (Gauge.model_validate(one) for one in ({"name": "level", **LEVEL}, {"name": "bow", **FLAT}))
+    read = [Reading(level, k, value=1e-3 * k, sigma_random=1e-5, sigma_systematic=1e-6) for k in range(3)]
+    file = tmp_path / "measures.csv"
+    write_measures(file, [*read, Reading(level, 3, reason="too few points"), Reading(bow, 0, value=1e-4)])
+    found = step_readings(file, (level, bow))
+    assert verdict_counts(level, found[level]) == {"none": 1, "pass": 3}
+    assert verdict_counts(bow, found[bow]) == {"no tolerance": 1}
+    narrow = level.model_copy(update={"upper": 1e-3, "name": "renamed"})
+    assert narrow.reads_as(level) and verdict_counts(narrow, found[level]) == {
+        "fail": 1, "none": 1, "pass": 1, "undecided": 1,
+    }  # fmt: skip
+    assert step_readings(tmp_path / "none.csv", (level,)) == {}
+    file.write_bytes(b"name,value,sigma_random\nlevel,wide\n\xff")
+    assert step_readings(file, (level,)) == {}
+    file.write_bytes(b"name,value,sigma_random\nlevel,wide\nother,1\n")
+    assert verdict_counts(level, step_readings(file, (level,))[level]) == {"none": 1}
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,79 @@
+"""Of a scan each figure in Measure says whether it is of the step that is looked at or of all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from analysis.gauges.gauge import Gauge
+from studio.project.document import Document
+from studio.project.project import Project
+from studio.qt.core.scan_steps import scan_steps
+from studio.qt.core.session import Session
+from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.results.results_panel import PART, ResultsPanel
+from studio.scan.options import ScanOptions
+from studio.scan.region import Region
+from studio.scan.scan import run_scan
+from studio.scan.scan_folder import open_folder
+from tests.studio.scan_of_steps import SCALE, small_project
+
+LEVEL = Gauge(name="level", kind="step", regions=((-0.2, -0.1), (0.1, 0.2)), nominal=0.0, lower=-0.1, upper=0.1)
+FLAT = Gauge(name="flat", kind="flatness", regions=((-0.2, 0.2),))
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("steps")
+    file = folder / "project" / "steps.json"
+    project = small_project().model_copy(update={"measures": (LEVEL, FLAT)}).save(file)
+    run_scan(project, file.parent, out=folder / "scan", options=ScanOptions(image_scale=SCALE, report=False))
+    return file, folder / "scan"
+
+
+@pytest.fixture
+def panel(scanned: tuple[Path, Path], qtbot: QtBot) -> Iterator[ResultsPanel]:
+    file, folder = scanned
+    session = Session(Document(Project.load(file), file))
+    made = ResultsPanel(session)
+    qtbot.addWidget(made)
+    made.resize(1366, 420)
+    made.show()
+    develop = DevelopPanel(session)
+    qtbot.addWidget(develop)
+    steps = scan_steps(session)
+    with qtbot.waitSignal(session.measured, timeout=20_000):
+        steps.show(open_folder(folder))
+    made.figures.setCurrentIndex(PART)
+    yield made
+    steps.close()
+    develop.close()
+
+
+def test_counts_of_all_steps_follow_the_tolerance(panel: ResultsPanel) -> None:
+    session, told = panel.session, panel.part.told
+    panel.part.table.selectRow(0)
+    assert told.text().startswith("Of step 1 of 3. All steps, as measured last, by the tolerance of now: 3 pass.")
+    session.set(("measures", 0, "nominal"), 1.0)
+    assert "3 fail." in told.text() and "pass" not in told.text()
+    session.set(("measures", 0, "regions"), ((-0.2, -0.15), (0.1, 0.2)))
+    assert "not measured like this yet: Measure > Measure the scan again" in told.text() and "fail" not in told.text()
+
+
+def test_a_flatness_is_of_all_steps(panel: ResultsPanel) -> None:
+    told = panel.part.told
+    panel.part.table.selectRow(1)
+    assert told.text().startswith("Of all 3 steps together, as measured last.") and "step 1" not in told.text()
+    panel.session.set(("measures", 1, "regions"), ((-0.15, 0.2),))
+    assert "as measured last" not in told.text() and "Measure the scan again" in told.text()
+
+
+def test_scan_lines_are_of_the_step_that_is_looked_at(panel: ResultsPanel, qtbot: QtBot) -> None:
+    assert panel.scan_bar.whole is not None
+    panel.choose(Region("scan lines", 10.0, 60.0))
+    assert panel.region.title.text() == "<b>Scan lines 10 to 60, of step 1 of 3</b>"
+    panel.session.look_at_step(2)
+    qtbot.waitUntil(lambda: "of step 3 of 3" in panel.region.title.text())
