@@ -119,7 +119,7 @@ def worst(found: Sequence[Reading]) -> Reading:
 
 
 def measures_record(gauges: Sequence[Gauge], found: Sequence[Reading]) -> list[dict[str, Any]]:
-    """One entry for each measure: its worst reading with a value, and how many readings came to which verdict; SI units.
+    """One entry for each measure: its worst reading with a value, and how many came to which verdict; SI units.
 
     The verdict is that of all readings: one that was not measured leaves it undecided, where none fails.
     """

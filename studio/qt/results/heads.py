@@ -12,9 +12,10 @@ STOPPED = "This render was stopped early: light is missing, and the figures are 
 MEASURING = "Measuring… until then these are the figures of the settings before."
 CHANGED = "The scene has changed since: these are the figures of the render as it was."
 MEASURED_OTHERWISE = (
-    "Figures of all steps are as they were measured: sensor, extraction or calibration has changed since (Measure > "
-    "Measure the scan again)."
+    "Measure > Measure the scan again: figures of all steps are as they were measured, and sensor, extraction or "
+    "calibration has changed since."
 )
+"""The remedy first."""
 
 
 def heads(session: Session, step_problem: str) -> list[str]:

@@ -93,8 +93,8 @@ class ResultsPanel(QWidget):
         self.region = RegionTab(session, self.rows, self.profile, self.scan_bar)
         self.scan_steps = scan_steps(session)
         self.head = QFrame()
-        self.head_text = QLabel()
-        self.head_text.setMinimumWidth(1)  # a narrow panel may cut it off: it is among the remarks as well
+        self.head_text = QLabel(wordWrap=True)
+        self.head_text.setMinimumWidth(1)
         self.notices = Remarks(), Remarks()
         """What a reader should notice: below the measures, and in a tab where there is no room below them."""
         self._lay_out()

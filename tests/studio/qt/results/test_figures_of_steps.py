@@ -14,6 +14,7 @@ from studio.project.project import Project
 from studio.qt.core.scan_steps import scan_steps
 from studio.qt.core.session import Session
 from studio.qt.render.develop_panel import DevelopPanel
+from studio.qt.results.heads import CHANGED, MEASURED_OTHERWISE
 from studio.qt.results.results_panel import PART, ResultsPanel
 from studio.scan.options import ScanOptions
 from studio.scan.region import Region
@@ -77,3 +78,17 @@ def test_scan_lines_are_of_the_step_that_is_looked_at(panel: ResultsPanel, qtbot
     assert panel.region.title.text() == "<b>Scan lines 10 to 60, of step 1 of 3</b>"
     panel.session.look_at_step(2)
     qtbot.waitUntil(lambda: "of step 3 of 3" in panel.region.title.text())
+
+
+@pytest.mark.parametrize("width", [1366, 900])
+def test_what_stands_above_the_figures_is_seen_whole(panel: ResultsPanel, qtbot: QtBot, width: int) -> None:
+    """Of one line that was cut off nobody could read what to do."""
+    panel.resize(width, 300)
+    panel.session.set(("sensor", "exposure_time"), 0.5 * panel.session.project.sensor.exposure_time)
+    panel.session.set(("scene", "rig", "lasers", 0, "fan_angle"), 0.5)
+    label = panel.head_text
+    assert label.text().startswith(CHANGED) and MEASURED_OTHERWISE in label.text() and label.isVisible()
+    qtbot.wait(20)
+    assert label.height() >= label.heightForWidth(label.width()) > 0
+    assert label.width() >= max(label.fontMetrics().horizontalAdvance(word) for word in label.text().split())
+    assert panel.rect().contains(label.mapTo(panel, label.rect().bottomRight()))
